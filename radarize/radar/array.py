@@ -1,0 +1,92 @@
+"""Antenna positions of the evaluation boards and the virtual array that they span.
+
+Sensor frame: x forward (boresight), y left, z up, origin at RX1. The data sheets draw the board's front, where the
+radar's left is on the viewer's right, so the drawings' rightward axis is +y here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+
+
+@dataclass(frozen=True)
+class Board:
+    """Antenna layout of a board: positions as (left, up) in half wavelengths at the design frequency."""
+
+    design_frequency: float
+    tx: tuple[tuple[float, float], ...]
+    rx: tuple[tuple[float, float], ...]
+
+
+_ROW_RX = ((0, 0), (1, 0), (2, 0), (3, 0))
+
+BOARDS: dict[str, Board] = {
+    # SPRUIM4 (IWR1843BOOST): RX half a wavelength apart, TX a wavelength apart, TX2 half a wavelength higher.
+    "iwr1843boost": Board(77e9, tx=((0, 0), (2, 1), (4, 0)), rx=_ROW_RX),
+    # SWRU546 (IWR6843ISK): the same pattern at 60 GHz.
+    "iwr6843isk": Board(60e9, tx=((0, 0), (2, 1), (4, 0)), rx=_ROW_RX),
+}
+
+
+def tx_positions(config: RadarConfig) -> Float[np.ndarray, "tx 3"]:
+    """Positions of the enabled transmitters in the sensor frame, m, physical order."""
+    return _positions(config, BOARDS[config.board].tx, config.tx)
+
+
+def rx_positions(config: RadarConfig) -> Float[np.ndarray, "rx 3"]:
+    """Positions of the enabled receivers in the sensor frame, m, physical order."""
+    return _positions(config, BOARDS[config.board].rx, config.rx)
+
+
+def _positions(config: RadarConfig, layout: tuple, enabled: tuple[int, ...]) -> Float[np.ndarray, "antenna 3"]:
+    half = SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
+    positions = np.zeros((len(enabled), 3))
+    positions[:, 1:] = half * np.asarray(layout, float)[list(enabled)]
+    return positions
+
+
+def virtual_positions(config: RadarConfig) -> Float[np.ndarray, "tx rx 3"]:
+    """Sum of transmitter and receiver position per virtual antenna, m.
+
+    An echo from unit direction u (far field) has the phase -2 pi / wavelength * (position . u) relative to the origin.
+    """
+    return tx_positions(config)[:, None] + rx_positions(config)[None]
+
+
+def rows(config: RadarConfig) -> dict[float, Int[np.ndarray, "antenna"]]:
+    """Virtual antennas of equal height, as flat (tx, rx) indices by ascending y; where two coincide, the first stays.
+
+    Returns a dictionary from height (half wavelengths, ascending) to indices.
+    """
+    half = SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
+    grid = np.rint(virtual_positions(config).reshape(-1, 3)[:, 1:] / half).astype(int)
+    result = {}
+    for height in np.unique(grid[:, 1]):
+        members = np.flatnonzero(grid[:, 1] == height)
+        _, first = np.unique(grid[members, 0], return_index=True)
+        result[float(height)] = members[first]
+    return result
+
+
+def azimuth_row(config: RadarConfig) -> Int[np.ndarray, "antenna"]:
+    """Flat (tx, rx) indices of the longest horizontal line of virtual antennas, by ascending y."""
+    return max(rows(config).values(), key=len)
+
+
+def elevation_pairs(config: RadarConfig) -> Int[np.ndarray, "pair 2"] | None:
+    """Pairs (lower, upper) of virtual antennas at the same y, half a wavelength apart in z; None without such pairs.
+
+    Averaging a pair steers to 0 deg elevation and nulls the zenith: the paper's elevation-aware beamforming (section 4).
+    """
+    half = SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
+    grid = np.rint(virtual_positions(config).reshape(-1, 3)[:, 1:] / half).astype(int)
+    by_height = rows(config)
+    pairs = []
+    for height, lower in by_height.items():
+        upper = by_height.get(height + 1.0, ())
+        left_of_upper = {grid[u, 0]: u for u in upper}
+        pairs += [(low, left_of_upper[grid[low, 0]]) for low in lower if grid[low, 0] in left_of_upper]
+    return np.asarray(pairs) if pairs else None

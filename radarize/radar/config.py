@@ -1,0 +1,187 @@
+"""The radar's configuration: what is transmitted, when, on which antennas, and how it is sampled."""
+
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+SPEED_OF_LIGHT = 299_792_458.0
+
+#: High-pass corner frequencies (Hz) that the codes 0-3 of a profile select (data sheet SWRS228).
+HIGH_PASS_1 = (175e3, 235e3, 350e3, 700e3)
+HIGH_PASS_2 = (350e3, 700e3, 1.4e6, 2.8e6)
+
+
+class RadarConfig(BaseModel):
+    """One TDM-MIMO chirp profile of a TI xWR radar.
+
+    Times count from the start of a chirp's cycle: idle time first, then the ramp, in which the ADC samples from
+    ``idle_time + adc_start_time`` on. All chirps of a frame use one profile; they differ in their transmitter only.
+
+    Attributes:
+        board: antenna layout, a key of `radarize.radar.array.BOARDS`.
+        start_frequency: carrier at the start of the ramp, Hz.
+        slope: chirp slope, Hz/s.
+        idle_time, adc_start_time, ramp_end_time: s; the last two count from the ramp's start.
+        samples: complex samples per chirp and receiver.
+        sample_rate: Hz, complex-1x.
+        loops: repetitions of the transmitter sequence per frame.
+        frame_period: s, start to start.
+        tx_order: transmitters in firing order, 0-based physical numbers (TX1 is 0).
+        rx: enabled receivers, 0-based physical numbers, ascending.
+        rx_gain_db: receive gain, dB.
+        tx_backoff_db: transmit power below maximum, dB.
+        high_pass: corner frequencies of the two high-pass stages, Hz.
+        iq_order: order within a DCA1000 group of four words: ``"iiqq"`` (mmWave Studio) or ``"qqii"`` (SDK demo).
+        range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``).
+        channel_calibration: complex factor per *physical* (tx, rx) as (re, im) pairs, TX1 x RX1..4, TX2 x ..., TX3 x ...
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    board: Literal["iwr1843boost", "iwr6843isk", "iwr6843ods", "iwr6843aop"] = "iwr1843boost"
+    start_frequency: float = Field(gt=0)
+    slope: float = Field(gt=0)
+    idle_time: float = Field(gt=0)
+    adc_start_time: float = Field(ge=0)
+    ramp_end_time: float = Field(gt=0)
+    samples: int = Field(gt=0)
+    sample_rate: float = Field(gt=0)
+    loops: int = Field(gt=0)
+    frame_period: float = Field(gt=0)
+    tx_order: tuple[int, ...] = Field(min_length=1, max_length=3)
+    rx: tuple[int, ...] = Field((0, 1, 2, 3), min_length=1, max_length=4)
+    rx_gain_db: float = 30.0
+    tx_backoff_db: float = 0.0
+    high_pass: tuple[float, float] = (HIGH_PASS_1[0], HIGH_PASS_2[0])
+    iq_order: Literal["iiqq", "qqii"] = "qqii"
+    range_bias: float = 0.0
+    channel_calibration: tuple[tuple[float, float], ...] = ((1.0, 0.0),) * 12
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "RadarConfig":
+        if len(set(self.tx_order)) != len(self.tx_order) or not set(self.tx_order) <= {0, 1, 2}:
+            raise ValueError(f"tx_order is {self.tx_order}, expected distinct numbers of 0, 1, 2")
+        if tuple(sorted(set(self.rx))) != self.rx or not set(self.rx) <= {0, 1, 2, 3}:
+            raise ValueError(f"rx is {self.rx}, expected ascending distinct numbers of 0, 1, 2, 3")
+        if len(self.channel_calibration) != 12:
+            raise ValueError(f"channel_calibration has {len(self.channel_calibration)} pairs, expected 12")
+        if self.adc_start_time + self.samples / self.sample_rate > self.ramp_end_time * (1 + 1e-9):
+            raise ValueError(
+                f"the ADC window ends {1e6 * (self.adc_start_time + self.samples / self.sample_rate):.2f} us into the "
+                f"ramp (adc_start_time + samples / sample_rate), expected no later than ramp_end_time = "
+                f"{1e6 * self.ramp_end_time:.2f} us"
+            )
+        if self.burst_time > self.frame_period * (1 + 1e-9):
+            raise ValueError(
+                f"frame_period is {1e3 * self.frame_period:.3f} ms, expected at least the {1e3 * self.burst_time:.3f} ms "
+                f"that {self.loops} loops x {len(self.tx_order)} chirps take"
+            )
+        return self
+
+    # --- array -----------------------------------------------------------------------------------------------------
+    @property
+    def tx(self) -> tuple[int, ...]:
+        """Enabled transmitters in physical order, the order of the tx axis of every decoded array."""
+        return tuple(sorted(self.tx_order))
+
+    @property
+    def slot(self) -> tuple[int, ...]:
+        """TDM slot (0 = fires first) of each transmitter of `tx`."""
+        return tuple(self.tx_order.index(t) for t in self.tx)
+
+    @property
+    def frame_shape(self) -> tuple[int, int, int, int, int]:
+        """Shape of one decoded frame: loop, tx, rx, sample, iq."""
+        return self.loops, len(self.tx), len(self.rx), self.samples, 2
+
+    @property
+    def frame_bytes(self) -> int:
+        """Bytes of one frame of int16 I/Q."""
+        return 2 * int(np.prod(self.frame_shape))
+
+    # --- range -----------------------------------------------------------------------------------------------------
+    @property
+    def bandwidth(self) -> float:
+        """Bandwidth swept while sampling, Hz."""
+        return self.slope * self.samples / self.sample_rate
+
+    @property
+    def center_frequency(self) -> float:
+        """Carrier in the middle of the ADC window, Hz: where Doppler and angle are measured."""
+        return self.start_frequency + self.slope * self.adc_center_time
+
+    @property
+    def wavelength(self) -> float:
+        """Wavelength at `center_frequency`, m."""
+        return SPEED_OF_LIGHT / self.center_frequency
+
+    @property
+    def range_resolution(self) -> float:
+        """Spacing of range bins, m: c / 2B."""
+        return SPEED_OF_LIGHT / (2 * self.bandwidth)
+
+    @property
+    def max_range(self) -> float:
+        """Range at which the beat frequency reaches the sample rate, m."""
+        return self.range_resolution * self.samples
+
+    @property
+    def ranges(self) -> Float[np.ndarray, "sample"]:
+        """Range of each bin of a `samples`-point transform, m, without `range_bias`."""
+        return self.range_resolution * np.arange(self.samples)
+
+    # --- time and velocity -------------------------------------------------------------------------------------------
+    @property
+    def adc_center_time(self) -> float:
+        """From the ramp's start to the middle of the samples, which are taken at adc_start_time + n / sample_rate, s."""
+        return self.adc_start_time + (self.samples - 1) / (2 * self.sample_rate)
+
+    @property
+    def chirp_time(self) -> float:
+        """One chirp cycle: idle plus ramp, s."""
+        return self.idle_time + self.ramp_end_time
+
+    @property
+    def loop_time(self) -> float:
+        """Repetition interval of one transmitter, s."""
+        return self.chirp_time * len(self.tx_order)
+
+    @property
+    def burst_time(self) -> float:
+        """Active part of a frame, s."""
+        return self.loop_time * self.loops
+
+    @cached_property
+    def chirp_times(self) -> Float[np.ndarray, "loop tx"]:
+        """Middle of each chirp's ADC window after the frame's stamp, s, transmitters in physical order."""
+        slots = np.arange(self.loops)[:, None] * len(self.tx_order) + np.asarray(self.slot)
+        return slots * self.chirp_time + self.idle_time + self.adc_center_time
+
+    @property
+    def burst_center(self) -> float:
+        """Mean of `chirp_times`, s: the instant that a single-frame product belongs to."""
+        return float(self.chirp_times.mean())
+
+    @property
+    def max_velocity(self) -> float:
+        """Unambiguous radial speed, m/s: wavelength / (4 loop_time)."""
+        return self.wavelength / (4 * self.loop_time)
+
+    @property
+    def velocity_resolution(self) -> float:
+        """Radial speed per Doppler bin of one burst, m/s."""
+        return self.wavelength / (2 * self.burst_time)
+
+    @property
+    def frame_rate(self) -> float:
+        """Frames per second, Hz."""
+        return 1 / self.frame_period
+
+    @property
+    def calibration(self) -> np.ndarray:
+        """Complex factor per enabled (tx, rx), to be multiplied onto decoded samples."""
+        pairs = np.asarray(self.channel_calibration).reshape(3, 4, 2)[np.ix_(self.tx, self.rx)]
+        return pairs[..., 0] + 1j * pairs[..., 1]

@@ -1,7 +1,8 @@
 """Antenna positions of the evaluation boards and the virtual array that they span.
 
-Sensor frame: x forward (boresight), y left, z up, origin at RX1. The data sheets draw the board's front, where the
-radar's left is on the viewer's right, so the drawings' rightward axis is +y here.
+Sensor frame: x forward (boresight), y left, z up, origin at the (0, 0) of the board's layout (RX1; RX4 on the AOP).
+The data sheets draw the board's front, where the radar's left is on the viewer's right, so the drawings' rightward
+axis is +y here.
 """
 
 from dataclasses import dataclass
@@ -14,11 +15,24 @@ from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 
 @dataclass(frozen=True)
 class Board:
-    """Antenna layout of a board: positions as (left, up) in half wavelengths at the design frequency."""
+    """Antenna layout of a board.
+
+    Attributes:
+        design_frequency: Hz.
+        tx, rx: antenna positions as (left, up) in half wavelengths at the design frequency.
+        rx_sign: -1 for receivers fed from the opposite side of the patch, whose signal is turned by 180 deg. A
+            configuration without a measured calibration takes it as `channel_calibration`.
+    """
 
     design_frequency: float
     tx: tuple[tuple[float, float], ...]
     rx: tuple[tuple[float, float], ...]
+    rx_sign: tuple[int, ...] = (1, 1, 1, 1)
+
+    @property
+    def channel_calibration(self) -> tuple[tuple[float, float], ...]:
+        """Nominal factor per physical (tx, rx) as (re, im) pairs, as `RadarConfig.channel_calibration` has them."""
+        return tuple((float(sign), 0.0) for sign in self.rx_sign) * 3
 
 
 _ROW_RX = ((0, 0), (1, 0), (2, 0), (3, 0))
@@ -28,6 +42,17 @@ BOARDS: dict[str, Board] = {
     "iwr1843boost": Board(77e9, tx=((0, 0), (2, 1), (4, 0)), rx=_ROW_RX),
     # SWRU546 (IWR6843ISK): the same pattern at 60 GHz.
     "iwr6843isk": Board(60e9, tx=((0, 0), (2, 1), (4, 0)), rx=_ROW_RX),
+    # SWRU546 (IWR6843ISK-ODS): four receivers in a square, transmitters in an L. TI's people-counting configurations
+    # give it per virtual antenna in units of half a wavelength: antGeometry0 (right) 0 0 -1 -1 | -2 -2 -3 -3 | -2 -2
+    # -3 -3, antGeometry1 (up) 0 -1 -1 0 | 0 -1 -1 0 | -2 -3 -3 -2, antPhaseRot 1 -1 -1 1; spacing 2.426 mm.
+    "iwr6843ods": Board(
+        61.8e9, tx=((0, 0), (2, 0), (2, -2)), rx=((0, 0), (0, -1), (1, -1), (1, 0)), rx_sign=(1, -1, -1, 1)
+    ),
+    # SWRS237 (IWR6843AOP): antennas on the package. antGeometry0 -1 -1 0 0 | -3 -3 -2 -2 | -1 -1 0 0, antGeometry1
+    # -1 0 -1 0 | -3 -2 -3 -2 | -3 -2 -3 -2, antPhaseRot 1 -1 1 -1; spacing 2.5 mm.
+    "iwr6843aop": Board(
+        60e9, tx=((0, 0), (2, -2), (0, -2)), rx=((1, -1), (1, 0), (0, -1), (0, 0)), rx_sign=(1, -1, 1, -1)
+    ),
 }
 
 

@@ -5,7 +5,9 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from radarize.errors import InputError
 
 SPEED_OF_LIGHT = 299_792_458.0
 
@@ -39,7 +41,7 @@ class RadarConfig(BaseModel):
         channel_calibration: complex factor per *physical* (tx, rx) as (re, im) pairs, TX1 x RX1..4, TX2 x ..., TX3 x ...
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     board: Literal["iwr1843boost", "iwr6843isk", "iwr6843ods", "iwr6843aop"] = "iwr1843boost"
     start_frequency: float = Field(gt=0)
@@ -80,6 +82,23 @@ class RadarConfig(BaseModel):
                 f"that {self.loops} loops x {len(self.tx_order)} chirps take"
             )
         return self
+
+    @classmethod
+    def build(cls, source: str, **fields: object) -> "RadarConfig":
+        """A configuration from its fields; `source` is what errors name as their origin.
+
+        Raises:
+            InputError: a field is missing, unknown or out of range, or the fields contradict each other.
+        """
+        try:
+            return cls(**fields)
+        except ValidationError as error:
+            first = error.errors()[0]
+            field = ".".join(str(part) for part in first["loc"])
+            message = first["msg"].removeprefix("Value error, ")
+            if field:
+                message = f"{field} is {first['input']!r}, {message[0].lower()}{message[1:]}"
+            raise InputError(f"{source}: {message}") from error
 
     # --- array -----------------------------------------------------------------------------------------------------
     @property

@@ -16,7 +16,7 @@ PRESETS: dict[str, RadarConfig] = {
         frame_period=33.333e-3,
         tx_order=(0, 2, 1),
     ),
-    # Ten times the range at the same frame rate and velocity span, for halls: 8 cm bins, 20 m.
+    # Five times the range at the same frame rate and velocity span, for halls: 8 cm bins, 20 m.
     "long-range": RadarConfig(
         start_frequency=77e9,
         slope=35e12,

@@ -86,6 +86,7 @@ class RecordingWriter:
         self.part = self.path.with_name(self.path.name + ".part")
         self.config = config
         self.frames = 0
+        self._notes: dict[str, object] = {}
         self._pending: list[tuple] = []
         self._flushed = clock.monotonic()
         try:
@@ -172,6 +173,10 @@ class RecordingWriter:
         target.resize(start + len(data), axis=0)
         target[start:] = data
 
+    def annotate(self, **attributes: object) -> None:
+        """Attributes of the file that are known only at the end; stored when the writer is closed."""
+        self._notes.update(attributes)
+
     def flush(self) -> None:
         """Make every appended frame visible to readers. Times go last: a frame counts once its time is there."""
         self._file.flush()
@@ -191,6 +196,9 @@ class RecordingWriter:
             try:
                 self.flush()
                 self._file.close()
+                if self._notes:  # HDF5 takes no new attributes while readers may follow
+                    with h5py.File(self.part, "r+", libver="latest") as file:
+                        file.attrs.update(self._notes)
             except (OSError, RuntimeError) as error:
                 raise InputError(f"cannot finish {self.part}: {_reason(error)}; {self._survivors()}") from error
             if not keep_part:

@@ -104,7 +104,8 @@ def azimuth_row(config: RadarConfig) -> Int[np.ndarray, "antenna"]:
 def elevation_pairs(config: RadarConfig) -> Int[np.ndarray, "pair 2"] | None:
     """Pairs (lower, upper) of virtual antennas at the same y, half a wavelength apart in z; None without such pairs.
 
-    Averaging a pair steers to 0 deg elevation and nulls the zenith: the paper's elevation-aware beamforming (section 4).
+    Averaging a pair steers to 0 deg elevation and nulls the zenith: the paper's elevation-aware beamforming (section
+    4).
     """
     half = SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
     grid = np.rint(virtual_positions(config).reshape(-1, 3)[:, 1:] / half).astype(int)

@@ -22,21 +22,14 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "channelCfg": ("rxChannelEn", "txChannelEn", "cascading"),
     "adcCfg": ("numADCBits", "adcOutputFmt"),
     "adcbufCfg": ("subFrameIdx", "adcOutputFmt", "SampleSwap", "ChanInterleave", "ChirpThreshold"),
-    "profileCfg": (
+    "profileCfg": tuple(
         "profileId startFreq idleTime adcStartTime rampEndTime txOutPower txPhaseShifter freqSlopeConst txStartTime "
-        "numAdcSamples digOutSampleRate hpfCornerFreq1 hpfCornerFreq2 rxGain"
-    ).split(),
-    "chirpCfg": (
-        "startIdx",
-        "endIdx",
-        "profileId",
-        "startFreqVar",
-        "freqSlopeVar",
-        "idleTimeVar",
-        "adcStartTimeVar",
-        "txEnable",
+        "numAdcSamples digOutSampleRate hpfCornerFreq1 hpfCornerFreq2 rxGain".split()
     ),
-    "frameCfg": ("startIdx", "endIdx", "numLoops", "numFrames", "framePeriodicity", "triggerSelect", "frameTriggerDelay"),
+    "chirpCfg": tuple(
+        "startIdx endIdx profileId startFreqVar freqSlopeVar idleTimeVar adcStartTimeVar txEnable".split()
+    ),
+    "frameCfg": tuple("startIdx endIdx numLoops numFrames framePeriodicity triggerSelect frameTriggerDelay".split()),
     "bpmCfg": ("subFrameIdx", "isEnabled", "chirp0Idx", "chirp1Idx"),
     "lvdsStreamCfg": ("subFrameIdx", "enableHeader", "dataFmt", "enableSW"),
     "compRangeBiasAndRxChanPhase": ("rangeBias", *(f"{p}{i}" for i in range(12) for p in ("re", "im"))),
@@ -60,7 +53,8 @@ def load_config(source: str | Path) -> tuple[RadarConfig, str]:
     path = Path(source)
     if not path.is_file():
         raise InputError(
-            f"{source}: no such radar configuration, expected a .cfg or .mmwave.json file or one of {', '.join(PRESETS)}"
+            f"{source}: no such radar configuration, expected a .cfg or .mmwave.json file or one of the presets "
+            f"{', '.join(PRESETS)}"
         )
     if path.suffix.lower() == ".json":
         from radarize.radar.studio import load_studio
@@ -89,7 +83,7 @@ def read_text(path: Path) -> str:
     return text
 
 
-# --- reading -----------------------------------------------------------------------------------------------------------
+# --- reading ----------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Command:
     """One line of a configuration: values are read by field name, errors say where."""
@@ -200,7 +194,9 @@ def _commands(text: str, name: str) -> Iterator[Command]:
         if not re.fullmatch(r"[A-Za-z]\w*", word):
             raise InputError(f"{name}, line {number}: starts with {word[:40]!r}, expected a command such as profileCfg")
         if word in REFUSED:
-            raise InputError(f"{name}, line {number}: {word} asks for {REFUSED[word]}, expected plain frames (frameCfg)")
+            raise InputError(
+                f"{name}, line {number}: {word} asks for {REFUSED[word]}, expected plain frames (frameCfg)"
+            )
         if word in FIELDS:
             count = len(FIELDS[word])
             if len(words) - 1 != count:
@@ -294,7 +290,7 @@ def _calibration(last: dict[str, Command]) -> tuple[float, tuple[tuple[float, fl
     return bias, tuple((f.real, f.imag) for f in factors)
 
 
-# --- writing -----------------------------------------------------------------------------------------------------------
+# --- writing ----------------------------------------------------------------------------------------------------------
 def write_cfg(config: RadarConfig) -> str:
     """The configuration as commands for the SDK demo firmware; ``parse_cfg`` of it is equal to `config`.
 
@@ -362,5 +358,7 @@ def _whole(field: str, value: float, high: int) -> int:
 
 def _code(field: str, value: float, table: tuple[float, ...]) -> int:
     if value not in table:
-        raise InputError(f"{field} is {value:g} Hz, expected one of {', '.join(f'{f:g}' for f in table)} in a .cfg file")
+        raise InputError(
+            f"{field} is {value:g} Hz, expected one of {', '.join(f'{f:g}' for f in table)} in a .cfg file"
+        )
     return table.index(value)

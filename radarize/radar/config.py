@@ -38,7 +38,7 @@ class RadarConfig(BaseModel):
         high_pass: corner frequencies of the two high-pass stages, Hz.
         iq_order: order within a DCA1000 group of four words: ``"iiqq"`` (mmWave Studio) or ``"qqii"`` (SDK demo).
         range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``).
-        channel_calibration: complex factor per *physical* (tx, rx) as (re, im) pairs, TX1 x RX1..4, TX2 x ..., TX3 x ...
+        channel_calibration: complex factor per *physical* (tx, rx) as (re, im) pairs: TX1 x RX1..4, TX2 x ..., TX3 x ...
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -78,8 +78,8 @@ class RadarConfig(BaseModel):
             )
         if self.burst_time > self.frame_period * (1 + 1e-9):
             raise ValueError(
-                f"frame_period is {1e3 * self.frame_period:.3f} ms, expected at least the {1e3 * self.burst_time:.3f} ms "
-                f"that {self.loops} loops x {len(self.tx_order)} chirps take"
+                f"frame_period is {1e3 * self.frame_period:.3f} ms, expected at least the "
+                f"{1e3 * self.burst_time:.3f} ms that {self.loops} loops x {len(self.tx_order)} chirps take"
             )
         return self
 
@@ -155,7 +155,7 @@ class RadarConfig(BaseModel):
     # --- time and velocity -------------------------------------------------------------------------------------------
     @property
     def adc_center_time(self) -> float:
-        """From the ramp's start to the middle of the samples, which are taken at adc_start_time + n / sample_rate, s."""
+        """From the ramp's start to the middle of the samples (taken at adc_start_time + n / sample_rate), s."""
         return self.adc_start_time + (self.samples - 1) / (2 * self.sample_rate)
 
     @property

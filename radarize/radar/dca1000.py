@@ -19,7 +19,7 @@ MAX_PAYLOAD = 1456
 HEADER = struct.Struct("<IIH")  # sequence from 1; bytes sent before this packet, 48 bits
 
 
-# --- samples -----------------------------------------------------------------------------------------------------------
+# --- samples ----------------------------------------------------------------------------------------------------------
 def check_layout(config: RadarConfig) -> None:
     """Refuse a sample count that does not fill the groups of two complex samples.
 
@@ -99,7 +99,7 @@ def detect_iq_order(raw: Int16[np.ndarray, "word"], config: RadarConfig) -> tupl
     return ("iiqq" if decibels >= 0 else "qqii"), abs(decibels)
 
 
-# --- packets -----------------------------------------------------------------------------------------------------------
+# --- packets ----------------------------------------------------------------------------------------------------------
 @dataclass(frozen=True)
 class Packet:
     """A data packet.
@@ -162,8 +162,8 @@ class FrameAssembler:
         max_jump: a byte count further than this past the newest one is taken for a damaged header.
 
     Attributes:
-        received, duplicates, late, damaged: packets so far that were used, held nothing new, came after their frame
-            was given out, or had an impossible header.
+        received, duplicates, late, damaged: packets so far that were used, held nothing new, came (perhaps again) after
+            their frame was given out, or had an impossible header.
         lost_bytes: bytes of the frames given out that never came.
         incomplete_bytes: after `finish`, bytes that had come of a last frame that is not whole.
     """
@@ -175,6 +175,7 @@ class FrameAssembler:
         self.max_jump = max_jump
         self.received = self.duplicates = self.late = self.damaged = 0
         self.lost_bytes = self.incomplete_bytes = 0
+        self._started = False
         self._next = 0  # number of the frame to be given out next
         self._newest = 0  # end of the furthest payload so far
         self._partial: dict[int, _PartialFrame] = {}
@@ -182,15 +183,17 @@ class FrameAssembler:
     def add(self, packet: Packet) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Take a packet; yields frames that are now settled, as `_settle` describes."""
         end = packet.offset + len(packet.payload)
+        if not self._started:
+            self._started = True
+            if packet.offset > self.window:  # listening began in the middle of a capture
+                self._next, self._newest = -(-packet.offset // self.config.frame_bytes), packet.offset
         if end > self._newest + self.max_jump:
             self.damaged += 1
             return
         self._place(packet)
         self._newest = max(self._newest, end)
         size = self.config.frame_bytes
-        while (partial := self._partial.get(self._next)) and not partial.missing or (
-            self._newest >= (self._next + 1) * size + self.window
-        ):
+        while self._newest >= (self._next + 1) * size + self.window or self._whole(self._next):
             yield self._settle()
 
     def finish(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -211,7 +214,8 @@ class FrameAssembler:
             taken += len(part)
             if number < self._next:
                 continue
-            partial = self._partial.setdefault(number, _PartialFrame(size))
+            if (partial := self._partial.get(number)) is None:
+                partial = self._partial[number] = _PartialFrame(size)
             span = slice(start, start + len(part))
             new = len(part) - int(partial.arrived[span].sum())
             partial.data[span] = part
@@ -224,6 +228,9 @@ class FrameAssembler:
             self.late += 1
         else:
             self.duplicates += 1
+
+    def _whole(self, number: int) -> bool:
+        return number in self._partial and not self._partial[number].missing
 
     def _settle(self) -> tuple[Int16[np.ndarray, "word"], Bool[np.ndarray, "loop tx"]]:
         """Give out the next frame: its words as captured, for `decode`, and which chirps (physical order) are whole."""

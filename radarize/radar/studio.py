@@ -1,6 +1,6 @@
 """mmWave Studio settings: ``NAME.mmwave.json`` (the radar) and ``NAME.setup.json`` (device, files of a capture).
 
-Field names: mmWave Studio user's guide and the mmWaveLink ICD; numbers come as JSON numbers or as strings in hexadecimal.
+Field names: mmWave Studio user's guide and the mmWaveLink ICD; numbers come as JSON numbers or as hexadecimal strings.
 """
 
 import json

@@ -1,0 +1,102 @@
+"""Raw ``.bin`` files of a DCA1000: nothing but words, from the first frame's start on."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from radarize.errors import InputError
+from radarize.importers.capture import Capture, batch_frames
+from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import check_layout
+
+
+def open_bin(
+    files: Sequence[Path],
+    config: RadarConfig,
+    cfg_text: str = "",
+    assumed: tuple[str, ...] = (),
+    warnings: Sequence[str] = (),
+) -> Capture:
+    """Open raw files that follow each other.
+
+    An incomplete last frame is left out with a warning, unless the samples show that it is the configuration which
+    does not fit. Chirps of nothing but zeros count as lost: capture programs fill lost packets with zeros.
+
+    Raises:
+        InputError: less than one frame, or the samples repeat with another period than the configuration's loop.
+    """
+    check_layout(config)
+    warnings = list(warnings)
+    size = sum(path.stat().st_size for path in files)
+    whole, rest = divmod(size, config.frame_bytes)
+    loops, tx, rx, samples, _ = config.frame_shape
+    name = ", ".join(str(path) for path in files)
+    layout = f"{config.frame_bytes} bytes a frame ({loops} loops x {tx} TX x {rx} RX x {samples} samples x 4 bytes)"
+    if not whole:
+        raise InputError(f"{name}: has {size} bytes, less than one frame; expected a multiple of {layout}")
+    if period := _other_period(files[0], config):
+        expected = tx * rx * samples
+        message = (
+            f"{name}: has {size} bytes, {whole} frames and {rest} bytes of {layout}, but its samples repeat every "
+            f"{period} and not every {expected} (TX x RX x samples), expected the configuration of this capture"
+        )
+        if rest:
+            raise InputError(message)
+        warnings.append(message)
+    elif rest:
+        warnings.append(
+            f"{name}: has {size} bytes, {whole} whole frames and {rest} bytes of an incomplete one, which is left out; "
+            f"expected {layout}"
+        )
+    return Capture(config, cfg_text, _batches(files, config), whole, assumed, warnings)
+
+
+def _batches(files: Sequence[Path], config: RadarConfig) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    loops, tx = config.frame_shape[:2]
+    for data in _blocks(files, batch_frames(config) * config.frame_bytes):
+        words = np.frombuffer(data, "<i2", len(data) // config.frame_bytes * config.frame_bytes // 2)
+        words = words.astype(np.int16, copy=False)
+        if words.size:
+            fired = words.reshape(-1, loops, tx, 2 * config.samples * len(config.rx)).any(axis=3)
+            yield words, fired[:, :, list(config.slot)]
+
+
+def _blocks(files: Sequence[Path], size: int) -> Iterator[bytes]:
+    """Content of the files put end to end, in blocks of `size` bytes; the last one may be shorter."""
+    block = b""
+    for path in files:
+        try:
+            with path.open("rb") as file:
+                while data := file.read(size - len(block)):
+                    block += data
+                    if len(block) == size:
+                        yield block
+                        block = b""
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    yield block
+
+
+def _other_period(path: Path, config: RadarConfig) -> int | None:
+    """Complex samples after which the capture repeats, if that is clearly not the configuration's loop.
+
+    Chirps of one transmitter and receiver look alike from loop to loop, so the magnitude of the autocorrelation peaks
+    at the loop's length. None where the peak is there, or nowhere distinct.
+    """
+    loop = config.frame_bytes // 4 // config.loops
+    with path.open("rb") as file:
+        data = file.read(1 << 21)
+    words = np.frombuffer(data, "<i2", len(data) // 8 * 4)
+    pairs = words.reshape(-1, 2, 2).astype(np.float32)  # either order of I and Q: the other is its mirror image
+    signal = (pairs[:, 0] + 1j * pairs[:, 1]).reshape(-1)
+    signal -= signal.mean()
+    longest = min(2 * loop, len(signal) // 2)
+    if loop > longest or not signal.any():
+        return None
+    spectrum = np.fft.fft(signal, 2 * len(signal))
+    correlation = np.abs(np.fft.ifft(np.abs(spectrum) ** 2)[: longest + 1])
+    correlation *= len(signal) / (len(signal) - np.arange(longest + 1)) / correlation[0]
+    candidates = np.arange(loop // 2 & ~1, longest + 1, 2)
+    best = int(candidates[np.argmax(correlation[candidates])])
+    return best if correlation[best] > 0.7 and correlation[loop] < 0.5 * correlation[best] else None

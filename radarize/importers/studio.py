@@ -1,0 +1,73 @@
+"""Captures of mmWave Studio: ``.bin`` with ``NAME.mmwave.json`` and ``NAME.setup.json`` beside it."""
+
+from dataclasses import dataclass
+from pathlib import Path, PureWindowsPath
+
+from radarize.errors import InputError
+from radarize.radar.config import RadarConfig
+from radarize.radar.studio import load_json, load_studio
+
+
+@dataclass(frozen=True)
+class StudioCapture:
+    """Files and settings of a capture."""
+
+    files: tuple[Path, ...]
+    settings: Path
+    config: RadarConfig
+    text: str
+    warnings: tuple[str, ...]
+
+
+def beside(source: Path) -> bool:
+    """Whether exactly one settings file lies beside a ``.bin``."""
+    return len(list(source.parent.glob("*.mmwave.json"))) == 1
+
+
+def find(source: Path) -> StudioCapture:
+    """Collect a capture from its folder, or from one of its ``.bin`` files.
+
+    Raises:
+        InputError: settings or samples are missing or ambiguous.
+    """
+    folder = source if source.is_dir() else source.parent
+    settings = _one(folder, "*.mmwave.json")
+    setups = sorted(folder.glob("*.setup.json"))
+    if len(setups) > 1:
+        raise InputError(f"{folder}: has {len(setups)} files *.setup.json, expected one")
+    setup = load_json(setups[0]) if setups else {}
+    config, text = load_studio(settings, setups[0] if setups else None)
+    files, filled = _captured(setup, folder)
+    if not source.is_dir():
+        files = [source]
+    elif not files:
+        files = [_one(folder, "*.bin")]
+    warnings = (f"{filled} bytes were lost on capture and filled with zeros",) if filled else ()
+    return StudioCapture(tuple(files), settings, config, text, warnings)
+
+
+def _captured(setup: dict, folder: Path) -> tuple[list[Path], int]:
+    """The sample files that the setup names and that are there, and the bytes that were zero-filled in them."""
+    captured = setup.get("capturedFiles")
+    entries = captured.get("files") if isinstance(captured, dict) else None
+    files, filled = [], 0
+    for entry in entries if isinstance(entries, list) else ():
+        if not isinstance(entry, dict):
+            continue
+        # The names come from another machine: only their last part is used.
+        names = [PureWindowsPath(str(entry.get(key, ""))).name for key in ("processedFileName", "rawFileName")]
+        present = [folder / name for name in names if name and (folder / name).is_file()]
+        if present and present[0] not in files:
+            files.append(present[0])
+        summary = entry.get("processedFileSummary")
+        count = summary.get("numZeroFillBytes", 0) if isinstance(summary, dict) else 0
+        filled += count if isinstance(count, int) else 0
+    return files, filled
+
+
+def _one(folder: Path, pattern: str) -> Path:
+    found = sorted(folder.glob(pattern))
+    if len(found) != 1:
+        names = f" ({', '.join(path.name for path in found[:5])})" if found else ""
+        raise InputError(f"{folder}: has {len(found)} files {pattern}{names}, expected one")
+    return found[0]

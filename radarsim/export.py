@@ -1,0 +1,88 @@
+"""Recordings as files for other programs."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from radarize.errors import InputError
+from radarize.radar.cfg import parse_cfg, write_cfg
+from radarize.radar.dca1000 import encode
+from radarize.recording import Recording
+
+_BATCH_BYTES = 16 << 20
+
+
+def export(recording: Path, to: str, output: Path) -> Path:
+    """Write a recording in another format.
+
+    Args:
+        recording: ``.h5`` file.
+        to: ``dca1000``: ``OUT.bin`` of raw samples and ``OUT.cfg``, as an IWR1843 with a DCA1000 leaves them; ``tum``:
+            true poses, ``time x y z qx qy qz qw`` a line.
+        output: file to write; ``.bin`` is put in place of any other suffix for ``dca1000``.
+
+    Returns:
+        The file written.
+
+    Raises:
+        InputError: unknown format, the recording lacks what is asked for, or the file cannot be written.
+    """
+    if to not in _WRITERS:
+        raise InputError(f"export format is {to!r}, expected one of {', '.join(_WRITERS)}")
+    with Recording(recording) as source:
+        return _WRITERS[to](source, Path(output))
+
+
+def _dca1000(source: Recording, output: Path) -> Path:
+    config = source.config
+    # Files are named NAME.bin and NAME.cfg; a suffix such as .v2 belongs to the name.
+    stem = output.with_suffix("") if output.suffix in (".bin", ".cfg") else output
+    binary, settings = stem.with_name(stem.name + ".bin"), stem.with_name(stem.name + ".cfg")
+    text = write_cfg(config)
+    if source.cfg_text and _says_the_same(source.cfg_text, config):
+        text = source.cfg_text
+
+    def samples(file) -> None:
+        for _, adc in source.batches(max(1, _BATCH_BYTES // config.frame_bytes)):
+            file.write(encode(adc, config).astype("<i2", copy=False).data)
+
+    _write(settings, lambda file: file.write(text.encode()))
+    _write(binary, samples)
+    return binary
+
+
+def _says_the_same(text: str, config: object) -> bool:
+    try:
+        return parse_cfg(text) == config
+    except InputError:
+        return False
+
+
+def _tum(source: Recording, output: Path) -> Path:
+    if not (source.has("truth/time") and source.has("truth/pose")):
+        raise InputError(f"{source.path}: has no true poses (/truth/time and /truth/pose) to write as TUM")
+    times, poses = source.read("truth/time"), source.read("truth/pose")
+    rows = np.column_stack([times, poses])[: min(len(times), len(poses))]
+    _write(output, lambda file: np.savetxt(file, rows, fmt="%.9f"))
+    return output
+
+
+def _write(path: Path, write: Callable) -> None:
+    """Write a file under a temporary name and rename it when it is whole."""
+    part = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with part.open("wb") as file:
+            write(file)
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    except BaseException:
+        part.unlink(missing_ok=True)
+        raise
+
+
+_WRITERS: dict[str, Callable[[Recording, Path], Path]] = {"dca1000": _dca1000, "tum": _tum}

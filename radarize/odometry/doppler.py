@@ -1,0 +1,268 @@
+"""Ego-velocity from the Doppler shifts of a static world: the classical odometry that networks must beat.
+
+An echo from unit direction u of a static world closes at v . u, v being the sensor's velocity. Echoes are peaks of a
+burst's range-Doppler-azimuth cube. Their u_y comes from the azimuth row, their u_z from the phase between the elevation
+pairs, so that ceiling and floor, which close more slowly than the wall below them, fit the same model. RANSAC rejects
+people, ghosts and aliased echoes; reweighted least squares refines and yields the covariance (after Doer and
+Trommer, "An EKF based approach to radar inertial odometry", 2020: REVE).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Complex64, Float, Int
+from numba import njit
+
+from radarize.heatmaps import Heatmaps
+from radarize.radar.array import virtual_positions
+from radarize.radar.config import RadarConfig
+
+
+@dataclass(frozen=True)
+class Velocities:
+    """Sensor velocities, one per frame, at the frames' burst centres.
+
+    Attributes:
+        velocity: (frame, 2) m/s, sensor frame (x forward, y left).
+        covariance: (frame, 2, 2) (m/s)^2; large where the echoes do not determine a velocity.
+        inliers: (frame,) echoes that agree with the velocity.
+    """
+
+    velocity: Float[np.ndarray, "frame 2"]
+    covariance: Float[np.ndarray, "frame 2 2"]
+    inliers: Int[np.ndarray, "frame"]
+
+
+@dataclass(frozen=True)
+class DopplerSettings:
+    """Settings of `DopplerVelocity`.
+
+    Attributes:
+        beams: azimuth beams of the cube, uniform in u_y.
+        echoes: strongest peaks kept per frame.
+        threshold: least peak power over the cube's median.
+        min_range: m; nearer peaks are leakage.
+        inlier: m/s, RANSAC's limit on the residual.
+        hypotheses: pairs of echoes that RANSAC tries.
+        speed_noise, azimuth_noise, elevation_noise: standard deviations of an echo's speed (m/s), u_y and u_z.
+        climb: m/s, expected vertical speed (handheld bobbing); its mean is zero.
+        still: m/s; below it, and with most echoes still as well, the sensor counts as standing (zero-velocity test).
+    """
+
+    beams: int = 48
+    echoes: int = 160
+    threshold: float = 12.0
+    min_range: float = 0.25
+    inlier: float = 0.15
+    hypotheses: int = 200
+    speed_noise: float = 0.03
+    azimuth_noise: float = 0.03
+    elevation_noise: float = 0.10
+    climb: float = 0.15
+    still: float = 0.02
+
+
+class DopplerVelocity:
+    """Velocity estimator by robust least squares over Doppler peaks; stateless between frames.
+
+    Speeds beyond `config.max_velocity` alias. Residuals are taken modulo the unambiguous span, so a faster walk is
+    still found from the echoes to the side, which close slowly enough.
+    """
+
+    def __init__(self, heatmaps: Heatmaps, settings: DopplerSettings | None = None, seed: int = 0):
+        self.settings = settings or DopplerSettings()
+        self.config = heatmaps.config
+        self.row, self.pairs = heatmaps.row, heatmaps.pairs
+        self._heatmaps = heatmaps
+        self._u = np.linspace(-0.94, 0.94, self.settings.beams)
+        self._steering = torch.as_tensor(heatmaps.steering(self.row, self._u), device=heatmaps.device)
+        self._steering = self._steering.to(torch.complex64)
+        self._geometry = _geometry(self.config)
+        self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
+        # One table of random numbers for all frames: the same frame gives the same answer in any batch.
+        self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 2))
+
+    def estimate(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Velocities:
+        """Velocities of a batch of frames from their `Heatmaps.spectrum`."""
+        power = self._heatmaps._beamformed(spectrum, self.row, self._steering).cpu().numpy()
+        cells = spectrum.cpu().numpy()
+        frames = len(cells)
+        velocity, covariance = np.zeros((frames, 2)), np.zeros((frames, 2, 2))
+        inliers = np.zeros(frames, int)
+        for frame in range(frames):
+            echoes = self._echoes(cells[frame], power[frame])
+            solution = self._solve(echoes)
+            velocity[frame], covariance[frame], inliers[frame] = solution
+        return Velocities(velocity, covariance, inliers)
+
+    def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 5"]:
+        """Peaks of one frame: range bin, closing speed (m/s), u_y, u_z, power over the median."""
+        power = self._heatmaps._beamformed(spectrum[None], self.row, self._steering)[0].cpu().numpy()
+        return self._echoes(spectrum.cpu().numpy(), power)
+
+    def _echoes(self, cells: np.ndarray, power: np.ndarray) -> np.ndarray:
+        level = float(np.median(power[self._first :: 2, :, ::4]))
+        found = _peaks(power, max(level, 1e-12) * self.settings.threshold, self._first)
+        if len(found) > self.settings.echoes:
+            strength = power[found[:, 0], found[:, 1], found[:, 2]]
+            found = found[np.argsort(-strength, kind="stable")[: self.settings.echoes]]
+        pairs = np.zeros((0, 2), np.int64) if self.pairs is None else self.pairs.astype(np.int64)
+        echoes = _refine(found, power, cells, self._u, self._heatmaps.velocities, pairs, *self._geometry)
+        echoes[:, 4] /= max(level, 1e-12)
+        return echoes
+
+    def _solve(self, echoes: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+        s = self.settings
+        noise = np.array([s.speed_noise, s.azimuth_noise, s.elevation_noise if self.pairs is not None else 0.3])
+        climb = s.climb if self.pairs is not None else 1e-3
+        span = 2 * self.config.max_velocity
+        velocity, covariance, inliers = _fit(echoes[:, 1:4], self._draws, noise, climb, s.inlier, span)
+        if np.hypot(*velocity) < s.still and np.median(np.abs(echoes[:, 1])) < 2 * s.still:
+            velocity = np.zeros(2)
+        return velocity, covariance, inliers
+
+
+def _geometry(config: RadarConfig) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Per antenna y / wavelength and TDM phase per speed (rad s/m); height of a pair / wavelength; Doppler bin."""
+    positions = virtual_positions(config).reshape(-1, 3) / config.wavelength
+    delay = np.repeat(np.asarray(config.slot) * config.chirp_time, len(config.rx))
+    heights = np.unique(np.round(positions[:, 2], 6))
+    height = float(heights[1] - heights[0]) if len(heights) > 1 else 0.5
+    return positions[:, 1].copy(), 4 * np.pi / config.wavelength * delay, height, config.velocity_resolution
+
+
+#: A weaker peak beside a stronger one of the same range and Doppler may be its sidelobe (-25 dB, and mismatch).
+SIDELOBE = 0.1
+
+
+@njit(cache=True)
+def _peaks(power, threshold, first):
+    """Local maxima of the cube (range, doppler cyclic, beam) above a threshold, as index triples."""
+    ranges, bins, beams = power.shape
+    found = []
+    for r in range(max(first, 1), ranges - 1):
+        for d in range(bins):
+            before, after = (d - 1) % bins, (d + 1) % bins
+            strongest = threshold
+            for b in range(beams):
+                strongest = max(strongest, SIDELOBE * power[r, d, b])
+            for b in range(1, beams - 1):
+                p = power[r, d, b]
+                if p < strongest or p <= power[r, d, b - 1] or p < power[r, d, b + 1]:
+                    continue
+                if p <= power[r, before, b] or p < power[r, after, b]:
+                    continue
+                if p <= power[r - 1, d, b] or p < power[r + 1, d, b]:
+                    continue
+                found.append((r, d, b))
+    result = np.empty((len(found), 3), np.int64)
+    for i, cell in enumerate(found):
+        result[i] = cell
+    return result
+
+
+@njit(cache=True)
+def _vertex(left, middle, right):
+    """Offset in bins of a peak from the parabola through three log powers."""
+    a, b, c = np.log(left + 1e-30), np.log(middle + 1e-30), np.log(right + 1e-30)
+    bend = a - 2 * b + c
+    return 0.5 * (a - c) / bend if bend < -1e-9 else 0.0
+
+
+@njit(cache=True)
+def _refine(found, power, cells, u, velocities, pairs, y, tdm, height, bin_width):
+    """Echoes between bins: (range bin, speed, u_y, u_z, power)."""
+    echoes = np.empty((len(found), 5))
+    bins = power.shape[1]
+    for i in range(len(found)):
+        r, d, b = found[i]
+        p = power[r, d, b]
+        speed_offset = bin_width * _vertex(power[r, (d - 1) % bins, b], p, power[r, (d + 1) % bins, b])
+        u_y = u[b] + (u[1] - u[0]) * _vertex(power[r, d, b - 1], p, power[r, d, b + 1])
+        u_z = 0.0
+        if len(pairs):
+            lower, upper = 0.0j, 0.0j
+            for low, high in pairs:
+                for antenna in (low, high):
+                    phase = 2 * np.pi * y[antenna] * u_y + tdm[antenna] * speed_offset
+                    value = cells[r, d, antenna] * np.exp(1j * phase)
+                    if antenna == low:
+                        lower += value
+                    else:
+                        upper += value
+            u_z = -np.angle(upper * np.conj(lower)) / (2 * np.pi * height)
+        limit = 0.98 * np.sqrt(max(1 - u_y * u_y, 0.0))
+        u_z = min(max(u_z, -limit), limit)
+        echoes[i, 0], echoes[i, 4] = r, p
+        echoes[i, 1], echoes[i, 2], echoes[i, 3] = velocities[d] + speed_offset, u_y, u_z
+    return echoes
+
+
+@njit(cache=True)
+def _wrap(residual, span):
+    return residual - span * np.rint(residual / span)
+
+
+@njit(cache=True)
+def _fit(echoes, draws, noise, climb, inlier, span):
+    """RANSAC over pairs of echoes, then iteratively reweighted least squares for (vx, vy, vz)."""
+    count = len(echoes)
+    unknown = np.array([[1.0, 0.0], [0.0, 1.0]])
+    if count < 4:
+        return np.zeros(2), unknown, 0
+    speed = echoes[:, 0]
+    u = np.empty((count, 3))
+    u[:, 1], u[:, 2] = echoes[:, 1], echoes[:, 2]
+    u[:, 0] = np.sqrt(np.maximum(1 - u[:, 1] ** 2 - u[:, 2] ** 2, 1e-3))
+
+    best, score = np.zeros(2), -1.0
+    for h in range(len(draws) + 1):
+        v = np.zeros(2)  # the first hypothesis is standing still
+        if h:
+            i, j = int(draws[h - 1, 0] * count), int(draws[h - 1, 1] * count)
+            det = u[i, 0] * u[j, 1] - u[j, 0] * u[i, 1]
+            if abs(det) < 0.15:
+                continue
+            v[0] = (speed[i] * u[j, 1] - speed[j] * u[i, 1]) / det
+            v[1] = (u[i, 0] * speed[j] - u[j, 0] * speed[i]) / det
+            if v[0] ** 2 + v[1] ** 2 > (1.5 * span / 2) ** 2:
+                continue
+        total = 0.0
+        for k in range(count):
+            e = _wrap(speed[k] - v[0] * u[k, 0] - v[1] * u[k, 1], span) / inlier
+            total += max(1 - e * e, 0.0)
+        if total > score:
+            best, score = v, total
+
+    v = np.array([best[0], best[1], 0.0])
+    normal = np.zeros((3, 3))
+    scale, inliers = 1.0, 0
+    for _ in range(8):
+        normal[:] = 0.0
+        normal[2, 2] = 1 / climb**2
+        right = np.zeros(3)
+        squares, weights, inliers = 0.0, 0.0, 0
+        for k in range(count):
+            # u_x is not measured but follows from u_y and u_z, and so do their errors.
+            by_y = v[1] - v[0] * u[k, 1] / u[k, 0]
+            by_z = v[2] - v[0] * u[k, 2] / u[k, 0]
+            variance = noise[0] ** 2 + (by_y * noise[1]) ** 2 + (by_z * noise[2]) ** 2
+            predicted = v[0] * u[k, 0] + v[1] * u[k, 1] + v[2] * u[k, 2]
+            e = _wrap(speed[k] - predicted, span)
+            z = e * e / variance
+            w = 1 / (1 + z / 4) ** 2  # Geman-McClure: an outlier loses all say
+            inliers += z < 9
+            squares += w * z
+            weights += w
+            for a in range(3):
+                right[a] += w / variance * u[k, a] * (e + predicted)
+                for b in range(3):
+                    normal[a, b] += w / variance * u[k, a] * u[k, b]
+        v = np.linalg.solve(normal, right)
+        scale = max(squares / max(weights - 2, 1.0), 0.3)
+    covariance = np.linalg.inv(normal)[:2, :2] * scale
+    # Few agreeing echoes: the fit may be to something else altogether.
+    share = inliers / count
+    covariance *= 1 + (0.5 / max(share, 0.05)) ** 4
+    return v[:2].copy(), covariance.copy(), inliers

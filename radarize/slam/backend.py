@@ -1,0 +1,233 @@
+"""The SLAM back end: gather scans, match, build submaps, close loops, optimise.
+
+After Google's Cartographer (Hess et al., Real-Time Loop Closure in 2D LIDAR SLAM, ICRA 2016), on gtsam: matching runs
+in a local frame that is smooth and drifts, the graph's poses are global and jump when loops close.
+"""
+
+from collections import deque
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize.errors import InputError
+from radarize.slam.config import SlamConfig
+from radarize.slam.correlation import Pyramid, search
+from radarize.slam.grid import OccupancyGrid
+from radarize.slam.loops import candidates, close, uncertainty
+from radarize.slam.matcher import match
+from radarize.slam.node import Node, Scan
+from radarize.slam.odometry import Odometry, Stillness
+from radarize.slam.pose import between, compose, interpolate, transform
+from radarize.slam.posegraph import PoseGraph
+from radarize.slam.submap import Submap
+
+
+class Slam:
+    """Simultaneous localisation and mapping from scans and odometry.
+
+        slam = Slam(SlamConfig.preset("radar"))
+        slam.add_odometry(time, pose); slam.add_scan(time, azimuths, ranges); ...
+        slam.finish()
+        times, poses = slam.trajectory()
+        slam.map().save("map")
+
+    Odometry and scans come in any interleaving: a scan waits until odometry has reached its time. Entries that are not
+    later than the one before them are left out and counted in `skipped`; scans before the first odometry entry take
+    its pose, scans after the last one the last. Without any odometry motion is taken to go on as matched before.
+
+    Args:
+        config: all parameters; the default is the preset ``lidar``.
+    """
+
+    def __init__(self, config: SlamConfig | None = None):
+        self.config = config or SlamConfig()
+        self.odometry = Odometry(self.config.odometry)
+        self.graph = PoseGraph(self.config.loop.inlier_probability)
+        self.nodes: list[Node] = []
+        self.submaps: list[Submap] = []
+        self.skipped = {"odometry": 0, "scans": 0}
+        self._waiting: deque[tuple[float, np.ndarray, np.ndarray]] = deque()
+        self._scan_times: list[float] = []
+        self._open: list[Scan] = []
+        self._local: list[np.ndarray] = []  # of every node in the local frame
+        self._closures_at_last_optimisation = 0
+
+    def add_odometry(
+        self, time: float, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"] | None = None
+    ) -> None:
+        """Say where odometry puts the sensor.
+
+        Args:
+            time: s.
+            pose: x, y (m), yaw (rad) in any fixed frame.
+            covariance: of the motion since the entry before, for (x, y, yaw) in this pose's frame (m^2, m rad, rad^2);
+                None: as configured in `SlamConfig.odometry`.
+
+        Raises:
+            InputError: a value is not finite, or the covariance is none.
+        """
+        if self.odometry.add(time, pose, covariance):
+            self._drain()
+        else:
+            self.skipped["odometry"] += 1
+
+    def add_scan(self, time: float, azimuths: Float[np.ndarray, "beam"], ranges: Float[np.ndarray, "beam"]) -> None:
+        """Say what the sensor saw.
+
+        Args:
+            time: s.
+            azimuths: of the beams, rad, positive to the left.
+            ranges: m; inf: nothing seen on this beam; nan: not known.
+
+        Raises:
+            InputError: the time is not finite, or the lengths differ.
+        """
+        azimuths, ranges = np.asarray(azimuths, float), np.asarray(ranges, float)
+        if not np.isfinite(time):
+            raise InputError(f"scan: time is {time}, expected a finite number of seconds")
+        if azimuths.ndim != 1 or azimuths.shape != ranges.shape:
+            raise InputError(f"scan at {time}: {ranges.shape} ranges on {azimuths.shape} azimuths, expected one each")
+        if self._scan_times and time <= self._scan_times[-1]:
+            self.skipped["scans"] += 1
+            return
+        self._scan_times.append(float(time))
+        self._waiting.append((float(time), azimuths, ranges))
+        self._drain()
+
+    def finish(self) -> None:
+        """Process what still waits, search all loops once more from the optimised poses, and optimise."""
+        if not len(self.odometry):
+            self.odometry = Stillness(self.config.odometry)
+        self._drain(final=True)
+        if self._open:
+            self._add_node()
+        if self.config.loop.enabled:
+            self.graph.optimise()
+            self._close_again()
+        self.graph.optimise()
+
+    def trajectory(self) -> tuple[Float[np.ndarray, "scan"], Float[np.ndarray, "scan 3"]]:
+        """Times (s) and poses (x, y, yaw) of every scan in a node, in the frame in which odometry began.
+
+        Between two nodes odometry gives the shape, and the nodes its ends.
+        """
+        if not self.nodes:
+            return np.zeros(0), np.zeros((0, 3))
+        knots, poses = np.array([node.time for node in self.nodes]), np.stack(self.graph.poses)
+        times = np.array(self._scan_times[: len(self._scan_times) - len(self._waiting) - len(self._open)])
+        odometry = np.stack([self.odometry.pose(t) for t in times])
+        anchors = np.stack([self.odometry.pose(t) for t in knots])
+        after = np.clip(np.searchsorted(knots, times), 1, max(len(knots) - 1, 1))
+        before, after = after - 1, np.minimum(after, len(knots) - 1)
+        forward = compose(poses[before], between(anchors[before], odometry))
+        backward = compose(poses[after], between(anchors[after], odometry))
+        span = np.maximum(knots[after] - knots[before], 1e-9)
+        return times, interpolate(forward, backward, np.clip((times - knots[before]) / span, 0, 1))
+
+    def map(self) -> OccupancyGrid:
+        """Occupancy grid of all nodes, drawn anew at their optimised poses."""
+        grid = OccupancyGrid.empty(self.config.grid.map_resolution)
+        for node, pose in zip(self.nodes, self.graph.poses, strict=True):
+            grid.insert(transform(pose, node.origins), transform(pose, node.ends), node.hits, self.config.grid)
+        return grid.crop(margin=4)
+
+    # --- the algorithm, step by step ---------------------------------------------------------------------------------
+    def _drain(self, final: bool = False) -> None:
+        while self._waiting and (final or self.odometry.covers(self._waiting[0][0])):
+            time, azimuths, ranges = self._waiting.popleft()
+            scan = Scan(time, self.odometry.pose(time), azimuths, ranges)
+            if self._open and self._moved(self._open[0], scan):
+                self._add_node()
+            self._open.append(scan)
+
+    def _moved(self, first: Scan, scan: Scan) -> bool:
+        x, y, yaw = between(first.odometry, scan.odometry)
+        c = self.config.node
+        still = isinstance(self.odometry, Stillness)
+        return still or np.hypot(x, y) >= c.distance or abs(yaw) >= c.angle or scan.time - first.time >= c.duration
+
+    def _add_node(self) -> None:
+        node = Node.gather(self._open, self.config)
+        self._open = []
+        if not self.nodes:
+            start = self.odometry.pose(node.time)
+            self._local.append(start)
+            self.graph.add_node(start)
+        else:
+            motion, covariance = self.odometry.motion(self.nodes[-1].time, node.time)
+            local = self._match(node, compose(self._local[-1], motion), covariance)
+            moved = between(self._local[-1], local)
+            self.graph.add_node(compose(self.graph.poses[-1], moved))
+            self.graph.add_motion(len(self.nodes) - 1, len(self.nodes), motion, covariance)
+            self._local.append(local)
+            if isinstance(self.odometry, Stillness):
+                self.odometry.last = moved
+        self.nodes.append(node)
+        self._insert(len(self.nodes) - 1, node)
+        if self.config.loop.enabled and (len(self.nodes) - 1) % self.config.loop.every == 0:
+            self._close(len(self.nodes) - 1)
+
+    def _match(self, node: Node, predicted: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+        """Local pose of a new node: the prediction, moved to fit the older of the submaps being built."""
+        c = self.config.matcher
+        if not c.enabled or len(node.points) < self.config.node.min_points:
+            return predicted
+        submap = next(s for s in self.submaps if not s.finished)
+        prior = between(self._local[submap.anchor], predicted)
+        guess = prior
+        if c.presearch_distance > 0:
+            weight = np.linalg.inv(covariance) * c.sigma**2 / len(node.points)
+            found = search(
+                Pyramid.of(submap.grid, 3),
+                node.points,
+                prior,
+                distance=c.presearch_distance,
+                angle=c.presearch_angle,
+                min_score=0.1,
+                penalty=(min(weight[0, 0], weight[1, 1]), weight[2, 2]),
+            )
+            guess = prior if found is None else found[0]
+        result = match(
+            submap.grid, node.points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
+        )
+        noise = uncertainty(result, c.translation_floor, c.rotation_floor)
+        self.graph.add_motion(submap.anchor, len(self.nodes), result.pose, noise)
+        return compose(self._local[submap.anchor], result.pose)
+
+    def _insert(self, number: int, node: Node) -> None:
+        """Add a node to the two submaps being built; a new one starts when the older is half full."""
+        building = [s for s in self.submaps if not s.finished]
+        if len(building) < 2 and (not building or len(building[0].nodes) >= self.config.grid.nodes // 2):
+            self.submaps.append(Submap(self.config, number))
+            building.append(self.submaps[-1])
+        for submap in building:
+            submap.insert(number, node, between(self._local[submap.anchor], self._local[number]))
+
+    def _close(self, number: int) -> None:
+        """Search a node in the submaps near it, and optimise when it is time and there is news."""
+        c = self.config.loop
+        if len(self.nodes[number].points) >= self.config.node.min_points:
+            for submap in candidates(number, self.submaps, self.graph.poses, c)[: c.candidates]:
+                self._try(number, submap, c.distance, c.angle)
+        if number % c.optimise_every == 0 and len(self.graph.closures) > self._closures_at_last_optimisation:
+            self._closures_at_last_optimisation = len(self.graph.closures)
+            self.graph.optimise()
+
+    def _close_again(self) -> None:
+        """With loops closed, nodes and submaps lie where they overlap: match what was not matched, in a small window."""
+        c, grid = self.config.loop, self.config.grid
+        done = set(self.graph.closures)
+        for number, node in enumerate(self.nodes):
+            if len(node.points) >= self.config.node.min_points:
+                near = [s for s in candidates(number, self.submaps, self.graph.poses, c)]
+                for submap in near[: 2 * c.candidates]:
+                    if (submap.anchor, number) not in done:
+                        self._try(number, submap, 8 * grid.resolution, 0.1)
+
+    def _try(self, number: int, submap: Submap, distance: float, angle: float) -> None:
+        guess = between(self.graph.poses[submap.anchor], self.graph.poses[number])
+        found = close(
+            number, self.nodes[number], submap, guess, self.config.loop, distance=distance, angle=angle
+        )
+        if found is not None:
+            self.graph.add_closure(found.anchor, found.node, found.pose, found.covariance)

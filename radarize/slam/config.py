@@ -1,0 +1,176 @@
+"""Every parameter of the SLAM back end, with its unit, its default and two presets."""
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class OdometryConfig(_Section):
+    """Uncertainty of odometry that comes without covariances, as standard deviations of one step.
+
+    Attributes:
+        translation, rotation: floor of a step, m and rad.
+        translation_per_metre, rotation_per_metre: m/m and rad/m.
+        rotation_per_radian: rad/rad.
+        missing_translation, missing_rotation: of a step without any odometry (constant velocity is assumed), m and rad.
+    """
+
+    translation: float = Field(0.02, gt=0)
+    rotation: float = Field(0.01, gt=0)
+    translation_per_metre: float = Field(0.05, ge=0)
+    rotation_per_metre: float = Field(0.02, ge=0)
+    rotation_per_radian: float = Field(0.03, ge=0)
+    missing_translation: float = Field(0.3, gt=0)
+    missing_rotation: float = Field(0.2, gt=0)
+
+
+class NodeConfig(_Section):
+    """How scans are gathered into the nodes of the graph.
+
+    Scans join the open node until the sensor has moved by `distance` or `angle`, or `duration` has passed since its
+    first one. This is the motion filter, and what makes enough points of scans that are too sparse alone.
+
+    Attributes:
+        distance, angle, duration: m, rad, s.
+        scans: at most so many scans, evenly picked, are used of a node.
+        min_points: nodes with fewer points are neither matched nor searched for loops.
+    """
+
+    distance: float = Field(0.2, ge=0)
+    angle: float = Field(0.1, ge=0)
+    duration: float = Field(5.0, ge=0)
+    scans: int = Field(1, gt=0)
+    min_points: int = Field(20, gt=0)
+
+
+class GridConfig(_Section):
+    """Probability grids of submaps and of the final map.
+
+    Attributes:
+        resolution: cell size of submaps, m.
+        map_resolution: cell size of the final map, m.
+        hit, miss: probability that a cell is occupied given one echo from it, or one ray through it.
+        lowest, highest: probabilities are kept between these, so that a map can change its mind.
+        min_range, max_range: returns outside count as nothing seen, m.
+        free_range: rays that saw nothing clear the cells up to here, m; 0 means they say nothing.
+        nodes: nodes per submap; the next submap starts when half of them are in.
+    """
+
+    resolution: float = Field(0.05, gt=0)
+    map_resolution: float = Field(0.05, gt=0)
+    hit: float = Field(0.7, gt=0.5, lt=1)
+    miss: float = Field(0.45, gt=0, lt=0.5)
+    lowest: float = Field(0.12, gt=0, lt=0.5)
+    highest: float = Field(0.97, gt=0.5, lt=1)
+    min_range: float = Field(0.1, ge=0)
+    max_range: float = Field(30.0, gt=0)
+    free_range: float = Field(5.0, ge=0)
+    nodes: int = Field(10, ge=2)
+
+
+class MatcherConfig(_Section):
+    """Scan-to-submap matching.
+
+    Attributes:
+        enabled: without it nodes follow odometry and submaps serve the loop search only.
+        presearch_distance, presearch_angle: half-widths of the correlative search before refinement, m and rad;
+            0 switches it off.
+        sigma: standard deviation of the residual 1 - p of one point, points taken as independent. It sets the weight of
+            a match against odometry, and the covariance it enters the graph with.
+        translation_floor, rotation_floor: no match is believed better than this, m and rad.
+        iterations: at most so many Gauss-Newton steps.
+        spacing: points are thinned to one per square of this size, m.
+    """
+
+    enabled: bool = True
+    presearch_distance: float = Field(0.3, ge=0)
+    presearch_angle: float = Field(0.17, ge=0)
+    sigma: float = Field(1.0, gt=0)
+    translation_floor: float = Field(0.01, gt=0)
+    rotation_floor: float = Field(0.003, gt=0)
+    iterations: int = Field(20, gt=0)
+    spacing: float = Field(0.05, gt=0)
+
+
+class LoopConfig(_Section):
+    """Loop closure.
+
+    Attributes:
+        enabled: search for loops at all.
+        radius: submaps whose centre is estimated to lie this near to a node are searched, m.
+        distance, angle: half-widths of the search window, m and rad.
+        candidates: at most so many submaps are searched per node, nearest first.
+        every: only every so-many-th node is searched for.
+        min_score: mean probability at the node's points that a closure needs.
+        levels: halvings of the resolution in the branch-and-bound search.
+        sigma: as `MatcherConfig.sigma`, for closures.
+        translation_floor, rotation_floor: no closure is believed better than this, m and rad.
+        inlier_probability: closures whose error is less likely than one minus this are rejected.
+        optimise_every: nodes between two optimisations on the way.
+    """
+
+    enabled: bool = True
+    radius: float = Field(10.0, gt=0)
+    distance: float = Field(3.0, gt=0)
+    angle: float = Field(0.5, gt=0)
+    candidates: int = Field(3, gt=0)
+    every: int = Field(1, gt=0)
+    min_score: float = Field(0.6, gt=0, lt=1)
+    levels: int = Field(5, ge=0, le=8)
+    sigma: float = Field(1.0, gt=0)
+    translation_floor: float = Field(0.03, gt=0)
+    rotation_floor: float = Field(0.006, gt=0)
+    inlier_probability: float = Field(0.99, gt=0, lt=1)
+    optimise_every: int = Field(50, gt=0)
+
+
+class SlamConfig(_Section):
+    """All parameters of `radarize.slam.backend.Slam`. The defaults are the preset ``lidar``."""
+
+    odometry: OdometryConfig = OdometryConfig()
+    node: NodeConfig = NodeConfig()
+    grid: GridConfig = GridConfig()
+    matcher: MatcherConfig = MatcherConfig()
+    loop: LoopConfig = LoopConfig()
+
+    @classmethod
+    def preset(cls, name: Literal["radar", "lidar"]) -> "SlamConfig":
+        """A named set of parameters.
+
+        ``lidar``: wide, dense and exact scans. ``radar``: 88 deg and 4.28 m of noisy scans at 30 Hz with odometry that
+        is good in translation and weak in heading; matches and closures weigh little, so that they do no harm.
+
+        Raises:
+            KeyError: there is no preset of that name.
+        """
+        return PRESETS[name]
+
+
+PRESETS: dict[str, SlamConfig] = {
+    "lidar": SlamConfig(),
+    "radar": SlamConfig(
+        odometry=OdometryConfig(
+            translation=0.005,
+            rotation=0.005,
+            translation_per_metre=0.03,
+            rotation_per_metre=0.03,
+            rotation_per_radian=0.05,
+        ),
+        node=NodeConfig(distance=0.3, angle=0.2, duration=3.0, scans=10, min_points=25),
+        # Cartographer's settings published with Radarize: 0.08 m cells, ranges of 0.3-4.284 m.
+        grid=GridConfig(
+            resolution=0.08, hit=0.6, miss=0.45, min_range=0.3, max_range=4.284, free_range=0.0, nodes=16
+        ),
+        matcher=MatcherConfig(
+            presearch_distance=0.0, presearch_angle=0.0, sigma=3.0, translation_floor=0.03, rotation_floor=0.015
+        ),
+        loop=LoopConfig(
+            radius=6.0, distance=2.0, angle=0.5, min_score=0.55, levels=4, sigma=3.0,
+            translation_floor=0.1, rotation_floor=0.03,
+        ),
+    ),
+}

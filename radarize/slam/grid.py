@@ -1,0 +1,173 @@
+"""Occupancy grids: what rays say about the cells they cross and end in.
+
+A cell holds the probability that it is occupied, 0 where no ray has been. Evidence is multiplied as odds, which is
+adding log odds: one hit multiplies by hit / (1 - hit), one miss by miss / (1 - miss), and per insertion a cell takes
+either one hit or one miss, the hit first (Hess et al., Real-Time Loop Closure in 2D LIDAR SLAM, ICRA 2016, eq. 2-3).
+"""
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numba
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+from radarize.errors import InputError
+from radarize.slam.config import GridConfig
+
+_MARGIN = 32  # cells added around whatever a grid has to hold when it grows
+
+
+@dataclass
+class OccupancyGrid:
+    """A grid of probabilities, rows along +y and columns along +x.
+
+    Attributes:
+        resolution: cell size, m.
+        origin: x, y of the outer corner of cell (0, 0), m.
+        probability: 0 where unknown.
+    """
+
+    resolution: float
+    origin: Float[np.ndarray, "2"]
+    probability: Float[np.ndarray, "row column"]
+
+    @classmethod
+    def empty(cls, resolution: float) -> "OccupancyGrid":
+        """A grid that knows nothing yet."""
+        return cls(resolution, np.zeros(2), np.zeros((1, 1), np.float32))
+
+    def cells(self, points: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "n 2"]:
+        """Row and column of points, inside the grid or not."""
+        return np.floor((points - self.origin) / self.resolution).astype(np.int64)[:, ::-1]
+
+    def insert(
+        self,
+        origins: Float[np.ndarray, "ray 2"],
+        ends: Float[np.ndarray, "ray 2"],
+        hits: np.ndarray,
+        config: GridConfig,
+    ) -> None:
+        """Add the rays of one node: cells on the way are missed, the end is hit where `hits` is true, else missed."""
+        if not len(ends):
+            return
+        self._grow(np.minimum(origins.min(axis=0), ends.min(axis=0)), np.maximum(origins.max(axis=0), ends.max(axis=0)))
+        _insert(
+            self.probability,
+            (origins - self.origin) / self.resolution,
+            (ends - self.origin) / self.resolution,
+            np.ascontiguousarray(hits, dtype=np.bool_),
+            config.hit / (1 - config.hit),
+            config.miss / (1 - config.miss),
+            config.lowest,
+            config.highest,
+        )
+
+    def _grow(self, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
+        rows, columns = self.probability.shape
+        first, last = self.cells(np.stack([low, high]))
+        if self.probability.size == 1:  # an empty grid starts where its first rays are
+            self.origin = (first[::-1] - _MARGIN) * self.resolution + self.origin
+            shape = last - first + 1 + 2 * _MARGIN
+            self.probability = np.zeros(tuple(shape), np.float32)
+            return
+        before = np.where(first < 0, -first + _MARGIN, 0)
+        after = np.where(last >= (rows, columns), last - (rows - 1, columns - 1) + _MARGIN, 0)
+        if before.any() or after.any():
+            self.probability = np.pad(self.probability, np.stack([before, after], axis=1))
+            self.origin = self.origin - before[::-1] * self.resolution
+
+    def crop(self, margin: int = 0) -> "OccupancyGrid":
+        """The smallest grid with all known cells, and `margin` unknown ones around them."""
+        known = np.argwhere(self.probability > 0)
+        if not len(known):
+            return OccupancyGrid.empty(self.resolution)
+        (top, left), (bottom, right) = known.min(axis=0), known.max(axis=0) + 1
+        inner = self.probability[top:bottom, left:right]
+        origin = self.origin + (np.array([left, top]) - margin) * self.resolution
+        return OccupancyGrid(self.resolution, origin, np.pad(inner, margin))
+
+    def image(self, occupied: float = 0.65, free: float = 0.35) -> UInt8[np.ndarray, "row column"]:
+        """The map_server picture, y up: 0 occupied, 254 free, 205 unknown."""
+        picture = np.full(self.probability.shape, 205, np.uint8)
+        picture[self.probability >= occupied] = 0
+        picture[(self.probability > 0) & (self.probability <= free)] = 254
+        return picture[::-1]
+
+    def save(self, path: str | Path) -> None:
+        """Write `path` with suffix .pgm and .yaml, as ROS map_server reads them.
+
+        Raises:
+            InputError: the files cannot be written.
+        """
+        pgm, yaml = Path(path).with_suffix(".pgm"), Path(path).with_suffix(".yaml")
+        picture = self.image()
+        rows, columns = picture.shape
+        text = (
+            f"image: {pgm.name}\nmode: trinary\nresolution: {self.resolution:.6g}\n"
+            f"origin: [{self.origin[0]:.6f}, {self.origin[1]:.6f}, 0.0]\n"
+            "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+        )
+        for target, data in ((pgm, b"P5\n%d %d\n255\n" % (columns, rows) + picture.tobytes()), (yaml, text.encode())):
+            part = target.with_name(target.name + ".part")
+            try:
+                part.write_bytes(data)
+                os.replace(part, target)
+            except OSError as error:
+                raise InputError(f"cannot write {target}: {error.strerror}") from error
+
+
+@numba.njit(cache=True)
+def cross(x0: float, y0: float, x1: float, y1: float, out: np.ndarray) -> int:
+    """Cells (row, column) that a segment crosses, in order, both ends included; returns their number.
+
+    Coordinates in cells. A. Amanatides, A. Woo, A Fast Voxel Traversal Algorithm for Ray Tracing, Eurographics 1987.
+    """
+    column, row = int(np.floor(x0)), int(np.floor(y0))
+    last_column, last_row = int(np.floor(x1)), int(np.floor(y1))
+    step_x, step_y = (1 if x1 >= x0 else -1), (1 if y1 >= y0 else -1)
+    dx, dy = abs(x1 - x0), abs(y1 - y0)
+    delta_x, delta_y = (1 / dx if dx > 0 else np.inf), (1 / dy if dy > 0 else np.inf)
+    next_x = ((column + 1 - x0) if step_x > 0 else (x0 - column)) * delta_x if dx > 0 else np.inf
+    next_y = ((row + 1 - y0) if step_y > 0 else (y0 - row)) * delta_y if dy > 0 else np.inf
+    count = abs(last_column - column) + abs(last_row - row) + 1
+    for k in range(count):
+        out[k, 0], out[k, 1] = row, column
+        # The number of steps is known beforehand; rounding in next_x and next_y cannot lead past the end.
+        if column != last_column and (next_x < next_y or row == last_row):
+            column += step_x
+            next_x += delta_x
+        else:
+            row += step_y
+            next_y += delta_y
+    return count
+
+
+@numba.njit(cache=True)
+def _insert(probability, origins, ends, hits, hit_odds, miss_odds, lowest, highest):
+    # Cells already updated by this insertion have their sign turned.
+    rows, columns = probability.shape
+    for i in range(len(ends)):
+        if hits[i]:
+            row, column = int(np.floor(ends[i, 1])), int(np.floor(ends[i, 0]))
+            _update(probability, row, column, hit_odds, lowest, highest)
+    line = np.empty((2 * (rows + columns), 2), np.int64)
+    for i in range(len(ends)):
+        count = cross(origins[i, 0], origins[i, 1], ends[i, 0], ends[i, 1], line)
+        for k in range(count - 1 if hits[i] else count):
+            _update(probability, line[k, 0], line[k, 1], miss_odds, lowest, highest)
+    top, bottom = min(origins[:, 1].min(), ends[:, 1].min()), max(origins[:, 1].max(), ends[:, 1].max())
+    left, right = min(origins[:, 0].min(), ends[:, 0].min()), max(origins[:, 0].max(), ends[:, 0].max())
+    for row in range(int(top), int(bottom) + 1):
+        for column in range(int(left), int(right) + 1):
+            probability[row, column] = abs(probability[row, column])
+
+
+@numba.njit(cache=True)
+def _update(probability, row, column, factor, lowest, highest):
+    p = probability[row, column]
+    if p < 0:
+        return
+    odds = (p / (1 - p) if p > 0 else 1.0) * factor
+    probability[row, column] = -min(max(odds / (1 + odds), lowest), highest)

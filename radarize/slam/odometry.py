@@ -1,0 +1,110 @@
+"""Odometry as a function of time: where it says the sensor was, and how sure it is of a motion."""
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize.errors import InputError
+from radarize.slam.config import OdometryConfig
+from radarize.slam.pose import adjoint, between, interpolate, inverse
+
+
+class Odometry:
+    """Poses in an odometry frame, in order of time.
+
+    Args:
+        config: uncertainty of steps that come without covariance.
+    """
+
+    def __init__(self, config: OdometryConfig):
+        self.config = config
+        self.times: list[float] = []
+        self.poses: list[np.ndarray] = []
+        self.covariances: list[np.ndarray | None] = []
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def add(self, time: float, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"] | None) -> bool:
+        """Append a pose and the covariance of the motion since the one before; False if it comes too late.
+
+        Raises:
+            InputError: a value is not finite, or the covariance is not symmetric and positive semidefinite.
+        """
+        pose = np.asarray(pose, float)
+        if pose.shape != (3,) or not np.isfinite(pose).all() or not np.isfinite(time):
+            raise InputError(f"odometry at {time}: pose is {pose}, expected finite time, x, y and yaw")
+        if covariance is not None:
+            covariance = np.asarray(covariance, float)
+            if covariance.shape != (3, 3) or not np.isfinite(covariance).all():
+                raise InputError(f"odometry at {time}: covariance is {covariance.tolist()}, expected a finite 3 x 3")
+            scale = max(np.abs(covariance).max(), 1e-300)
+            if np.abs(covariance - covariance.T).max() > 1e-6 * scale or np.linalg.eigvalsh(covariance)[0] < -1e-6 * scale:
+                raise InputError(
+                    f"odometry at {time}: covariance is {covariance.tolist()}, expected symmetric, no negative eigenvalue"
+                )
+        if self.times and time <= self.times[-1]:
+            return False
+        self.times.append(float(time))
+        self.poses.append(pose)
+        self.covariances.append(covariance)
+        return True
+
+    def covers(self, time: float) -> bool:
+        """Whether the pose at a time is known without looking into the future."""
+        return bool(self.times) and self.times[-1] >= time
+
+    def pose(self, time: float) -> Float[np.ndarray, "3"]:
+        """Pose at a time, interpolated; before the first and after the last entry the sensor is taken to stand still."""
+        after = int(np.searchsorted(self.times, time))
+        if after == 0:
+            return self.poses[0]
+        if after == len(self.times):
+            return self.poses[-1]
+        t0, t1 = self.times[after - 1], self.times[after]
+        return interpolate(self.poses[after - 1], self.poses[after], (time - t0) / (t1 - t0))
+
+    def motion(self, start: float, end: float) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
+        """Motion from start to end (s) in the frame at the start, and its covariance in the frame at the end.
+
+        Steps are independent: C = Ad C_before Ad^T + C_step, with the adjoint of the step's inverse.
+        """
+        first, last = self.pose(start), self.pose(end)
+        whole = between(first, last)
+        low, high = np.searchsorted(self.times, [start, end])
+        inner = range(max(low, 1), min(high, len(self.times) - 1) + 1)
+        steps = [(k, self.covariances[k]) for k in inner]
+        if not steps or any(c is None for _, c in steps):
+            return whole, self.model(whole)
+        total = np.zeros((3, 3))
+        for k, covariance in steps:
+            t0, t1 = self.times[k - 1], self.times[k]
+            fraction = (min(end, t1) - max(start, t0)) / (t1 - t0)
+            step = between(self.pose(max(start, t0)), self.pose(min(end, t1)))
+            carry = adjoint(inverse(step))
+            total = carry @ total @ carry.T + fraction * covariance
+        # A floor keeps the graph solvable where the source claims to be perfect (a sensor at rest).
+        return whole, total + np.diag([1e-4, 1e-4, 1e-4]) ** 2
+
+    def model(self, step: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+        """Covariance of a step from the configured standard deviations."""
+        c, distance, angle = self.config, np.hypot(step[0], step[1]), abs(step[2])
+        translation = np.hypot(c.translation, c.translation_per_metre * distance)
+        rotation = np.linalg.norm([c.rotation, c.rotation_per_metre * distance, c.rotation_per_radian * angle])
+        return np.diag([translation, translation, rotation]) ** 2
+
+
+class Stillness(Odometry):
+    """Stands in where there is no odometry at all: the last motion, as the matcher found it, goes on."""
+
+    def __init__(self, config: OdometryConfig):
+        super().__init__(config)
+        self.last = np.zeros(3)
+
+    def pose(self, time: float) -> Float[np.ndarray, "3"]:
+        """Scans of one node are taken from one place."""
+        return np.zeros(3)
+
+    def motion(self, start: float, end: float) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
+        """The last motion again, with the wide covariance of no odometry."""
+        c = self.config
+        return self.last, np.diag([c.missing_translation, c.missing_translation, c.missing_rotation]) ** 2

@@ -1,0 +1,57 @@
+"""Planar poses as arrays (..., 3): x m, y m, yaw rad. Leading axes broadcast."""
+
+import numpy as np
+from jaxtyping import Float
+
+Pose = Float[np.ndarray, "*batch 3"]
+
+
+def wrap(angle: np.ndarray | float) -> np.ndarray | float:
+    """Angle in [-pi, pi)."""
+    return (angle + np.pi) % (2 * np.pi) - np.pi
+
+
+def compose(a: Pose, b: Pose) -> Pose:
+    """Pose b, given in the frame of a, in the frame that a is given in."""
+    a, b = np.asarray(a, float), np.asarray(b, float)
+    cos, sin = np.cos(a[..., 2]), np.sin(a[..., 2])
+    return np.stack(
+        [
+            a[..., 0] + cos * b[..., 0] - sin * b[..., 1],
+            a[..., 1] + sin * b[..., 0] + cos * b[..., 1],
+            wrap(a[..., 2] + b[..., 2]),
+        ],
+        axis=-1,
+    )
+
+
+def inverse(a: Pose) -> Pose:
+    """The pose that undoes a."""
+    a = np.asarray(a, float)
+    cos, sin = np.cos(a[..., 2]), np.sin(a[..., 2])
+    return np.stack([-cos * a[..., 0] - sin * a[..., 1], sin * a[..., 0] - cos * a[..., 1], wrap(-a[..., 2])], axis=-1)
+
+
+def between(a: Pose, b: Pose) -> Pose:
+    """Pose b seen from a: compose(a, between(a, b)) == b."""
+    return compose(inverse(a), b)
+
+
+def transform(pose: Pose, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+    """Points of the pose's frame in the frame that the pose is given in."""
+    cos, sin = np.cos(pose[2]), np.sin(pose[2])
+    return points @ np.array([[cos, sin], [-sin, cos]]) + pose[:2]
+
+
+def adjoint(a: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Matrix that carries a small motion (x, y, yaw) in the frame of a into the frame that a is given in."""
+    cos, sin = np.cos(a[2]), np.sin(a[2])
+    return np.array([[cos, -sin, a[1]], [sin, cos, -a[0]], [0, 0, 1]])
+
+
+def interpolate(a: Pose, b: Pose, fraction: np.ndarray | float) -> Pose:
+    """Pose at a fraction (0 gives a, 1 gives b) of the way, position on the straight line, heading the short way."""
+    fraction = np.asarray(fraction, float)
+    position = a[..., :2] + fraction[..., None] * (b[..., :2] - a[..., :2])
+    yaw = wrap(a[..., 2] + fraction * wrap(b[..., 2] - a[..., 2]))
+    return np.concatenate([position, yaw[..., None]], axis=-1)

@@ -214,7 +214,7 @@ class Slam:
             self.graph.optimise()
 
     def _close_again(self) -> None:
-        """With loops closed, nodes and submaps lie where they overlap: match what was not matched, in a small window."""
+        """With loops closed, nodes and submaps lie where they overlap: match what was not matched, closely."""
         c, grid = self.config.loop, self.config.grid
         done = set(self.graph.closures)
         for number, node in enumerate(self.nodes):

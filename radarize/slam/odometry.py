@@ -37,10 +37,11 @@ class Odometry:
             covariance = np.asarray(covariance, float)
             if covariance.shape != (3, 3) or not np.isfinite(covariance).all():
                 raise InputError(f"odometry at {time}: covariance is {covariance.tolist()}, expected a finite 3 x 3")
-            scale = max(np.abs(covariance).max(), 1e-300)
-            if np.abs(covariance - covariance.T).max() > 1e-6 * scale or np.linalg.eigvalsh(covariance)[0] < -1e-6 * scale:
+            slack = 1e-6 * np.abs(covariance).max()
+            if np.abs(covariance - covariance.T).max() > slack or np.linalg.eigvalsh(covariance)[0] < -slack:
                 raise InputError(
-                    f"odometry at {time}: covariance is {covariance.tolist()}, expected symmetric, no negative eigenvalue"
+                    f"odometry at {time}: covariance is {covariance.tolist()}, "
+                    "expected it symmetric and without negative eigenvalues"
                 )
         if self.times and time <= self.times[-1]:
             return False
@@ -54,7 +55,7 @@ class Odometry:
         return bool(self.times) and self.times[-1] >= time
 
     def pose(self, time: float) -> Float[np.ndarray, "3"]:
-        """Pose at a time, interpolated; before the first and after the last entry the sensor is taken to stand still."""
+        """Pose at a time, interpolated; before the first entry and after the last the sensor stands still."""
         after = int(np.searchsorted(self.times, time))
         if after == 0:
             return self.poses[0]

@@ -1,0 +1,148 @@
+"""Range scans from heat maps: detection, then echo suppression, by one of several methods.
+
+A scan has one range per bearing, inf where nothing is seen. `make_scans` is the way in; `METHODS` names the ways to get
+there, each a function of `Maps` that returns fractional range bins. A network joins them by another entry.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from pydantic import BaseModel, ConfigDict, Field
+
+from radarize.errors import InputError
+from radarize.mapping import echoes
+
+#: Bearings of a scan: 88 columns of 1 deg, -44...+43 deg, left positive, rad (the paper's field of view).
+BEARINGS = np.radians(np.arange(-44.0, 44.0))
+
+
+class ScanConfig(BaseModel):
+    """Parameters of detection.
+
+    Attributes:
+        min_range: nearer cells hold transmitter leakage, m.
+        above_noise_db: an echo stands so far above the noise.
+        below_ring_db: an echo lies at most so far below the strongest of all bearings at its range; what is weaker is
+            taken for that echo's sidelobe.
+        noise_quantile: the noise is this quantile of a frame's cells: most of a room's cells are behind its walls.
+        elevation_power: how strongly echoes from above and below are weighed down: a cell's power is multiplied with
+            (elevation-aware / all-elevations power)^this, at most 1.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    min_range: float = Field(0.25, ge=0)
+    above_noise_db: float = Field(15.0, gt=0)
+    below_ring_db: float = Field(15.0, gt=0)
+    noise_quantile: float = Field(0.25, gt=0, lt=1)
+    elevation_power: float = Field(2.0, gt=0)
+
+
+@dataclass(frozen=True)
+class Maps:
+    """Power maps on the scan's bearings.
+
+    Attributes:
+        power: all elevations.
+        elevation_aware: echoes off the horizon weakened; None if the array cannot.
+        ranges: of the bins, m, evenly spaced.
+        config: parameters.
+    """
+
+    power: Float[np.ndarray, "frame range bearing"]
+    elevation_aware: Float[np.ndarray, "frame range bearing"] | None
+    ranges: Float[np.ndarray, "range"]
+    config: ScanConfig
+
+
+def detect(power: Float[np.ndarray, "frame range bearing"], maps: Maps) -> Bool[np.ndarray, "frame range bearing"]:
+    """Cells with an echo: above the noise, no sidelobe of another bearing, and not too near."""
+    config = maps.config
+    noise = np.quantile(power, config.noise_quantile, axis=(1, 2), keepdims=True)
+    ring = power.max(axis=2, keepdims=True)
+    echo = (power > noise * 10 ** (config.above_noise_db / 10)) & (power > ring * 10 ** (-config.below_ring_db / 10))
+    return echo & (maps.ranges >= config.min_range)[:, None]
+
+
+def threshold(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
+    """The strongest echo of every bearing."""
+    return echoes.strongest(detect(maps.power, maps), maps.power)
+
+
+def first_echo(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
+    """The first echo of every bearing."""
+    return echoes.first(detect(maps.power, maps), maps.power)
+
+
+def elevation_aware(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
+    """The first echo of every bearing after weighing down what comes from above and below."""
+    if maps.elevation_aware is None:
+        raise InputError("scans: method elevation-aware needs an elevation-aware map, found none; use first-echo")
+    horizon = np.clip(maps.elevation_aware / np.maximum(maps.power, 1e-30), 0, 1)
+    power = maps.power * horizon**maps.config.elevation_power
+    return echoes.first(detect(power, maps), power)
+
+
+METHODS: dict[str, Callable[[Maps], np.ndarray]] = {
+    "threshold": threshold,
+    "first-echo": first_echo,
+    "elevation-aware": elevation_aware,
+}
+
+
+def make_scans(
+    range_azimuth: Float[np.ndarray, "frame range azimuth"],
+    ranges: Float[np.ndarray, "range"],
+    azimuths: Float[np.ndarray, "azimuth"],
+    elevation_aware: Float[np.ndarray, "frame range azimuth"] | None = None,
+    *,
+    method: str = "elevation-aware",
+    config: ScanConfig | None = None,
+) -> Float[np.ndarray, "frame bearing"]:
+    """Scans on `BEARINGS` from power maps.
+
+    Args:
+        range_azimuth: power (linear) over all elevations.
+        ranges: of the bins, m, evenly spaced.
+        azimuths: of the columns, rad, ascending; bearings outside see nothing.
+        elevation_aware: power of the elevation-aware array on the same axes.
+        method: a key of `METHODS`.
+        config: parameters of detection.
+
+    Returns:
+        Ranges, m, inf where nothing is seen.
+
+    Raises:
+        InputError: unknown method, or shapes that do not fit.
+    """
+    if method not in METHODS:
+        raise InputError(f"scans: method is {method!r}, expected one of {', '.join(METHODS)}")
+    ranges, azimuths = np.asarray(ranges, float), np.asarray(azimuths, float)
+    for name, power in (("range_azimuth", range_azimuth), ("elevation_aware", elevation_aware)):
+        if power is not None and np.shape(power)[1:] != (len(ranges), len(azimuths)):
+            raise InputError(
+                f"scans: {name} has shape {np.shape(power)}, expected (frame, {len(ranges)}, {len(azimuths)}) "
+                "from its range and azimuth axes"
+            )
+    if not len(range_azimuth):
+        return np.zeros((0, len(BEARINGS)))
+    maps = Maps(
+        _resample(range_azimuth, azimuths),
+        None if elevation_aware is None else _resample(elevation_aware, azimuths),
+        ranges,
+        config or ScanConfig(),
+    )
+    bins = METHODS[method](maps)
+    return np.where(np.isfinite(bins), ranges[0] + bins * (ranges[1] - ranges[0]), np.inf)
+
+
+def _resample(power: np.ndarray, azimuths: np.ndarray) -> np.ndarray:
+    """Power on `BEARINGS`, linear between columns, 0 outside of them; not-a-number (a lost frame) counts as 0."""
+    power = np.nan_to_num(np.asarray(power, float), nan=0.0, posinf=0.0)
+    after = np.clip(np.searchsorted(azimuths, BEARINGS), 1, len(azimuths) - 1)
+    fraction = (BEARINGS - azimuths[after - 1]) / (azimuths[after] - azimuths[after - 1])
+    inside = (BEARINGS >= azimuths[0] - 1e-9) & (BEARINGS <= azimuths[-1] + 1e-9)
+    fraction = np.clip(fraction, 0, 1)
+    return (power[..., after - 1] * (1 - fraction) + power[..., after] * fraction) * inside

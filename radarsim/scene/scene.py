@@ -1,0 +1,273 @@
+"""A world of triangles with materials, and the ray tests on it.
+
+Rays run on the Mitsuba geometry of a Sionna RT scene (Embree on a CPU, one shape per object). It computes in float32:
+within a kilometre of the origin, which is checked, positions are good to 0.06 mm, well under the margin of `occluded`.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import shapely
+import trimesh
+from jaxtyping import Bool, Float, Int
+
+from radarize.errors import InputError
+from radarsim.scene.materials import Material
+
+FREQUENCY = 77e9  # at which Sionna RT's own solvers start out
+_REACH = 1000.0
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One thing of one material.
+
+    Attributes:
+        name: unique in its scene.
+        mesh: float64 triangles in world coordinates, normals outward (either side reflects).
+        material: of all its triangles.
+        solid: part of the surface of a body, though perhaps an open mesh: seen from its outside only.
+    """
+
+    name: str
+    mesh: trimesh.Trimesh
+    material: Material
+    solid: bool = False
+
+    @cached_property
+    def two_sided(self) -> bool:
+        """Whether it is a sheet, which reflects on both sides."""
+        return not (self.solid or self.mesh.is_watertight)
+
+    @cached_property
+    def is_floor_or_ceiling(self) -> bool:
+        """Whether it has horizontal faces only."""
+        return bool(np.all(np.abs(self.mesh.face_normals[:, 2]) > 0.999))
+
+
+class Scene:
+    """Objects, their triangles in one list, and ray tests.
+
+    Args:
+        name: for titles and recordings.
+        objects: with unique names.
+
+    Attributes:
+        triangles: (T, 3, 3) corners of all triangles, in the order of the objects, m.
+        normals: (T, 3) unit normals.
+        triangle_object: (T,) index into `objects`.
+
+    Raises:
+        InputError: no object, a name twice, a mesh without triangles or too far away.
+    """
+
+    def __init__(self, name: str, objects: list[SceneObject]):
+        self.name, self.objects = name, list(objects)
+        if not self.objects:
+            raise InputError(f"scene {name}: has no objects, expected at least one")
+        seen: set[str] = set()
+        for item in self.objects:
+            if item.name in seen:
+                raise InputError(f"scene {name}: two objects are named {item.name!r}, expected unique names")
+            seen.add(item.name)
+            if not len(item.mesh.faces):
+                raise InputError(f"scene {name}: object {item.name!r} has no triangles")
+            if not np.all(np.abs(item.mesh.vertices) < _REACH):
+                raise InputError(
+                    f"scene {name}: object {item.name!r} reaches {np.abs(item.mesh.vertices).max():g} m from the "
+                    f"origin, expected finite coordinates within {_REACH:g} m"
+                )
+        self.triangles = np.concatenate([np.asarray(o.mesh.vertices)[o.mesh.faces] for o in self.objects])
+        self.triangle_object = np.repeat(np.arange(len(self.objects)), [len(o.mesh.faces) for o in self.objects])
+        cross = np.cross(self.triangles[:, 1] - self.triangles[:, 0], self.triangles[:, 2] - self.triangles[:, 0])
+        self.normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-300)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Scene":
+        """Read a scene file.
+
+        Args:
+            path: a YAML file; a bare name such as ``office`` is looked for as a file here, then in ``scenes/`` here,
+                then among the scenes that come with the project.
+
+        Raises:
+            InputError: missing file, malformed YAML, unknown key or material, missing mesh; with file and field.
+        """
+        from radarsim.scene.description import find, read
+
+        file = find(path)
+        return cls(*read(file))
+
+    @property
+    def bounds(self) -> Float[np.ndarray, "2 3"]:
+        """Lowest and highest corner, m."""
+        corners = self.triangles.reshape(-1, 3)
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    @cached_property
+    def sionna(self):
+        """The same world as a `sionna.rt.Scene` with radio materials; its `mi_scene` answers the ray tests.
+
+        Raises:
+            InputError: no usable LLVM.
+        """
+        return self._geometry[0]
+
+    @cached_property
+    def _geometry(self):
+        """The Sionna scene, and the first triangle of the shape that has each Mitsuba registry number."""
+        from radarsim import llvm
+
+        llvm.require()
+        import drjit as dr
+        import mitsuba as mi
+        import sionna.rt as rt
+
+        scene = rt.Scene()
+        scene.frequency = FREQUENCY
+        radio = {o.material.name: _radio_material(o.material) for o in self.objects}
+        items = []
+        for number, item in enumerate(self.objects):
+            label = f"{number} {item.name}".replace(".", "_")  # Mitsuba keeps dots for paths
+            shape = mi.Mesh(label, len(item.mesh.vertices), len(item.mesh.faces))
+            data = mi.traverse(shape)
+            data["vertex_positions"] = np.ravel(item.mesh.vertices).astype(np.float32)
+            data["faces"] = np.ravel(item.mesh.faces).astype(np.uint32)
+            data.update()
+            items.append(rt.SceneObject(mi_mesh=shape, name=label, radio_material=radio[item.material.name]))
+        scene.edit(add=items)
+        numbers = [dr.reinterpret_array(mi.UInt32, mi.ShapePtr(o.mi_mesh)).numpy()[0] for o in items]
+        counts = [len(o.mesh.faces) for o in self.objects]
+        first = np.zeros(max(numbers) + 1, np.int64)
+        first[numbers] = np.cumsum([0, *counts[:-1]])
+        return scene, first
+
+    def occluded(
+        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], margin: float = 1e-3
+    ) -> Bool[np.ndarray, "n"]:
+        """Whether anything lies on the segment from origin to target, both ends shortened by `margin` (m)."""
+        import mitsuba as mi
+
+        geometry = self.sionna.mi_scene
+        origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
+        if not len(origins):
+            return np.zeros(0, bool)
+        directions, lengths = _directions(targets - origins)
+        ray = _ray(origins + margin * directions, directions)
+        ray.maxt = mi.Float(np.maximum(lengths - 2 * margin, 0).astype(np.float32))
+        return geometry.ray_test(ray).numpy().astype(bool)
+
+    def hit(
+        self, origins: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]
+    ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
+        """Distance along each ray to the first triangle (inf: none) and that triangle's index (-1: none)."""
+        import drjit as dr
+        import mitsuba as mi
+
+        scene, first = self._geometry
+        origins, directions = np.broadcast_arrays(np.asarray(origins, float), np.asarray(directions, float))
+        if not len(origins):
+            return np.zeros(0), np.zeros(0, int)
+        found = scene.mi_scene.ray_intersect_preliminary(_ray(origins, _directions(directions)[0]), coherent=False)
+        shape = dr.reinterpret_array(mi.UInt32, found.shape)
+        dr.eval(found.t, shape, found.prim_index)
+        distance = found.t.numpy().astype(float)
+        number = shape.numpy()
+        missed = (number == 0) | ~np.isfinite(distance)
+        triangle = first[np.where(missed, 0, number)] + found.prim_index.numpy()
+        return np.where(missed, np.inf, distance), np.where(missed, -1, triangle)
+
+    def cast(
+        self, origins: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]
+    ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
+        """Distance along each ray to the first object (inf: none) and its index into `objects` (-1: none)."""
+        distance, triangle = self.hit(origins, directions)
+        return distance, np.where(triangle < 0, -1, self.triangle_object[triangle])
+
+    def floor_plan(self, height: float) -> Float[np.ndarray, "n 4"]:
+        """Everything cut by the plane z = `height`, as segments x0 y0 x1 y1 in m; collinear pieces are joined."""
+        # A cut through an edge or a horizontal face is ill defined; a nanometre up it is not.
+        cut = trimesh.intersections.mesh_plane(
+            trimesh.Trimesh(
+                self.triangles.reshape(-1, 3), np.arange(3 * len(self.triangles)).reshape(-1, 3), process=False
+            ),
+            plane_normal=[0, 0, 1],
+            plane_origin=[0, 0, height + 1e-9],
+        )
+        lines = np.round(np.asarray(cut)[..., :2].reshape(-1, 2, 2), 6)
+        lines = lines[np.any(lines[:, 0] != lines[:, 1], axis=1)]
+        if not len(lines):
+            return np.zeros((0, 4))
+        merged = shapely.simplify(shapely.line_merge(shapely.union_all(shapely.linestrings(lines))), 1e-6)
+        pieces = []
+        for line in shapely.get_parts(merged):
+            points = shapely.get_coordinates(line)
+            pieces.append(np.hstack([points[:-1], points[1:]]))
+        return np.concatenate(pieces)
+
+    def planar_scan(
+        self,
+        position: Float[np.ndarray, "*f 3"],
+        yaw: Float[np.ndarray, "*f"] | float,
+        azimuths: Float[np.ndarray, "a"],
+        max_range: float,
+    ) -> Float[np.ndarray, "*f a"]:
+        """True horizontal ranges at the sensor's height, one scan or one per frame.
+
+        Args:
+            position: sensor in the world, m, (3,) or (frame, 3).
+            yaw: heading, rad, scalar or (frame,).
+            azimuths: of the beams against the heading, rad, positive to the left.
+            max_range: m.
+
+        Returns:
+            Horizontal distance to the first surface, inf beyond `max_range`.
+        """
+        position, yaw = np.asarray(position, float), np.asarray(yaw, float)
+        bearing = yaw[..., None] + np.asarray(azimuths, float)
+        directions = np.stack([np.cos(bearing), np.sin(bearing), np.zeros_like(bearing)], axis=-1)
+        origins = np.broadcast_to(position[..., None, :], directions.shape)
+        distance, _ = self.hit(origins.reshape(-1, 3), directions.reshape(-1, 3))
+        distance = distance.reshape(bearing.shape)
+        return np.where(distance <= max_range, distance, np.inf)
+
+
+def _directions(vectors: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n"]]:
+    lengths = np.linalg.norm(vectors, axis=1)
+    return vectors / np.maximum(lengths, 1e-12)[:, None], lengths
+
+
+def _ray(origins: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]):
+    import mitsuba as mi
+
+    return mi.Ray3f(
+        mi.Point3f(np.ascontiguousarray(origins.T, np.float32)),
+        mi.Vector3f(np.ascontiguousarray(directions.T, np.float32)),
+    )
+
+
+def _radio_material(material: Material):
+    """Sionna's counterpart: permittivity as here, roughness as a Lambertian share of the reflected amplitude."""
+    import drjit as dr
+    import mitsuba as mi
+    import sionna.rt as rt
+
+    def law(frequency) -> tuple:
+        hertz = float(np.ravel(np.array(frequency))[0])
+        if material.conductor:
+            return mi.Float(1.0), mi.Float(1e7)
+        eps = material.permittivity_at(hertz)
+        return mi.Float(eps.real), mi.Float(-eps.imag * 2 * dr.pi * hertz * 8.8541878128e-12)
+
+    gamma = abs(complex(material.fresnel(np.array(1.0), FREQUENCY)[0]))
+    return rt.RadioMaterial(
+        name=material.name.replace(".", "_"),
+        thickness=material.thickness or 0.5,
+        # sigma0 = 4 S^2 |Gamma|^2 at normal incidence for Sionna's Lambertian pattern
+        scattering_coefficient=float(np.clip(np.sqrt(material.sigma0) / (2 * gamma), 0.0, 1.0)),
+        scattering_pattern="lambertian",
+        frequency_update_callback=law,
+        color=material.color,
+    )

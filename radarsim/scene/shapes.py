@@ -1,0 +1,121 @@
+"""Primitive meshes: planar facets as triangles that share vertices, outward normals, metres.
+
+Faces of a box can be left out where they would touch another surface: a hidden face would scatter without being seen,
+and two coplanar faces would reflect twice.
+"""
+
+import numpy as np
+import shapely
+import trimesh
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+from shapely.geometry import Polygon
+
+# Corner signs of each face of a box, counter-clockwise seen from outside.
+_FACES = {
+    "-x": ((-1, -1, -1), (-1, -1, 1), (-1, 1, 1), (-1, 1, -1)),
+    "+x": ((1, -1, -1), (1, 1, -1), (1, 1, 1), (1, -1, 1)),
+    "-y": ((-1, -1, -1), (1, -1, -1), (1, -1, 1), (-1, -1, 1)),
+    "+y": ((-1, 1, -1), (-1, 1, 1), (1, 1, 1), (1, 1, -1)),
+    "-z": ((-1, -1, -1), (-1, 1, -1), (1, 1, -1), (1, -1, -1)),
+    "+z": ((-1, -1, 1), (1, -1, 1), (1, 1, 1), (-1, 1, 1)),
+}
+
+
+def mesh(vertices: Float[np.ndarray, "v 3"], faces: np.ndarray) -> trimesh.Trimesh:
+    """A mesh exactly as given, equal vertices merged, nothing reordered or repaired."""
+    result = trimesh.Trimesh(np.asarray(vertices, float), np.asarray(faces), process=False)
+    result.merge_vertices(digits_vertex=9)
+    return result
+
+
+def box(
+    center: tuple[float, float, float], size: tuple[float, float, float], without: tuple[str, ...] = ()
+) -> trimesh.Trimesh:
+    """Axis-aligned box, `without` some of its faces (``"-x"``, ``"+x"``, ... ``"+z"``)."""
+    corners = [c for face, signs in _FACES.items() if face not in without for c in signs]
+    vertices = np.asarray(center, float) + 0.5 * np.asarray(size, float) * np.array(corners, float)
+    quads = 4 * np.arange(len(corners) // 4)[:, None]
+    return mesh(vertices, np.concatenate([quads + [0, 1, 2], quads + [0, 2, 3]]))
+
+
+def span(
+    low: tuple[float, float, float], high: tuple[float, float, float], without: tuple[str, ...] = ()
+) -> trimesh.Trimesh:
+    """Axis-aligned box between two corners."""
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    return box((low + high) / 2, high - low, without)
+
+
+def rectangle(
+    center: tuple[float, float, float], size: tuple[float, float], facing: tuple[float, float, float]
+) -> trimesh.Trimesh:
+    """Rectangle of (width, height) whose normal is `facing`.
+
+    Height runs as close to vertical as the plane allows; if it is horizontal, height runs along y and width along x.
+    """
+    normal = np.asarray(facing, float) / np.linalg.norm(facing)
+    if abs(normal[2]) > 0.999:
+        up = np.array([0.0, 1.0, 0.0])
+    else:
+        up = np.array([0.0, 0.0, 1.0]) - normal[2] * normal
+        up /= np.linalg.norm(up)
+    across = np.cross(up, normal)
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.5 * np.asarray(size, float)
+    return mesh(np.asarray(center, float) + corners @ np.stack([across, up]), [[0, 1, 2], [0, 2, 3]])
+
+
+def cylinder(
+    center: tuple[float, float, float], radius: float, height: float, sides: int = 12, without: tuple[str, ...] = ()
+) -> trimesh.Trimesh:
+    """Upright prism with `sides` facets around, `without` its lower (``"-z"``) or upper (``"+z"``) cap."""
+    angle = 2 * np.pi * np.arange(sides) / sides
+    ring = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    low = np.column_stack([ring, np.full(sides, -height / 2)])
+    vertices = np.concatenate([low, low + [0, 0, height]]) + np.asarray(center, float)
+    i, j = np.arange(sides), (np.arange(sides) + 1) % sides
+    faces = [np.stack([i, j, j + sides], 1), np.stack([i, j + sides, i + sides], 1)]
+    fan = np.stack([np.zeros(sides - 2, int), np.arange(1, sides - 1), np.arange(2, sides)], 1)
+    if "+z" not in without:
+        faces.append(fan + sides)
+    if "-z" not in without:
+        faces.append(fan[:, ::-1])
+    return mesh(vertices, np.concatenate(faces))
+
+
+def sphere(center: tuple[float, float, float], radius: float, subdivisions: int = 3) -> trimesh.Trimesh:
+    """Icosphere."""
+    result = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
+    result.apply_translation(center)
+    return result
+
+
+def polygon(
+    outline: Polygon,
+    origin: tuple[float, float, float] = (0, 0, 0),
+    u: tuple[float, float, float] = (1, 0, 0),
+    v: tuple[float, float, float] = (0, 1, 0),
+) -> trimesh.Trimesh:
+    """Planar polygon, holes included: the point (a, b) of `outline` lies at origin + a u + b v, the normal is u x v."""
+    flat, faces = trimesh.creation.triangulate_polygon(shapely.geometry.polygon.orient(outline), engine="earcut")
+    a, b, c = (flat[faces[:, k]] for k in range(3))
+    turn = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    faces = np.where(turn[:, None] < 0, faces[:, ::-1], faces)[np.abs(turn) > 1e-12]
+    return mesh(np.asarray(origin, float) + flat @ np.array([u, v], float), faces)
+
+
+def placed(
+    shape: trimesh.Trimesh,
+    position: tuple[float, float, float] = (0, 0, 0),
+    rotation: tuple[float, float, float] = (0, 0, 0),
+) -> trimesh.Trimesh:
+    """A copy, rotated by roll, pitch, yaw (rad; about x, then y, then z) about the origin and moved to `position`."""
+    turn = Rotation.from_euler("xyz", rotation).as_matrix()
+    return trimesh.Trimesh(shape.vertices @ turn.T + np.asarray(position, float), shape.faces.copy(), process=False)
+
+
+def joined(*shapes: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Several meshes as one."""
+    offsets = np.cumsum([0] + [len(s.vertices) for s in shapes[:-1]])
+    faces = [s.faces + offset for s, offset in zip(shapes, offsets, strict=True)]
+    return trimesh.Trimesh(np.concatenate([s.vertices for s in shapes]), np.concatenate(faces), process=False)

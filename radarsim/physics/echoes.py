@@ -1,0 +1,339 @@
+"""Echoes of one frame: which paths there are, how strong, and why.
+
+An echo is either a pair of world points (a, b), the scatterer as seen through the mirrors of its outgoing and of its
+returning leg, with the path length |tx - a| + |b - rx|; or an image, an isometry M of the receiver, with the path length
+|tx - M rx|. Points carry the diffuse surface (a = b) and its ghosts (a = s, b = s mirrored, and the reciprocal). Images
+carry plates: the reflection in the plane, a half turn about each edge, an inversion in each corner, which together are
+the physical-optics integral over a rectangle. Both stay exact for every antenna and instant while amplitudes and
+visibility are taken once per frame, at the middle of the burst.
+"""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from jaxtyping import Complex, Float, UInt8
+from numba import njit, prange
+
+from radarize.radar.array import rx_positions, tx_positions
+from radarize.radar.config import RadarConfig
+from radarsim.physics import plates
+from radarsim.physics.antenna import amplitude_gain, gain_tables
+from radarsim.physics.facets import TABLE, Facets
+from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.synthesis import BurstClock, parabolas
+from radarsim.scene.scene import Scene
+
+#: Every n-th scatterer bounces off mirrors, with n times the power: ghosts are weaker and many.
+GHOST_STRIDE = 4
+#: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
+CLEARANCE = 5e-3
+
+
+class Provenance(IntEnum):
+    """Why there is an echo."""
+
+    DIRECT = 0
+    FLOOR_CEILING = 1
+    GHOST = 2
+
+
+@dataclass(frozen=True)
+class Echoes:
+    """The echoes of a frame, points first, then images.
+
+    Attributes:
+        points: a and b of point echoes, world, m.
+        images: 3 x 4 isometries (matrix | offset) of the receiver, world.
+        amplitude: square root of received over transmitted power, with phase, as in the beat signal.
+        provenance: a `Provenance` each.
+    """
+
+    points: Float[np.ndarray, "point 2 3"]
+    images: Float[np.ndarray, "image 3 4"]
+    amplitude: Complex[np.ndarray, "echo"]
+    provenance: UInt8[np.ndarray, "echo"]
+
+    def __len__(self) -> int:
+        return len(self.amplitude)
+
+    def of(self, provenance: Provenance) -> "Echoes":
+        """The echoes of one cause."""
+        keep = self.provenance == provenance
+        n = len(self.points)
+        return Echoes(self.points[keep[:n]], self.images[keep[n:]], self.amplitude[keep], self.provenance[keep])
+
+    def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "echo virtual 3"]:
+        """Path length of each echo and virtual antenna over the burst of the frame that starts at `time`.
+
+        Args:
+            config: radar configuration.
+            motion: has position(t) and rotation(t) of the sensor.
+            time: the frame's stamp, s.
+
+        Returns:
+            parabolas in the burst's normalised time (see `synthesis`), m.
+        """
+        times = time + BurstClock.of(config).nodes
+        position, rotation = motion.position(times), motion.rotation(times).as_matrix()
+        tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1)
+        rx = position[:, None] + rx_positions(config) @ rotation.transpose(0, 2, 1)
+        values = np.empty((len(self), tx.shape[1] * rx.shape[1], 3))
+        _point_lengths(self.points, tx, rx, values)
+        _image_lengths(self.images, tx, rx, values[len(self.points) :])
+        return parabolas(values)
+
+
+@njit(parallel=True, cache=True)
+def _point_lengths(points, tx, rx, out):
+    nodes, n_tx, _ = tx.shape
+    n_rx = rx.shape[1]
+    for e in prange(len(points)):
+        back = np.empty(n_rx)
+        for i in range(nodes):
+            for r in range(n_rx):
+                d = points[e, 1] - rx[i, r]
+                back[r] = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+            for k in range(n_tx):
+                d = points[e, 0] - tx[i, k]
+                there = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+                for r in range(n_rx):
+                    out[e, k * n_rx + r, i] = there + back[r]
+
+
+@njit(cache=True)
+def _image_lengths(images, tx, rx, out):
+    nodes, n_tx, _ = tx.shape
+    n_rx = rx.shape[1]
+    for e in range(len(images)):
+        m = images[e]
+        for i in range(nodes):
+            for r in range(n_rx):
+                q = rx[i, r]
+                x = m[0, 0] * q[0] + m[0, 1] * q[1] + m[0, 2] * q[2] + m[0, 3]
+                y = m[1, 0] * q[0] + m[1, 1] * q[1] + m[1, 2] * q[2] + m[1, 3]
+                z = m[2, 0] * q[0] + m[2, 1] * q[1] + m[2, 2] * q[2] + m[2, 3]
+                for k in range(n_tx):
+                    p = tx[i, k]
+                    out[e, k * n_rx + r, i] = np.sqrt((p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2)
+
+
+class EchoFinder:
+    """Finds the echoes of a frame.
+
+    Args:
+        scene: ray tests run on its geometry; None where nothing can stand in the way.
+        scatterers: the diffuse surface.
+        facets: mirrors and plates.
+        config: radar configuration.
+        weakest: echoes below this amplitude are left out.
+        reach: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | None,
+        scatterers: Scatterers,
+        facets: Facets | None,
+        config: RadarConfig,
+        weakest: float = 0.0,
+        reach: float | None = None,
+    ):
+        self.scene, self.scatterers, self.facets, self.config = scene, scatterers, facets, config
+        self.weakest = weakest
+        self.reach = 1.05 * config.max_range if reach is None else reach
+        self._tables = gain_tables()
+        self._phasor = np.exp(1j * scatterers.phase)
+
+    def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Echoes:
+        """Echoes for a sensor pose (rotation: sensor to world)."""
+        direct, amplitude = self._direct(position, rotation)
+        s = self.scatterers
+        points = [np.repeat(s.position[direct][:, None], 2, axis=1)]
+        amplitudes = [amplitude * self._phasor[direct]]
+        causes = [np.where(s.horizontal[direct], Provenance.FLOOR_CEILING, Provenance.DIRECT)]
+        images = np.zeros((0, 3, 4))
+        if self.facets is not None and len(self.facets):
+            ghosts = direct[direct % GHOST_STRIDE == 0]
+            index, a, b, ghost_amplitude = self._ghosts(position, rotation, ghosts)
+            ghost_amplitude = ghost_amplitude * self._phasor[index]
+            points += [np.stack([a, b], axis=1), np.stack([b, a], axis=1)]
+            amplitudes += [ghost_amplitude, ghost_amplitude]
+            causes += [np.full(2 * len(a), Provenance.GHOST)]
+            images, plate_amplitude, horizontal = self._plates(position, rotation)
+            amplitudes.append(plate_amplitude)
+            causes.append(np.where(horizontal, Provenance.FLOOR_CEILING, Provenance.DIRECT))
+        return Echoes(
+            np.concatenate(points), images, np.concatenate(amplitudes), np.concatenate(causes).astype(np.uint8)
+        )
+
+    def _visible(self, origins: np.ndarray, targets: np.ndarray) -> np.ndarray:
+        if self.scene is None or not len(targets):
+            return np.ones(len(targets), bool)
+        return ~self.scene.occluded(origins, targets, margin=CLEARANCE)
+
+    def _direct(self, position, rotation):
+        s = self.scatterers
+        amplitude = np.zeros(len(s))
+        _direct_amplitudes(
+            s.position, s.normal, s.sigma, s.two_sided, position, rotation, self.reach, self.config.wavelength,
+            *self._tables, amplitude,
+        )  # fmt: skip
+        index = np.flatnonzero(amplitude > self.weakest)
+        targets = s.position[index]
+        index = index[self._visible(np.broadcast_to(position, targets.shape), targets)]
+        return index, amplitude[index]
+
+    def _ghosts(self, position, rotation, candidates):
+        s, f = self.scatterers, self.facets
+        near = np.abs(np.einsum("md,md->m", position - f.center, f.normal)) < self.reach
+        mirrors = np.flatnonzero(f.mirror & near)
+        amplitude = np.zeros((len(mirrors), len(candidates)), complex)
+        _ghost_amplitudes(
+            s.position[candidates], s.normal[candidates], s.sigma[candidates], s.two_sided[candidates],
+            f.center[mirrors], f.normal[mirrors], f.u[mirrors], f.v[mirrors], f.half[mirrors], f.two_sided[mirrors],
+            f.reflection[mirrors], position, rotation, self.reach, self.config.wavelength, self.weakest,
+            *self._tables, amplitude,
+        )  # fmt: skip
+        m, c = np.nonzero(amplitude)
+        index, mirror = candidates[c], mirrors[m]
+        amplitude = amplitude[m, c] * np.sqrt(GHOST_STRIDE)
+        target, normal = s.position[index], f.normal[mirror]
+        h = np.einsum("ed,ed->e", position - f.center[mirror], normal)[:, None]
+        hs = np.einsum("ed,ed->e", target - f.center[mirror], normal)[:, None]
+        bounce = position - 2 * h * normal + (target - position + 2 * h * normal) * h / (h + hs)
+        seen = self._visible(np.broadcast_to(position, bounce.shape), bounce)
+        seen[seen] = self._visible(bounce[seen], target[seen])
+        image = target - 2 * hs * normal
+        return index[seen], target[seen], image[seen], amplitude[seen]
+
+    def _plates(self, position, rotation):
+        facet, point, images, amplitude = plates.parts(
+            self.facets, position, rotation, self.reach, self.config.wavelength, self.weakest, self._tables
+        )
+        seen = self._visible(np.broadcast_to(position, point.shape), point)
+        return images[seen], amplitude[seen], self.facets.horizontal[facet[seen]]
+
+
+@njit(parallel=True, cache=True)
+def _direct_amplitudes(
+    place, normal, sigma, two_sided, position, rotation, reach, wavelength, azimuth_table, elevation_table, out
+):
+    """Radar equation, |a|^2 = G^2 lambda^2 sigma cos^2 / ((4 pi)^3 R^4): a Lambertian surface has cos out and cos back."""
+    scale = wavelength / (4 * np.pi) ** 1.5
+    for i in prange(len(place)):
+        dx, dy, dz = place[i, 0] - position[0], place[i, 1] - position[1], place[i, 2] - position[2]
+        square = dx * dx + dy * dy + dz * dz
+        if square > reach * reach or square < 1e-4:
+            continue
+        x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
+        if x <= 0:
+            continue
+        cosine = _facing(normal[i], -dx, -dy, -dz, np.sqrt(square), two_sided[i])
+        if cosine <= 0:
+            continue
+        y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
+        z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
+        gain = amplitude_gain(x, y, z, azimuth_table, elevation_table)
+        out[i] = scale * gain * gain * np.sqrt(sigma[i]) * cosine / square
+
+
+@njit(inline="always")
+def _facing(normal, dx, dy, dz, length, two_sided):
+    """Cosine between a normal and the direction away from the surface; 1 for an isotropic scatterer."""
+    if normal[0] == 0.0 and normal[1] == 0.0 and normal[2] == 0.0:
+        return 1.0
+    cosine = (normal[0] * dx + normal[1] * dy + normal[2] * dz) / length
+    return abs(cosine) if two_sided else cosine
+
+
+@njit(parallel=True, cache=True)
+def _ghost_amplitudes(
+    place, normal, sigma, two_sided, center, plane, u, v, half, sheet, reflection, position, rotation, reach,
+    wavelength, weakest, azimuth_table, elevation_table, out,
+):  # fmt: skip
+    """Sensor -> scatterer -> mirror -> sensor, for every mirror and scatterer; the reciprocal path has the same value."""
+    scale = wavelength / (4 * np.pi) ** 1.5
+    up = rotation[:, 2].copy()  # polarisation: the board's patches radiate an upright electric field
+    for m in prange(len(center)):
+        n = plane[m]
+        h = np.dot(position - center[m], n)
+        if h < 0 and not sheet[m]:
+            continue
+        if h < 0:
+            n, h = -n, -h
+        image = position - 2 * h * n
+        for i in range(len(place)):
+            s = place[i]
+            hs = np.dot(s - center[m], n)
+            if hs < 0.01:
+                continue
+            d1 = np.sqrt((s[0] - position[0]) ** 2 + (s[1] - position[1]) ** 2 + (s[2] - position[2]) ** 2)
+            d2 = np.sqrt((s[0] - image[0]) ** 2 + (s[1] - image[1]) ** 2 + (s[2] - image[2]) ** 2)
+            if d1 + d2 > 2 * reach:
+                continue
+            bounce = image + (s - image) * (h / (h + hs))
+            first = d2 * h / (h + hs)
+            last = d2 - first
+            # The mirror's edge acts over about half a Fresnel zone, not at a point.
+            zone = 0.5 * np.sqrt(wavelength * first * last / d2)
+            offset = bounce - center[m]
+            edge = _ramp(half[m, 0] - abs(np.dot(offset, u[m])), zone) * _ramp(
+                half[m, 1] - abs(np.dot(offset, v[m])), zone
+            )
+            if edge == 0:
+                continue
+            arriving, leaving = (bounce - position) / first, (s - bounce) / last
+            face_direct = _facing(
+                normal[i], position[0] - s[0], position[1] - s[1], position[2] - s[2], d1, two_sided[i]
+            )
+            face_mirror = _facing(normal[i], -leaving[0], -leaving[1], -leaving[2], 1.0, two_sided[i])
+            if face_direct <= 0 or face_mirror <= 0:
+                continue
+            gain = 1.0
+            for target in (s, bounce):
+                d = target - position
+                gain *= amplitude_gain(
+                    rotation[0, 0] * d[0] + rotation[1, 0] * d[1] + rotation[2, 0] * d[2],
+                    rotation[0, 1] * d[0] + rotation[1, 1] * d[1] + rotation[2, 1] * d[2],
+                    rotation[0, 2] * d[0] + rotation[1, 2] * d[1] + rotation[2, 2] * d[2],
+                    azimuth_table, elevation_table,
+                )  # fmt: skip
+            size = scale * gain * edge * np.sqrt(sigma[i] * face_direct * face_mirror) / (d1 * d2)
+            if size <= weakest:
+                continue
+            value = size * _copolar(reflection[m], arriving, leaving, n, up)
+            if abs(value) > weakest:
+                out[m, i] = value
+
+
+@njit(inline="always")
+def _ramp(inside, zone):
+    """0 ... 1 as a point moves from `zone` outside an edge to `zone` inside; two abutting mirrors add up to one."""
+    x = inside / zone
+    if x <= -1:
+        return 0.0
+    if x >= 1:
+        return 1.0
+    return 0.5 + 0.25 * x * (3 - x * x)
+
+
+@njit(cache=True)
+def _copolar(reflection, arriving, leaving, normal, up):
+    """Reflection coefficient from upright to upright polarisation, by its parts across and in the plane of incidence."""
+    cosine = min(abs(np.dot(arriving, normal)), 1.0)
+    at = cosine * (TABLE - 1)
+    j = min(int(at), TABLE - 2)
+    te = reflection[0, j] + (at - j) * (reflection[0, j + 1] - reflection[0, j])
+    tm = reflection[1, j] + (at - j) * (reflection[1, j + 1] - reflection[1, j])
+    across = np.cross(arriving, normal)
+    size = np.sqrt(np.dot(across, across))
+    if size < 1e-6:
+        return te
+    across /= size
+    sent = up - np.dot(up, arriving) * arriving
+    sent /= np.sqrt(np.dot(sent, sent)) + 1e-12
+    taken = up - np.dot(up, leaving) * leaving
+    taken /= np.sqrt(np.dot(taken, taken)) + 1e-12
+    inside = np.dot(sent, np.cross(across, arriving)) * np.dot(taken, np.cross(across, leaving))
+    return te * np.dot(sent, across) * np.dot(taken, across) + tm * inside

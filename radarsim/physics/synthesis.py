@@ -1,0 +1,228 @@
+"""From echoes to the beat signal of one burst, phases exact for every chirp, TDM slot and antenna.
+
+The beat signal of virtual antenna (k, r), loop l, sample n is a sum over echoes e with path length L (out and back),
+
+    s = sum_e A_e exp(j 2 pi [ (f_c / c) L + ((S / c) L + (f_c / c) dL/dt) (t_n - t_c) ])
+
+with L taken when the middle of the chirp's ADC window passes: range walk, TDM slots and near field are in L, and the
+motion during the ramp is in dL/dt (range-Doppler coupling). A direct sum costs echoes x traces x samples. Here the
+three dimensions come apart:
+
+1. L of each echo and virtual antenna is a parabola in time through three instants of the burst (its third-order rest
+   is below 10 um for anything a person carries), so the phase of a trace is a polynomial in the loop number.
+2. The tone along the samples has a frequency of b bins, b = (S L + f_c dL/dt) N / (c f_s). Each echo joins the cell
+   g = round(b); what is left, |b - g| <= w, is expanded as Jacobi and Anger did:
+       exp(j x u v) = sum_p i_p J_p(x v) T_p(u),  i_0 = 1, i_p = 2 j^p,  u = (b - g) / w, v = (n - n_c) / (N / 2), x = pi w,
+   which converges faster than exponentially. So an echo adds `orders` numbers per trace to its cell, whatever the
+   number of samples,
+3. and a discrete Fourier transform over the cells, once per order, gives the samples. Beat frequencies beyond the
+   sample rate alias, as they do in the converter.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float
+from numba import njit, prange
+from scipy.special import jv
+
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+
+#: Instants (in half bursts from the middle) at which path lengths are evaluated: Chebyshev nodes.
+NODES = np.array([-np.sqrt(3) / 2, 0.0, np.sqrt(3) / 2])
+
+
+@dataclass(frozen=True)
+class BurstClock:
+    """The burst's time axis: normalised time s = -1...1 over the chirps' ADC middles.
+
+    Attributes:
+        middle: after the frame's stamp, s.
+        half: half the span, s.
+    """
+
+    middle: float
+    half: float
+
+    @classmethod
+    def of(cls, config: RadarConfig) -> "BurstClock":
+        """The clock of a configuration's frame."""
+        times = config.chirp_times
+        half = max((times.max() - times.min()) / 2, config.chirp_time / 2)
+        return cls(config.burst_center, half)
+
+    @property
+    def nodes(self) -> Float[np.ndarray, "3"]:
+        """Instants of `NODES` after the frame's stamp, s."""
+        return self.middle + self.half * NODES
+
+
+def parabolas(values: Float[np.ndarray, "... 3"]) -> Float[np.ndarray, "... 3"]:
+    """Coefficients (s^0, s^1, s^2) of the parabola through values at `NODES`."""
+    low, mid, high = values[..., 0], values[..., 1], values[..., 2]
+    s = NODES[2]
+    return np.stack([mid, (high - low) / (2 * s), (high - 2 * mid + low) / (2 * s * s)], axis=-1)
+
+
+class Synthesizer:
+    """Turns path-length parabolas and amplitudes into the beat signal of a burst.
+
+    Args:
+        config: radar configuration.
+        accuracy: amplitude error of the expansion relative to each echo, about; -60 dB is below every noise here.
+    """
+
+    def __init__(self, config: RadarConfig, accuracy: float = 1e-3):
+        self.config = config
+        self.accuracy = accuracy
+        clock = BurstClock.of(config)
+        first = (config.chirp_times[0] - clock.middle) / clock.half
+        self._start = np.repeat(first, len(config.rx))  # s of loop 0 per virtual antenna
+        self._step = config.loop_time / clock.half
+        n = config.samples
+        self._v = (np.arange(n) - (n - 1) / 2) / (n / 2)
+        cells = np.arange(n)[None, :]
+        self._dft = np.exp(2j * np.pi * cells * (np.arange(n) - (n - 1) / 2)[:, None] / n).astype(np.complex64)
+        self._bins_per_metre = 1 / (2 * config.range_resolution)
+        # f_c / c dL/dt in bins, for dL/ds
+        self._bins_per_rate = config.center_frequency / SPEED_OF_LIGHT * n / config.sample_rate / clock.half
+
+    def __call__(
+        self, lengths: Float[np.ndarray, "echo virtual 3"], amplitudes: Complex[np.ndarray, "echo"]
+    ) -> Complex[np.ndarray, "loop tx rx sample"]:
+        """Beat signal of a burst.
+
+        Args:
+            lengths: path length per echo and virtual antenna (tx-major), m, as a parabola in normalised time.
+            amplitudes: square root of power, with the phase of reflection and scattering.
+
+        Returns:
+            complex64 in the amplitudes' unit.
+        """
+        config = self.config
+        loops, tx, rx, n, _ = config.frame_shape
+        if not len(amplitudes):
+            return np.zeros((loops, tx, rx, n), np.complex64)
+        cells, tone, width = _tones(lengths, self._start, self._step, loops, self._bins_per_metre, self._bins_per_rate)
+        orders = self._orders(np.pi * width)
+        order = np.argsort(cells % n, kind="stable")
+        edges = np.searchsorted(cells[order] % n, np.arange(n + 1))
+        moments = np.zeros((n, orders, tx * rx, loops, 2), np.float32)
+        _accumulate(
+            moments, edges, order, lengths, amplitudes, cells // n * ((n - 1) / 2), tone, np.float32(1 / width),
+            self._start, self._step, config.center_frequency / SPEED_OF_LIGHT,
+        )  # fmt: skip
+        return self._samples(moments, np.pi * width)
+
+    def _orders(self, x: float) -> int:
+        """Terms after which the rest of the Jacobi-Anger series is below `accuracy`."""
+        orders = np.arange(1, 200)
+        return int(orders[2 * np.abs(jv(orders, x)) + 2 * np.abs(jv(orders + 1, x)) < self.accuracy][0])
+
+    def _samples(self, moments: np.ndarray, x: float) -> Complex[np.ndarray, "loop tx rx sample"]:
+        loops, tx, rx, n, _ = self.config.frame_shape
+        orders = moments.shape[1]
+        p = np.arange(orders)
+        basis = np.where(p == 0, 1, 2) * 1j**p * jv(p, x * self._v[:, None])  # sample, order
+        # One matrix product: the transform over cells and the sum over orders are both sums over (cell, order).
+        kernel = (self._dft[:, :, None] * basis[:, None, :].astype(np.complex64)).reshape(n, n * orders)
+        flat = moments.view(np.complex64).reshape(n * orders, tx * rx * loops)
+        return (kernel @ flat).reshape(n, tx, rx, loops).transpose(3, 1, 2, 0)
+
+
+@njit(cache=True)
+def _tones(lengths, start, step, loops, per_metre, per_rate):
+    """Cell of each echo, its tone's parabola in s relative to that cell (bins), and the largest distance from it."""
+    echoes, virtual, _ = lengths.shape
+    cells = np.empty(echoes, np.int64)
+    tone = np.empty((echoes, virtual, 3))
+    width = 0.5
+    for e in range(echoes):
+        middle = 0.0
+        for a in range(virtual):
+            c0, c1, c2 = lengths[e, a]
+            tone[e, a, 0] = c0 * per_metre + c1 * per_rate
+            tone[e, a, 1] = c1 * per_metre + 2 * c2 * per_rate
+            tone[e, a, 2] = c2 * per_metre
+            middle += tone[e, a, 0]
+        cells[e] = np.int64(np.floor(middle / virtual + 0.5))
+        for a in range(virtual):
+            tone[e, a, 0] -= cells[e]
+            for l in (0, loops - 1):
+                s = start[a] + step * l
+                off = abs(tone[e, a, 0] + s * (tone[e, a, 1] + s * tone[e, a, 2]))
+                width = max(width, off)
+    return cells, tone, width
+
+
+@njit(parallel=True, fastmath=True, cache=True)
+def _accumulate(moments, edges, order, lengths, amplitudes, aliased, tone, scale, start, step, wavenumber):
+    """moments[cell, p, antenna, loop] += A exp(j phase) T_p(u), over the echoes of each cell.
+
+    Cells repeat after N bins, but phases are referred to the instant n_c = (N - 1) / 2, where a tone N bins higher has
+    turned n_c cycles further: `aliased`, in cycles.
+    """
+    n, orders, virtual, loops, _ = moments.shape
+    for i in prange(n):
+        # Threads get contiguous ranges of i; near cells hold few echoes, so deal the cells out alternately.
+        cell = 2 * i if 2 * i < n else 2 * (i - (n + 1) // 2) + 1
+        if edges[cell] == edges[cell + 1]:
+            continue
+        re, im = np.empty(loops, np.float32), np.empty(loops, np.float32)
+        u, before, now = np.empty(loops, np.float32), np.empty(loops, np.float32), np.empty(loops, np.float32)
+        acc = np.zeros((2, orders, virtual, loops), np.float32)
+        for j in range(edges[cell], edges[cell + 1]):
+            e = order[j]
+            size = np.float32(abs(amplitudes[e]))
+            turn = np.arctan2(amplitudes[e].imag, amplitudes[e].real) / (2 * np.pi) - aliased[e]
+            for a in range(virtual):
+                c0, c1, c2 = lengths[e, a]
+                s = start[a]
+                # phase in cycles as a parabola in the loop number; float64 only for the part that is large
+                p0 = turn + wavenumber * (c0 + s * (c1 + s * c2))
+                p0 = np.float32(p0 - np.floor(p0))
+                p1 = np.float32(wavenumber * step * (c1 + 2 * s * c2))
+                p2 = np.float32(wavenumber * step * step * c2)
+                t0, t1, t2 = tone[e, a]
+                u0 = np.float32(t0 + s * (t1 + s * t2)) * scale
+                u1 = np.float32(step * (t1 + 2 * s * t2)) * scale
+                u2 = np.float32(step * step * t2) * scale
+                for l in range(loops):
+                    k = np.float32(l)
+                    x = p0 + k * (p1 + k * p2)
+                    x -= np.floor(x + np.float32(0.5))
+                    sine, cosine = _sincos_cycles(x)
+                    re[l] = size * cosine
+                    im[l] = size * sine
+                    u[l] = u0 + k * (u1 + k * u2)
+                    before[l] = u[l]
+                    now[l] = np.float32(1)
+                for p in range(orders):
+                    for l in range(loops):
+                        acc[0, p, a, l] += re[l] * now[l]
+                        acc[1, p, a, l] += im[l] * now[l]
+                        following = np.float32(2) * u[l] * now[l] - before[l]
+                        before[l] = now[l]
+                        now[l] = following
+        for p in range(orders):
+            for a in range(virtual):
+                for l in range(loops):
+                    moments[cell, p, a, l, 0] = acc[0, p, a, l]
+                    moments[cell, p, a, l, 1] = acc[1, p, a, l]
+
+
+@njit(inline="always", fastmath=True)
+def _sincos_cycles(x):
+    """sin and cos of 2 pi x for |x| <= 1/2, float32, error below 1e-6: polynomials that the compiler vectorises."""
+    y = x * x
+    sine = x * (
+        np.float32(6.28318492)
+        + y * (np.float32(-41.34158923) + y * (np.float32(81.59994333) + y * (np.float32(-76.61447253)
+        + y * (np.float32(41.34288235) + y * np.float32(-12.47124353)))))
+    )  # fmt: skip
+    cosine = (
+        np.float32(0.99999921)
+        + y * (np.float32(-19.73898036) + y * (np.float32(64.92865742) + y * (np.float32(-85.27162153)
+        + y * (np.float32(58.79049212) + y * np.float32(-21.07110563)))))
+    )  # fmt: skip
+    return sine, cosine

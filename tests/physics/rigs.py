@@ -1,0 +1,70 @@
+"""Motions and measurements that the physics tests share."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation
+
+from radarize.radar.array import virtual_positions
+from radarize.radar.config import RadarConfig
+from radarsim.physics.synthesis import Synthesizer
+
+
+@dataclass
+class Rig:
+    """A body at constant velocity and yaw rate, the sensor on a lever arm (body frame)."""
+
+    velocity: tuple = (0.0, 0.0, 0.0)
+    yaw_rate: float = 0.0
+    yaw: float = 0.0
+    lever: tuple = (0.0, 0.0, 0.0)
+
+    def rotation(self, t):
+        return Rotation.from_rotvec(np.outer(self.yaw + self.yaw_rate * np.asarray(t), [0, 0, 1]))
+
+    def position(self, t):
+        return np.outer(t, self.velocity) + self.rotation(t).apply(self.lever)
+
+
+def polar(range_, azimuth_deg=0.0, elevation_deg=0.0):
+    """Point at a range and direction from the origin."""
+    a, e = np.deg2rad([azimuth_deg, elevation_deg])
+    return range_ * np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
+
+
+def burst(config, echoes, motion, time=0.0):
+    """Beat signal of echoes by the fast synthesis."""
+    return Synthesizer(config)(echoes.lengths(config, motion, time), echoes.amplitude)
+
+
+def locate(config: RadarConfig, signal, guess):
+    """Range, azimuth, elevation (rad), closing speed and amplitude of the strongest echo, by maximising the matched filter.
+
+    A far-field, constant-velocity signal model written from the definitions, not from the synthesis: phase
+    -2 pi / lambda (antenna . u) over antennas, closing echoes at exp(-j 4 pi v t / lambda), beat frequency from range
+    and the Doppler shift within the ramp.
+    """
+    t = config.chirp_times - config.burst_center
+    n = (np.arange(config.samples) - (config.samples - 1) / 2) / config.sample_rate
+    k = 2 * np.pi / config.wavelength
+    antennas = virtual_positions(config)
+
+    def response(x):
+        range_, azimuth, elevation, speed = x
+        u = np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+        path = 2 * range_ - antennas @ u
+        beat = (config.slope * path - 2 * config.center_frequency * speed) / 299792458.0
+        slow = -2 * k * speed * t[:, :, None, None] + k * (path - 2 * range_)[None, :, :, None]
+        phase = slow + 2 * np.pi * beat[None, :, :, None] * n
+        return np.mean(signal * np.exp(-1j * phase))
+
+    scale = np.array([0.01, 0.02, 0.02, 0.02])
+    found = minimize(
+        lambda x: -abs(response(np.asarray(guess) + x * scale)) ** 2 / np.mean(abs(signal) ** 2),
+        np.zeros(4),
+        method="Nelder-Mead",
+        options={"xatol": 1e-5, "fatol": 1e-14, "maxiter": 4000, "maxfev": 4000},
+    )
+    best = np.asarray(guess) + found.x * scale
+    return *best, response(best)

@@ -1,0 +1,162 @@
+"""Planar odometry: velocities at burst centres and yaw increments between them, integrated to a trajectory."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int16
+
+from radarize.errors import InputError
+from radarize.heatmaps import Heatmaps
+from radarize.odometry.doppler import DopplerVelocity, Velocities
+from radarize.odometry.rotation import MapRotation, Rotations
+from radarize.radar.config import RadarConfig
+
+
+class VelocityEstimator(Protocol):
+    """Sensor velocity per frame from `Heatmaps.spectrum`."""
+
+    def estimate(self, spectrum: torch.Tensor) -> Velocities: ...
+
+
+class RotationEstimator(Protocol):
+    """Yaw increment per frame from spectra in order, their burst-centre times and filtered velocities."""
+
+    def estimate(self, spectrum: torch.Tensor, times: np.ndarray, velocities: Velocities) -> Rotations: ...
+
+
+@dataclass(frozen=True)
+class Track:
+    """Poses of consecutive frames.
+
+    Attributes:
+        time: (frame,) burst centres, s.
+        pose: (frame, 3) x, y (m) and yaw (rad, not wrapped), the first frame of all being the origin.
+        step: (frame, 3) motion since the frame before, in its sensor frame: x, y (m), yaw (rad).
+        covariance: (frame, 3, 3) of `step`.
+        velocity: (frame, 2) filtered, m/s, sensor frame.
+    """
+
+    time: Float[np.ndarray, "frame"]
+    pose: Float[np.ndarray, "frame 3"]
+    step: Float[np.ndarray, "frame 3"]
+    covariance: Float[np.ndarray, "frame 3 3"]
+    velocity: Float[np.ndarray, "frame 2"]
+
+
+class VelocityFilter:
+    """Causal Kalman filter of the planar velocity as a random walk; measurements far off their prediction count less.
+
+    Args:
+        acceleration: m/s^2, standard deviation that a handheld radar's velocity wanders with.
+        gate: squared Mahalanobis distance from which a measurement's covariance is inflated to fit (Huber-like).
+    """
+
+    def __init__(self, acceleration: float = 4.0, gate: float = 9.0):
+        self.acceleration, self.gate = acceleration, gate
+        self._time: float | None = None
+        self._velocity, self._covariance = np.zeros(2), np.eye(2)
+
+    def filter(self, times: Float[np.ndarray, "frame"], measured: Velocities) -> Velocities:
+        """Filtered velocities of the next frames."""
+        velocity, covariance = np.empty_like(measured.velocity), np.empty_like(measured.covariance)
+        for i, time in enumerate(times):
+            dt = 0.0 if self._time is None else time - self._time
+            self._time = float(time)
+            # A random walk of dt, and of no less than a frame's worth of it, never beyond walking speeds.
+            self._covariance = np.minimum(self._covariance + np.eye(2) * (self.acceleration * dt) ** 2, 4.0)
+            innovation = measured.velocity[i] - self._velocity
+            total = self._covariance + measured.covariance[i]
+            distance = innovation @ np.linalg.solve(total, innovation)
+            if distance > self.gate:
+                total = self._covariance + measured.covariance[i] * (distance / self.gate) ** 2
+            gain = self._covariance @ np.linalg.inv(total)
+            self._velocity = self._velocity + gain @ innovation
+            self._covariance = (np.eye(2) - gain) @ self._covariance
+            self._covariance = (self._covariance + self._covariance.T) / 2
+            velocity[i], covariance[i] = self._velocity, self._covariance
+        return Velocities(velocity, covariance, measured.inliers)
+
+
+class Odometry:
+    """Radar odometry in a stream: push batches of frames of any size, get their poses. Memory does not grow.
+
+    Args:
+        config: radar configuration.
+        velocity, rotation: estimators; Doppler least squares and local-map matching if None.
+        device: torch device of the heat maps.
+    """
+
+    def __init__(
+        self,
+        config: RadarConfig,
+        velocity: VelocityEstimator | None = None,
+        rotation: RotationEstimator | None = None,
+        device: str | torch.device = "cpu",
+    ):
+        self.config = config
+        self.heatmaps = Heatmaps(config, device=device)
+        self.velocity = velocity or DopplerVelocity(self.heatmaps)
+        self.rotation = rotation or MapRotation(self.heatmaps)
+        self._filter = VelocityFilter()
+        self._pose = np.zeros(3)
+        self._last: tuple[float, np.ndarray, np.ndarray] | None = None  # time, velocity, covariance
+
+    def push(
+        self,
+        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        times: Float[np.ndarray, "frame"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+    ) -> Track:
+        """Poses of the next frames.
+
+        Args:
+            adc: raw samples.
+            times: the frames' stamps (starts of their first chirps), s.
+            valid: False where a chirp was lost.
+
+        Raises:
+            InputError: samples of the wrong shape, or stamps that do not increase.
+        """
+        centers = np.asarray(times, float) + self.config.burst_center
+        before = centers[0] - 1 if self._last is None else self._last[0]
+        steps = np.diff(centers, prepend=before)
+        if not (steps > 0).all():
+            bad = int(np.argmin(steps > 0))
+            raise InputError(f"frame times step by {steps[bad]:.6f} s before {times[bad]:.6f} s, expected ascending times")
+        spectrum = self.heatmaps.spectrum(adc, valid)
+        velocities = self._filter.filter(centers, self.velocity.estimate(spectrum))
+        rotations = self.rotation.estimate(spectrum, centers, velocities)
+        return self._integrate(centers, velocities, rotations)
+
+    def _integrate(self, times: np.ndarray, velocities: Velocities, rotations: Rotations) -> Track:
+        frames = len(times)
+        pose, step, covariance = np.empty((frames, 3)), np.zeros((frames, 3)), np.zeros((frames, 3, 3))
+        for i in range(frames):
+            velocity, spread = velocities.velocity[i], velocities.covariance[i]
+            if self._last is not None:
+                time, last_velocity, last_spread = self._last
+                dt = times[i] - time
+                step[i] = exponential(dt * (last_velocity + velocity) / 2, rotations.yaw[i])
+                covariance[i, :2, :2] = dt**2 * (last_spread + spread) / 2
+                covariance[i, 2, 2] = rotations.variance[i]
+            self._last = (times[i], velocity, spread)
+            self._pose = pose[i] = compose(self._pose, step[i])
+        return Track(times, pose, step, covariance, velocities.velocity)
+
+
+def exponential(translation: Float[np.ndarray, "2"], turn: float) -> Float[np.ndarray, "3"]:
+    """Motion (x, y, yaw) of a body that drives `translation` (m, body frame) while turning by `turn` evenly: exp of SE(2)."""
+    if abs(turn) < 1e-6:
+        a, b = 1.0, turn / 2
+    else:
+        a, b = np.sin(turn) / turn, (1 - np.cos(turn)) / turn
+    x, y = translation
+    return np.array([a * x - b * y, b * x + a * y, turn])
+
+
+def compose(pose: Float[np.ndarray, "3"], step: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """Pose after a step given in its own frame; yaw is not wrapped."""
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    return pose + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])

@@ -1,0 +1,235 @@
+"""Yaw from range-azimuth maps, by matching each frame against a sliding local map of the frames before it.
+
+Pairs of frames force a choice: close together they measure every increment with the noise of one match, far apart they
+lose their overlap in turns. A local map that forgets slowly has both spacings at once. Each frame is laid into the map
+at the position that the velocities predict, at a fan of yaws around the predicted one; the best correlation is its yaw,
+and the map is renewed there. As long as landmarks stay in view, errors do not accumulate.
+
+The maps are Capon power, whose sharp ridges halve the error of windowed-sum maps, compressed by an eighth power
+so that a wall's flash does not outvote the furniture.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Complex64, Float, Float32
+from numba import njit
+
+from radarize.heatmaps import Heatmaps
+from radarize.odometry.doppler import Velocities
+
+
+@dataclass(frozen=True)
+class Rotations:
+    """Yaw increments, one per frame, from the burst centre of the frame before to this frame's.
+
+    Attributes:
+        yaw: (frame,) rad, positive to the left; zero for the very first frame.
+        variance: (frame,) rad^2.
+        correlation: (frame,) of the match, -1...1; zero for the very first frame.
+    """
+
+    yaw: Float[np.ndarray, "frame"]
+    variance: Float[np.ndarray, "frame"]
+    correlation: Float[np.ndarray, "frame"]
+
+
+@dataclass(frozen=True)
+class RotationSettings:
+    """Settings of `MapRotation`.
+
+    Attributes:
+        field: largest |sin azimuth| used.
+        columns: azimuth columns, uniform in sin azimuth.
+        min_range: m; nearer bins are leakage.
+        compression: exponent of power.
+        cell: m, side of a map cell.
+        memory: frames over which the map forgets.
+        fan, step: rad, half width and spacing of the yaws tried around the prediction.
+        jerk: rad/s, standard deviation of the change of turning rate from frame to frame.
+        yaw_noise: rad, standard deviation of a match at full correlation.
+        least_correlation: a match below it is not believed: turning is taken to go on as before.
+    """
+
+    field: float = 0.85
+    columns: int = 69
+    min_range: float = 0.2
+    compression: float = 0.125
+    cell: float = 0.05
+    memory: int = 20
+    fan: float = np.radians(5.0)
+    step: float = np.radians(0.5)
+    jerk: float = np.radians(12.0)
+    yaw_noise: float = np.radians(0.3)
+    least_correlation: float = 0.15
+
+
+class MapRotation:
+    """Rotation estimator with a local map; frames are pushed in order, in batches of any size.
+
+    The pose inside the local map is a running one: x, y from the velocities, yaw and turning rate from a filter with a
+    constant rate, which the matches correct.
+    """
+
+    def __init__(self, heatmaps: Heatmaps, settings: RotationSettings | None = None):
+        s = self.settings = settings or RotationSettings()
+        sines = np.linspace(-s.field, s.field, s.columns)
+        self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(sines), heatmaps.loading, heatmaps.device)
+        self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
+        self._ranges = heatmaps.ranges[self._first :]
+        side = 2 * int((self._ranges[-1] + 2.0) / s.cell)
+        self._map = np.zeros((2, side, side), np.float32)  # mean, count
+        self._offsets = np.arange(-round(s.fan / s.step), round(s.fan / s.step) + 1) * s.step
+        self._state: tuple | None = None  # time, velocity
+        self._position = np.zeros(2)
+        self._heading = np.zeros(2)  # yaw, rate
+        self._spread = np.diag([0.0, 1.0])
+
+    def features(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Float32[np.ndarray, "frame r a"]:
+        """Compressed Capon maps over the noise floor."""
+        power = self._heatmaps.range_azimuth_of(spectrum, "capon")[:, self._first :].cpu().numpy()
+        floor = np.median(power, axis=(1, 2), keepdims=True)
+        return np.ascontiguousarray((power / np.maximum(floor, 1e-9)) ** self.settings.compression, np.float32)
+
+    def estimate(
+        self,
+        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
+        times: Float[np.ndarray, "frame"],
+        velocities: Velocities,
+    ) -> Rotations:
+        """Yaw increments of the next frames.
+
+        Args:
+            spectrum: `Heatmaps.spectrum` of the frames.
+            times: burst centres, s.
+            velocities: velocities there.
+        """
+        result = np.zeros((3, len(times)))
+        for i, feature in enumerate(self.features(spectrum)):
+            result[:, i] = self._push(feature, float(times[i]), velocities.velocity[i])
+        return Rotations(*result)
+
+    def _push(self, feature: np.ndarray, time: float, velocity: np.ndarray) -> tuple[float, float, float]:
+        s = self.settings
+        if self._state is None:
+            self._renew(feature, time, velocity)
+            return 0.0, 0.0, 0.0
+        before, last_velocity = self._state
+        dt = time - before
+        transition = np.array([[1.0, dt], [0.0, 1.0]])
+        start = self._heading[0]
+        self._heading = transition @ self._heading
+        change = (s.jerk * dt / 0.033) ** 2
+        self._spread = transition @ self._spread @ transition.T + change * np.array([[dt**2 / 4, dt / 2], [dt / 2, 1]])
+        middle = (start + self._heading[0]) / 2
+        c, d = np.cos(middle), np.sin(middle)
+        self._position += dt * np.array([[c, -d], [d, c]]) @ ((last_velocity + velocity) / 2)
+
+        yaws = self._heading[0] + self._offsets
+        correlation = _correlate(feature, self._ranges, self._angles, *self._map, *self._position, yaws, s.cell)
+        offset, noise, peak = _peak(correlation, self._offsets, s)
+        gain = self._spread[:, 0] / (self._spread[0, 0] + noise)
+        self._heading = self._heading + gain * offset
+        self._spread = self._spread - np.outer(gain, self._spread[0])
+        self._renew(feature, time, velocity)
+        return self._heading[0] - start, self._spread[0, 0], peak
+
+    @property
+    def _angles(self) -> np.ndarray:
+        return self._heatmaps.azimuths
+
+    def _renew(self, feature: np.ndarray, time: float, velocity: np.ndarray) -> None:
+        """Blend the frame into the map at the current pose, keeping the sensor in the map's middle metre."""
+        s = self.settings
+        shift = np.rint(self._position / s.cell).astype(int)
+        if np.abs(shift).max() * s.cell > 1.0:
+            self._map = _shifted(self._map, -shift)
+            self._position = self._position - shift * s.cell
+        spacing = self._ranges[1] - self._ranges[0]
+        pose = (*self._position, self._heading[0])
+        if feature.any():  # a frame lost as a whole has nothing to say
+            _blend(feature, self._ranges[0], spacing, s.field, *self._map, *pose, s.cell, 1 / s.memory)
+        self._state = (time, np.asarray(velocity, float))
+
+
+def _shifted(grid: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """Grid moved by whole cells, zeros coming in."""
+    moved = np.zeros_like(grid)
+    source, target = [slice(None)], [slice(None)]
+    for step, size in zip(shift, grid.shape[1:], strict=True):
+        source.append(slice(max(-step, 0), size - max(step, 0)))
+        target.append(slice(max(step, 0), size - max(-step, 0)))
+    moved[tuple(target)] = grid[tuple(source)]
+    return moved
+
+
+def _peak(correlation: np.ndarray, offsets: np.ndarray, s: RotationSettings) -> tuple[float, float, float]:
+    """Yaw offset (rad), its variance and the height of the best match; a match not believed has a large variance."""
+    best = int(np.argmax(correlation))
+    peak = float(correlation[best])
+    if not 0 < best < len(offsets) - 1 or peak < s.least_correlation:
+        return 0.0, s.fan**2 * 4, peak
+    left, right = correlation[best - 1], correlation[best + 1]
+    offset = offsets[best] + 0.5 * s.step * (left - right) / (left - 2 * peak + right)
+    return float(offset), (s.yaw_noise / peak) ** 2, peak
+
+
+@njit(cache=True, fastmath=True)
+def _correlate(feature, ranges, azimuths, mean, count, x, y, yaws, cell):
+    """Normalised correlation of a polar map with the grid map, seen from (x, y) at each yaw; cells weigh by area."""
+    side = mean.shape[0]
+    result = np.zeros(len(yaws))
+    origin_x, origin_y = x / cell + side / 2, y / cell + side / 2
+    for k in range(len(yaws)):
+        n = sum_f = sum_m = sum_ff = sum_mm = sum_fm = 0.0
+        for j in range(len(azimuths)):
+            c, s = np.cos(azimuths[j] + yaws[k]) / cell, np.sin(azimuths[j] + yaws[k]) / cell
+            for i in range(len(ranges)):
+                w = ranges[i]
+                at_x, at_y = origin_x + w * c, origin_y + w * s
+                ix, iy = int(at_x), int(at_y)
+                if ix < 0 or iy < 0 or ix >= side - 1 or iy >= side - 1:
+                    continue
+                if min(count[ix, iy], count[ix + 1, iy], count[ix, iy + 1], count[ix + 1, iy + 1]) <= 0:
+                    continue
+                u, v = at_x - ix, at_y - iy
+                m = (mean[ix, iy] * (1 - u) + mean[ix + 1, iy] * u) * (1 - v)
+                m += (mean[ix, iy + 1] * (1 - u) + mean[ix + 1, iy + 1] * u) * v
+                f = feature[i, j]
+                n += w
+                sum_f += w * f
+                sum_m += w * m
+                sum_ff += w * f * f
+                sum_mm += w * m * m
+                sum_fm += w * f * m
+        if n > 0:
+            f_var, m_var = sum_ff - sum_f * sum_f / n, sum_mm - sum_m * sum_m / n
+            result[k] = (sum_fm - sum_f * sum_m / n) / np.sqrt(max(f_var * m_var, 1e-12))
+    return result
+
+
+@njit(cache=True, fastmath=True)
+def _blend(feature, nearest, spacing, field, mean, count, x, y, yaw, cell, least):
+    """Running mean of polar maps on the grid; a cell's newest value weighs 1/count, but no less than `least`."""
+    side, (rows, columns) = mean.shape[0], feature.shape
+    c, s = np.cos(yaw), np.sin(yaw)
+    reach = int((nearest + spacing * rows) / cell) + 1
+    middle_x, middle_y = int(x / cell + side / 2), int(y / cell + side / 2)
+    for ix in range(max(0, middle_x - reach), min(side, middle_x + reach)):
+        for iy in range(max(0, middle_y - reach), min(side, middle_y + reach)):
+            dx, dy = (ix - side / 2) * cell - x, (iy - side / 2) * cell - y
+            ahead, left = c * dx + s * dy, c * dy - s * dx
+            if ahead <= 0:
+                continue
+            r = np.sqrt(dx * dx + dy * dy)
+            i = (r - nearest) / spacing
+            j = (left / r + field) / (2 * field) * (columns - 1)
+            if i < 0 or j < 0 or i >= rows - 1 or j >= columns - 1:
+                continue
+            a, b = int(i), int(j)
+            u, v = i - a, j - b
+            f = (feature[a, b] * (1 - v) + feature[a, b + 1] * v) * (1 - u)
+            f += (feature[a + 1, b] * (1 - v) + feature[a + 1, b + 1] * v) * u
+            count[ix, iy] += 1
+            mean[ix, iy] += max(1 / count[ix, iy], least) * (f - mean[ix, iy])

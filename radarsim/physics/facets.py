@@ -6,14 +6,15 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from radarize.radar.config import RadarConfig
+from radarsim.physics.scatterers import is_floor_or_ceiling, is_sheet
 from radarsim.scene.scene import Scene
 
 #: Facets below this area (m^2) do not flash: their scatterers stand for them.
 SMALLEST_PLATE = 0.01
 #: Facets below this area (m^2) are no mirrors: at 77 GHz and 2 m the first Fresnel zone is about 0.03 m^2 wide.
 SMALLEST_MIRROR = 0.25
-#: A facet that fills less than this share of its rectangle is neither.
-SMALLEST_FILL = 0.75
+#: A rectangle is a group of triangles that fills this share of its bounding rectangle.
+SMALLEST_FILL = 0.97
 #: Entries of the reflection tables, over the cosine of the angle of incidence.
 TABLE = 65
 
@@ -47,7 +48,7 @@ class Facets:
 
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig) -> "Facets":
-        """The rectangles of a scene: groups of coplanar neighbouring triangles that fill their bounding rectangle."""
+        """The rectangles of a scene: coplanar neighbouring triangles, as a whole or pair by pair (walls with openings)."""
         rows = []
         tables: dict[str, np.ndarray] = {}
         for item in scene.objects:
@@ -55,17 +56,16 @@ class Facets:
             name = item.material.name
             if name not in tables:
                 tables[name] = _reflection_table(item.material, config)
-            for faces, area in zip(mesh.facets, mesh.facets_area, strict=True):
-                if area < SMALLEST_PLATE:
-                    continue
+            for faces in mesh.facets:
                 normal = mesh.face_normals[faces[0]]
-                rectangle = _rectangle(mesh.triangles[faces].reshape(-1, 3), normal)
-                if area < SMALLEST_FILL * 4 * rectangle[3].prod():
-                    continue
-                rows.append(
-                    (rectangle[0], normal, rectangle[1], rectangle[2], rectangle[3], not mesh.is_watertight,
-                     area >= SMALLEST_MIRROR, _is_floor_or_ceiling(item), tables[name])
-                )  # fmt: skip
+                for center, u, v, half in _rectangles(mesh, faces, normal):
+                    area = 4 * half.prod()
+                    if area < SMALLEST_PLATE:
+                        continue
+                    rows.append(
+                        (center, normal, u, v, half, is_sheet(mesh), area >= SMALLEST_MIRROR,
+                         is_floor_or_ceiling(item), tables[name])
+                    )  # fmt: skip
         if not rows:
             empty = np.zeros((0, 3))
             none = np.zeros(0, bool)
@@ -78,6 +78,22 @@ def _reflection_table(material, config: RadarConfig) -> Complex[np.ndarray, "2 c
     cosine = np.linspace(0, 1, TABLE)
     rough = np.exp(-8 * (np.pi * material.roughness * cosine / config.wavelength) ** 2)
     return np.conj(np.stack(material.fresnel(cosine, config.center_frequency))) * rough
+
+
+def _rectangles(mesh, faces, normal):
+    """Rectangles that a group of coplanar triangles consists of: the group itself, or pairs of its triangles."""
+    whole = _rectangle(mesh.triangles[faces].reshape(-1, 3), normal)
+    if mesh.area_faces[faces].sum() >= SMALLEST_FILL * 4 * whole[3].prod():
+        return [whole]
+    members, taken, found = set(faces.tolist()), set(), []
+    for pair in mesh.face_adjacency.tolist():
+        if not members.issuperset(pair) or taken.intersection(pair):
+            continue
+        rectangle = _rectangle(mesh.triangles[pair].reshape(-1, 3), normal)
+        if mesh.area_faces[pair].sum() >= SMALLEST_FILL * 4 * rectangle[3].prod():
+            found.append(rectangle)
+            taken.update(pair)
+    return found
 
 
 def _rectangle(points: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "3"]):

@@ -13,25 +13,44 @@ import re
 from radarize.errors import InputError
 
 OLDEST = 19
+PACKAGE = "libllvm19"
+INSTALL = f"apt-get install {PACKAGE}"
 _PATTERNS = (
     "/usr/lib/*/libLLVM*.so*",
     "/usr/lib/llvm-*/lib/libLLVM*.so*",
     "/usr/lib64/libLLVM*.so*",
+    "/usr/lib64/llvm*/lib*/libLLVM*.so*",
     "/usr/lib/libLLVM*.so*",
     "/usr/local/lib/libLLVM*.so*",
     "/opt/homebrew/opt/llvm*/lib/libLLVM*.dylib",
 )
-INSTALL = "apt-get install libllvm19"
 
 
 def version(path: str) -> int:
-    """Major version of a libLLVM, asked of the library itself (LLVMGetVersion, since 16), else 0."""
+    """Major version of a libLLVM: asked of the library (LLVMGetVersion, since 16), else by its name; 0 if unreadable."""
+    try:
+        library = ctypes.CDLL(path)
+    except OSError:
+        return 0
     try:
         major = ctypes.c_uint()
-        ctypes.CDLL(path).LLVMGetVersion(ctypes.byref(major), None, None)
+        library.LLVMGetVersion(ctypes.byref(major), None, None)
         return major.value
-    except (OSError, AttributeError):
-        return 0
+    except AttributeError:
+        # So it is older than 16, whatever it is called.
+        return min(_named_version(path), 15)
+
+
+def _named_version(path: str) -> int:
+    """Major version that a file's name promises (``libLLVM-14.so.1``, ``libLLVM.so.19.1``), 0 if none."""
+    numbers = re.findall(r"\d+", os.path.basename(os.path.realpath(path)))
+    return int(numbers[0]) if numbers else 0
+
+
+def installed() -> list[tuple[int, str]]:
+    """Every libLLVM of this machine as (major version by its name, path), newest first; none is loaded."""
+    paths = {os.path.realpath(path): path for pattern in _PATTERNS for path in glob.glob(pattern)}
+    return sorted(((_named_version(path), path) for path in paths.values()), reverse=True)
 
 
 def find() -> tuple[str, int] | None:
@@ -39,13 +58,8 @@ def find() -> tuple[str, int] | None:
     if named := os.environ.get("DRJIT_LIBLLVM_PATH"):
         return named, version(named)
     # Only files whose name promises a usable version are opened: loading several LLVMs into a process invites clashes.
-    candidates = {}
-    for pattern in _PATTERNS:
-        for path in glob.glob(pattern):
-            if (numbers := re.findall(r"\d+", os.path.basename(path))) and int(numbers[0]) >= OLDEST:
-                candidates.setdefault(int(numbers[0]), path)
-    for _, path in sorted(candidates.items(), reverse=True):
-        if (major := version(path)) >= OLDEST:
+    for promised, path in installed():
+        if promised >= OLDEST and (major := version(path)) >= OLDEST:
             return path, major
     return None
 
@@ -58,11 +72,16 @@ def require() -> None:
     """
     found = find()
     if found is None:
-        raise InputError(f"no LLVM of version {OLDEST} or newer found, which the ray tests need; type: {INSTALL}")
+        old = sorted({major for major, _ in installed() if major})
+        raise InputError(
+            f"found {f'only LLVM {old[-1]}' if old else 'no LLVM'} on this machine, expected version {OLDEST} or newer "
+            f"for the ray tests; type: {INSTALL}"
+        )
     path, major = found
     if major < OLDEST:
         raise InputError(
             f"DRJIT_LIBLLVM_PATH names {path}, which is "
-            f"{f'LLVM {major}' if major else 'no readable LLVM'}, expected version {OLDEST} or newer; type: {INSTALL}"
+            f"{f'LLVM {major}' if major else 'no readable LLVM'}, expected version {OLDEST} or newer; unset it, or "
+            f"type: {INSTALL}"
         )
     os.environ["DRJIT_LIBLLVM_PATH"] = path

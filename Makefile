@@ -1,0 +1,22 @@
+# make demo: sets this machine up and runs the main job end to end      make test: sets up and passes the tests
+RUN := runs/demo
+
+.PHONY: setup demo test lint clean
+
+setup:
+	@./setup.sh
+
+demo: setup
+	@.venv/bin/radarsim simulate office -o $(RUN)/office.h5 --platform handheld --duration 40 --seed 0
+	@.venv/bin/radarize run $(RUN)/office.h5 -o $(RUN)
+	@.venv/bin/radarize evaluate $(RUN)
+	@.venv/bin/radarize report $(RUN)
+
+test: setup
+	@.venv/bin/python -m pytest $(TESTS)
+
+lint: setup
+	@.venv/bin/ruff check .
+
+clean:
+	rm -rf .venv $(RUN) build *.egg-info

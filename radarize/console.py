@@ -1,0 +1,146 @@
+"""What both command lines share: errors as one sentence, progress bars, and what an interrupt leaves behind."""
+
+import errno
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from radarize.errors import InputError
+
+#: Exit code of everything that ends in an error sentence.
+FAILED = 2
+
+
+def new_app(about: str) -> typer.Typer:
+    """A command line with the options that every command takes."""
+    app = typer.Typer(help=about, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
+
+    @app.callback()
+    def options(debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False):
+        del debug  # taken from the arguments by `run`, so that it works in any place
+
+    return app
+
+
+def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None:
+    """Run a command line and exit: 0, or 2 with one sentence on stderr.
+
+    Args:
+        app: its commands.
+        name: as the user typed it.
+        arguments: the process's own if None.
+    """
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in arguments
+    arguments = [argument for argument in arguments if argument != "--debug"]
+    try:
+        code = typer.main.get_command(app).main(arguments, prog_name=name, standalone_mode=False)
+    except (Exception, KeyboardInterrupt) as error:
+        if debug:
+            raise
+        print(f"{name}: {_sentence(error)}", file=sys.stderr)
+        code = FAILED
+    if code == 130:  # how Typer hands on an interrupt that no command caught
+        print(f"\n{name}: stopped; nothing was written", file=sys.stderr)
+        code = FAILED
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def _sentence(error: BaseException) -> str:
+    if isinstance(error, InputError):
+        return str(error)
+    if isinstance(error, KeyboardInterrupt):
+        return "stopped; nothing was written"
+    if hasattr(error, "format_message"):  # the parser's own: a wrong option, a missing argument
+        return " ".join(error.format_message().split())
+    if isinstance(error, MemoryError) or type(error).__name__ == "OutOfMemoryError":
+        return f"not enough memory ({_first_line(error)}); a shorter recording or a smaller scene needs less"
+    if isinstance(error, OSError):
+        reason = "no space left on the device" if error.errno == errno.ENOSPC else error.strerror or _first_line(error)
+        return f"{error.filename}: {reason}" if error.filename else reason
+    return f"internal error, {type(error).__name__}: {_first_line(error)}; --debug shows where"
+
+
+def _first_line(error: BaseException) -> str:
+    return str(error).strip().split("\n", 1)[0] or type(error).__name__
+
+
+@contextmanager
+def progress(label: str) -> Iterator[Callable[[int, int], None]]:
+    """A progress bar on stderr, moved by calling what this yields with (done, in all)."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+    columns = (
+        TextColumn("{task.description:<22}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        task = bar.add_task(label, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total or None)
+
+
+@contextmanager
+def stages() -> Iterator[Callable[[str, int, int], None]]:
+    """Progress bars on stderr, one per stage, moved by (stage, done, in all)."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (TextColumn("{task.description:<22}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bar:
+        tasks: dict[str, object] = {}
+
+        def move(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bar.add_task(stage, total=None)
+            bar.update(tasks[stage], completed=done, total=total or None)
+
+        yield move
+
+
+@contextmanager
+def working(label: str) -> Iterator[None]:
+    """A spinner on stderr for steps that cannot say how far they are."""
+    from rich.console import Console
+
+    with Console(stderr=True).status(label):
+        yield
+
+
+@contextmanager
+def keeping(output: Path) -> Iterator[None]:
+    """Turn an interrupt into a sentence that says what of `output`, a recording, was kept.
+
+    Raises:
+        InputError: the user interrupted.
+    """
+    before = _written(output)
+    try:
+        yield
+    except KeyboardInterrupt:
+        raise InputError(f"stopped; {_kept(output, before)}") from None
+
+
+def _written(path: Path) -> int | None:
+    return path.stat().st_mtime_ns if path.is_file() else None
+
+
+def _kept(output: Path, before: int | None) -> str:
+    from radarize.recording import Recording
+
+    for path in (output, output.with_name(output.name + ".part")):
+        if path.is_file() and not (path == output and _written(path) == before):
+            try:
+                with Recording(path) as recording:
+                    return f"{len(recording)} whole frames are kept in {path}"
+            except InputError:
+                pass  # not even its first frame was written
+    return "nothing was written"

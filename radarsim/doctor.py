@@ -1,0 +1,180 @@
+"""Examines the machine: what is there, what is missing, and the command that gets it.
+
+``python -m radarsim.doctor --missing-packages`` prints the system packages that are missing; `setup.sh` asks it before
+any Python package is installed, so everything here that is not the standard library's is imported late.
+"""
+
+import ctypes
+import importlib.metadata
+import importlib.util
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+
+from radarize.errors import InputError
+from radarsim import llvm
+
+#: Shared libraries that Python packages load from the system (all of them open3d's), and their Debian packages.
+LIBRARIES = {
+    "libusb-1.0.so.0": "libusb-1.0-0",
+    "libudev.so.1": "libudev1",
+    "libEGL.so.1": "libegl1",
+    "libGL.so.1": "libgl1",
+    "libX11.so.6": "libx11-6",
+    "libidn2.so.0": "libidn2-0",
+}
+PACKAGES = ("torch", "sionna-rt", "mitsuba", "drjit", "gtsam", "open3d", "numba", "h5py", "evo")
+#: A recording of a minute takes about a quarter of this.
+FREE_DISK = 2e9
+
+# In a process of its own, for what it guards against ends the process.
+_RAY_TEST = """
+from radarsim import llvm
+llvm.require()
+import mitsuba as mi
+mi.set_variant("llvm_ad_mono_polarized")
+scene = mi.load_dict({"type": "scene", "wall": {"type": "rectangle"}})
+hit = scene.ray_intersect(mi.Ray3f(o=[0, 0, 2], d=[0, 0, -1]))
+assert abs(hit.t[0] - 2) < 1e-5, hit.t
+import sionna.rt
+"""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the examination.
+
+    Attributes:
+        what: the thing looked for.
+        state: ``"ok"``, ``"missing"`` (nothing works without) or ``"optional"`` (not there, and not needed).
+        detail: what was found.
+        remedy: the command to type, if any.
+    """
+
+    what: str
+    state: str
+    detail: str
+    remedy: str = ""
+
+
+def missing_packages() -> list[str]:
+    """Names of the system packages (Debian, Ubuntu) that are missing; none elsewhere than on Linux."""
+    if platform.system() != "Linux":
+        return []
+    packages = [] if llvm.find() else [llvm.PACKAGE]
+    return packages + [package for library, package in LIBRARIES.items() if not _loads(library)]
+
+
+def _loads(library: str) -> bool:
+    try:
+        ctypes.CDLL(library)
+        return True
+    except OSError:
+        return False
+
+
+def findings() -> list[Finding]:
+    """Everything the examination found; takes a few seconds."""
+    return [
+        _python(),
+        *(_package(name) for name in PACKAGES),
+        _llvm(),
+        *(_library(library) for library in LIBRARIES if platform.system() == "Linux"),
+        _ray_test(),
+        _cuda(),
+        _chromium(),
+        _disk(),
+    ]
+
+
+def _python() -> Finding:
+    found = f"{platform.python_version()}, {sys.prefix}"
+    good = sys.version_info >= (3, 11)
+    return Finding("Python", "ok" if good else "missing", found, "" if good else "apt-get install python3.11-venv")
+
+
+def _package(name: str) -> Finding:
+    try:
+        return Finding(name, "ok", importlib.metadata.version(name))
+    except importlib.metadata.PackageNotFoundError:
+        return Finding(name, "missing", "not installed", "./setup.sh")
+
+
+def _llvm() -> Finding:
+    try:
+        llvm.require()
+    except InputError as error:
+        return Finding("LLVM", "missing", str(error).partition("; ")[0], llvm.INSTALL)
+    path, major = llvm.find()
+    return Finding("LLVM", "ok", f"{major}, {path}")
+
+
+def _library(library: str) -> Finding:
+    if _loads(library):
+        return Finding(library, "ok", "loads")
+    return Finding(library, "missing", "not found (open3d needs it)", f"apt-get install {LIBRARIES[library]}")
+
+
+def _ray_test() -> Finding:
+    try:
+        done = subprocess.run([sys.executable, "-c", _RAY_TEST], capture_output=True, text=True, timeout=120)
+    except subprocess.TimeoutExpired:
+        return Finding("ray test", "missing", "no answer within two minutes", "./setup.sh")
+    if done.returncode == 0:
+        return Finding("ray test", "ok", "Mitsuba's llvm_ad_mono_polarized variant hits a wall; Sionna RT imports")
+    reason = (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1]
+    return Finding("ray test", "missing", reason, llvm.INSTALL if "LLVM" in done.stderr else "./setup.sh")
+
+
+def _cuda() -> Finding:
+    if importlib.util.find_spec("torch") is None:
+        return Finding("CUDA", "optional", "unknown without torch")
+    import torch
+
+    if torch.cuda.is_available():
+        return Finding("CUDA", "ok", torch.cuda.get_device_name())
+    card = shutil.which("nvidia-smi") is not None
+    # The lock file brings the build for processors; this one brings the CUDA libraries along.
+    remedy = f".venv/bin/pip install --force-reinstall torch=={torch.__version__.split('+')[0]}" if card else ""
+    return Finding("CUDA", "optional", "a card, but torch cannot use it" if card else "no NVIDIA card", remedy)
+
+
+def _chromium() -> Finding:
+    for name in ("chromium", "chromium-browser", "google-chrome"):
+        if path := shutil.which(name):
+            return Finding("Chromium", "ok", path)
+    return Finding("Chromium", "optional", "only a test of the reports uses it", "apt-get install chromium")
+
+
+def _disk() -> Finding:
+    free = shutil.disk_usage(os.getcwd()).free
+    found = f"{free / 1e9:.1f} GB free in {os.getcwd()}"
+    if free >= FREE_DISK:
+        return Finding("disk", "ok", found)
+    return Finding("disk", "missing", f"{found}, expected {FREE_DISK / 1e9:.0f} GB or more")
+
+
+def examine() -> bool:
+    """Print the findings as a table; whether everything that is needed is there."""
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    from radarize.console import working
+
+    with working("examining this machine"):
+        found = findings()
+    marks = {"ok": "[green]ok[/]", "missing": "[red]missing[/]", "optional": "[yellow]optional[/]"}
+    table = Table("what", "state", Column("found", overflow="fold"), "type this to get it", header_style="bold")
+    for finding in found:
+        table.add_row(finding.what, marks[finding.state], finding.detail, finding.remedy)
+    Console().print(table)
+    return not any(finding.state == "missing" for finding in found)
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] != ["--missing-packages"]:
+        sys.exit("usage: python -m radarsim.doctor --missing-packages (people type: radarsim doctor)")
+    print(" ".join(missing_packages()))

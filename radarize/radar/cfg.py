@@ -205,7 +205,7 @@ def _commands(text: str, name: str) -> Iterator[Command]:
                     f"({', '.join(FIELDS[word][:14])}{', ...' if count > 14 else ''})"
                 )
             yield Command(name, number, word, tuple(words[1:]))
-        elif close := difflib.get_close_matches(word, FIELDS, 1, cutoff=0.88):
+        elif close := difflib.get_close_matches(word, FIELDS, 1, cutoff=0.85):
             raise InputError(f"{name}, line {number}: unknown command {word}, expected {close[0]}")
 
 

@@ -38,7 +38,7 @@ class RadarConfig(BaseModel):
         high_pass: corner frequencies of the two high-pass stages, Hz.
         iq_order: order within a DCA1000 group of four words: ``"iiqq"`` (mmWave Studio) or ``"qqii"`` (SDK demo).
         range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``).
-        channel_calibration: complex factor per *physical* (tx, rx) as (re, im) pairs: TX1 x RX1..4, TX2 x ..., TX3 x ...
+        channel_calibration: complex factor per *physical* (tx, rx) as (re, im) pairs: TX1 x RX1..4, then TX2, TX3.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

@@ -133,8 +133,8 @@ class _Builder:
     def _doors(self) -> None:
         for side, row in enumerate(self.sides):
             for i, room in enumerate(row):
-                paired = i < len(row) - len(row) % 2  # rooms 1-2, 3-4, ... share a doorway and keep their doors open
-                self._corridor_door(room, side, is_open=paired or self.rng.random() < 0.5)
+                # Rooms 1-2, 3-4, ... share a doorway. The first pair of a side keeps both doors open: a loop to walk.
+                self._corridor_door(room, side, is_open=self.rng.random() < 0.75 or i < 2)
             for left, right in zip(row[::2], row[1::2], strict=False):
                 self._doorway(left, right, side)
 
@@ -147,7 +147,7 @@ class _Builder:
         face = room.y1 if side == 0 else room.y0
         room.kept.append(area(*sorted_box(x0 - 0.1, face, x0 + DOOR_WIDTH + 0.1, face + inward * 1.1)))
         # The way to the middle of the room stays walkable, through whichever doors there are.
-        room.kept.append(LineString([(x0 + DOOR_WIDTH / 2, face), room.center]).buffer(0.55))
+        room.kept.append(LineString([(x0 + DOOR_WIDTH / 2, face), room.center]).buffer(0.5))
         name = f"{room.name} door"
         if not is_open:
             leaf = shapes.box(
@@ -178,7 +178,7 @@ class _Builder:
         middle = y0 + DOOR_WIDTH / 2
         for room, face, inward in ((left, left.x1, -1), (right, right.x0, 1)):
             room.kept.append(area(*sorted_box(face, y0 - 0.1, face + inward * 0.9, y0 + DOOR_WIDTH + 0.1)))
-            room.kept.append(LineString([(face, middle), room.center]).buffer(0.55))
+            room.kept.append(LineString([(face, middle), room.center]).buffer(0.5))
 
     def _windows(self) -> None:
         o = self.office
@@ -301,9 +301,9 @@ class _Builder:
                 self._along_corridor(make(rng))
             return
         if room.kind == "office":
-            for _ in range(2):
+            for _ in range(3):
                 self._workplace(room)
-            plan = [furniture.cabinet, furniture.shelf, furniture.bin, furniture.whiteboard]
+            plan = [furniture.cabinet, furniture.shelf, furniture.bin, furniture.whiteboard, furniture.cabinet]
         elif room.kind == "meeting":
             self._meeting(room)
             plan = [furniture.whiteboard, furniture.cabinet, furniture.whiteboard]
@@ -331,7 +331,7 @@ class _Builder:
         if yaw is None:
             return
         x, y = room.taken[-1].centroid.coords[0]
-        x, y = x + 0.72 * np.cos(yaw), y + 0.72 * np.sin(yaw)
+        x, y = x + 0.82 * np.cos(yaw), y + 0.82 * np.sin(yaw)
         turn = yaw + np.pi + self.rng.uniform(-0.5, 0.5)
         piece = furniture.chair(self.rng)
         if self._free(room, footprint(piece, x, y, turn), ignore_kept=True):

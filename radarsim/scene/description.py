@@ -113,7 +113,7 @@ class Mesh(_Turned):
     def mesh(self, folder: Path) -> trimesh.Trimesh:
         path = folder / self.file
         if not path.is_file():
-            raise InputError(f"object {self.name!r}: file {path} does not exist, expected a mesh (.ply, .obj, .stl, .glb)")
+            raise InputError(f"object {self.name!r}: file {path} does not exist, expected a mesh (.ply, .obj, .stl)")
         try:
             loaded = trimesh.load(path, force="mesh", process=False)
             vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces)
@@ -202,8 +202,9 @@ def _first(error: ValidationError, data: dict) -> str:
     tags = {"box", "rectangle", "cylinder", "sphere", "mesh", "str", "CustomMaterial"}
     place = [part for part in problem["loc"] if part not in tags]
     field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).lstrip(".")
-    if len(place) > 1 and place[0] == "objects" and isinstance(item := data["objects"][place[1]], dict) and "name" in item:
-        field += f" (object {item['name']!r})"
+    if len(place) > 1 and place[0] == "objects":
+        item = data["objects"][place[1]]
+        field += f" (object {item['name']!r})" if isinstance(item, dict) and "name" in item else ""
     if problem["type"] == "extra_forbidden":
         return f"{field}: unknown key"
     value = "" if isinstance(problem["input"], dict) else f" is {problem['input']!r}"

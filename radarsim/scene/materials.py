@@ -7,9 +7,9 @@ lies outside every band (brick, plywood, marble, vinyl, carpet, asphalt, acrylic
 Reflection and the diffuse floor share one energy budget. Roughness takes the factor
 rho = exp(-8 (pi sigma_h cos(theta) / lambda)^2) from the coherent amplitude, and what it takes comes back as Lambertian
 scattering of backscatter coefficient 4 (1 - rho^2) |Gamma|^2 cos^2(theta) (effective roughness, Degli-Esposti et al.,
-IEEE TAP 55(1), 2007). The table's `sigma0` at normal incidence are these values rounded, and a few dB less for coarse or
-porous surfaces (carpet, fabric, mineral fibre, asphalt), which absorb part of what they take. RMS heights are estimates
-for common finishes; expect sigma0 within some 5 dB of a given real wall.
+IEEE TAP 55(1), 2007). The table's `sigma0` at normal incidence are these values rounded, and a few dB less for coarse
+or porous surfaces (carpet, fabric, mineral fibre, asphalt), which absorb part of what they take. RMS heights are
+estimates for common finishes; expect sigma0 within some 5 dB of a given real wall.
 """
 
 from collections.abc import Callable
@@ -127,10 +127,8 @@ def itu_permittivity(name: str, frequency: float) -> complex:
     """
     ghz = frequency / 1e9
     bands = _itu_table()[name]
-    for (low, high), law in bands.items():
-        if low <= ghz <= high:
-            break
-    else:
+    law = next((law for (low, high), law in bands.items() if low <= ghz <= high), None)
+    if law is None:
         below = max((b for b in bands if b[1] < ghz), key=lambda b: b[1], default=None)
         above = min((b for b in bands if b[0] > ghz), key=lambda b: b[0], default=None)
         if below and above:
@@ -217,5 +215,3 @@ def material(name: str) -> Material:
     if plain not in MATERIALS:
         raise InputError(f"unknown material {name!r}, expected one of: {', '.join(sorted(MATERIALS))}")
     return MATERIALS[plain]
-
-

@@ -1,0 +1,152 @@
+"""How a sensor moves: smooth position and attitude at any time, with their exact derivatives.
+
+A body follows a C2 spline in position and attitude; the sensor sits on it with a lever arm and a fixed tilt. So its
+velocity holds the lever arm's share, and Doppler follows from the same functions that give the path length.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
+
+from radarize.errors import InputError
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A sensor on a moving body.
+
+    Times run from 0; outside the span of the splines the body stands still.
+
+    Attributes:
+        duration: s.
+        path: body position in the world over time, m.
+        attitude: body-to-world rotation over time.
+        lever_arm: sensor in the body frame, m.
+        mount: sensor-to-body rotation.
+    """
+
+    duration: float
+    path: CubicSpline
+    attitude: RotationSpline
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mount: Rotation = Rotation.identity()
+
+    def position(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
+        """Sensor in the world, m."""
+        inside = self._inside(t)
+        return self.path(inside) + self.attitude(inside).apply(self.lever_arm)
+
+    def rotation(self, t: Float[np.ndarray, "n"]) -> Rotation:
+        """Sensor-to-world rotation."""
+        return self.attitude(self._inside(t)) * self.mount
+
+    def velocity(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
+        """Velocity of the sensor in the world frame, m/s: v + R (omega x lever arm)."""
+        inside = self._inside(t)
+        swing = np.cross(self.attitude(inside, 1), self.lever_arm)
+        return (self.path(inside, 1) + self.attitude(inside).apply(swing)) * self._moving(t)
+
+    def angular_velocity(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
+        """Angular velocity in the sensor frame, rad/s."""
+        return self.mount.inv().apply(self.attitude(self._inside(t), 1)) * self._moving(t)
+
+    def _inside(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        return np.clip(np.asarray(t, float), self.path.x[0], self.path.x[-1])
+
+    def _moving(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 1"]:
+        t = np.asarray(t, float)
+        return ((t >= self.path.x[0]) & (t <= self.path.x[-1]))[:, None].astype(float)
+
+    @classmethod
+    def still(
+        cls,
+        position: tuple[float, float, float],
+        yaw: float = 0.0,
+        pitch: float = 0.0,
+        roll: float = 0.0,
+        duration: float = 1.0,
+    ) -> "Motion":
+        """Standing still; angles in rad, applied as roll, pitch, yaw (pitch positive: nose down)."""
+        times = np.array([-1.0, duration + 1.0])
+        turn = Rotation.from_euler("ZYX", np.tile([yaw, pitch, roll], (2, 1)))
+        return cls(duration, CubicSpline(times, np.tile(np.asarray(position, float), (2, 1))), RotationSpline(times, turn))
+
+    @classmethod
+    def linear(
+        cls,
+        position: tuple[float, float, float],
+        velocity: tuple[float, float, float],
+        yaw: float = 0.0,
+        yaw_rate: float = 0.0,
+        lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        duration: float = 1.0,
+    ) -> "Motion":
+        """Body at `position` at t = 0 with constant world `velocity` (m/s) and yaw rate (rad/s); keeps on either side."""
+        # Knots close enough that no turn between two exceeds half a right angle.
+        span = np.array([-1.0, duration + 1.0])
+        count = 2 + int(np.ceil(abs(yaw_rate) * np.ptp(span) / (np.pi / 4)))
+        times = np.linspace(*span, count)
+        path = np.asarray(position, float) + times[:, None] * np.asarray(velocity, float)
+        turn = Rotation.from_euler("z", yaw + yaw_rate * times)
+        return cls(duration, CubicSpline(times, path), RotationSpline(times, turn), lever_arm)
+
+
+def motion_from_tum(path: str | Path) -> Motion:
+    """Motion through the poses of a TUM file (``time x y z qx qy qz qw``, ``#`` comments); its first pose is t = 0.
+
+    Raises:
+        InputError: missing file, wrong columns, something that is no finite number, stamps that do not ascend, a
+            quaternion that is not of unit length, or fewer than four poses; with the line.
+    """
+    path = Path(path)
+    try:
+        lines = path.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as a TUM trajectory ({error})") from error
+    rows: list[list[float]] = []
+    for number, line in enumerate(lines, start=1):
+        fields = line.split("#", 1)[0].replace(",", " ").split()
+        if not fields:
+            continue
+        where = f"{path}, line {number}"
+        if len(fields) != 8:
+            raise InputError(f"{where}: {len(fields)} columns, expected 8: time x y z qx qy qz qw")
+        try:
+            row = [float(value) for value in fields]
+        except ValueError as error:
+            raise InputError(f"{where}: {error}, expected 8 numbers: time x y z qx qy qz qw") from error
+        if not np.all(np.isfinite(row)):
+            raise InputError(f"{where}: {line.strip()!r} holds a value that is not finite, expected 8 finite numbers")
+        if rows and row[0] <= rows[-1][0]:
+            raise InputError(f"{where}: time {row[0]} does not follow {rows[-1][0]}, expected ascending times")
+        if abs(np.linalg.norm(row[4:]) - 1) > 1e-2:
+            raise InputError(f"{where}: quaternion of length {np.linalg.norm(row[4:]):.3g}, expected 1")
+        rows.append(row)
+    if len(rows) < 4:
+        raise InputError(f"{path}: {len(rows)} poses, expected at least 4")
+    data = np.array(rows)
+    times = data[:, 0] - data[0, 0]
+    return Motion(
+        float(times[-1]), CubicSpline(times, data[:, 1:4]), RotationSpline(times, Rotation.from_quat(data[:, 4:]))
+    )
+
+
+def plan_motion(scene, platform: str, duration: float, rng: np.random.Generator) -> Motion:
+    """A tour through a scene on a platform: see `radarsim.platforms.plan`.
+
+    Args:
+        scene: the `Scene` to move in.
+        platform: ``handheld``, ``cart`` or ``robot``.
+        duration: s.
+        rng: source of every choice made.
+
+    Raises:
+        InputError: unknown platform, or no room to move.
+    """
+    from radarsim.platforms import plan
+
+    return plan(scene, platform, duration, rng)

@@ -1,5 +1,6 @@
 """Recordings as files for other programs."""
 
+import contextlib
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -77,11 +78,11 @@ def _write(path: Path, write: Callable) -> None:
         with part.open("wb") as file:
             write(file)
         os.replace(part, path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-    except BaseException:
-        part.unlink(missing_ok=True)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        if isinstance(error, OSError):
+            raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
         raise
 
 

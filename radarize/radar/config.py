@@ -93,10 +93,12 @@ class RadarConfig(BaseModel):
         try:
             return cls(**fields)
         except ValidationError as error:
-            first = error.errors()[0]
+            first = min(error.errors(), key=lambda e: e["type"] == "missing")  # a wrong value says more
             field = ".".join(str(part) for part in first["loc"])
             message = first["msg"].removeprefix("Value error, ")
-            if field:
+            if first["type"] == "missing":
+                message = f"has no {field}"
+            elif field:
                 message = f"{field} is {first['input']!r}, {message[0].lower()}{message[1:]}"
             raise InputError(f"{source}: {message}") from error
 

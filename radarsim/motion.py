@@ -73,7 +73,9 @@ class Motion:
         """Standing still; angles in rad, applied as roll, pitch, yaw (pitch positive: nose down)."""
         times = np.array([-1.0, duration + 1.0])
         turn = Rotation.from_euler("ZYX", np.tile([yaw, pitch, roll], (2, 1)))
-        return cls(duration, CubicSpline(times, np.tile(np.asarray(position, float), (2, 1))), RotationSpline(times, turn))
+        return cls(
+            duration, CubicSpline(times, np.tile(np.asarray(position, float), (2, 1))), RotationSpline(times, turn)
+        )
 
     @classmethod
     def linear(
@@ -85,7 +87,7 @@ class Motion:
         lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0),
         duration: float = 1.0,
     ) -> "Motion":
-        """Body at `position` at t = 0 with constant world `velocity` (m/s) and yaw rate (rad/s); keeps on either side."""
+        """Constant world `velocity` (m/s) and yaw rate (rad/s); the body passes `position` at t = 0."""
         # Knots close enough that no turn between two exceeds half a right angle.
         span = np.array([-1.0, duration + 1.0])
         count = 2 + int(np.ceil(abs(yaw_rate) * np.ptp(span) / (np.pi / 4)))

@@ -178,7 +178,7 @@ class Slam:
         if c.presearch_distance > 0:
             weight = np.linalg.inv(covariance) * c.sigma**2 / len(node.points)
             found = search(
-                Pyramid.of(submap.grid, 3),
+                Pyramid.of(submap.grid, 3, c.presearch_distance),
                 node.points,
                 prior,
                 distance=c.presearch_distance,

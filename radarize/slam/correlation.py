@@ -20,26 +20,31 @@ class Pyramid:
 
     Attributes:
         resolution, origin: of level 0, as in `OccupancyGrid`.
+        half: half-width of the largest window that can be searched, cells; twice this much empty space is added around
+            the grid, so that the search need not look where the grid ends.
         buffer: levels one after the other, row by row.
         starts, rows, columns: of each level; from level 1 on, cell (-1, -1) is stored at (0, 0).
     """
 
     resolution: float
     origin: Float[np.ndarray, "2"]
+    half: int
     buffer: np.ndarray
     starts: np.ndarray
     rows: np.ndarray
     columns: np.ndarray
 
     @classmethod
-    def of(cls, grid: OccupancyGrid, levels: int) -> "Pyramid":
-        """Pyramid with `levels` halvings."""
-        base = np.rint(255 * grid.probability).astype(np.uint8)
+    def of(cls, grid: OccupancyGrid, levels: int, distance: float) -> "Pyramid":
+        """Pyramid with `levels` halvings for windows of half-width up to `distance` (m)."""
+        half = int(np.ceil(distance / grid.resolution))
+        base = np.pad(np.rint(255 * grid.probability).astype(np.uint8), 2 * half)
         planes = [base] + [_maxima(base, 1 << h) for h in range(1, levels + 1)]
         sizes = np.array([p.size for p in planes])
         return cls(
             grid.resolution,
-            grid.origin,
+            grid.origin - 2 * half * grid.resolution,
+            half,
             np.concatenate([p.ravel() for p in planes]),
             np.concatenate([[0], np.cumsum(sizes)[:-1]]),
             np.array([p.shape[0] for p in planes]),
@@ -82,7 +87,7 @@ def search(
     step = pyramid.resolution / reach
     turns = int(np.ceil(angle / step))
     angles = np.arange(-turns, turns + 1) * step
-    half = int(np.ceil(distance / pyramid.resolution))
+    half = min(int(np.ceil(distance / pyramid.resolution)), pyramid.half)
     found, score, a, dx, dy = _search(
         pyramid.buffer,
         pyramid.starts,
@@ -121,14 +126,11 @@ def _maxima(base, size):
 
 
 @numba.njit(cache=True)
-def _bound(buffer, start, rows, columns, cells, dx, dy, level):
-    total = 0
-    shift = 1 if level > 0 else 0
+def _bound(buffer, cells, shift):
+    total = np.int64(0)
     for k in range(len(cells)):
-        column, row = ((cells[k, 0] + dx) >> level) + shift, ((cells[k, 1] + dy) >> level) + shift
-        if 0 <= row < rows and 0 <= column < columns:
-            total += buffer[start + row * columns + column]
-    return total / (255.0 * len(cells))
+        total += buffer[cells[k] + shift]
+    return total
 
 
 @numba.njit(cache=True)
@@ -139,28 +141,32 @@ def _nearest(low, size):
 
 @numba.njit(cache=True)
 def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty, scale, half, min_score, penalty):
+    # Shifts (dx, dy) count from the window's corner, so a block's shift at its level is one number for all points.
     top = len(starts) - 1
     size = 1 << top
     across = (2 * half + size) // size
     count = len(angles) * across * across
-    cells = np.empty((len(angles), len(points), 2), np.int64)
+    unit = 1 / (255.0 * len(points))
+    cells, inside = np.empty((len(angles), top + 1, len(points)), np.int64), np.zeros(len(angles), np.int64)
     bounds, where = np.empty(count), np.empty((count, 3), np.int64)
     n = 0
     for a in range(len(angles)):
         cos, sin = np.cos(angles[a]), np.sin(angles[a])
         for k in range(len(points)):
             x, y = points[k, 0] * scale, points[k, 1] * scale
-            cells[a, k, 0] = int(np.floor(cos * x - sin * y + guess[0]))
-            cells[a, k, 1] = int(np.floor(sin * x + cos * y + guess[1]))
+            column = int(np.floor(cos * x - sin * y + guess[0])) - half
+            row = int(np.floor(sin * x + cos * y + guess[1])) - half
+            if column >= 0 and row >= 0 and column + 2 * half < columns[0] and row + 2 * half < rows[0]:
+                for h in range(top + 1):
+                    rim = 1 if h > 0 else 0
+                    cells[a, h, inside[a]] = starts[h] + ((row >> h) + rim) * columns[h] + (column >> h) + rim
+                inside[a] += 1
         for i in range(across):
             for j in range(across):
-                dx, dy = -half + i * size, -half + j * size
-                away = _nearest(dx, size) ** 2 + _nearest(dy, size) ** 2
-                bounds[n] = (
-                    _bound(buffer, starts[top], rows[top], columns[top], cells[a], dx, dy, top)
-                    - angle_penalty[a]
-                    - penalty * away
-                )
+                dx, dy = i * size, j * size
+                away = _nearest(dx - half, size) ** 2 + _nearest(dy - half, size) ** 2
+                total = _bound(buffer, cells[a, top, : inside[a]], i + j * columns[top])
+                bounds[n] = total * unit - angle_penalty[a] - penalty * away
                 where[n, 0], where[n, 1], where[n, 2] = a, dx, dy
                 n += 1
     best, best_a, best_x, best_y, found = min_score, 0, 0, 0, False
@@ -178,7 +184,7 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
                 continue
             dx, dy, level = stack[depth, 0], stack[depth, 1], stack[depth, 2]
             if level == 0:
-                best, best_a, best_x, best_y, found = stack_bound[depth], a, dx, dy, True
+                best, best_a, best_x, best_y, found = stack_bound[depth], a, dx - half, dy - half, True
                 continue
             level -= 1
             size = 1 << level
@@ -186,13 +192,12 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
                 cx, cy = dx + (c & 1) * size, dy + (c >> 1) * size
                 child[c, 0], child[c, 1] = cx, cy
                 child_bound[c] = -1.0
-                if cx <= half and cy <= half:
-                    away = _nearest(cx, size) ** 2 + _nearest(cy, size) ** 2
-                    child_bound[c] = (
-                        _bound(buffer, starts[level], rows[level], columns[level], cells[a], cx, cy, level)
-                        - angle_penalty[a]
-                        - penalty * away
+                if cx <= 2 * half and cy <= 2 * half:
+                    away = _nearest(cx - half, size) ** 2 + _nearest(cy - half, size) ** 2
+                    total = _bound(
+                        buffer, cells[a, level, : inside[a]], (cx >> level) + (cy >> level) * columns[level]
                     )
+                    child_bound[c] = total * unit - angle_penalty[a] - penalty * away
             for c in np.argsort(child_bound):  # the best child is looked at first
                 if child_bound[c] > best:
                     stack_bound[depth] = child_bound[c]

@@ -46,7 +46,7 @@ class Submap:
     @cached_property
     def pyramid(self) -> Pyramid:
         """For the loop search; of a finished submap."""
-        return Pyramid.of(self.grid, self.config.loop.levels)
+        return Pyramid.of(self.grid, self.config.loop.levels, self.config.loop.distance)
 
     @cached_property
     def center(self) -> Float[np.ndarray, "2"]:

@@ -1,0 +1,64 @@
+"""A synthetic planar world of walls, scanned by exact ray casting."""
+
+import numpy as np
+
+
+def box(x0, y0, x1, y1):
+    """Walls (4, 4: x0 y0 x1 y1) of a rectangle."""
+    return np.array([[x0, y0, x1, y0], [x1, y0, x1, y1], [x1, y1, x0, y1], [x0, y1, x0, y0]], float)
+
+
+def ring():
+    """A square corridor with niches and columns that break its symmetry, 12 m outside, 3 m wide."""
+    return np.concatenate(
+        [
+            box(0, 0, 12, 12),
+            box(3, 3, 9, 9),
+            box(5, 0, 5.6, 0.5),
+            box(11.2, 4, 12, 5.1),
+            box(11.5, 8.2, 12, 8.6),
+            box(7, 11.3, 8.2, 12),
+            box(2.5, 11.6, 3, 12),
+            box(0, 7, 0.7, 7.4),
+            box(0, 2.2, 0.4, 3.4),
+            box(9, 2.6, 9.3, 3),
+        ]
+    )
+
+
+def scan(walls, pose, azimuths, max_range=np.inf):
+    """Distance to the first wall on every bearing, m, inf beyond max_range."""
+    angles = pose[2] + azimuths
+    d = np.stack([np.cos(angles), np.sin(angles)], axis=-1)[:, None]
+    a, b = walls[None, :, :2], walls[None, :, 2:]
+    e, w = b - a, a - pose[:2]
+    det = d[..., 0] * e[..., 1] - d[..., 1] * e[..., 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = (w[..., 0] * e[..., 1] - w[..., 1] * e[..., 0]) / det
+        s = (w[..., 0] * d[..., 1] - w[..., 1] * d[..., 0]) / det
+    t = np.where((np.abs(det) > 1e-12) & (t > 0) & (s >= 0) & (s <= 1), t, np.inf).min(axis=1)
+    return np.where(t <= max_range, t, np.inf)
+
+
+def walk(corners, step, turn):
+    """Poses along a polyline, turning on the spot at its corners."""
+    poses = []
+    corners = np.asarray(corners, float)
+    yaw = np.arctan2(*(corners[1] - corners[0])[::-1])
+    for a, b in zip(corners[:-1], corners[1:], strict=True):
+        heading = np.arctan2(*(b - a)[::-1])
+        swing = (heading - yaw + np.pi) % (2 * np.pi) - np.pi
+        for k in range(1, int(np.ceil(abs(swing) / turn)) + 1):
+            poses.append([*a, yaw + swing * k / np.ceil(abs(swing) / turn)])
+        yaw = heading
+        count = int(np.ceil(np.hypot(*(b - a)) / step))
+        poses += [[*(a + (b - a) * k / count), yaw] for k in range(count)]
+    return np.array([*poses, [*corners[-1], yaw]])
+
+
+def ate(truth, estimate):
+    """Mean distance after the best rigid alignment, m."""
+    p, q = truth[:, :2], estimate[:, :2]
+    u, _, vt = np.linalg.svd((p - p.mean(0)).T @ (q - q.mean(0)))
+    turn = u @ np.diag([1, np.linalg.det(u @ vt)]) @ vt
+    return float(np.hypot(*((q - q.mean(0)) @ turn.T - (p - p.mean(0))).T).mean())

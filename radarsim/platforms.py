@@ -63,7 +63,7 @@ class Platform:
 PLATFORMS: dict[str, Platform] = {
     "handheld": Platform(
         body=(0.06, 1.8), height=1.2, radius=0.40, speed=1.05, top_speed=1.6, acceleration=1.2,
-        turn_rate=np.deg2rad(80), lever_arm=0.12, tilt=np.deg2rad(2), bob=0.02,
+        turn_rate=np.deg2rad(70), lever_arm=0.12, tilt=np.deg2rad(2), bob=0.02,
         sway=(np.deg2rad(2), np.deg2rad(1.5), np.deg2rad(3)), tremor=np.deg2rad(1.2), free_heading=True,
     ),
     "cart": Platform(
@@ -172,8 +172,9 @@ def _leg(
     course = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
     course = gaussian_filter1d(course, 3, mode="nearest")
     curvature = np.abs(np.gradient(course)) / step
-    pace = gaussian_filter1d(rng.standard_normal(len(step)), 75, mode="wrap")
-    pace = carrier.speed * (1 + 0.15 * pace / max(pace.std(), 1e-9))
+    # Smoothed white noise of standard deviation 0.15 over some 1.5 m.
+    habit = 0.15 * np.sqrt(2 * np.sqrt(np.pi) * 75) * gaussian_filter1d(rng.standard_normal(len(step)), 75)
+    pace = carrier.speed * np.clip(1 + habit, 0.6, 1.4)
     limit = np.minimum(pace, 0.85 * carrier.top_speed)
     limit = np.minimum(limit, 0.8 * carrier.turn_rate / np.maximum(curvature, 1e-6))
     limit = np.minimum(limit, np.sqrt(carrier.acceleration / np.maximum(curvature, 1e-6)))

@@ -11,8 +11,10 @@ A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames
 HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame flushed so far.
 """
 
+import errno
 import json
 import os
+import shutil
 import time as clock
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -29,6 +31,9 @@ from radarize.radar.config import RadarConfig
 
 FORMAT = 1
 _FLUSH_INTERVAL = 1.0
+#: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
+#: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.
+_RESERVE = 512 << 10
 
 
 @dataclass(frozen=True)
@@ -86,11 +91,13 @@ class RecordingWriter:
         self.part = self.path.with_name(self.path.name + ".part")
         self.config = config
         self.frames = 0
+        self._file: h5py.File | None = None
         self._notes: dict[str, object] = {}
         self._pending: list[tuple] = []
         self._flushed = clock.monotonic()
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._require_space(sum(product.data.nbytes for product in (products or {}).values()))
             self._file = h5py.File(self.part, "w", libver="latest")
             self._create(cfg_text, attributes or {}, streams or {}, products or {})
         except OSError as error:
@@ -148,6 +155,7 @@ class RecordingWriter:
         if valid is None:
             valid = np.ones(adc.shape[:3], bool)
         try:
+            self._require_space(adc.nbytes + sum(np.asarray(data).nbytes for data in rows.values()))
             for name, data in rows.items():
                 self._extend(name.replace("__", "/"), data)
             self._extend("radar/adc", adc)
@@ -161,9 +169,17 @@ class RecordingWriter:
     def extend(self, name: str, data: np.ndarray) -> None:
         """Append rows to a stream that runs at its own rate (an IMU)."""
         try:
+            self._require_space(data.nbytes)
             self._extend(name, data)
         except (OSError, RuntimeError) as error:
             raise InputError(f"cannot write {self.part}: {_reason(error)}; {self._survivors()}") from error
+
+    def _require_space(self, size: int) -> None:
+        free = shutil.disk_usage(self.path.parent).free
+        if free < size + _RESERVE:
+            if self._file:
+                self.flush()
+            raise OSError(errno.ENOSPC, "no space left on the device")
 
     def _extend(self, name: str, data: np.ndarray) -> None:
         if not len(data):
@@ -185,6 +201,8 @@ class RecordingWriter:
             self.frames += len(times)
         self._pending.clear()
         self._file["radar/time"].flush()
+        if os.path.getsize(self.part) < self._file.id.get_filesize():  # somebody else filled the disk meanwhile
+            raise OSError(errno.ENOSPC, "no space left on the device")
         self._flushed = clock.monotonic()
 
     def _survivors(self) -> str:
@@ -227,6 +245,25 @@ def _reason(error: Exception) -> str:
     return text.splitlines()[0] if text else type(error).__name__
 
 
+def _is_growing(path: Path) -> bool:
+    """Whether a writer has the file open, or died with it open: then HDF5 must read in its multiple-reader mode.
+
+    That mode retries without end where a file is cut short, so this is looked at first (superblock version 3: byte 11
+    holds the flags, bytes 28-35 the end of the file).
+
+    Raises:
+        OSError: the file is shorter than its writer left it.
+    """
+    with path.open("rb") as file:
+        head = file.read(48)
+    if len(head) < 48 or head[:8] != b"\x89HDF\r\n\x1a\n" or head[8] != 3 or not head[11] & 0b101:
+        return False
+    size, end = path.stat().st_size, int.from_bytes(head[28:36], "little")
+    if size < end:
+        raise OSError(f"truncated: has {size} bytes of at least {end}")
+    return True
+
+
 @dataclass
 class Recording:
     """A recording opened for reading; use as a context manager.
@@ -247,8 +284,8 @@ class Recording:
         if not self.path.is_file():
             raise InputError(f"{self.path}: no such file, expected a recording (.h5)")
         try:
-            self.file = h5py.File(self.path, "r", libver="latest", swmr=True)
-        except OSError as error:
+            self.file = h5py.File(self.path, "r", libver="latest", swmr=_is_growing(self.path))
+        except (OSError, RuntimeError) as error:
             raise InputError(f"{self.path}: not a readable HDF5 recording ({_reason(error)})") from error
         try:
             radar = self.file["radar"]

@@ -5,6 +5,9 @@
 set -eu
 cd "$(dirname "$0")"
 
+# Imported once after installing; looked for every time.
+NEEDED="torch numba h5py scipy gtsam evo open3d trimesh drjit mitsuba sionna plotly matplotlib typer pytest"
+
 find_python() {
     # PYTHON=... chooses another interpreter. 3.11 is what the lock file was written and tested with.
     for candidate in ${PYTHON:-} python3.11 python3.12 python3.13 python3; do
@@ -19,16 +22,17 @@ find_python() {
 
 # Whether .venv is whole: it runs, belongs to this folder, and holds every locked version.
 is_complete() {
-    .venv/bin/python - 2>/dev/null <<'PYTHON'
-import importlib.metadata, pathlib, sys
+    .venv/bin/python - 2>/dev/null <<PYTHON
+import importlib.metadata, importlib.util, pathlib, sys
 
 assert pathlib.Path(sys.prefix) == pathlib.Path(".venv").resolve()
 assert pathlib.Path(".venv/.ready").read_text() == pathlib.Path("requirements.lock").read_text()
-assert sys.prefix in pathlib.Path(".venv/bin/radarize").read_text().split("\n", 1)[0]
+assert sys.prefix in pathlib.Path(".venv/bin/radarize").read_text().splitlines()[0]
 for line in pathlib.Path("requirements.lock").read_text().splitlines():
     if not line.startswith("#"):
         name, version = line.split("==")
         assert importlib.metadata.version(name).split("+")[0] == version
+assert all(importlib.util.find_spec(name) for name in "$NEEDED".split())
 found = {point.name for point in importlib.metadata.distribution("radarize").entry_points}
 assert {"radarize", "radarsim"} <= found
 PYTHON
@@ -64,7 +68,7 @@ install_python_packages() {
             { python -c 'import torch' 2>/dev/null || $pip --force-reinstall "$(grep '^torch==' requirements.lock)" \
                 --index-url https://download.pytorch.org/whl/cpu; } &&
             $pip --no-build-isolation --editable . &&
-            python -c 'import torch, numba, h5py, scipy, gtsam, evo, open3d, trimesh, drjit, mitsuba' &&
+            python -c "import $(echo $NEEDED | tr ' ' ',')" &&
             python -m pip --disable-pip-version-check check >/dev/null
     )
 }

@@ -70,38 +70,25 @@ def _first_line(error: BaseException) -> str:
 
 
 @contextmanager
-def progress(label: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on stderr, moved by calling what this yields with (done, in all)."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-
-    columns = (
-        TextColumn("{task.description:<22}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left"),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        task = bar.add_task(label, total=None)
-        yield lambda done, total: bar.update(task, completed=done, total=total or None)
-
-
-@contextmanager
-def stages() -> Iterator[Callable[[str, int, int], None]]:
-    """Progress bars on stderr, one per stage, moved by (stage, done, in all)."""
+def progress(label: str) -> Iterator[Callable[..., None]]:
+    """Progress bars on stderr, moved by calling what this yields with (done, in all) or (stage, done, in all)."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import TimeRemainingColumn as TimeLeftColumn
 
-    columns = (TextColumn("{task.description:<22}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bar:
-        tasks: dict[str, object] = {}
+    text = TextColumn("{task.description:<20}")
+    columns = (text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeLeftColumn())
+    with Progress(*columns, console=Console(stderr=True)) as bars:
+        tasks = {label: bars.add_task(label, total=None)}
 
-        def move(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bar.add_task(stage, total=None)
-            bar.update(tasks[stage], completed=done, total=total or None)
+        def move(*where) -> None:
+            *stage, done, total = where
+            name = stage[0] if stage else label
+            if name not in tasks:
+                if label in tasks and not bars.tasks[0].completed:  # the first stage takes the label's place
+                    bars.remove_task(tasks.pop(label))
+                tasks[name] = bars.add_task(name, total=None)
+            bars.update(tasks[name], completed=done, total=total or None)
 
         yield move
 

@@ -27,7 +27,7 @@ _PATTERNS = (
 
 
 def version(path: str) -> int:
-    """Major version of a libLLVM: asked of the library (LLVMGetVersion, since 16), else by its name; 0 if unreadable."""
+    """Major version of a libLLVM: asked of it (LLVMGetVersion, since 16), else by its name; 0 if unreadable."""
     try:
         library = ctypes.CDLL(path)
     except OSError:

@@ -1,0 +1,156 @@
+"""`radarize`: the pipeline's command line. Heavy modules load inside the commands, so that --help is instant."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from radarize.console import keeping, new_app, progress, run, working
+from radarize.errors import InputError
+
+app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
+
+RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="A recording.")]
+RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
+
+
+def _antennas(text: str | None, option: str) -> int | tuple[int, ...] | None:
+    """A count (``3``), or TI's antenna numbers (``1,3,2``) as 0-based ones."""
+    if text is None:
+        return None
+    try:
+        numbers = [int(part) for part in text.split(",")]
+    except ValueError:
+        raise InputError(f"{option} is {text!r}, expected a count (3) or antenna numbers (1,3,2)") from None
+    return numbers[0] if len(numbers) == 1 else tuple(number - 1 for number in numbers)
+
+
+@app.command("import")
+def import_(
+    source: Annotated[Path, typer.Argument(metavar="SOURCE", help=".bin, .pcap, or a folder of mmWave Studio.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
+    config: Annotated[str | None, typer.Option(help="A .cfg, a .mmwave.json or a preset's name.")] = None,
+    poses: Annotated[Path | None, typer.Option(help="True poses of the sensor (TUM).")] = None,
+    samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
+    loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
+    rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
+    tx: Annotated[str | None, typer.Option(help="How many transmitters (3), or their firing order (1,3,2).")] = None,
+    iq_order: Annotated[Literal["iiqq", "qqii"] | None, typer.Option(help="mmWave Studio, or SDK demo.")] = None,
+    board: Annotated[str | None, typer.Option(help="Antenna layout, e.g. iwr1843boost.")] = None,
+    start_frequency: Annotated[float | None, typer.Option(help="Hz.")] = None,
+    slope: Annotated[float | None, typer.Option(help="Hz/s (80 MHz/us is 80e12).")] = None,
+    sample_rate: Annotated[float | None, typer.Option(help="Hz.")] = None,
+    idle_time: Annotated[float | None, typer.Option(help="s.")] = None,
+    adc_start_time: Annotated[float | None, typer.Option(help="s.")] = None,
+    ramp_end_time: Annotated[float | None, typer.Option(help="s.")] = None,
+    frame_period: Annotated[float | None, typer.Option(help="s.")] = None,
+    start_time: Annotated[float | None, typer.Option(help="Stamp of the first frame, s.")] = None,
+):
+    """Make a recording from a capture of a real radar."""
+    fields = {
+        "samples": samples,
+        "loops": loops,
+        "rx": _antennas(rx, "--rx"),
+        "tx": _antennas(tx, "--tx"),
+        "iq_order": iq_order,
+        "board": board,
+        "start_frequency": start_frequency,
+        "slope": slope,
+        "sample_rate": sample_rate,
+        "idle_time": idle_time,
+        "adc_start_time": adc_start_time,
+        "ramp_end_time": ramp_end_time,
+        "frame_period": frame_period,
+        "start_time": start_time,
+    }
+    overrides = {name: value for name, value in fields.items() if value is not None}
+    from radarize.importers import import_recording
+    from radarize.recording import Recording
+
+    radar, cfg_text = None, ""
+    if config is not None:
+        from radarize.radar.cfg import load_config
+
+        radar, cfg_text = load_config(config)
+    with keeping(output), progress("import") as report:
+        written = import_recording(
+            source, output, config=radar, cfg_text=cfg_text, poses=poses, overrides=overrides, progress=report
+        )
+    with Recording(written) as recording:
+        for name in ("warnings", "assumed"):
+            if text := recording.attributes.get(name):
+                typer.echo(f"{name}: {text}", err=True)
+        print(f"{written}: {len(recording)} frames")
+
+
+@app.command()
+def info(recording: RecordingFile, as_json: AsJson = False):
+    """Say what a recording holds."""
+    from radarize.contents import contents, show
+
+    found = contents(recording)
+    _print_json(found) if as_json else show(found)
+
+
+@app.command("run")
+def run_(
+    recording: RecordingFile,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
+    odometry: Annotated[str, typer.Option(help="Where the motion comes from.")] = "doppler",
+    scans: Annotated[str, typer.Option(help="How scans are made.")] = "first-echo",
+    settings: Annotated[str, typer.Option(help="Which reading of the pipeline.")] = "corrected",
+):
+    """Estimate trajectory and map of a recording."""
+    from radarize.pipeline import run
+
+    try:
+        with progress("run") as report:
+            written = run(
+                recording, output, odometry=odometry, scans=scans, settings=settings, progress=report
+            )
+    except KeyboardInterrupt:
+        raise InputError(f"stopped; {output} is not a whole run, the recording is untouched") from None
+    print(written)
+
+
+@app.command()
+def evaluate(
+    run: RunFolder,
+    reference: Annotated[Path | None, typer.Option(help="True poses (TUM); by default the run's own.")] = None,
+    as_json: AsJson = False,
+):
+    """Compare a run with the truth; writes metrics.json."""
+    from radarize.evaluation.evaluate import evaluate, show
+
+    with working("evaluating"):
+        metrics = evaluate(run, reference)
+    _print_json(metrics) if as_json else show(metrics)
+
+
+@app.command()
+def report(
+    source: Annotated[Path, typer.Argument(metavar="RUN|REC.h5", help="A run's folder, or a recording.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (.html).")] = None,
+):
+    """Draw a run or a recording as one HTML page."""
+    from radarize.evaluation.report import report_recording, report_run
+
+    with working("drawing"):
+        written = report_run(source, output) if source.is_dir() else report_recording(source, output)
+    print(written)
+
+
+def _print_json(content: dict) -> None:
+    import json
+
+    print(json.dumps(content, indent=2))
+
+
+def main() -> None:
+    """Entry point of the `radarize` command."""
+    run(app, "radarize")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,91 @@
+"""What a recording holds, as plain data and as tables."""
+
+from pathlib import Path
+
+import numpy as np
+
+from radarize.recording import Recording
+
+#: Derived quantities of a configuration, with their units.
+DERIVED = {
+    "center_frequency": "Hz",
+    "wavelength": "m",
+    "bandwidth": "Hz",
+    "range_resolution": "m",
+    "max_range": "m",
+    "chirp_time": "s",
+    "loop_time": "s",
+    "burst_time": "s",
+    "burst_center": "s",
+    "max_velocity": "m/s",
+    "velocity_resolution": "m/s",
+    "frame_rate": "Hz",
+    "frame_bytes": "B",
+}
+
+
+def contents(path: Path) -> dict[str, object]:
+    """Everything about a recording but its samples, as JSON-ready data.
+
+    Returns:
+        ``path``, ``frames``, ``duration`` (s), ``lost_chirps`` (count) and ``lost_share``, ``config``, ``derived``
+        (name to value, units as in `DERIVED`), ``data_sets`` (path to shape, dtype, unit, about), ``attributes``.
+
+    Raises:
+        InputError: not a recording, or a damaged one.
+    """
+    with Recording(path) as recording:
+        config, times = recording.config, recording.times
+        valid = recording.valid(0, len(recording))
+        attributes = {name: value for name, value in recording.attributes.items()}
+        return {
+            "path": str(path),
+            "frames": len(recording),
+            "duration": float(times[-1] - times[0] + config.frame_period) if len(times) else 0.0,
+            "start_time": float(times[0]) if len(times) else None,
+            "lost_chirps": int(np.size(valid) - np.count_nonzero(valid)),
+            "lost_share": float(1 - np.mean(valid)) if np.size(valid) else 0.0,
+            "config": recording.config_json(),
+            "derived": {name: float(getattr(config, name)) for name in DERIVED},
+            "data_sets": {name: _plain(recording.describe(name)) for name in recording.names()},
+            "attributes": {name: _plain(value) for name, value in attributes.items()},
+        }
+
+
+def _plain(value: object) -> object:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, tuple | list | np.ndarray):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    return value if isinstance(value, bool | int | float | str) or value is None else str(value)
+
+
+def show(found: dict) -> None:
+    """Print what `contents` found."""
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    console = Console()
+    console.print(
+        f"[bold]{found['path']}[/]: {found['frames']} frames, {found['duration']:.2f} s, "
+        f"{found['lost_chirps']} chirps lost ({100 * found['lost_share']:.2f} %)",
+        highlight=False,
+    )
+    derived = Table("derived", Column("value", justify="right"), "unit", header_style="bold")
+    for name, value in found["derived"].items():
+        derived.add_row(name, f"{value:.6g}", DERIVED[name])
+    given = Table("configuration", Column("value", overflow="fold"), header_style="bold")
+    for name, value in found["config"].items():
+        untouched = name == "channel_calibration" and all(tuple(pair) == (1.0, 0.0) for pair in value)
+        given.add_row(name, "none" if untouched else str(value))
+    data = Table("data set", "shape", "type", "unit", Column("about", overflow="fold"), header_style="bold")
+    for name, item in found["data_sets"].items():
+        shape = " x ".join(str(length) for length in item["shape"])
+        data.add_row(f"/{name}", shape, item["dtype"], str(item["unit"]), str(item["about"]))
+    attributes = Table("attribute", Column("value", overflow="fold"), header_style="bold")
+    for name, value in found["attributes"].items():
+        attributes.add_row(name, str(value))
+    for table in (given, derived, data, attributes):
+        console.print(table)

@@ -1,0 +1,186 @@
+"""Trajectory errors: absolute after alignment, and relative over a frame, a second and a metre.
+
+As in the paper (section 6): association within 10 ms, alignment without scale, means per trajectory. Unlike its
+published tables, relative rotation is a true relative error. Transformations and error matrices are evo's.
+"""
+
+from dataclasses import asdict, dataclass, field
+
+import numpy as np
+from evo.core.metrics import APE, RPE, PoseRelation
+from evo.core.trajectory import PoseTrajectory3D
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from radarize.evaluation.trajectory import Association, alignment, matched, moved, planar
+
+#: Relative errors are taken between poses this far apart; a pair counts if it is within this share of it.
+SECOND, METRE, TOLERANCE = 1.0, 1.0, 0.1
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """Mean, root mean square and maximum of a number of errors; NaN where there are none."""
+
+    mean: float
+    rmse: float
+    max: float
+    count: int
+
+    @classmethod
+    def of(cls, errors: np.ndarray) -> "Statistics":
+        """Statistics of finite errors."""
+        errors = np.asarray(errors, float)
+        if not len(errors):
+            return cls(np.nan, np.nan, np.nan, 0)
+        return cls(float(errors.mean()), float(np.sqrt(np.mean(errors**2))), float(errors.max()), len(errors))
+
+
+@dataclass(frozen=True)
+class TrajectoryErrors:
+    """How far an estimated trajectory is from its reference.
+
+    Attributes:
+        position, rotation: absolute errors after alignment, m and rad (ATE).
+        relative_position, relative_rotation: by ``"frame"``, ``"second"`` and ``"metre"``, m and rad (RE).
+        distance: length of the reference, m; in the plane, so that a walker's bobbing does not count.
+        duration: s.
+        share: mean absolute position error as a share of the distance.
+        drift: distance of the last poses when the first ones are laid upon each other, as a share of the distance.
+        time: (pose,) stamps of the matched poses, s.
+        position_errors, rotation_errors: (pose,) absolute errors, m and rad.
+        estimate, reference: matched trajectories, the estimate aligned.
+        turn, shift: the alignment: a point p of the estimate's frame lies at turn p + shift in the reference's.
+    """
+
+    position: Statistics
+    rotation: Statistics
+    relative_position: dict[str, Statistics]
+    relative_rotation: dict[str, Statistics]
+    distance: float
+    duration: float
+    share: float
+    drift: float
+    time: Float[np.ndarray, "pose"] = field(repr=False)
+    position_errors: Float[np.ndarray, "pose"] = field(repr=False)
+    rotation_errors: Float[np.ndarray, "pose"] = field(repr=False)
+    estimate: PoseTrajectory3D = field(repr=False)
+    reference: PoseTrajectory3D = field(repr=False)
+    turn: Float[np.ndarray, "3 3"] = field(repr=False)
+    shift: Float[np.ndarray, "3"] = field(repr=False)
+
+    def summary(self) -> dict[str, object]:
+        """Figures for metrics.json; None where there is nothing to average."""
+        relative = {
+            name: {"position": asdict(self.relative_position[name]), "rotation": asdict(self.relative_rotation[name])}
+            for name in self.relative_position
+        }
+        return without_nan(
+            {
+                "ate": {"position": asdict(self.position), "rotation": asdict(self.rotation)},
+                "re": relative,
+                "distance": self.distance,
+                "duration": self.duration,
+                "ate_share": self.share,
+                "drift": self.drift,
+                "matched": len(self.time),
+            }
+        )
+
+
+def evaluate_trajectory(
+    estimate: PoseTrajectory3D,
+    reference: PoseTrajectory3D,
+    *,
+    in_plane: bool = True,
+    association: Association = "interpolate",
+    names: tuple[str, str] = ("estimate", "reference"),
+) -> TrajectoryErrors:
+    """Errors of an estimate against a reference.
+
+    Args:
+        estimate, reference: see `radarize.evaluation.trajectory.load`.
+        in_plane: compare x, y and yaw only, for an estimate that knows no more; else all six degrees of freedom.
+        association: see `radarize.evaluation.trajectory.matched`.
+        names: what errors call the two.
+
+    Raises:
+        InputError: fewer than three matching poses, or poses that are not finite.
+    """
+    estimate, reference = matched(estimate, reference, association, names)
+    if in_plane:
+        estimate, reference = planar(estimate), planar(reference)
+    relative_position, relative_rotation = {}, {}
+    for name, pairs in _pairs(reference).items():
+        position, rotation = _relative_errors(estimate, reference, pairs)
+        relative_position[name], relative_rotation[name] = Statistics.of(position), Statistics.of(rotation)
+    # Relative errors do not depend on the alignment, absolute ones do.
+    last = RPE.rpe_base(
+        reference.poses_se3[0], reference.poses_se3[-1], estimate.poses_se3[0], estimate.poses_se3[-1]
+    )
+    turn, shift = alignment(estimate, reference, in_plane)
+    aligned = moved(estimate, turn, shift)
+    position_errors = _absolute_errors(aligned, reference, PoseRelation.translation_part)
+    rotation_errors = _absolute_errors(aligned, reference, PoseRelation.rotation_angle_rad)
+    distance = float(reference.path_length)
+    return TrajectoryErrors(
+        position=Statistics.of(position_errors),
+        rotation=Statistics.of(rotation_errors),
+        relative_position=relative_position,
+        relative_rotation=relative_rotation,
+        distance=distance,
+        duration=float(reference.timestamps[-1] - reference.timestamps[0]),
+        share=float(position_errors.mean() / distance) if distance else np.nan,
+        drift=float(np.linalg.norm(last[:3, 3]) / distance) if distance else np.nan,
+        time=reference.timestamps,
+        position_errors=position_errors,
+        rotation_errors=rotation_errors,
+        estimate=aligned,
+        reference=reference,
+        turn=turn,
+        shift=shift,
+    )
+
+
+def _absolute_errors(estimate: PoseTrajectory3D, reference: PoseTrajectory3D, relation: PoseRelation) -> np.ndarray:
+    metric = APE(relation)
+    metric.process_data((reference, estimate))
+    return np.asarray(metric.error, float)
+
+
+def _pairs(reference: PoseTrajectory3D) -> dict[str, np.ndarray]:
+    """Index pairs (first, second) of poses one frame, one second and one metre of the reference apart."""
+    count = reference.num_poses
+    frames = np.column_stack([np.arange(count - 1), np.arange(1, count)])
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(reference.positions_xyz, axis=0), axis=1))])
+    return {"frame": frames, "second": _apart(reference.timestamps, SECOND), "metre": _apart(along, METRE)}
+
+
+def _apart(values: np.ndarray, delta: float) -> np.ndarray:
+    """For every pose the one whose value is nearest to `delta` more, if it is near enough."""
+    wanted = values + delta
+    after = np.clip(np.searchsorted(values, wanted), 1, len(values) - 1)
+    nearest = np.where(wanted - values[after - 1] < values[after] - wanted, after - 1, after)
+    good = (np.abs(values[nearest] - wanted) <= TOLERANCE * delta) & (wanted <= values[-1] + 1e-9)
+    return np.column_stack([np.flatnonzero(good), nearest[good]])
+
+
+def _relative_errors(
+    estimate: PoseTrajectory3D, reference: PoseTrajectory3D, pairs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    if not len(pairs):
+        return np.zeros(0), np.zeros(0)
+    q, p = reference.poses_se3, estimate.poses_se3
+    errors = np.array([RPE.rpe_base(q[i], q[j], p[i], p[j]) for i, j in pairs])
+    return np.linalg.norm(errors[:, :3, 3], axis=1), Rotation.from_matrix(errors[:, :3, :3]).magnitude()
+
+
+def without_nan(content: object) -> object:
+    """Plain data with None for numbers that are not finite, which JSON has no word for."""
+    if isinstance(content, dict):
+        return {key: without_nan(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [without_nan(value) for value in content]
+    if isinstance(content, float | np.floating):
+        return float(content) if np.isfinite(content) else None
+    return content

@@ -1,0 +1,167 @@
+"""Trajectory errors against evo's own commands and closed forms."""
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from radarize.errors import InputError
+from radarize.evaluation.metrics import evaluate_trajectory
+from radarize.evaluation.trajectory import load, matched, trajectory
+
+FREIBURG = Path(__file__).parents[3] / "shared" / "recordings" / "tum-freiburg1"
+
+
+def walk(seed: int = 0, count: int = 301, rate: float = 30.0):
+    """A smooth planar walk; returns times and poses."""
+    rng = np.random.default_rng(seed)
+    times = np.arange(count) / rate
+    yaw = np.cumsum(rng.normal(0, 0.02, count)) + 0.4 * np.sin(times)
+    steps = 1.0 / rate * np.column_stack([np.cos(yaw), np.sin(yaw)])
+    poses = np.zeros((count, 7))
+    poses[1:, :2] = np.cumsum(steps[:-1], axis=0)
+    poses[:, 3:] = Rotation.from_euler("z", yaw[:, None]).as_quat()
+    return times, poses
+
+
+def transformed(poses, angle, shift):
+    turn = Rotation.from_euler("z", angle)
+    return np.hstack([turn.apply(poses[:, :3]) + shift, (turn * Rotation.from_quat(poses[:, 3:])).as_quat()])
+
+
+@pytest.fixture(scope="module")
+def evo_results(tmp_path_factory):
+    """Statistics of `evo_ape` and `evo_rpe` by (command, relation)."""
+    if not FREIBURG.is_dir():
+        pytest.skip("../shared/recordings/tum-freiburg1 is not there")
+    home = tmp_path_factory.mktemp("evo")
+    environment = {**os.environ, "HOME": str(home), "MPLBACKEND": "agg"}
+    files = [str(FREIBURG / f"freiburg1_xyz-{name}.txt") for name in ("groundtruth", "rgbdslam")]
+    results = {}
+    for command, extra in {"ape": ["-a"], "rpe": ["--delta", "1", "--delta_unit", "f"]}.items():
+        for relation in ("trans_part", "angle_rad"):
+            archive = home / f"{command}-{relation}.zip"
+            program = Path(sys.executable).parent / f"evo_{command}"
+            subprocess.run(
+                [program, "tum", *files, "-r", relation, *extra, "--t_max_diff", "0.01", "--save_results", archive],
+                env=environment,
+                check=True,
+                capture_output=True,
+            )
+            with zipfile.ZipFile(archive) as content:
+                results[command, relation] = json.loads(content.read("stats.json"))
+    return results
+
+
+def test_agrees_with_the_evo_commands(evo_results):
+    reference, estimate = (load(FREIBURG / f"freiburg1_xyz-{name}.txt") for name in ("groundtruth", "rgbdslam"))
+    errors = evaluate_trajectory(estimate, reference, in_plane=False, association="nearest")
+    ours = {
+        ("ape", "trans_part"): errors.position,
+        ("ape", "angle_rad"): errors.rotation,
+        ("rpe", "trans_part"): errors.relative_position["frame"],
+        ("rpe", "angle_rad"): errors.relative_rotation["frame"],
+    }
+    for key, statistics in ours.items():
+        for name in ("mean", "rmse", "max"):
+            assert getattr(statistics, name) == pytest.approx(evo_results[key][name], abs=1e-6), (key, name)
+
+
+def test_a_moved_copy_has_no_error():
+    times, poses = walk()
+    errors = evaluate_trajectory(trajectory(times, transformed(poses, 2.0, [3, -1, 0])), trajectory(times, poses))
+    assert errors.position.max < 1e-9 and errors.rotation.max < 1e-7
+    assert errors.drift < 1e-9
+    assert errors.distance == pytest.approx(10.0, rel=1e-6)
+    np.testing.assert_allclose(errors.turn[:2, :2], [[np.cos(2), np.sin(2)], [-np.sin(2), np.cos(2)]], atol=1e-9)
+
+
+def test_a_straight_walk_aligns_in_the_plane_but_never_flips():
+    times = np.arange(100) / 10
+    poses = np.zeros((100, 7))
+    poses[:, 0], poses[:, 6] = 0.5 * times, 1
+    errors = evaluate_trajectory(trajectory(times, transformed(poses, -1.0, [1, 1, 0])), trajectory(times, poses))
+    assert errors.position.max < 1e-9 and errors.rotation.max < 1e-6
+
+
+def test_standing_still_is_aligned_by_attitude():
+    times = np.arange(50) / 10
+    poses = np.zeros((50, 7))
+    poses[:, 6] = 1
+    errors = evaluate_trajectory(trajectory(times, transformed(poses, 0.7, [1, 1, 0])), trajectory(times, poses))
+    assert errors.position.max < 1e-9 and errors.rotation.max < 1e-6
+    assert errors.summary()["drift"] is None
+
+
+def test_relative_errors_of_wrong_scale_and_turn_rate():
+    # Speed 3 % too high along a line: 3 cm over a metre and over a second at 1 m/s, 1 mm a frame.
+    times = np.arange(301) / 30
+    poses = np.zeros((301, 7))
+    poses[:, 0], poses[:, 6] = times, 1
+    fast = poses.copy()
+    fast[:, 0] *= 1.03
+    errors = evaluate_trajectory(trajectory(times, fast), trajectory(times, poses))
+    assert errors.relative_position["metre"].mean == pytest.approx(0.03, rel=1e-6)
+    assert errors.relative_position["second"].mean == pytest.approx(0.03, rel=1e-6)
+    assert errors.relative_position["frame"].mean == pytest.approx(0.001, rel=1e-6)
+    assert errors.drift == pytest.approx(0.03, rel=1e-6)
+    # Heading that drifts by 0.02 rad/s.
+    turning = poses.copy()
+    turning[:, 3:] = Rotation.from_euler("z", 0.02 * times[:, None]).as_quat()
+    errors = evaluate_trajectory(trajectory(times, turning), trajectory(times, poses))
+    assert errors.relative_rotation["second"].mean == pytest.approx(0.02, rel=1e-6)
+    assert errors.relative_rotation["frame"].mean == pytest.approx(0.02 / 30, rel=1e-6)
+    # Aligned by position, which is exact: the rotation error is the drift itself, 0...0.2 rad.
+    assert errors.rotation.mean == pytest.approx(0.1, rel=1e-6)
+
+
+def test_the_plane_leaves_height_and_tilt_out():
+    times, poses = walk()
+    shaken = poses.copy()
+    shaken[:, 2] = 1 + 0.05 * np.sin(10 * times)
+    tilt = Rotation.from_euler("y", 0.3 * np.sin(7 * times)[:, None])
+    shaken[:, 3:] = (Rotation.from_quat(poses[:, 3:]) * tilt).as_quat()
+    errors = evaluate_trajectory(trajectory(times, poses), trajectory(times, shaken))
+    assert errors.position.max < 1e-9 and errors.rotation.max < 1e-6
+    assert evaluate_trajectory(trajectory(times, poses), trajectory(times, shaken), in_plane=False).rotation.max > 0.1
+
+
+def test_a_denser_and_offset_reference_is_interpolated():
+    times, poses = walk(count=3001, rate=300.0)
+    later = times[5:-10:20] + 0.0013
+    inner = trajectory(times, poses)
+    at, reference = matched(trajectory(later, poses[5:-10:20]), inner)
+    assert len(at.timestamps) == len(later)
+    between = poses[5:-10:20, :3] + 0.0013 * 300 * (poses[6:-9:20, :3] - poses[5:-10:20, :3])
+    np.testing.assert_allclose(reference.positions_xyz, between, atol=1e-9)
+    _, nearest = matched(trajectory(later, poses[5:-10:20]), inner, association="nearest")
+    np.testing.assert_allclose(nearest.positions_xyz, poses[5:-10:20, :3], atol=1e-12)
+
+
+def test_long_gaps_of_the_reference_are_not_bridged():
+    times, poses = walk()
+    holes = (times < 3) | (times > 5)
+    at, _ = matched(trajectory(times, poses), trajectory(times[holes], poses[holes]))
+    assert not np.any((at.timestamps > 3) & (at.timestamps < 5))
+    assert len(at.timestamps) == holes.sum()
+
+
+def test_bad_input_is_one_sentence(tmp_path):
+    times, poses = walk()
+    good = trajectory(times, poses)
+    with pytest.raises(InputError, match="0 of 301 poses have a counterpart.*spans 100"):
+        evaluate_trajectory(trajectory(times + 100, poses), good)
+    broken = poses.copy()
+    broken[7, 1] = np.nan
+    with pytest.raises(InputError, match="estimate: 1 of 301 poses are not finite"):
+        evaluate_trajectory(trajectory(times, broken), good)
+    for content in ("", "# only a comment\n", "1 2 3\n", "0 0 0 nan 0 0 0 1\n"):
+        (tmp_path / "bad.tum").write_text(content)
+        with pytest.raises(InputError, match="bad.tum"):
+            load(tmp_path / "bad.tum")

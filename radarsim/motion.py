@@ -93,7 +93,7 @@ class Motion:
         count = 2 + int(np.ceil(abs(yaw_rate) * np.ptp(span) / (np.pi / 4)))
         times = np.linspace(*span, count)
         path = np.asarray(position, float) + times[:, None] * np.asarray(velocity, float)
-        turn = Rotation.from_euler("z", yaw + yaw_rate * times)
+        turn = Rotation.from_euler("z", (yaw + yaw_rate * times)[:, None])
         return cls(duration, CubicSpline(times, path), RotationSpline(times, turn), lever_arm)
 
 

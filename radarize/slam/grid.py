@@ -48,8 +48,14 @@ class OccupancyGrid:
         ends: Float[np.ndarray, "ray 2"],
         hits: np.ndarray,
         config: GridConfig,
+        spread: bool = False,
     ) -> None:
-        """Add the rays of one node: cells on the way are missed, the end is hit where `hits` is true, else missed."""
+        """Add the rays of one node: cells on the way are missed, the end is hit where `hits` is true, else missed.
+
+        With `spread` a hit is shared among the four cells around it, log odds weighted bilinearly: surfaces then lie
+        where they are and not in the middle of cells, which would pull every match to its submap's raster. Without it
+        surfaces are one cell thin.
+        """
         if not len(ends):
             return
         self._grow(np.minimum(origins.min(axis=0), ends.min(axis=0)), np.maximum(origins.max(axis=0), ends.max(axis=0)))
@@ -62,6 +68,7 @@ class OccupancyGrid:
             config.miss / (1 - config.miss),
             config.lowest,
             config.highest,
+            spread,
         )
 
     def _grow(self, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
@@ -145,29 +152,32 @@ def cross(x0: float, y0: float, x1: float, y1: float, out: np.ndarray) -> int:
 
 
 @numba.njit(cache=True)
-def _insert(probability, origins, ends, hits, hit_odds, miss_odds, lowest, highest):
-    # Cells already updated by this insertion have their sign turned.
-    rows, columns = probability.shape
-    for i in range(len(ends)):
-        if hits[i]:
-            row, column = int(np.floor(ends[i, 1])), int(np.floor(ends[i, 0]))
-            _update(probability, row, column, hit_odds, lowest, highest)
-    line = np.empty((2 * (rows + columns), 2), np.int64)
+def _insert(probability, origins, ends, hits, hit_odds, miss_odds, lowest, highest, spread):
+    left, top = int(min(origins[:, 0].min(), ends[:, 0].min())) - 1, int(min(origins[:, 1].min(), ends[:, 1].min())) - 1
+    right = int(max(origins[:, 0].max(), ends[:, 0].max())) + 1
+    bottom = int(max(origins[:, 1].max(), ends[:, 1].max())) + 1
+    # What this insertion says of each cell: a share of a hit (0...1], or a miss (-1), or nothing.
+    news = np.zeros((bottom - top + 1, right - left + 1), np.float32)
+    line = np.empty((2 * (news.shape[0] + news.shape[1]), 2), np.int64)
     for i in range(len(ends)):
         count = cross(origins[i, 0], origins[i, 1], ends[i, 0], ends[i, 1], line)
         for k in range(count - 1 if hits[i] else count):
-            _update(probability, line[k, 0], line[k, 1], miss_odds, lowest, highest)
-    top, bottom = min(origins[:, 1].min(), ends[:, 1].min()), max(origins[:, 1].max(), ends[:, 1].max())
-    left, right = min(origins[:, 0].min(), ends[:, 0].min()), max(origins[:, 0].max(), ends[:, 0].max())
-    for row in range(int(top), int(bottom) + 1):
-        for column in range(int(left), int(right) + 1):
-            probability[row, column] = abs(probability[row, column])
-
-
-@numba.njit(cache=True)
-def _update(probability, row, column, factor, lowest, highest):
-    p = probability[row, column]
-    if p < 0:
-        return
-    odds = (p / (1 - p) if p > 0 else 1.0) * factor
-    probability[row, column] = -min(max(odds / (1 + odds), lowest), highest)
+            news[line[k, 0] - top, line[k, 1] - left] = -1
+    for i in range(len(ends)):
+        if hits[i] and spread:
+            row, column = int(np.floor(ends[i, 1] - 0.5)), int(np.floor(ends[i, 0] - 0.5))
+            v, u = ends[i, 1] - 0.5 - row, ends[i, 0] - 0.5 - column
+            for j in range(2):
+                for k in range(2):
+                    share = (v if j else 1 - v) * (u if k else 1 - u)
+                    if share > news[row + j - top, column + k - left]:
+                        news[row + j - top, column + k - left] = share
+        elif hits[i]:
+            news[int(np.floor(ends[i, 1])) - top, int(np.floor(ends[i, 0])) - left] = 1
+    for row in range(news.shape[0]):
+        for column in range(news.shape[1]):
+            share = news[row, column]
+            if share != 0:
+                p = probability[row + top, column + left]
+                odds = (p / (1 - p) if p > 0 else 1.0) * (miss_odds if share < 0 else hit_odds**share)
+                probability[row + top, column + left] = min(max(odds / (1 + odds), lowest), highest)

@@ -4,9 +4,10 @@ The pose T of a scan in a submap minimises
 
     sum_k ((1 - M(T p_k)) / sigma)^2 + e^T C^-1 e,      e = (R0^T (t - t0), yaw - yaw0)
 
-over the scan's points p_k, M the submap's probability and (t0, yaw0), C what odometry says (compare Hess et al., ICRA
-2016, eq. CS, which leaves out the prior's covariance). M is the quadratic B-spline over the cells: its gradient is
-continuous, and it never overshoots.
+over the scan's points p_k, M the submap's occupancy and (t0, yaw0), C what odometry says (compare Hess et al., ICRA
+2016, eq. CS, which leaves out the prior's covariance). M is the quadratic B-spline over the cells' max(2 p - 1, 0): its
+gradient is continuous, it never overshoots, and with free and unknown cells both at 0 a wall's ridge leans to neither
+of its sides.
 """
 
 from dataclasses import dataclass
@@ -24,7 +25,7 @@ class Match:
 
     Attributes:
         pose: of the scan in the grid's frame.
-        score: mean probability at the scan's points, 0...1.
+        score: mean occupancy M at the scan's points, 0...1.
         information: of the scan alone, without the prior, for (x, y, yaw) in the scan's frame.
     """
 
@@ -80,7 +81,7 @@ def thin(points: Float[np.ndarray, "n 2"], spacing: float) -> Float[np.ndarray, 
 
 @numba.njit(cache=True)
 def interpolate(probability: np.ndarray, x: float, y: float) -> tuple[float, float, float]:
-    """Quadratic B-spline over the cells and its gradient; x, y in cells from the grid's corner; 0 outside."""
+    """Quadratic B-spline over max(2 p - 1, 0) and its gradient; x, y in cells from the grid's corner; 0 outside."""
     rows, columns = probability.shape
     column, row = int(np.floor(x)), int(np.floor(y))
     if column < 1 or row < 1 or column >= columns - 1 or row >= rows - 1:
@@ -93,7 +94,7 @@ def interpolate(probability: np.ndarray, x: float, y: float) -> tuple[float, flo
     value = slope_x = slope_y = 0.0
     for j in range(3):
         for i in range(3):
-            p = probability[row + j - 1, column + i - 1]
+            p = max(2 * probability[row + j - 1, column + i - 1] - 1, 0)
             value += wy[j] * wx[i] * p
             slope_x += wy[j] * gx[i] * p
             slope_y += gy[j] * wx[i] * p
@@ -102,7 +103,7 @@ def interpolate(probability: np.ndarray, x: float, y: float) -> tuple[float, flo
 
 @numba.njit(cache=True)
 def _cost(probability, ox, oy, resolution, points, pose, prior, prior_weight, weight, hessian, gradient):
-    # Fills the Gauss-Newton system at the pose; returns the cost and the mean probability.
+    # Fills the Gauss-Newton system at the pose; returns the cost and the mean occupancy.
     hessian[:] = 0
     gradient[:] = 0
     cos, sin = np.cos(pose[2]), np.sin(pose[2])

@@ -33,7 +33,7 @@ class Submap:
     def insert(self, number: int, node: Node, pose: Float[np.ndarray, "3"]) -> None:
         """Add a node at its pose in this submap's frame."""
         origins, ends = transform(pose, node.origins), transform(pose, node.ends)
-        self.grid.insert(origins, ends, node.hits, self.config.grid)
+        self.grid.insert(origins, ends, node.hits, self.config.grid, spread=True)
         self.nodes.append(number)
         if self.finished:
             self.grid = self.grid.crop(margin=2)

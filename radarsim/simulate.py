@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float, Int16
 
 from radarize import __version__
 from radarize.errors import InputError
@@ -47,18 +48,23 @@ class Simulator:
         )
         self.synthesize = Synthesizer(config) if device == "cpu" else DirectSum(config, device)
 
-    def echoes(self, time: float) -> Echoes:
-        """Echoes of the frame that starts at `time` (s), found at the middle of its burst."""
-        middle = np.array([time + self.config.burst_center])
-        return self.finder(self.motion.position(middle)[0], self.motion.rotation(middle).as_matrix()[0])
+    def echoes(self, times: Float[np.ndarray, "frame"]) -> list[Echoes]:
+        """Echoes of the frames that start at `times` (s), found at the middle of each burst."""
+        middle = np.asarray(times) + self.config.burst_center
+        return self.finder.batch(self.motion.position(middle), self.motion.rotation(middle).as_matrix())
 
-    def frame(self, time: float) -> tuple[np.ndarray, Echoes]:
-        """Samples (loop, tx, rx, sample, iq) of the frame that starts at `time` (s), and the echoes in it."""
-        echoes = self.echoes(time)
-        lengths = echoes.lengths(self.config, self.motion, time)
-        response = self.front_end.if_response(lengths[:, :, 0].mean(axis=1))
-        signal = self.synthesize(lengths, echoes.amplitude * response)
-        return self.front_end.digitize(signal, self._noise), echoes
+    def frames(
+        self, times: Float[np.ndarray, "frame"]
+    ) -> tuple[Int16[np.ndarray, "frame loop tx rx sample 2"], list[Echoes]]:
+        """Samples of the frames that start at `times` (s), and the echoes in them."""
+        echoes = self.echoes(times)
+        samples = []
+        for time, present in zip(times, echoes, strict=True):
+            lengths = present.lengths(self.config, self.motion, time)
+            response = self.front_end.if_response(lengths[:, 0, 0])
+            signal = self.synthesize(lengths, present.amplitude * response)
+            samples.append(self.front_end.digitize(signal, self._noise))
+        return np.stack(samples), echoes
 
 
 def simulate(
@@ -143,12 +149,12 @@ def simulate(
     ) as writer:
         for first in range(0, frames, _BATCH):
             batch = times[first : first + _BATCH]
-            made = [simulator.frame(t) for t in batch]
+            samples, echoes = simulator.frames(batch)
             writer.append(
-                np.stack([adc for adc, _ in made]),
+                samples,
                 batch,
                 **_truth(world, motion, batch + config.burst_center, config.max_range),
-                **_counts([echoes for _, echoes in made]),
+                **_counts(echoes),
             )
             if progress:
                 progress(first + len(batch), frames)

@@ -24,8 +24,6 @@ from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.synthesis import BurstClock, parabolas
 from radarsim.scene.scene import Scene
 
-#: Every n-th scatterer bounces off mirrors, with n times the power: ghosts are weaker and many.
-GHOST_STRIDE = 4
 #: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
 CLEARANCE = 5e-3
 
@@ -146,73 +144,110 @@ class EchoFinder:
         self._phasor = np.exp(1j * scatterers.phase)
 
     def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Echoes:
-        """Echoes for a sensor pose (rotation: sensor to world)."""
-        direct, amplitude = self._direct(position, rotation)
+        """Echoes for one sensor pose (rotation: sensor to world)."""
+        return self.batch(np.asarray(position)[None], np.asarray(rotation)[None])[0]
+
+    def batch(
+        self, positions: Float[np.ndarray, "frame 3"], rotations: Float[np.ndarray, "frame 3 3"]
+    ) -> list[Echoes]:
+        """Echoes of several frames: one after the other, but for the ray tests, which are quicker in large numbers."""
+        poses = list(zip(np.asarray(positions, float), np.asarray(rotations, float), strict=True))
+        points = self._points(poses)
+        images = self._images(poses)
+        echoes = []
+        for (index, amplitude), ghosts, (transforms, flashes, horizontal) in zip(
+            points, self._ghosts(poses, points), images, strict=True
+        ):
+            s = self.scatterers
+            place = s.position[index]
+            mirrored, bounced, ghost_amplitude = ghosts
+            echoes.append(
+                Echoes(
+                    np.concatenate([
+                        np.stack([place, place], axis=1),
+                        np.stack([bounced, mirrored], axis=1),
+                        np.stack([mirrored, bounced], axis=1),
+                    ]),
+                    transforms,
+                    np.concatenate([amplitude * self._phasor[index], ghost_amplitude, ghost_amplitude, flashes]),
+                    np.concatenate([
+                        np.where(s.horizontal[index], Provenance.FLOOR_CEILING, Provenance.DIRECT),
+                        np.full(2 * len(mirrored), Provenance.GHOST),
+                        np.where(horizontal, Provenance.FLOOR_CEILING, Provenance.DIRECT),
+                    ]).astype(np.uint8),
+                )
+            )  # fmt: skip
+        return echoes
+
+    def _seen(self, segments: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
+        """Per frame, which segments (origins, targets) nothing stands in."""
+        counts = np.cumsum([len(targets) for _, targets in segments])
+        if self.scene is None or not counts[-1]:
+            return [np.ones(len(targets), bool) for _, targets in segments]
+        origins = np.concatenate([np.broadcast_to(o, t.shape) for o, t in segments])
+        targets = np.concatenate([t for _, t in segments])
+        return np.split(~self.scene.occluded(origins, targets, margin=CLEARANCE), counts[:-1])
+
+    def _points(self, poses) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Visible scatterers and their amplitudes."""
         s = self.scatterers
-        points = [np.repeat(s.position[direct][:, None], 2, axis=1)]
-        amplitudes = [amplitude * self._phasor[direct]]
-        causes = [np.where(s.horizontal[direct], Provenance.FLOOR_CEILING, Provenance.DIRECT)]
-        images = np.zeros((0, 3, 4))
-        if self.facets is not None and len(self.facets):
-            ghosts = direct[direct % GHOST_STRIDE == 0]
-            index, a, b, ghost_amplitude = self._ghosts(position, rotation, ghosts)
-            ghost_amplitude = ghost_amplitude * self._phasor[index]
-            points += [np.stack([a, b], axis=1), np.stack([b, a], axis=1)]
-            amplitudes += [ghost_amplitude, ghost_amplitude]
-            causes += [np.full(2 * len(a), Provenance.GHOST)]
-            images, plate_amplitude, horizontal = self._plates(position, rotation)
-            amplitudes.append(plate_amplitude)
-            causes.append(np.where(horizontal, Provenance.FLOOR_CEILING, Provenance.DIRECT))
-        return Echoes(
-            np.concatenate(points), images, np.concatenate(amplitudes), np.concatenate(causes).astype(np.uint8)
-        )
+        candidates = []
+        for position, rotation in poses:
+            amplitude = np.zeros(len(s))
+            _direct_amplitudes(
+                s.position, s.normal, s.sigma, s.two_sided, position, rotation, self.reach, self.config.wavelength,
+                *self._tables, amplitude,
+            )  # fmt: skip
+            index = np.flatnonzero(amplitude > self.weakest)
+            candidates.append((index, amplitude[index]))
+        seen = self._seen([(p, s.position[i]) for (p, _), (i, _) in zip(poses, candidates, strict=True)])
+        return [(i[v], a[v]) for (i, a), v in zip(candidates, seen, strict=True)]
 
-    def _visible(self, origins: np.ndarray, targets: np.ndarray) -> np.ndarray:
-        if self.scene is None or not len(targets):
-            return np.ones(len(targets), bool)
-        return ~self.scene.occluded(origins, targets, margin=CLEARANCE)
-
-    def _direct(self, position, rotation):
-        s = self.scatterers
-        amplitude = np.zeros(len(s))
-        _direct_amplitudes(
-            s.position, s.normal, s.sigma, s.two_sided, position, rotation, self.reach, self.config.wavelength,
-            *self._tables, amplitude,
-        )  # fmt: skip
-        index = np.flatnonzero(amplitude > self.weakest)
-        targets = s.position[index]
-        index = index[self._visible(np.broadcast_to(position, targets.shape), targets)]
-        return index, amplitude[index]
-
-    def _ghosts(self, position, rotation, candidates):
+    def _ghosts(self, poses, points) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Mirrored scatterers, the scatterers themselves and the amplitude of either way round."""
         s, f = self.scatterers, self.facets
-        near = np.abs(np.einsum("md,md->m", position - f.center, f.normal)) < self.reach
-        mirrors = np.flatnonzero(f.mirror & near)
-        amplitude = np.zeros((len(mirrors), len(candidates)), complex)
-        _ghost_amplitudes(
-            s.position[candidates], s.normal[candidates], s.sigma[candidates], s.two_sided[candidates],
-            f.center[mirrors], f.normal[mirrors], f.u[mirrors], f.v[mirrors], f.half[mirrors], f.two_sided[mirrors],
-            f.reflection[mirrors], position, rotation, self.reach, self.config.wavelength, self.weakest,
-            *self._tables, amplitude,
-        )  # fmt: skip
-        m, c = np.nonzero(amplitude)
-        index, mirror = candidates[c], mirrors[m]
-        amplitude = amplitude[m, c] * np.sqrt(GHOST_STRIDE)
-        target, normal = s.position[index], f.normal[mirror]
-        h = np.einsum("ed,ed->e", position - f.center[mirror], normal)[:, None]
-        hs = np.einsum("ed,ed->e", target - f.center[mirror], normal)[:, None]
-        bounce = position - 2 * h * normal + (target - position + 2 * h * normal) * h / (h + hs)
-        seen = self._visible(np.broadcast_to(position, bounce.shape), bounce)
-        seen[seen] = self._visible(bounce[seen], target[seen])
-        image = target - 2 * hs * normal
-        return index[seen], target[seen], image[seen], amplitude[seen]
+        if f is None or not len(f):
+            return [(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, complex))] * len(poses)
+        found = []
+        for (position, rotation), (index, _) in zip(poses, points, strict=True):
+            candidates = index[s.bounces[index] > 0]
+            height = np.einsum("md,md->m", position - f.center, f.normal)
+            away = np.linalg.norm(position - f.center, axis=1) - np.linalg.norm(f.half, axis=1)
+            mirrors = np.flatnonzero(f.mirror & (away < self.reach) & (f.two_sided | (height > 0)))
+            amplitude = np.zeros((len(mirrors), len(candidates)), complex)
+            _ghost_amplitudes(
+                s.position[candidates], s.normal[candidates], s.sigma[candidates], s.two_sided[candidates],
+                f.center[mirrors], f.normal[mirrors], f.u[mirrors], f.v[mirrors], f.half[mirrors],
+                f.two_sided[mirrors], f.reflection[mirrors], position, rotation, self.reach, self.config.wavelength,
+                self.weakest, *self._tables, amplitude,
+            )  # fmt: skip
+            m, c = np.nonzero(amplitude)
+            ghost, mirror = candidates[c], mirrors[m]
+            place, normal = s.position[ghost], f.normal[mirror]
+            h = height[mirror, None]
+            hs = np.einsum("ed,ed->e", place - f.center[mirror], normal)[:, None]
+            image_of_sensor = position - 2 * h * normal
+            bounce = image_of_sensor + (place - image_of_sensor) * h / (h + hs)
+            strength = amplitude[m, c] * np.sqrt(s.bounces[ghost]) * self._phasor[ghost]
+            found.append((bounce, place, place - 2 * hs * normal, strength))
+        first = self._seen([(p, bounce) for (p, _), (bounce, *_) in zip(poses, found, strict=True)])
+        found = [tuple(column[v] for column in row) for row, v in zip(found, first, strict=True)]
+        second = self._seen([(bounce, place) for bounce, place, *_ in found])
+        return [(image[v], place[v], a[v]) for (_, place, image, a), v in zip(found, second, strict=True)]
 
-    def _plates(self, position, rotation):
-        facet, point, images, amplitude = plates.parts(
-            self.facets, position, rotation, self.reach, self.config.wavelength, self.weakest, self._tables
-        )
-        seen = self._visible(np.broadcast_to(position, point.shape), point)
-        return images[seen], amplitude[seen], self.facets.horizontal[facet[seen]]
+    def _images(self, poses) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Visible parts of plates: isometry, amplitude, whether of a floor or ceiling."""
+        if self.facets is None:
+            return [(np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, bool))] * len(poses)
+        found = [
+            plates.parts(self.facets, p, r, self.reach, self.config.wavelength, self.weakest, self._tables)
+            for p, r in poses
+        ]
+        seen = self._seen([(p, row[1]) for (p, _), row in zip(poses, found, strict=True)])
+        return [
+            (images[v], amplitude[v], self.facets.horizontal[facet[v]])
+            for (facet, _, images, amplitude), v in zip(found, seen, strict=True)
+        ]
 
 
 @njit(parallel=True, cache=True)

@@ -13,6 +13,8 @@ from radarsim.scene.scene import Scene
 
 #: Scatterers per square metre: about ten per range-azimuth cell of the `radarize` preset on a wall 2 m away.
 DENSITY = 150.0
+#: Of a sampled surface every n-th scatterer is seen over mirrors.
+BOUNCE_STRIDE = 4
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,8 @@ class Scatterers:
         phase: rad, uniformly random.
         two_sided: whether it scatters from behind as well (sheets without a volume).
         horizontal: whether it belongs to a floor or ceiling.
+        bounces: weight of its power in paths over mirrors. Ghosts are many and weak, so of a sampled surface only
+            every fourth scatterer has them, with four times the power.
     """
 
     position: Float[np.ndarray, "scatterer 3"]
@@ -34,6 +38,7 @@ class Scatterers:
     phase: Float[np.ndarray, "scatterer"]
     two_sided: np.ndarray
     horizontal: np.ndarray
+    bounces: Float[np.ndarray, "scatterer"]
 
     def __len__(self) -> int:
         return len(self.position)
@@ -53,6 +58,7 @@ class Scatterers:
             np.zeros(n) if phase is None else phase,
             zeros,
             zeros,
+            np.ones(n),
         )
 
     @classmethod
@@ -99,4 +105,5 @@ def _on_object(item, rng: np.random.Generator, density: float) -> Scatterers:
         rng.uniform(0, 2 * np.pi, count),
         np.full(count, is_sheet(mesh)),
         np.full(count, is_floor_or_ceiling(item)),
+        np.where(np.arange(count) % BOUNCE_STRIDE == 0, float(BOUNCE_STRIDE), 0.0),
     )

@@ -85,8 +85,20 @@ def import_recording(
             done += len(valid)
             if progress:
                 progress(done, max(done, capture.expected_frames))
+        if products:
+            capture.warnings += _apart(products["truth/time"].data, start_time, done * radar.frame_period, Path(poses))
         writer.annotate(warnings="; ".join(capture.warnings), assumed=", ".join(capture.assumed))
     return output
+
+
+def _apart(times: np.ndarray, start: float, duration: float, poses: Path) -> list[str]:
+    """A warning if no pose falls into the recording: two clocks, most likely."""
+    if times[-1] >= start and times[0] <= start + duration:
+        return []
+    return [
+        f"{poses} covers {times[0]:.3f} to {times[-1]:.3f} s, but the frames {start:.3f} to {start + duration:.3f} s: "
+        "give start_time to bring both to one clock"
+    ]
 
 
 def _open(source: Path, config: RadarConfig | None, cfg_text: str, overrides: dict[str, object]) -> Capture:

@@ -84,6 +84,8 @@ def _violations(config: RadarConfig) -> Iterator[str]:
             f"loops x transmitters x receivers x samples make a frame of {config.frame_bytes} bytes, "
             f"expected at most {MAX_CUBE}"
         )
+    if config.samples % 2:
+        yield f"samples is {config.samples}, expected an even number: LVDS carries complex samples in pairs"
     chirp_bytes = 4 * len(config.rx) * config.samples
     if chirp_bytes > MAX_CHIRP_BUFFER:
         yield f"samples x receivers make a chirp of {chirp_bytes} bytes, expected at most {MAX_CHIRP_BUFFER}"

@@ -204,6 +204,16 @@ def test_poses_come_along(tmp_path):
     assert np.loadtxt(tmp_path / "q.tum") == pytest.approx(np.loadtxt(tmp_path / "p.tum"))
 
 
+def test_poses_of_another_clock_are_noticed(tmp_path):
+    source = write_bin(tmp_path / "a.bin", room(CONFIG, 2), CONFIG)
+    (tmp_path / "p.tum").write_text("1700000000 1 2 3 0 0 0 1\n1700000009 1 2 3 0 0 0 1\n")
+    for start, warned in ((0.0, True), (1700000001.0, False)):
+        overrides = {"start_time": start}
+        import_recording(source, tmp_path / "a.h5", config=CONFIG, poses=tmp_path / "p.tum", overrides=overrides)
+        with Recording(tmp_path / "a.h5") as recording:
+            assert ("give start_time" in recording.attributes["warnings"]) == warned
+
+
 @pytest.mark.parametrize(
     "text, message",
     [

@@ -37,6 +37,12 @@ def test_known_echoes_of_the_public_capture(recordings, tmp_path, source):
     assert ranges[strongest] == pytest.approx(1.57, abs=0.03)
 
 
+@pytest.mark.parametrize("samples", [450, 500, 510])
+def test_a_wrong_sample_count_is_refused(recordings, tmp_path, samples):
+    with pytest.raises(InputError, match=f"repeat every 6144 and not every {12 * samples}"):
+        import_recording(recordings / "iwr6843-studio", tmp_path / "a.h5", overrides={"samples": samples, "loops": 30})
+
+
 def test_export_gives_the_captured_file_back(recordings, tmp_path):
     source = recordings / "iwr6843-studio"
     import_recording(source, tmp_path / "a.h5")

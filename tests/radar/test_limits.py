@@ -39,6 +39,7 @@ def test_the_60_ghz_chip_has_its_own_band():
         ({"idle_time": 3.4e-6, "slope": 40e12}, "expected at least 3.5 us"),
         ({"idle_time": 1.9e-6, "slope": 19e12}, "expected at least 2 us"),
         ({"idle_time": 4e-6, "slope": 19e12, "ramp_end_time": 10e-6, "samples": 4}, "expected at least 15 us"),
+        ({"samples": 95}, "samples is 95, expected an even number"),
         ({"loops": 256, "frame_period": 0.5}, "loops is 256"),
         ({"frame_period": 1.4}, "frame_period is 1400 ms"),
         ({"frame_period": 16.6e-3}, "at least 0.3 ms more"),

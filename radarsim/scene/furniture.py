@@ -106,7 +106,9 @@ def sofa(rng: np.random.Generator) -> Piece:
 def radiator(rng: np.random.Generator, width: float = 1.2) -> Piece:
     """Sheet-steel radiator with upright ribs on its front."""
     body = span((-0.05, -width / 2, 0.12), (0.03, width / 2, 0.72))
-    ribs = [box((0.041, y, 0.42), (0.02, 0.03, 0.54)) for y in np.arange(-width / 2 + 0.05, width / 2 - 0.04, 0.1)]
+    ribs = [
+        box((0.04, y, 0.42), (0.02, 0.03, 0.54), ("-x",)) for y in np.arange(-width / 2 + 0.05, width / 2 - 0.04, 0.1)
+    ]
     return Piece("radiator", 0.12, width, {"metal": joined(body, *ribs)})
 
 
@@ -114,7 +116,7 @@ def whiteboard(rng: np.random.Generator) -> Piece:
     """Enamelled steel sheet on the wall with a pen tray."""
     width = rng.choice([1.2, 1.8])
     sheet = box((0, 0, 1.45), (0.02, width, 1.0))
-    tray = box((0.051, 0, 0.96), (0.08, width * 0.6, 0.015))
+    tray = box((0.05, 0, 0.96), (0.08, width * 0.6, 0.015), ("-x",))
     return Piece("whiteboard", 0.05, width, {"metal": joined(sheet, tray)})
 
 

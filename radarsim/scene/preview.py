@@ -38,7 +38,11 @@ def _plan(scene: Scene):
     up = (scene.normals[:, 2] > 0.5) & (scene.triangles[:, :, 2].max(axis=1) < low[2] + 1.7)
     order = np.flatnonzero(up)[np.argsort(scene.triangles[up][:, :, 2].mean(axis=1), kind="stable")]
     colors = np.array([o.material.color for o in scene.objects])[scene.triangle_object[order]]
-    axes.add_collection(PolyCollection(scene.triangles[order][:, :, :2], facecolors=0.5 + 0.5 * colors))
+    axes.add_collection(
+        PolyCollection(
+            scene.triangles[order][:, :, :2], facecolors=0.5 + 0.5 * colors, edgecolors="face", linewidths=0.3
+        )
+    )
     seen = {o.material.name: o.material.color for o in scene.objects}
     for name, color in seen.items():
         part = [o for o in scene.objects if o.material.name == name]
@@ -53,25 +57,29 @@ def _plan(scene: Scene):
     return figure
 
 
-def view(scene: Scene, width: int = 1280, height: int = 800, samples: int = 6) -> Float[np.ndarray, "h w 3"]:
-    """A perspective picture, RGB in 0...1: sunlight with shadows and light from the sky, by the scene's own ray tests."""
+def view(scene: Scene, width: int = 1280, samples: int = 12) -> Float[np.ndarray, "h w 3"]:
+    """A perspective picture, RGB in 0...1: sunlight with shadows and skylight, by the scene's own ray tests."""
     shown = _without_ceiling(scene)
     low, high = shown.bounds
     center, reach = (low + high) / 2, np.linalg.norm(high - low)
-    eye = center + reach * np.array([-0.28, -0.62, 0.78])
-    target = center - np.array([0, 0.03 * reach, 0.5])
-    ahead = (target - eye) / np.linalg.norm(target - eye)
+    ahead = np.array([0.28, 0.62, -0.78]) / np.linalg.norm([0.28, 0.62, -0.78])
+    eye = center - 1.1 * reach * ahead
     right = np.cross(ahead, [0, 0, 1])
     right /= np.linalg.norm(right)
     top = np.cross(right, ahead)
-    rng = np.random.default_rng(0)
+    # The picture's edges are those of the world, as tangents of the angles from the line of sight, and a little more.
+    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
+    seen = np.stack([(corners - eye) @ right, (corners - eye) @ top], axis=1) / ((corners - eye) @ ahead)[:, None]
+    edges = np.stack([seen.min(axis=0), seen.max(axis=0)])
+    edges += 0.04 * np.ptp(edges, axis=0) * [[-1], [1]]
+    height = int(width * np.ptp(edges[:, 1]) / np.ptp(edges[:, 0]))
     colors = np.array([o.material.color for o in shown.objects])
-    tangent = _fit(shown, eye, ahead, right, top, width / height)
+    rng = np.random.default_rng(0)
     picture = np.zeros((height * width, 3))
     for _ in range(samples):
-        column = (np.arange(width) + rng.random(width)) / width * 2 - 1
-        row = 1 - (np.arange(height) + rng.random(height)) / height * 2
-        u, v = np.meshgrid(tangent * column, tangent * row * height / width)
+        u = np.interp((np.arange(width) + rng.random(width)) / width, [0, 1], edges[:, 0])
+        v = np.interp((np.arange(height) + rng.random(height)) / height, [0, 1], edges[::-1, 1])
+        u, v = np.meshgrid(u, v)
         rays = (ahead + u[..., None] * right + v[..., None] * top).reshape(-1, 3)
         rays /= np.linalg.norm(rays, axis=1, keepdims=True)
         picture += _shade(shown, colors, eye, rays, rng)
@@ -89,14 +97,6 @@ def _without_ceiling(scene: Scene) -> Scene:
             continue
         kept.append(item)
     return Scene(scene.name, kept or scene.objects)
-
-
-def _fit(scene: Scene, eye, ahead, right, top, aspect: float) -> float:
-    """Tangent of half the horizontal angle that shows everything."""
-    low, high = scene.bounds
-    corners = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
-    away = (corners - eye) @ ahead
-    return 1.04 * max(np.abs((corners - eye) @ right / away).max(), aspect * np.abs((corners - eye) @ top / away).max())
 
 
 def _shade(scene: Scene, colors, eye, rays, rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:

@@ -1,0 +1,100 @@
+"""Scene files: what they mean, and one clear sentence for each mistake."""
+
+import numpy as np
+import pytest
+
+from radarize.errors import InputError
+from radarsim.scene import shapes
+from radarsim.scene.scene import Scene
+
+WALL = "{name: wall, shape: rectangle, size: [4, 3], position: [3, 0, 1], facing: [-1, 0, 0], material: concrete}"
+
+
+def load(folder, text):
+    path = folder / "scene.yaml"
+    path.write_text(text)
+    return Scene.load(path)
+
+
+def test_primitives(tmp_path):
+    shapes.box((0, 0, 0), (100, 100, 100)).export(tmp_path / "cube.ply")
+    scene = load(
+        tmp_path,
+        f"""
+objects:
+  - {WALL}
+  - {{name: crate, shape: box, size: [2, 1, 1], position: [0, 0, 5], rotation: [0, 0, 90], material: wood}}
+  - {{name: pipe, shape: cylinder, radius: 0.1, height: 2, position: [9, 0, 1], material: metal}}
+  - {{name: ball, shape: sphere, radius: 0.5, position: [0, 9, 0],
+      material: {{custom: {{permittivity: 4, conductivity: 0.2, sigma0_db: -20}}}}}}
+  - {{name: scan, shape: mesh, file: cube.ply, scale: 0.01, position: [0, -9, 0], material: brick}}
+""",
+    )
+    wall, crate, pipe, ball, scan = scene.objects
+    assert scene.name == "scene"
+    assert wall.mesh.face_normals[0] == pytest.approx([-1, 0, 0])
+    assert np.ptp(crate.mesh.vertices, axis=0) == pytest.approx([1, 2, 1])
+    assert pipe.mesh.bounds[:, 2] == pytest.approx([0, 2])
+    assert ball.material.permittivity_at(77e9).real == 4 and ball.material.sigma0 == pytest.approx(0.01)
+    assert np.ptp(scan.mesh.vertices, axis=0) == pytest.approx([1, 1, 1])
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("objects: [", "malformed YAML"),
+        ("[1, 2]", "holds list, expected keys"),
+        ("name: x", "neither objects nor a building"),
+        ("objekts: []", "objekts: unknown key"),
+        (f"objects: [{WALL.replace('concrete', 'unobtainium')}]", "object 'wall': unknown material 'unobtainium'"),
+        (f"objects: [{WALL.replace('facing', 'facking')}]", r"objects\[0\].* \(object 'wall'\)"),
+        (f"objects: [{WALL.replace('[4, 3]', '[4, -3]')}]", r"objects\[0\].size\[1\] \(object 'wall'\) is -3"),
+        (f"objects: [{WALL.replace('[4, 3]', '[4, .nan]')}]", r"objects\[0\].size\[1\]"),
+        (f"objects: [{WALL.replace('rectangle', 'blob')}]", r"objects\[0\] \(object 'wall'\)"),
+        (f"objects: [{WALL}, {WALL}]", "two objects are named 'wall'"),
+        (
+            "objects: [{name: m, shape: mesh, file: gone.ply, material: wood}]",
+            "object 'm': file .*gone.ply does not exist",
+        ),
+        ("building: {kind: castle}", "building.kind is 'castle'"),
+        ("building: {kind: office, seed: x}", "building.seed is 'x'"),
+        ("objects: [3]", r"objects\[0\]"),
+        ("objects: 3", "objects is 3"),
+    ],
+)
+def test_mistakes_get_one_sentence(tmp_path, text, complaint):
+    with pytest.raises(InputError, match=complaint) as caught:
+        load(tmp_path, text)
+    message = str(caught.value)
+    assert "scene" in message and "\n" not in message
+
+
+def test_broken_mesh(tmp_path):
+    (tmp_path / "bad.ply").write_bytes(b"ply\nnot a mesh")
+    with pytest.raises(InputError, match="bad.ply"):
+        load(tmp_path, "objects: [{name: m, shape: mesh, file: bad.ply, material: wood}]")
+
+
+def test_bare_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert Scene.load("physics/wall").name == "wall"
+    with pytest.raises(InputError, match="no scene 'attic'.*office"):
+        Scene.load("attic")
+    with pytest.raises(InputError, match="attic.yaml does not exist"):
+        Scene.load("attic.yaml")
+    (tmp_path / "scenes").mkdir()
+    (tmp_path / "scenes" / "attic.yaml").write_text(f"objects: [{WALL}]")
+    assert Scene.load("attic").name == "attic"
+
+
+@pytest.mark.parametrize("name", ["wall", "plate", "room"])
+def test_physics_scenes(name):
+    assert Scene.load(f"physics/{name}").sionna is not None
+
+
+def test_room_is_closed():
+    room = Scene.load("physics/room")
+    directions = np.random.default_rng(0).standard_normal((500, 3))
+    distance, triangle = room.hit(np.array([0.3, 0.2, 1.4]), directions)
+    assert np.isfinite(distance).all()
+    assert np.all(np.sum(room.normals[triangle] * directions, axis=1) < 0)  # faces look inward

@@ -1,5 +1,7 @@
 """Planar odometry: velocities at burst centres and yaw increments between them, integrated to a trajectory."""
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -119,15 +121,25 @@ class Odometry:
         Raises:
             InputError: samples of the wrong shape, or stamps that do not increase.
         """
+        return self.follow(self.heatmaps.spectrum(adc, valid), times)
+
+    def follow(
+        self,
+        spectrum: torch.Tensor,
+        times: Float[np.ndarray, "frame"],
+        stage: Callable[[str], AbstractContextManager] = nullcontext,
+    ) -> Track:
+        """As `push`, from spectra of `Heatmaps.spectrum`; `stage` is entered with the name of each estimator, to time it."""
         centers = np.asarray(times, float) + self.config.burst_center
         before = centers[0] - 1 if self._last is None else self._last[0]
         steps = np.diff(centers, prepend=before)
         if not (steps > 0).all():
             bad = int(np.argmin(steps > 0))
             raise InputError(f"frame times step by {steps[bad]:.6f} s before {times[bad]:.6f} s, expected ascending times")
-        spectrum = self.heatmaps.spectrum(adc, valid)
-        velocities = self._filter.filter(centers, self.velocity.estimate(spectrum))
-        rotations = self.rotation.estimate(spectrum, centers, velocities)
+        with stage("translation"):
+            velocities = self._filter.filter(centers, self.velocity.estimate(spectrum))
+        with stage("rotation"):
+            rotations = self.rotation.estimate(spectrum, centers, velocities)
         return self._integrate(centers, velocities, rotations)
 
     def _integrate(self, times: np.ndarray, velocities: Velocities, rotations: Rotations) -> Track:

@@ -1,0 +1,190 @@
+"""From raw I/Q to trajectory and map: the whole of Radarize, frame batch by frame batch."""
+
+import json
+import platform as machine
+import time as clock
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from radarize import __version__
+from radarize.errors import InputError
+from radarize.mapping.scans import BEARINGS, METHODS, ScanConfig, make_scans
+from radarize.odometry.integration import Odometry
+from radarize.radar.config import RadarConfig
+from radarize.recording import Recording
+from radarize.slam.backend import Slam
+from radarize.slam.config import SlamConfig
+from radarize.tum import planar_poses, write_tum
+
+#: Odometry by name. Learned estimators will join.
+ODOMETRY = ("doppler",)
+#: Readings of the paper's pipeline: what the physics asks for.
+SETTINGS = ("corrected",)
+#: Frames a batch: enough to vectorise over, few enough to stay in cache.
+BATCH = 16
+#: Heat maps kept for the report, spread over the recording.
+_PICTURES = 6
+
+
+class Pipeline:
+    """Radar SLAM as a stream: push raw frames, then read trajectory and map. Memory grows with the path, not the data.
+
+    Args:
+        config: radar configuration.
+        scans: how scans are made, a key of `radarize.mapping.scans.METHODS`.
+    """
+
+    def __init__(self, config: RadarConfig, scans: str = "elevation-aware"):
+        self.config, self.scans = config, scans
+        self.odometry = Odometry(config)
+        self.heatmaps = self.odometry.heatmaps
+        self.scan_config = ScanConfig()
+        self.slam = Slam(SlamConfig.preset("radar"))
+        self.times: list[np.ndarray] = []
+        self.poses: list[np.ndarray] = []
+        self.velocities: list[np.ndarray] = []
+        self.ranges: list[np.ndarray] = []
+        self.stage_seconds: dict[str, float] = defaultdict(float)
+
+    def push(self, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None = None) -> None:
+        """Process the next frames.
+
+        Args:
+            adc: int16 (frame, loop, tx, rx, sample, iq).
+            times: (frame,) stamps, s.
+            valid: (frame, loop, tx), False where a chirp was lost.
+        """
+        with self._stage("spectra"):
+            spectrum = self.heatmaps.spectrum(adc, valid)
+        track = self.odometry.follow(spectrum, times, self._stage)
+        with self._stage("maps"):
+            power = self.heatmaps.range_azimuth_of(spectrum).numpy()
+            level = None if self.heatmaps.pairs is None else self.heatmaps.elevation_aware_of(spectrum).numpy()
+        with self._stage("scans"):
+            ranges = make_scans(
+                power, self.heatmaps.ranges, self.heatmaps.azimuths, level, method=self.scans, config=self.scan_config
+            )
+        with self._stage("slam"):
+            for instant, pose, spread, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):
+                self.slam.add_odometry(instant, pose, spread)
+                self.slam.add_scan(instant, BEARINGS, scan)
+        self.times.append(track.time)
+        self.poses.append(track.pose)
+        self.velocities.append(track.velocity)
+        self.ranges.append(ranges.astype(np.float32))
+
+    def finish(self) -> None:
+        """Close the last loops and optimise."""
+        with self._stage("slam"):
+            self.slam.finish()
+
+    @contextmanager
+    def _stage(self, name: str) -> Iterator[None]:
+        start = clock.perf_counter()
+        yield
+        self.stage_seconds[name] += clock.perf_counter() - start
+
+
+def run(
+    recording: Path,
+    output: Path,
+    *,
+    odometry: str = "doppler",
+    scans: str = "elevation-aware",
+    settings: str = "corrected",
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Run the pipeline on a recording.
+
+    Args:
+        recording: ``.h5`` file, simulated or real.
+        output: folder to write: trajectory.tum (SLAM), odometry.tum, reference.tum (if the recording has true poses),
+            map.pgm and map.yaml, scans.h5, run.json.
+        odometry, scans, settings: methods by name.
+        progress: called with (frames done, frames in all).
+
+    Returns:
+        the folder.
+
+    Raises:
+        InputError: unusable recording or unknown method.
+    """
+    for name, value, known in (("odometry", odometry, ODOMETRY), ("scans", scans, METHODS), ("settings", settings, SETTINGS)):
+        if value not in known:
+            raise InputError(f"{name} is {value!r}, expected one of {', '.join(known)}")
+    output = Path(output)
+    with Recording(recording) as source:
+        if not len(source):
+            raise InputError(f"{recording}: has no whole frame, expected at least one")
+        if scans == "elevation-aware" and Pipeline(source.config).heatmaps.pairs is None:
+            raise InputError(
+                f"{recording}: its antennas have no vertical pairs, which scans=elevation-aware needs; use first-echo"
+            )
+        pipeline = Pipeline(source.config, scans)
+        for frames, adc in source.batches(BATCH):
+            pipeline.push(adc, source.times[frames], source.valid(frames.start, frames.stop))
+            if progress:
+                progress(frames.stop, len(source))
+        pipeline.finish()
+        output.mkdir(parents=True, exist_ok=True)
+        _write(pipeline, source, output, {"odometry": odometry, "scans": scans, "settings": settings})
+    return output
+
+
+def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[str, str]) -> None:
+    times, poses = np.concatenate(pipeline.times), np.concatenate(pipeline.poses)
+    write_tum(output / "odometry.tum", times, planar_poses(poses))
+    slam_times, slam_poses = pipeline.slam.trajectory()
+    write_tum(output / "trajectory.tum", slam_times, planar_poses(slam_poses))
+    if source.has("truth/pose") and source.has("truth/time"):
+        write_tum(output / "reference.tum", source.read("truth/time"), source.read("truth/pose"))
+    pipeline.slam.map().save(output / "map")
+    _write_scans(pipeline, source, output / "scans.h5", times)
+    frames = len(times)
+    facts = {
+        "recording": source.path.name,
+        "recording_attributes": {k: v for k, v in source.attributes.items() if isinstance(v, (str, int, float))},
+        "frames": frames,
+        "duration_s": float(times[-1] - times[0] + source.config.frame_period),
+        "methods": methods,
+        "radar": source.config_json(),
+        "scan_settings": pipeline.scan_config.model_dump(),
+        "slam_settings": pipeline.slam.config.model_dump(),
+        "ms_per_frame": {name: 1e3 * seconds / frames for name, seconds in pipeline.stage_seconds.items()},
+        "closures": len(pipeline.slam.graph.closures) if hasattr(pipeline.slam.graph, "closures") else None,
+        "nodes": len(pipeline.slam.nodes),
+        "radarize_version": __version__,
+        "python": machine.python_version(),
+        "machine": f"{machine.system()} {machine.machine()}",
+    }
+    (output / "run.json").write_text(json.dumps(facts, indent=2))
+
+
+def _write_scans(pipeline: Pipeline, source: Recording, path: Path, times: np.ndarray) -> None:
+    with h5py.File(path, "w") as file:
+        def put(name: str, data: np.ndarray, unit: str) -> None:
+            file.create_dataset(name, data=data).attrs["unit"] = unit
+
+        put("time", times, "s, burst middles")
+        put("ranges", np.concatenate(pipeline.ranges), "m, inf: nothing seen")
+        put("azimuths", BEARINGS, "rad")
+        put("velocity", np.concatenate(pipeline.velocities), "m/s, sensor frame")
+        for name in ("velocity", "scan", "scan_azimuths", "floor_plan", "pose", "time"):
+            if source.has(f"truth/{name}"):
+                put(f"truth/{name}", source.read(f"truth/{name}"), str(source.describe(f"truth/{name}")["unit"]))
+        shown = np.unique(np.linspace(0, len(source) - 1, _PICTURES).astype(int))
+        maps = pipeline.heatmaps
+        adc = np.concatenate([source.adc(k, k + 1) for k in shown])
+        put("heatmaps/frames", shown, "index into /time")
+        put("heatmaps/range_azimuth", maps.range_azimuth(adc).numpy(), "counts^2")
+        put("heatmaps/doppler_azimuth", maps.doppler_azimuth(adc).numpy(), "counts^2")
+        if maps.pairs is not None:
+            put("heatmaps/elevation_aware", maps.elevation_aware(adc).numpy(), "counts^2")
+        put("heatmaps/ranges", maps.ranges, "m")
+        put("heatmaps/azimuths", maps.azimuths, "rad")
+        put("heatmaps/velocities", maps.velocities, "m/s, closing positive")

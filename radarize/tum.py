@@ -1,0 +1,73 @@
+"""TUM trajectory files: ``time x y z qx qy qz qw`` a line, ``#`` comments."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize.errors import InputError
+
+
+def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]]:
+    """Times (s) and poses (position m, unit quaternion x y z w) of a TUM file.
+
+    Raises:
+        InputError: naming the line: not eight finite numbers, times that do not ascend, or no unit quaternion.
+    """
+    try:
+        lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    rows = []
+    for number, line in enumerate(lines, 1):
+        words = line.split("#")[0].replace(",", " ").split()
+        if not words:
+            continue
+        try:
+            row = [float(word) for word in words]
+        except ValueError:
+            row = []
+        if len(row) != 8:
+            raise InputError(
+                f"{path}, line {number}: is {line.strip()[:60]!r}, expected eight numbers: time x y z qx qy qz qw"
+            )
+        if not np.isfinite(row).all():
+            raise InputError(f"{path}, line {number}: holds {' '.join(words)[:80]}, expected finite numbers")
+        if rows and row[0] <= rows[-1][0]:
+            raise InputError(
+                f"{path}, line {number}: has time {words[0]} after {rows[-1][0]:.6f}, expected ascending times"
+            )
+        if abs((norm := np.linalg.norm(row[4:])) - 1) > 1e-2:
+            raise InputError(f"{path}, line {number}: has a quaternion of length {norm:.4f}, expected 1")
+        rows.append(row)
+    if not rows:
+        raise InputError(f"{path}: holds no poses, expected lines of time x y z qx qy qz qw")
+    table = np.asarray(rows)
+    table[:, 4:] /= np.linalg.norm(table[:, 4:], axis=1, keepdims=True)
+    return table[:, 0], table[:, 1:]
+
+
+def write_tum(path: str | Path, times: Float[np.ndarray, "pose"], poses: Float[np.ndarray, "pose 7"]) -> Path:
+    """Write times (s) and poses (position m, quaternion x y z w), under a temporary name until whole.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    try:
+        np.savetxt(part, np.column_stack([times, poses]), fmt=["%.6f"] + ["%.9f"] * 7)
+        os.replace(part, path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise InputError(f"cannot write {path}: {error.strerror}") from error
+    return path
+
+
+def planar_poses(poses: Float[np.ndarray, "pose 3"]) -> Float[np.ndarray, "pose 7"]:
+    """Poses x, y, yaw (m, rad) as position and quaternion, z = 0."""
+    poses = np.asarray(poses, float)
+    zero = np.zeros(len(poses))
+    half = poses[:, 2] / 2
+    return np.column_stack([poses[:, 0], poses[:, 1], zero, zero, zero, np.sin(half), np.cos(half)])

@@ -16,7 +16,7 @@ def noise(frames=1):
     return RNG.exponential(1.0, (32, frames, len(RANGES), len(AZIMUTHS))).mean(axis=0)
 
 
-def echo(distance, azimuth, power, width=np.radians(8.0)):
+def echo(distance, azimuth, power, width=0.14):
     """A blob one range bin and one beam wide (Gaussian in range: parabolic in log power)."""
     along = np.exp(-(((RANGES - distance) / 0.0446) ** 2))
     across = np.exp(-(((AZIMUTHS - azimuth) / width) ** 2) / 2)

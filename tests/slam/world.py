@@ -56,9 +56,15 @@ def walk(corners, step, turn):
     return np.array([*poses, [*corners[-1], yaw]])
 
 
-def ate(truth, estimate):
-    """Mean distance after the best rigid alignment, m."""
+def align(truth, estimate):
+    """Rotation (2, 2) and shift that carry estimated positions best onto true ones."""
     p, q = truth[:, :2], estimate[:, :2]
     u, _, vt = np.linalg.svd((p - p.mean(0)).T @ (q - q.mean(0)))
     turn = u @ np.diag([1, np.linalg.det(u @ vt)]) @ vt
-    return float(np.hypot(*((q - q.mean(0)) @ turn.T - (p - p.mean(0))).T).mean())
+    return turn, p.mean(0) - turn @ q.mean(0)
+
+
+def ate(truth, estimate):
+    """Mean distance after the best rigid alignment, m."""
+    turn, shift = align(truth, estimate)
+    return float(np.hypot(*(estimate[:, :2] @ turn.T + shift - truth[:, :2]).T).mean())

@@ -1,0 +1,116 @@
+"""Matching and correlative search: known offsets, both signs, and agreement with brute force."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from radarize.slam.config import GridConfig
+from radarize.slam.correlation import Pyramid, search
+from radarize.slam.grid import OccupancyGrid
+from radarize.slam.matcher import interpolate, match, thin
+from radarize.slam.pose import transform, wrap
+from tests.slam.world import box, ring, scan
+
+# Off the grid's raster: a wall on the very edge of two cells is drawn into either of them by rounding.
+SHIFT = np.array([0.03, 0.036])
+WALLS = ring() + np.tile(SHIFT, 2)
+AZIMUTHS = np.radians(np.arange(-90.0, 90.0, 0.5))
+CONFIG = GridConfig()
+
+
+def hits(pose, walls=None, noise=0.0, rng=None):
+    r = np.nan_to_num(scan(WALLS if walls is None else walls, pose, AZIMUTHS, 10.0), posinf=99.0)
+    if noise:
+        r = r + rng.normal(0, noise, r.shape)
+    seen = r < 90
+    return (r[:, None] * np.stack([np.cos(AZIMUTHS), np.sin(AZIMUTHS)], axis=-1))[seen]
+
+
+def submap(poses, walls=None):
+    grid = OccupancyGrid.empty(0.05)
+    for pose in poses:
+        ends = transform(pose, hits(pose, walls))
+        grid.insert(np.broadcast_to(pose[:2], ends.shape), ends, np.ones(len(ends), bool), CONFIG, spread=True)
+    return grid
+
+
+POSES = np.array([[1.5 + 0.1 * k, 1.5, 0.05 * k] for k in range(8)])
+GRID = submap(POSES)
+
+
+@pytest.mark.parametrize(
+    "offset",
+    [*np.diag([0.08, 0.08, 0.04]), *-np.diag([0.08, 0.08, 0.04]), np.array([0.07, -0.06, 0.03])],
+)
+def test_match_recovers_an_offset(offset):
+    truth = np.array([1.83, 1.47, 0.12])
+    result = match(GRID, thin(hits(truth), 0.05), truth + offset, sigma=1.0)
+    assert np.hypot(*(result.pose - truth)[:2]) < 0.02  # cells are 0.05
+    assert abs(wrap(result.pose[2] - truth[2])) < 0.004
+    assert result.score > 0.6
+    eigenvalues = np.linalg.eigvalsh(result.information)
+    assert eigenvalues[0] > 0
+
+
+def test_gradient_of_the_interpolation():
+    rng = np.random.default_rng(3)
+    plane = rng.random((12, 9)).astype(np.float64)
+    for x, y in rng.uniform(2, 7, (50, 2)):
+        h = 1e-6
+        value, gx, gy = interpolate(plane, x, y)
+        east, west = interpolate(plane, x + h, y)[0], interpolate(plane, x - h, y)[0]
+        north, south = interpolate(plane, x, y + h)[0], interpolate(plane, x, y - h)[0]
+        assert gx == pytest.approx((east - west) / (2 * h), abs=1e-6)
+        assert gy == pytest.approx((north - south) / (2 * h), abs=1e-6)
+        assert 0 <= value <= 2 * plane.max() - 1
+
+
+def test_information_is_blind_along_a_corridor_and_the_prior_holds():
+    walls = np.array([[-100.0, -1.01, 100, -1.01], [-100, 1.02, 100, 1.02]])
+    grid = submap(np.array([[0.1 * k, 0.0, 0.0] for k in range(8)]), walls)
+    points = thin(hits(np.zeros(3), walls), 0.05)
+    prior, covariance = np.array([0.3, 0.05, 0.02]), np.diag([0.02, 0.1, 0.1]) ** 2
+    result = match(grid, points, prior, sigma=1.0, prior=prior, covariance=covariance)
+    assert result.pose[0] == pytest.approx(0.3, abs=0.01)  # along: odometry
+    assert abs(result.pose[1]) < 0.015 and abs(result.pose[2]) < 0.005  # across: the walls
+    assert result.information[0, 0] < 0.2 * result.information[1, 1]
+
+
+def test_search_finds_what_trying_everything_finds():
+    rng = np.random.default_rng(5)
+    truth = np.array([1.9, 1.5, 0.2])
+    points = hits(truth, noise=0.03, rng=rng)[::6]
+    pyramid = Pyramid.of(GRID, 4, 0.6)
+    base = np.rint(255 * GRID.probability).astype(np.uint8)
+    for guess in (truth + [0.31, -0.24, 0.1], truth + [-0.42, 0.13, -0.08]):
+        for penalty in ((0.0, 0.0), (0.4, 0.6)):
+            found = search(pyramid, points, guess, distance=0.6, angle=0.15, min_score=0.2, penalty=penalty)
+            step = GRID.resolution / max(np.percentile(np.hypot(*points.T), 90), 1.0)
+            turns = int(np.ceil(0.15 / step))
+            best = 0.0
+            for turn, dx, dy in itertools.product(range(-turns, turns + 1), range(-12, 13), range(-12, 13)):
+                pose = guess + [0, 0, turn * step]
+                cells = np.floor((transform(pose, points) - GRID.origin) / GRID.resolution).astype(int) + [dx, dy]
+                inside = ((cells >= 0) & (cells < base.shape[::-1])).all(axis=1)
+                score = base[cells[inside, 1], cells[inside, 0]].sum() / 255 / len(points)
+                score -= penalty[0] * (dx * dx + dy * dy) * GRID.resolution**2 + penalty[1] * (turn * step) ** 2
+                best = max(best, score)
+            assert found is not None
+            assert found[1] == pytest.approx(best, abs=1e-9)
+            if not any(penalty):
+                assert np.hypot(*(found[0] - truth)[:2]) < 0.1 and abs(found[0][2] - truth[2]) < 0.03
+
+
+def test_search_says_no_where_nothing_fits():
+    elsewhere = hits(np.array([0.0, 0.0, 0.3]), box(-1.3, -0.8, 1.1, 1.0))
+    pyramid = Pyramid.of(GRID, 5, 2.0)
+    assert search(pyramid, elsewhere, POSES[3], distance=2.0, angle=0.3, min_score=0.6) is None
+    assert search(pyramid, np.zeros((0, 2)), POSES[3], distance=2.0, angle=0.3, min_score=0.6) is None
+
+
+def test_thinning_leaves_one_mean_per_square():
+    points = np.array([[0.01, 0.01], [0.03, 0.01], [0.07, 0.01], [-0.01, 0.01]])
+    got = thin(points, 0.05)
+    assert sorted(map(tuple, got.round(6))) == [(-0.01, 0.01), (0.02, 0.01), (0.07, 0.01)]
+    assert thin(np.zeros((0, 2)), 0.05).shape == (0, 2)

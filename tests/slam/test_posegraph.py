@@ -1,0 +1,76 @@
+"""The graph: exact on clean input, unharmed by false closures."""
+
+import numpy as np
+import pytest
+
+from radarize.slam.pose import between, compose
+from radarize.slam.posegraph import PoseGraph
+from tests.slam.world import ate
+
+SIGMA = np.array([0.02, 0.02, 0.01])
+
+
+def lap(false, seed=7):
+    """201 nodes on two laps of a square of 25 m sides, noisy odometry, ten true and some false closures."""
+    rng = np.random.default_rng(seed)
+    truth = [np.zeros(3)]
+    for k in range(200):
+        truth.append(compose(truth[-1], np.array([1.0, 0, np.pi / 2 if k % 25 == 24 else 0.0])))
+    truth = np.array(truth)
+    graph = PoseGraph()
+    graph.add_node(truth[0])
+    for k in range(200):
+        step = between(truth[k], truth[k + 1]) + rng.normal(0, SIGMA)
+        graph.add_node(compose(graph.poses[-1], step))
+        graph.add_motion(k, k + 1, step, np.diag(SIGMA**2))
+    for k in range(10):
+        i = 5 + 9 * k
+        graph.add_closure(i, i + 100, between(truth[i], truth[i + 100]) + rng.normal(0, 0.03, 3), np.eye(3) * 0.03**2)
+    for i, j in [(10, 60), (30, 180), (55, 85), (3, 140), (20, 70)][:false]:
+        graph.add_closure(i, j, np.array([0.3, -0.2, 0.1]), np.eye(3) * 0.03**2)
+    odometry = ate(truth, np.array(graph.poses))
+    return graph, truth, odometry
+
+
+@pytest.mark.parametrize("false", [2, 5])
+def test_false_closures_do_no_harm(false):
+    clean, truth, odometry = lap(0)
+    clean.optimise()
+    best = ate(truth, np.array(clean.poses))
+    assert clean.accepted.sum() >= 9
+    graph, *_ = lap(false)
+    graph.optimise()
+    assert not graph.accepted[10:].any() and graph.accepted[:10].sum() >= 9
+    assert best < 0.5 * odometry
+    assert ate(truth, np.array(graph.poses)) < 1.05 * best
+
+
+def test_odometry_alone_is_left_as_it_is():
+    graph, truth, odometry = lap(0)
+    graph._uncertain.clear()
+    before = np.array(graph.poses)
+    graph.optimise()
+    np.testing.assert_allclose(np.array(graph.poses), before, atol=1e-6)
+
+
+def test_covariances_grow_from_the_start_and_shrink_with_loops():
+    graph, *_ = lap(0)
+    graph.optimise()
+    covariances = graph.covariances()
+    assert covariances.shape == (201, 3, 3)
+    assert covariances[0, 0, 0] < 1e-9 < covariances[50, 0, 0]
+    loose = PoseGraph()
+    loose.add_node(np.zeros(3))
+    for k in range(4):
+        loose.add_node(np.array([k + 1.0, 0, 0]))
+        loose.add_motion(k, k + 1, np.array([1.0, 0, 0]), np.diag([0.01, 0.01, 1e-8]))
+    np.testing.assert_allclose(loose.covariances()[:, 0, 0], 0.01 * np.arange(5), atol=1e-6)
+
+
+def test_empty_and_single():
+    graph = PoseGraph()
+    graph.optimise()
+    assert graph.covariances().shape == (0, 3, 3)
+    graph.add_node(np.array([1.0, 2.0, 3.0]))
+    graph.optimise()
+    np.testing.assert_allclose(graph.poses[0], [1, 2, 3])

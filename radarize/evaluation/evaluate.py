@@ -1,0 +1,150 @@
+"""A whole run against the truth: trajectories, map, scans, velocities; written as metrics.json."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from radarize.errors import InputError
+from radarize.evaluation.mapping import map_errors, scan_endpoints, scan_errors, velocity_errors
+from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
+from radarize.evaluation.runfiles import read_map, read_scans, write_whole
+from radarize.evaluation.trajectory import load, matched, trajectory, yaws
+
+#: Trajectories of a run by what the metrics call them, the best last.
+TRAJECTORIES = {"odometry": "odometry.tum", "slam": "trajectory.tum"}
+
+
+def trajectory_errors(run: Path, reference: Path | None = None) -> dict[str, TrajectoryErrors]:
+    """Errors of the run's trajectories, by ``odometry`` and ``slam``.
+
+    Args:
+        run: folder of a run.
+        reference: TUM file of the truth; by default the run's ``reference.tum``.
+
+    Raises:
+        InputError: not a run, no reference, or nothing that matches.
+    """
+    if not (run / TRAJECTORIES["slam"]).is_file():
+        raise InputError(f"{run}: has no trajectory.tum, expected a folder that radarize run wrote")
+    path = reference or run / "reference.tum"
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected true poses (TUM); --reference names another file")
+    truth = load(path)
+    return {
+        name: evaluate_trajectory(load(run / file), truth, names=(str(run / file), str(path)))
+        for name, file in TRAJECTORIES.items()
+        if (run / file).is_file()
+    }
+
+
+def seen_surfaces(scans: dict[str, np.ndarray], truth: TrajectoryErrors) -> np.ndarray | None:
+    """Ends of the true scans' beams that the radar could return, in the reference's frame; None if unknown."""
+    if "truth/scan" not in scans or "truth/scan_azimuths" not in scans:
+        return None
+    azimuths = scans["truth/scan_azimuths"]
+    inside = (azimuths >= scans["azimuths"].min()) & (azimuths <= scans["azimuths"].max())
+    still = np.zeros((len(scans["time"]), 7))
+    still[:, 6] = 1
+    at, poses = matched(trajectory(scans["time"], still), truth.reference, names=("scans.h5", "the reference"))
+    rows = np.isin(scans["time"], at.timestamps)
+    return scan_endpoints(
+        poses.positions_xyz[:, :2], yaws(poses), azimuths[inside], scans["truth/scan"][rows][:, inside]
+    )
+
+
+def evaluate(run: Path, reference: Path | None = None) -> dict[str, object]:
+    """Compare a run with the truth and write ``metrics.json`` into it.
+
+    Args:
+        run: folder of a run.
+        reference: TUM file of the truth; by default the run's ``reference.tum``.
+
+    Returns:
+        ``slam`` and ``odometry``: `TrajectoryErrors.summary`. Where the run knows the truth about them: ``map``,
+        ``scans``, ``velocity``, see `radarize.evaluation.mapping`. Numbers that do not exist are None.
+
+    Raises:
+        InputError: not a run, no truth, or nothing that matches.
+    """
+    run = Path(run)
+    errors = trajectory_errors(run, reference)
+    metrics: dict[str, object] = {name: item.summary() for name, item in errors.items()}
+    metrics["reference"] = Path(reference).name if reference else "reference.tum"
+    if (run / "scans.h5").is_file():
+        scans = read_scans(run / "scans.h5")
+        if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
+            metrics["scans"] = scan_errors(scans)
+        if {"velocity", "truth/velocity"} <= scans.keys():
+            metrics["velocity"] = velocity_errors(scans)
+        if "truth/floor_plan" in scans and (run / "map.yaml").is_file():
+            best = errors["slam"]
+            seen = seen_surfaces(scans, best)
+            metrics["map"] = map_errors(
+                read_map(run / "map.yaml"), scans["truth/floor_plan"], best.turn, best.shift, seen
+            )
+    metrics = without_nan(metrics)
+    write_whole(run / "metrics.json", json.dumps(metrics, indent=2) + "\n")
+    return metrics
+
+
+def show(metrics: dict) -> None:
+    """Print what `evaluate` returned as tables."""
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    console = Console()
+    names = [name for name in TRAJECTORIES if name in metrics]
+    table = Table("trajectory", *(Column(name, justify="right") for name in names), header_style="bold")
+
+    def row(label: str, unit: str, *path: str, factor: float = 1.0, digits: int = 3) -> None:
+        values = []
+        for name in names:
+            value = metrics[name]
+            for key in path:
+                value = value[key]
+            values.append("-" if value is None else f"{factor * value:.{digits}f} {unit}")
+        table.add_row(label, *values)
+
+    row("ATE position, mean", "m", "ate", "position", "mean")
+    row("ATE position, rmse", "m", "ate", "position", "rmse")
+    row("ATE position, max", "m", "ate", "position", "max")
+    row("ATE rotation, mean", "rad", "ate", "rotation", "mean")
+    for delta in ("frame", "second", "metre"):
+        row(f"RE position over a {delta}, mean", "m", "re", delta, "position", "mean", digits=4)
+        row(f"RE rotation over a {delta}, mean", "rad", "re", delta, "rotation", "mean", digits=4)
+    row("mean ATE / distance", "%", "ate_share", factor=100, digits=2)
+    row("end drift / distance", "%", "drift", factor=100, digits=2)
+    row("distance travelled", "m", "distance", digits=1)
+    console.print(table)
+    for name, words in {"map": MAP_WORDS, "scans": SCAN_WORDS, "velocity": VELOCITY_WORDS}.items():
+        if name in metrics:
+            table = Table(name, Column("value", justify="right"), header_style="bold")
+            for key, (label, unit, factor) in words.items():
+                value = metrics[name].get(key)
+                table.add_row(label, "-" if value is None else f"{factor * value:.3g} {unit}".strip())
+            console.print(table)
+
+
+#: Key of a figure to its label, unit and factor, for tables.
+MAP_WORDS = {
+    "precision": ("occupied cells within 10 cm of a wall (precision)", "%", 100),
+    "recall": ("visible wall within 10 cm of an occupied cell (recall)", "%", 100),
+    "f1": ("F1", "%", 100),
+    "chamfer": ("Chamfer distance", "m", 1),
+}
+SCAN_WORDS = {
+    "within_10cm": ("returned bearings within 10 cm of the truth", "%", 100),
+    "short": ("too near by more", "%", 100),
+    "beyond": ("too far by more", "%", 100),
+    "returned": ("bearings in reach that return anything", "%", 100),
+    "median": ("median range error", "m", 1),
+}
+VELOCITY_WORDS = {
+    "median": ("median error", "m/s", 1),
+    "p90": ("90 % within", "m/s", 1),
+    "forward": ("forward, rms", "m/s", 1),
+    "left": ("left, rms", "m/s", 1),
+    "missing": ("frames without an estimate", "%", 100),
+    "nees": ("median squared error over covariance (1.39 if it is honest)", "", 1),
+}

@@ -1,0 +1,164 @@
+"""Maps against the floor plan, scans against true scans, velocities against true ones."""
+
+import numpy as np
+import shapely
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+
+from radarize.evaluation.metrics import Statistics
+from radarize.evaluation.runfiles import OccupancyMap
+
+#: m: a mapped point this near to a true surface counts as right.
+TOLERANCE = 0.10
+#: m: spacing of the points that stand for a wall.
+SPACING = 0.02
+
+
+def segment_points(plan: Float[np.ndarray, "segment 4"], spacing: float = SPACING) -> Float[np.ndarray, "point 2"]:
+    """Points along segments (x0 y0 x1 y1), at most `spacing` apart, so that each stands for the same length."""
+    plan = np.asarray(plan, float).reshape(-1, 4)
+    start, end = plan[:, :2], plan[:, 2:]
+    counts = np.maximum(np.ceil(np.linalg.norm(end - start, axis=1) / spacing).astype(int), 1)
+    owner = np.repeat(np.arange(len(plan)), counts)
+    step = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
+    return start[owner] + ((step + 0.5) / counts[owner])[:, None] * (end - start)[owner]
+
+
+def distance_to_plan(
+    points: Float[np.ndarray, "point 2"], plan: Float[np.ndarray, "segment 4"]
+) -> Float[np.ndarray, "point"]:
+    """Distance of each point to the nearest segment, m."""
+    segments = shapely.linestrings(np.asarray(plan, float).reshape(-1, 2, 2))
+    _, distances = shapely.STRtree(segments).query_nearest(
+        shapely.points(points), return_distance=True, all_matches=False
+    )
+    return distances
+
+
+def visible_part(
+    plan_points: Float[np.ndarray, "point 2"], endpoints: Float[np.ndarray, "end 2"], reach: float = TOLERANCE
+) -> np.ndarray:
+    """Which points of the plan some true beam ended near to: what the sensor had a chance to map."""
+    if not len(endpoints):
+        return np.zeros(len(plan_points), bool)
+    return cKDTree(endpoints).query(plan_points, distance_upper_bound=reach)[0] <= reach
+
+
+def scan_endpoints(
+    positions: Float[np.ndarray, "scan 2"],
+    yaw: Float[np.ndarray, "scan"],
+    azimuths: Float[np.ndarray, "beam"],
+    ranges: Float[np.ndarray, "scan beam"],
+) -> Float[np.ndarray, "end 2"]:
+    """Where the beams that returned anything end, m, in the frame of the poses."""
+    bearing = yaw[:, None] + azimuths
+    hit = np.isfinite(ranges) & (ranges > 0)
+    ends = positions[:, None] + np.where(hit, ranges, 0)[..., None] * np.stack(
+        [np.cos(bearing), np.sin(bearing)], axis=-1
+    )
+    return ends[hit]
+
+
+def map_errors(
+    grid: OccupancyMap,
+    plan: Float[np.ndarray, "segment 4"],
+    turn: Float[np.ndarray, "3 3"],
+    shift: Float[np.ndarray, "3"],
+    seen: Float[np.ndarray, "end 2"] | None = None,
+) -> dict[str, float]:
+    """Occupied cells against a floor plan.
+
+    Args:
+        grid: map in the estimate's frame.
+        plan: wall segments in the reference's frame, m.
+        turn, shift: alignment of the trajectory, from the estimate's to the reference's frame.
+        seen: ends of true beams within the radar's reach, in the reference's frame; recall is of those parts of the
+            plan that they touch, and of the whole plan if None.
+
+    Returns:
+        ``precision``: share of occupied cells within 10 cm of a wall. ``recall``: share of the wall's length within
+        10 cm of an occupied cell. ``f1``: their harmonic mean. ``chamfer``: mean of the mean distances both ways, m.
+        ``cells``, ``seen_length`` (m): how many and how much that was about.
+        An empty map recalls nothing, and its precision is NaN.
+    """
+    cells = grid.centers(grid.occupied)
+    cells = (np.column_stack([cells, np.zeros(len(cells))]) @ turn.T + shift)[:, :2]
+    walls = segment_points(plan)
+    if seen is not None:
+        walls = walls[visible_part(walls, seen)]
+    if not len(cells) or not len(walls):
+        score = {"precision": np.nan, "recall": 0.0 if len(walls) else np.nan, "f1": np.nan, "chamfer": np.nan}
+        return {**score, "cells": len(cells), "seen_length": len(walls) * SPACING}
+    off_wall = distance_to_plan(cells, plan)
+    off_map, _ = cKDTree(cells).query(walls)
+    precision, recall = float(np.mean(off_wall <= TOLERANCE)), float(np.mean(off_map <= TOLERANCE))
+    return {
+        "precision": precision,
+        "recall": recall,
+        "f1": 2 * precision * recall / max(precision + recall, 1e-12),
+        "chamfer": float((off_wall.mean() + off_map.mean()) / 2),
+        "cells": len(cells),
+        "seen_length": len(walls) * SPACING,
+    }
+
+
+def scan_errors(scans: dict[str, np.ndarray]) -> dict[str, float]:
+    """Measured against true scans, bearing by bearing.
+
+    Args:
+        scans: `radarize.evaluation.runfiles.read_scans`, with ``truth/scan`` and ``truth/scan_azimuths``.
+
+    Returns:
+        ``within_10cm``: share of returned bearings within 10 cm of the true range there. ``returned``: share of
+        bearings with something true in reach that return anything. ``median``: of the absolute errors, m.
+        ``beyond``, ``short``: shares of returned bearings more than 10 cm too far and too near.
+    """
+    measured = scans["ranges"]
+    nearest = np.abs(scans["truth/scan_azimuths"][None] - scans["azimuths"][:, None]).argmin(axis=1)
+    true = scans["truth/scan"][:, nearest]
+    hit = np.isfinite(measured) & (measured > 0)
+    # Whatever is measured where nothing true is in reach is too short.
+    difference = np.where(np.isfinite(true), measured - np.where(np.isfinite(true), true, 0), -np.inf)[hit]
+    if not len(difference):
+        return {"within_10cm": np.nan, "returned": 0.0, "median": np.nan, "beyond": np.nan, "short": np.nan}
+    return {
+        "within_10cm": float(np.mean(np.abs(difference) <= TOLERANCE)),
+        "returned": float(hit[np.isfinite(true)].mean()) if np.isfinite(true).any() else np.nan,
+        "median": float(np.median(np.abs(difference))),
+        "beyond": float(np.mean(difference > TOLERANCE)),
+        "short": float(np.mean(difference < -TOLERANCE)),
+    }
+
+
+def velocity_errors(scans: dict[str, np.ndarray]) -> dict[str, object]:
+    """Estimated against true velocity in the body frame, forward and left.
+
+    Returns:
+        ``error``: `Statistics` of the difference's length, m/s. ``forward``, ``left``: root mean squares, m/s.
+        ``median``, ``p90``: of the difference's length, m/s. ``missing``: share of scans without an estimate.
+        ``nees``: median of the squared error in units of its covariance (1.39 if the covariance is right), if
+        there is one.
+    """
+    estimate, true = scans["velocity"][:, :2], scans["truth/velocity"][:, :2]
+    known = np.isfinite(estimate).all(axis=1) & np.isfinite(true).all(axis=1)
+    difference = (estimate - true)[known]
+    length = np.linalg.norm(difference, axis=1)
+    statistics = Statistics.of(length)
+    result: dict[str, object] = {
+        "mean": statistics.mean,
+        "rmse": statistics.rmse,
+        "max": statistics.max,
+        "median": float(np.median(length)) if len(length) else np.nan,
+        "p90": float(np.percentile(length, 90)) if len(length) else np.nan,
+        "forward": Statistics.of(difference[:, 0]).rmse,
+        "left": Statistics.of(difference[:, 1]).rmse,
+        "missing": float(1 - known.mean()) if len(known) else np.nan,
+    }
+    if "velocity_covariance" in scans and len(length):
+        covariance = scans["velocity_covariance"][known]
+        try:
+            whitened = np.linalg.solve(covariance, difference[..., None])[..., 0]
+            result["nees"] = float(np.median((difference * whitened).sum(axis=1)))
+        except np.linalg.LinAlgError:
+            result["nees"] = np.nan
+    return result

@@ -67,11 +67,11 @@ PLATFORMS: dict[str, Platform] = {
         sway=(np.deg2rad(2), np.deg2rad(1.5), np.deg2rad(3)), tremor=np.deg2rad(1.2), free_heading=True,
     ),
     "cart": Platform(
-        body=(0.04, 1.2), height=0.95, radius=0.36, speed=0.9, top_speed=1.4, acceleration=0.6,
+        body=(0.04, 1.2), height=0.95, radius=0.36, speed=1.1, top_speed=1.6, acceleration=0.8,
         turn_rate=np.deg2rad(45), lever_arm=0.20, tilt=np.deg2rad(0.5), tremor=np.deg2rad(0.15),
     ),
     "robot": Platform(
-        body=(0.03, 0.45), height=0.20, radius=0.34, speed=0.42, top_speed=0.5, acceleration=0.4,
+        body=(0.03, 0.45), height=0.20, radius=0.34, speed=0.45, top_speed=0.5, acceleration=0.4,
         turn_rate=np.deg2rad(40), lever_arm=0.10, tilt=np.deg2rad(0.5), tremor=np.deg2rad(0.1),
     ),
 }  # fmt: skip
@@ -96,8 +96,9 @@ def plan(scene: Scene, platform: str, duration: float, rng: np.random.Generator)
         except InputError as error:
             raise InputError(f"scene {scene.name}, platform {platform}: {error}") from error
         motion = _drive(carrier, legs, duration, rng)
-        # Lever arm and gait move the sensor off the planned line.
-        if clearance.at(motion.position(times)[:, :2]).min() >= CLEARANCE:
+        # Lever arm and gait move the sensor off the planned line, and add to its speed.
+        clear = clearance.at(motion.position(times)[:, :2]).min() >= CLEARANCE
+        if clear and np.linalg.norm(motion.velocity(times), axis=1).max() <= carrier.top_speed:
             return motion
     raise InputError(f"scene {scene.name}, platform {platform}: found no tour that keeps {CLEARANCE} m from everything")
 
@@ -175,7 +176,8 @@ def _leg(
     # Smoothed white noise of standard deviation 0.15 over some 1.5 m.
     habit = 0.15 * np.sqrt(2 * np.sqrt(np.pi) * 75) * gaussian_filter1d(rng.standard_normal(len(step)), 75)
     pace = carrier.speed * np.clip(1 + habit, 0.6, 1.4)
-    limit = np.minimum(pace, 0.85 * carrier.top_speed)
+    # Gait and turning add to the speed of a sensor in the hand.
+    limit = np.minimum(pace, (0.8 if carrier.free_heading else 0.95) * carrier.top_speed)
     limit = np.minimum(limit, 0.8 * carrier.turn_rate / np.maximum(curvature, 1e-6))
     limit = np.minimum(limit, np.sqrt(carrier.acceleration / np.maximum(curvature, 1e-6)))
     speed = np.concatenate([[0.0], (limit[:-1] + limit[1:]) / 2, [0.0]])

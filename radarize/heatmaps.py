@@ -172,13 +172,42 @@ class Heatmaps:
     def elevation_aware_of(self, spectrum: torch.Tensor) -> torch.Tensor:
         """`elevation_aware` of a spectrum at hand."""
         if self.pairs is None:
-            raise InputError(
-                f"elevation-aware maps need transmitters at two heights, found tx {self.config.tx}, rx {self.config.rx} "
-                f"on {self.config.board}, expected all three transmitters"
-            )
+            raise self._no_pairs()
         pairs = spectrum[..., torch.as_tensor(self.pairs, device=self.device)].mean(dim=-1)
         covariance = self.covariance(pairs, np.arange(len(self.pairs)))
         return self._bartlett(covariance, self._pair_steering)
+
+    def _no_pairs(self) -> InputError:
+        return InputError(
+            f"tx {self.config.tx} and rx {self.config.rx} of {self.config.board} hold no antenna pairs of different "
+            "height, expected all three transmitters for elevation"
+        )
+
+    def elevation_of(
+        self, spectrum: torch.Tensor
+    ) -> tuple[Float32[torch.Tensor, "frame range azimuth"], Float32[torch.Tensor, "frame range azimuth"]]:
+        """Direction cosine u_z of each cell of a range-azimuth map, and how coherent the two heights are (0...1).
+
+        From the phase between the upper and the lower antennas of the elevation pairs. Where echoes from above and
+        below mix, or noise prevails, the coherence is low.
+
+        Raises:
+            InputError: the array has no such pairs.
+        """
+        if self.pairs is None:
+            raise self._no_pairs()
+        pairs = torch.as_tensor(self.pairs, device=self.device)
+        lower, upper = spectrum[..., pairs[:, 0]], spectrum[..., pairs[:, 1]]
+
+        def beam(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
+            steering = self._pair_steering
+            return (steering.conj() * (a.transpose(-1, -2) @ b.conj() @ steering)).sum(dim=-2)
+
+        cross = beam(upper, lower)
+        power = (beam(upper, upper).real * beam(lower, lower).real).clamp_min(0).sqrt()
+        z = virtual_positions(self.config).reshape(-1, 3)[self.pairs, 2]
+        height = float((z[:, 1] - z[:, 0]).mean()) / self.config.wavelength
+        return -torch.angle(cross) / (2 * np.pi * height), cross.abs() / power.clamp_min(1e-12)
 
     def _bartlett(self, covariance: torch.Tensor, steering: torch.Tensor) -> torch.Tensor:
         beams = steering * self._tensor(self._taper(len(steering)), torch.float32)[:, None]
@@ -218,7 +247,7 @@ class Heatmaps:
         """
         if elevation_aware:
             if self.pairs is None:
-                raise InputError(f"tx {self.config.tx} on {self.config.board} has no elevation pairs, expected tx 1-3")
+                raise self._no_pairs()
             x = spectrum[..., torch.as_tensor(self.pairs, device=self.device)].mean(dim=-1)
             steering = self._pair_steering
         else:

@@ -129,13 +129,15 @@ class Odometry:
         times: Float[np.ndarray, "frame"],
         stage: Callable[[str], AbstractContextManager] = nullcontext,
     ) -> Track:
-        """As `push`, from spectra of `Heatmaps.spectrum`; `stage` is entered with the name of each estimator, to time it."""
+        """As `push`, from spectra of `Heatmaps.spectrum`; `stage` is entered with each estimator's name, to time it."""
         centers = np.asarray(times, float) + self.config.burst_center
         before = centers[0] - 1 if self._last is None else self._last[0]
         steps = np.diff(centers, prepend=before)
         if not (steps > 0).all():
             bad = int(np.argmin(steps > 0))
-            raise InputError(f"frame times step by {steps[bad]:.6f} s before {times[bad]:.6f} s, expected ascending times")
+            raise InputError(
+                f"frame times step by {steps[bad]:.6f} s before {times[bad]:.6f} s, expected ascending times"
+            )
         with stage("translation"):
             velocities = self._filter.filter(centers, self.velocity.estimate(spectrum))
         with stage("rotation"):
@@ -159,7 +161,7 @@ class Odometry:
 
 
 def exponential(translation: Float[np.ndarray, "2"], turn: float) -> Float[np.ndarray, "3"]:
-    """Motion (x, y, yaw) of a body that drives `translation` (m, body frame) while turning by `turn` evenly: exp of SE(2)."""
+    """Motion (x, y, yaw) of a body that moves by `translation` (m, in its own frame) while it turns: exp of SE(2)."""
     if abs(turn) < 1e-6:
         a, b = 1.0, turn / 2
     else:

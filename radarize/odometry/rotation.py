@@ -2,11 +2,17 @@
 
 Pairs of frames force a choice: close together they measure every increment with the noise of one match, far apart they
 lose their overlap in turns. A local map that forgets slowly has both spacings at once. Each frame is laid into the map
-at the position that the velocities predict, at a fan of yaws around the predicted one; the best correlation is its yaw,
-and the map is renewed there. As long as landmarks stay in view, errors do not accumulate.
+at the position that the velocities predict, at a fan of yaws around the predicted one; the likeliest is its yaw, and
+the map is renewed there. As long as landmarks stay in view, errors do not accumulate.
 
-The maps are Capon power, whose sharp ridges halve the error of windowed-sum maps, compressed by an eighth power
-so that a wall's flash does not outvote the furniture.
+Three things decide what a frame looks like to the matcher (`MapRotation.features`):
+
+- A wall's specular flash is no landmark: it follows the foot of the perpendicular as the sensor passes. It is 40 dB
+  above the wall's own texture, so the spectrum is limited per range-Doppler cell, and the streaks it leaves over range
+  and azimuth are taken out by their medians.
+- Capon's ridges are sharper than windowed sums by far, and so is the match.
+- u_y = sin(azimuth) cos(elevation): echoes from above and below turn by less than the sensor does. Cells are placed
+  by ground range and true azimuth with the elevation that the antenna pairs measure, or turns come out 2-4 % short.
 """
 
 from dataclasses import dataclass
@@ -15,6 +21,7 @@ import numpy as np
 import torch
 from jaxtyping import Complex64, Float, Float32
 from numba import njit
+from torch.nn.functional import avg_pool1d
 
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import Velocities
@@ -43,19 +50,24 @@ class RotationSettings:
         field: largest |sin azimuth| used.
         columns: azimuth columns, uniform in sin azimuth.
         min_range: m; nearer bins are leakage.
-        compression: exponent of power.
+        limit: power over the noise floor at which a range-Doppler cell is limited.
+        contrast: dB over the surroundings at which a map cell is clipped.
+        texture: half widths of the high-pass over range bins and azimuth columns.
         cell: m, side of a map cell.
         memory: frames over which the map forgets.
         fan, step: rad, half width and spacing of the yaws tried around the prediction.
         jerk: rad/s, standard deviation of the change of turning rate from frame to frame.
         yaw_noise: rad, standard deviation of a match at full correlation.
+        caution: how much correlation a deviation by one standard deviation of the prediction costs.
         least_correlation: a match below it is not believed: turning is taken to go on as before.
     """
 
     field: float = 0.85
     columns: int = 69
     min_range: float = 0.2
-    compression: float = 0.125
+    limit: float = 300.0
+    contrast: float = 15.0
+    texture: tuple[int, int] = (12, 12)
     cell: float = 0.05
     memory: int = 20
     fan: float = np.radians(5.0)
@@ -63,6 +75,7 @@ class RotationSettings:
     jerk: float = np.radians(12.0)
     yaw_noise: float = np.radians(0.3)
     least_correlation: float = 0.15
+    caution: float = 0.01
 
 
 class MapRotation:
@@ -75,6 +88,7 @@ class MapRotation:
     def __init__(self, heatmaps: Heatmaps, settings: RotationSettings | None = None):
         s = self.settings = settings or RotationSettings()
         sines = np.linspace(-s.field, s.field, s.columns)
+        self._sines = sines
         self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(sines), heatmaps.loading, heatmaps.device)
         self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
         self._ranges = heatmaps.ranges[self._first :]
@@ -86,11 +100,29 @@ class MapRotation:
         self._heading = np.zeros(2)  # yaw, rate
         self._spread = np.diag([0.0, 1.0])
 
-    def features(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Float32[np.ndarray, "frame r a"]:
-        """Compressed Capon maps over the noise floor."""
-        power = self._heatmaps.range_azimuth_of(spectrum, "capon")[:, self._first :].cpu().numpy()
-        floor = np.median(power, axis=(1, 2), keepdims=True)
-        return np.ascontiguousarray((power / np.maximum(floor, 1e-9)) ** self.settings.compression, np.float32)
+    def features(
+        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
+    ) -> tuple[Float32[np.ndarray, "frame r a"], Float32[np.ndarray, "frame r a"]]:
+        """Contrast of the Capon map, dB over the surroundings, and u_z (shrunk to the horizon where incoherent)."""
+        s = self.settings
+        power = spectrum.real.square().sum(dim=-1) + spectrum.imag.square().sum(dim=-1)
+        floor = power.flatten(1).median(dim=1).values.clamp_min(1e-9)[:, None, None]
+        limited = spectrum * torch.rsqrt(1 + power / (s.limit * floor))[..., None]
+        capon = self._heatmaps.range_azimuth_of(limited, "capon")[:, self._first :]
+        floor = capon.flatten(1).median(dim=1).values.clamp_min(1e-9)[:, None, None]
+        level = 10 * torch.log10((capon / floor).clamp_min(1))
+        level = level - level.median(dim=2, keepdim=True).values
+        level = level - level.median(dim=1, keepdim=True).values
+        level = level.clamp(0, s.contrast)
+        surroundings = _box_mean(_box_mean(level, s.texture[1]).mT, s.texture[0]).mT
+        return (level - surroundings).contiguous().cpu().numpy(), self._elevation(spectrum).cpu().numpy()
+
+    def _elevation(self, spectrum: torch.Tensor) -> torch.Tensor:
+        if self._heatmaps.pairs is None:
+            return torch.zeros(len(spectrum), len(self._ranges), self.settings.columns)
+        u_z, coherence = self._heatmaps.elevation_of(spectrum[:, self._first :])
+        limit = torch.as_tensor(0.9 * np.cos(self._heatmaps.azimuths), dtype=u_z.dtype, device=u_z.device)
+        return torch.clamp(u_z, -limit, limit) * coherence
 
     def estimate(
         self,
@@ -106,14 +138,16 @@ class MapRotation:
             velocities: velocities there.
         """
         result = np.zeros((3, len(times)))
-        for i, feature in enumerate(self.features(spectrum)):
-            result[:, i] = self._push(feature, float(times[i]), velocities.velocity[i])
+        for i, (feature, u_z) in enumerate(zip(*self.features(spectrum), strict=True)):
+            result[:, i] = self._push(feature, u_z, float(times[i]), velocities.velocity[i])
         return Rotations(*result)
 
-    def _push(self, feature: np.ndarray, time: float, velocity: np.ndarray) -> tuple[float, float, float]:
+    def _push(
+        self, feature: np.ndarray, u_z: np.ndarray, time: float, velocity: np.ndarray
+    ) -> tuple[float, float, float]:
         s = self.settings
         if self._state is None:
-            self._renew(feature, time, velocity)
+            self._renew(feature, u_z, time, velocity)
             return 0.0, 0.0, 0.0
         before, last_velocity = self._state
         dt = time - before
@@ -127,19 +161,28 @@ class MapRotation:
         self._position += dt * np.array([[c, -d], [d, c]]) @ ((last_velocity + velocity) / 2)
 
         yaws = self._heading[0] + self._offsets
-        correlation = _correlate(feature, self._ranges, self._angles, *self._map, *self._position, yaws, s.cell)
-        offset, noise, peak = _peak(correlation, self._offsets, s)
+        correlation = _correlate(feature, u_z, self._ranges, self._sines, *self._map, *self._position, yaws, s.cell)
+        offset, noise, peak = self._peak(correlation)
         gain = self._spread[:, 0] / (self._spread[0, 0] + noise)
         self._heading = self._heading + gain * offset
         self._spread = self._spread - np.outer(gain, self._spread[0])
-        self._renew(feature, time, velocity)
+        self._renew(feature, u_z, time, velocity)
         return self._heading[0] - start, self._spread[0, 0], peak
 
-    @property
-    def _angles(self) -> np.ndarray:
-        return self._heatmaps.azimuths
+    def _peak(self, correlation: np.ndarray) -> tuple[float, float, float]:
+        """Yaw offset (rad) of the likeliest match, its variance and height; if not believed, the variance is large."""
+        s = self.settings
+        likelihood = correlation - s.caution * self._offsets**2 / (self._spread[0, 0] + s.yaw_noise**2)
+        best = int(np.argmax(likelihood))
+        peak = float(correlation[best])
+        if not 0 < best < len(correlation) - 1 or peak < s.least_correlation:
+            return 0.0, (2 * s.fan) ** 2, peak
+        left, right = correlation[best - 1], correlation[best + 1]
+        bend = left - 2 * peak + right
+        slip = 0.5 * (left - right) / bend if bend < -1e-9 else 0.0
+        return float(self._offsets[best] + s.step * np.clip(slip, -1, 1)), (s.yaw_noise / peak) ** 2, peak
 
-    def _renew(self, feature: np.ndarray, time: float, velocity: np.ndarray) -> None:
+    def _renew(self, feature: np.ndarray, u_z: np.ndarray, time: float, velocity: np.ndarray) -> None:
         """Blend the frame into the map at the current pose, keeping the sensor in the map's middle metre."""
         s = self.settings
         shift = np.rint(self._position / s.cell).astype(int)
@@ -149,8 +192,13 @@ class MapRotation:
         spacing = self._ranges[1] - self._ranges[0]
         pose = (*self._position, self._heading[0])
         if feature.any():  # a frame lost as a whole has nothing to say
-            _blend(feature, self._ranges[0], spacing, s.field, *self._map, *pose, s.cell, 1 / s.memory)
+            _blend(feature, u_z, self._ranges[0], spacing, s.field, *self._map, *pose, s.cell, 1 / s.memory)
         self._state = (time, np.asarray(velocity, float))
+
+
+def _box_mean(values: torch.Tensor, half: int) -> torch.Tensor:
+    """Mean over the 2 half + 1 neighbours along the last axis, fewer at the ends."""
+    return avg_pool1d(values, 2 * half + 1, stride=1, padding=half, count_include_pad=False)
 
 
 def _shifted(grid: np.ndarray, shift: np.ndarray) -> np.ndarray:
@@ -164,30 +212,24 @@ def _shifted(grid: np.ndarray, shift: np.ndarray) -> np.ndarray:
     return moved
 
 
-def _peak(correlation: np.ndarray, offsets: np.ndarray, s: RotationSettings) -> tuple[float, float, float]:
-    """Yaw offset (rad), its variance and the height of the best match; a match not believed has a large variance."""
-    best = int(np.argmax(correlation))
-    peak = float(correlation[best])
-    if not 0 < best < len(offsets) - 1 or peak < s.least_correlation:
-        return 0.0, s.fan**2 * 4, peak
-    left, right = correlation[best - 1], correlation[best + 1]
-    offset = offsets[best] + 0.5 * s.step * (left - right) / (left - 2 * peak + right)
-    return float(offset), (s.yaw_noise / peak) ** 2, peak
-
-
 @njit(cache=True, fastmath=True)
-def _correlate(feature, ranges, azimuths, mean, count, x, y, yaws, cell):
+def _correlate(feature, u_z, ranges, sines, mean, count, x, y, yaws, cell):
     """Normalised correlation of a polar map with the grid map, seen from (x, y) at each yaw; cells weigh by area."""
     side = mean.shape[0]
     result = np.zeros(len(yaws))
     origin_x, origin_y = x / cell + side / 2, y / cell + side / 2
+    ahead, left = np.empty(feature.shape, np.float32), np.empty(feature.shape, np.float32)
+    for i in range(len(ranges)):
+        for j in range(len(sines)):
+            ahead[i, j] = ranges[i] / cell * np.sqrt(max(1 - sines[j] ** 2 - u_z[i, j] ** 2, 0.0))
+            left[i, j] = ranges[i] / cell * sines[j]
     for k in range(len(yaws)):
+        c, s = np.cos(yaws[k]), np.sin(yaws[k])
         n = sum_f = sum_m = sum_ff = sum_mm = sum_fm = 0.0
-        for j in range(len(azimuths)):
-            c, s = np.cos(azimuths[j] + yaws[k]) / cell, np.sin(azimuths[j] + yaws[k]) / cell
-            for i in range(len(ranges)):
-                w = ranges[i]
-                at_x, at_y = origin_x + w * c, origin_y + w * s
+        for i in range(len(ranges)):
+            w = ranges[i]
+            for j in range(len(sines)):
+                at_x, at_y = origin_x + c * ahead[i, j] - s * left[i, j], origin_y + s * ahead[i, j] + c * left[i, j]
                 ix, iy = int(at_x), int(at_y)
                 if ix < 0 or iy < 0 or ix >= side - 1 or iy >= side - 1:
                     continue
@@ -210,7 +252,7 @@ def _correlate(feature, ranges, azimuths, mean, count, x, y, yaws, cell):
 
 
 @njit(cache=True, fastmath=True)
-def _blend(feature, nearest, spacing, field, mean, count, x, y, yaw, cell, least):
+def _blend(feature, u_z, nearest, spacing, field, mean, count, x, y, yaw, cell, least):
     """Running mean of polar maps on the grid; a cell's newest value weighs 1/count, but no less than `least`."""
     side, (rows, columns) = mean.shape[0], feature.shape
     c, s = np.cos(yaw), np.sin(yaw)
@@ -220,16 +262,22 @@ def _blend(feature, nearest, spacing, field, mean, count, x, y, yaw, cell, least
         for iy in range(max(0, middle_y - reach), min(side, middle_y + reach)):
             dx, dy = (ix - side / 2) * cell - x, (iy - side / 2) * cell - y
             ahead, left = c * dx + s * dy, c * dy - s * dx
+            ground = np.sqrt(dx * dx + dy * dy)
             if ahead <= 0:
                 continue
-            r = np.sqrt(dx * dx + dy * dy)
-            i = (r - nearest) / spacing
-            j = (left / r + field) / (2 * field) * (columns - 1)
-            if i < 0 or j < 0 or i >= rows - 1 or j >= columns - 1:
-                continue
-            a, b = int(i), int(j)
-            u, v = i - a, j - b
-            f = (feature[a, b] * (1 - v) + feature[a, b + 1] * v) * (1 - u)
-            f += (feature[a + 1, b] * (1 - v) + feature[a + 1, b + 1] * v) * u
-            count[ix, iy] += 1
-            mean[ix, iy] += max(1 / count[ix, iy], least) * (f - mean[ix, iy])
+            # Which polar cell lies over this spot depends on its elevation: look at the horizon first, then there.
+            flat = 1.0
+            for look in range(2):
+                i = (ground / flat - nearest) / spacing
+                j = (left / ground * flat + field) / (2 * field) * (columns - 1)
+                if i < 0 or j < 0 or i >= rows - 1 or j >= columns - 1:
+                    break
+                if look == 0:
+                    flat = np.sqrt(1 - u_z[int(i + 0.5), int(j + 0.5)] ** 2)
+            else:
+                a, b = int(i), int(j)
+                u, v = i - a, j - b
+                f = (feature[a, b] * (1 - v) + feature[a, b + 1] * v) * (1 - u)
+                f += (feature[a + 1, b] * (1 - v) + feature[a + 1, b + 1] * v) * u
+                count[ix, iy] += 1
+                mean[ix, iy] += max(1 / count[ix, iy], least) * (f - mean[ix, iy])

@@ -26,16 +26,20 @@ class ScanConfig(BaseModel):
         above_noise_db: an echo stands so far above the noise.
         below_ring_db: an echo lies at most so far below the strongest of all bearings at its range; what is weaker is
             taken for that echo's sidelobe.
+        below_bearing_db: an echo lies at most so far below the strongest of all ranges on its bearing; what is weaker
+            and nearer is clutter above or below the plane, or the skirt of a neighbour. In simulated offices 6 dB
+            halves the echoes that come too early and costs one in ten of the others.
         noise_quantile: the noise is this quantile of a frame's cells: most of a room's cells are behind its walls.
         elevation_power: how strongly echoes from above and below are weighed down: a cell's power is multiplied with
-            (elevation-aware / all-elevations power)^this, at most 1.
+            (elevation-aware / reference power)^this, at most 1.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    min_range: float = Field(0.25, ge=0)
+    min_range: float = Field(0.3, ge=0)
     above_noise_db: float = Field(15.0, gt=0)
     below_ring_db: float = Field(15.0, gt=0)
+    below_bearing_db: float = Field(6.0, gt=0)
     noise_quantile: float = Field(0.25, gt=0, lt=1)
     elevation_power: float = Field(2.0, gt=0)
 
@@ -47,23 +51,28 @@ class Maps:
     Attributes:
         power: all elevations.
         elevation_aware: echoes off the horizon weakened; None if the array cannot.
+        reference: all elevations, by the beamformer of `elevation_aware`.
         ranges: of the bins, m, evenly spaced.
         config: parameters.
     """
 
     power: Float[np.ndarray, "frame range bearing"]
     elevation_aware: Float[np.ndarray, "frame range bearing"] | None
+    reference: Float[np.ndarray, "frame range bearing"]
     ranges: Float[np.ndarray, "range"]
     config: ScanConfig
 
 
 def detect(power: Float[np.ndarray, "frame range bearing"], maps: Maps) -> Bool[np.ndarray, "frame range bearing"]:
-    """Cells with an echo: above the noise, no sidelobe of another bearing, and not too near."""
+    """Cells with an echo: above the noise, no sidelobe, not too weak for their bearing, and not too near."""
     config = maps.config
     noise = np.quantile(power, config.noise_quantile, axis=(1, 2), keepdims=True)
-    ring = power.max(axis=2, keepdims=True)
-    echo = (power > noise * 10 ** (config.above_noise_db / 10)) & (power > ring * 10 ** (-config.below_ring_db / 10))
-    return echo & (maps.ranges >= config.min_range)[:, None]
+    power = power * (maps.ranges >= config.min_range)[:, None]
+    least = np.maximum(
+        power.max(axis=2, keepdims=True) * 10 ** (-config.below_ring_db / 10),
+        power.max(axis=1, keepdims=True) * 10 ** (-config.below_bearing_db / 10),
+    )
+    return power > np.maximum(least, noise * 10 ** (config.above_noise_db / 10))
 
 
 def threshold(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
@@ -80,7 +89,7 @@ def elevation_aware(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
     """The first echo of every bearing after weighing down what comes from above and below."""
     if maps.elevation_aware is None:
         raise InputError("scans: method elevation-aware needs an elevation-aware map, found none; use first-echo")
-    horizon = np.clip(maps.elevation_aware / np.maximum(maps.power, 1e-30), 0, 1)
+    horizon = np.clip(maps.elevation_aware / np.maximum(maps.reference, 1e-30), 0, 1)
     power = maps.power * horizon**maps.config.elevation_power
     return echoes.first(detect(power, maps), power)
 
@@ -98,16 +107,19 @@ def make_scans(
     azimuths: Float[np.ndarray, "azimuth"],
     elevation_aware: Float[np.ndarray, "frame range azimuth"] | None = None,
     *,
+    reference: Float[np.ndarray, "frame range azimuth"] | None = None,
     method: str = "elevation-aware",
     config: ScanConfig | None = None,
 ) -> Float[np.ndarray, "frame bearing"]:
     """Scans on `BEARINGS` from power maps.
 
     Args:
-        range_azimuth: power (linear) over all elevations.
+        range_azimuth: power (linear) over all elevations. Capon's beamformer gives far better scans than Bartlett's:
+            in simulated offices four of five ranges are within 10 cm, against one of two.
         ranges: of the bins, m, evenly spaced.
         azimuths: of the columns, rad, ascending; bearings outside see nothing.
         elevation_aware: power of the elevation-aware array on the same axes.
+        reference: power over all elevations by the beamformer of `elevation_aware`; None: `range_azimuth`.
         method: a key of `METHODS`.
         config: parameters of detection.
 
@@ -120,7 +132,11 @@ def make_scans(
     if method not in METHODS:
         raise InputError(f"scans: method is {method!r}, expected one of {', '.join(METHODS)}")
     ranges, azimuths = np.asarray(ranges, float), np.asarray(azimuths, float)
-    for name, power in (("range_azimuth", range_azimuth), ("elevation_aware", elevation_aware)):
+    for name, power in (
+        ("range_azimuth", range_azimuth),
+        ("elevation_aware", elevation_aware),
+        ("reference", reference),
+    ):
         if power is not None and np.shape(power)[1:] != (len(ranges), len(azimuths)):
             raise InputError(
                 f"scans: {name} has shape {np.shape(power)}, expected (frame, {len(ranges)}, {len(azimuths)}) "
@@ -128,9 +144,11 @@ def make_scans(
             )
     if not len(range_azimuth):
         return np.zeros((0, len(BEARINGS)))
+    power = _resample(range_azimuth, azimuths)
     maps = Maps(
-        _resample(range_azimuth, azimuths),
+        power,
         None if elevation_aware is None else _resample(elevation_aware, azimuths),
+        power if reference is None else _resample(reference, azimuths),
         ranges,
         config or ScanConfig(),
     )

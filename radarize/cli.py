@@ -97,18 +97,18 @@ def info(recording: RecordingFile, as_json: AsJson = False):
 def run_(
     recording: RecordingFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
-    odometry: Annotated[str, typer.Option(help="Where the motion comes from.")] = "doppler",
-    scans: Annotated[str, typer.Option(help="How scans are made.")] = "first-echo",
-    settings: Annotated[str, typer.Option(help="Which reading of the pipeline.")] = "corrected",
+    odometry: Annotated[str | None, typer.Option(help="Where the motion comes from: doppler.")] = None,
+    scans: Annotated[str | None, typer.Option(help="How scans are made: elevation-aware, first-echo...")] = None,
+    settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected.")] = None,
 ):
     """Estimate trajectory and map of a recording."""
     from radarize.pipeline import run
 
+    choices = {"odometry": odometry, "scans": scans, "settings": settings}
+    given = {name: value for name, value in choices.items() if value is not None}
     try:
         with progress("run") as report:
-            written = run(
-                recording, output, odometry=odometry, scans=scans, settings=settings, progress=report
-            )
+            written = run(recording, output, **given, progress=report)
     except KeyboardInterrupt:
         raise InputError(f"stopped; {output} is not a whole run, the recording is untouched") from None
     print(written)

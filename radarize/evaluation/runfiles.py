@@ -117,8 +117,11 @@ def read_scans(path: Path) -> dict[str, np.ndarray]:
     if found["ranges"].shape != shape:
         raise InputError(f"{path}: /ranges has shape {found['ranges'].shape}, expected {shape} (time, azimuth)")
     for name in ("velocity", "velocity_covariance", "truth/velocity", "truth/scan"):
-        if name in found and len(found[name]) != shape[0]:
-            raise InputError(f"{path}: /{name} has {len(found[name])} rows, expected {shape[0]} as /time")
+        if name in found:
+            # Truth that was written ahead of the last whole frame is cut.
+            found[name] = found[name][: shape[0]]
+            if len(found[name]) != shape[0]:
+                raise InputError(f"{path}: /{name} has {len(found[name])} rows, expected {shape[0]} as /time")
     return found
 
 

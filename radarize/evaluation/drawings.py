@@ -1,0 +1,126 @@
+"""Drawings of heat maps and scans with matplotlib, transparent and in neutral ink."""
+
+import matplotlib
+import numpy as np
+from jaxtyping import Float
+
+matplotlib.use("agg")
+
+import matplotlib.pyplot as plt  # noqa: E402
+
+from radarize.evaluation.page import COLORS, INK  # noqa: E402
+
+_STYLE = {
+    "text.color": INK,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": INK,
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.titlesize": 10,
+    "font.size": 9,
+    "axes.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+}
+#: dB below the strongest cell that is still drawn, and the range within which transmitter leakage may outshine it, m.
+DEPTH, LEAKAGE = 45.0, 0.25
+_MAP = "magma"
+
+
+def canvas(columns: int, rows: int = 1, width: float = 11.0, height: float = 3.6):
+    """A figure in the page's style and its axes as an array (rows, columns)."""
+    with plt.rc_context(_STYLE):
+        figure, axes = plt.subplots(
+            rows, columns, figsize=(width, height * rows), squeeze=False, layout="constrained"
+        )
+    return figure, axes
+
+
+def decibels(power: np.ndarray, reference: float | None = None) -> np.ndarray:
+    """Power in dB relative to the reference, or to its own largest value."""
+    power = np.asarray(power, float)
+    top = reference if reference else np.nanmax(power, initial=0.0)
+    return 10 * np.log10(np.maximum(power, top * 10 ** (-DEPTH / 10 - 2)) / top) if top > 0 else np.zeros(power.shape)
+
+
+def draw_fan(
+    axis,
+    power: Float[np.ndarray, "range azimuth"],
+    ranges: Float[np.ndarray, "range"],
+    azimuths: Float[np.ndarray, "azimuth"],
+    title: str,
+    reach: float | None = None,
+) -> None:
+    """Range-azimuth power from above: forward is up, left is left."""
+    far = ranges >= LEAKAGE
+    level = decibels(power, np.nanmax(power[far], initial=0.0) if far.any() else None)
+    edges_r, edges_a = _edges(ranges), _edges(azimuths)
+    x, y = -edges_r[:, None] * np.sin(edges_a), edges_r[:, None] * np.cos(edges_a)
+    drawn = axis.pcolormesh(x, y, level, cmap=_MAP, vmin=-DEPTH, vmax=0, rasterized=True)
+    reach = reach or ranges[-1]
+    half = reach * np.sin(min(np.abs(azimuths).max(), np.pi / 2))
+    axis.set(aspect="equal", title=title, xlim=(-half, half), ylim=(0, reach))
+    axis.set(xlabel="to the right, m", ylabel="forward, m")
+    _bar(axis, drawn)
+
+
+def draw_doppler(
+    axis,
+    power: Float[np.ndarray, "doppler azimuth"],
+    velocities: Float[np.ndarray, "doppler"],
+    azimuths: Float[np.ndarray, "azimuth"],
+    title: str,
+    velocity: Float[np.ndarray, "2"] | None = None,
+) -> None:
+    """Doppler-azimuth power; left is left. `velocity` (forward, left; m/s) adds the ridge v cos(phi - theta)."""
+    x, y = -np.degrees(_edges(azimuths)), _edges(velocities)
+    drawn = axis.pcolormesh(x, y, decibels(power), cmap=_MAP, vmin=-DEPTH, vmax=0, rasterized=True)
+    if velocity is not None and np.isfinite(velocity).all():
+        closing = velocity[0] * np.cos(azimuths) + velocity[1] * np.sin(azimuths)
+        span = velocities[-1] - velocities[0] + velocities[1] - velocities[0] if len(velocities) > 1 else np.inf
+        wrapped = (closing - velocities[0]) % span + velocities[0]
+        wrapped[np.abs(np.diff(wrapped, prepend=wrapped[0])) > span / 2] = np.nan
+        axis.plot(-np.degrees(azimuths), wrapped, "--", color="#39d0d8", lw=1.4, label="v cos(φ − θ)")
+        axis.legend(loc="lower left", frameon=False, labelcolor="w", fontsize=8)
+    ticks = np.arange(-60, 61, 30)
+    axis.set(title=title, xlabel="azimuth, deg (left is positive)", ylabel="closing speed, m/s")
+    axis.set_xticks(-ticks, ticks)
+    axis.set_xlim(-np.degrees(azimuths[-1]), -np.degrees(azimuths[0]))
+    _bar(axis, drawn)
+
+
+def draw_scan(axis, azimuths: np.ndarray, ranges: np.ndarray, kind: str, label: str) -> None:
+    """Ends of beams from above, in the axes of `draw_fan`: ``"truth"`` as small dots, else as rings."""
+    hit = np.isfinite(ranges) & (ranges > 0)
+    x, y = -ranges[hit] * np.sin(azimuths[hit]), ranges[hit] * np.cos(azimuths[hit])
+    if kind == "truth":
+        axis.plot(x, y, ".", color="#39d0d8", ms=2.2, label=label)
+    else:
+        axis.plot(x, y, "o", mfc="none", mec=COLORS["good"], mew=1.0, ms=4, label=label)
+
+
+def draw_profiles(axis, times: np.ndarray, ranges: np.ndarray, power: Float[np.ndarray, "time range"]) -> None:
+    """Range profiles side by side over time."""
+    far = ranges >= LEAKAGE
+    level = decibels(power, power[:, far].max() if far.any() and power.size else None)
+    # A lone frame gets a width of its own.
+    edges = _edges(times) if len(times) > 1 else times[0] + np.array([-0.5, 0.5])
+    drawn = axis.pcolormesh(edges, _edges(ranges), level.T, cmap=_MAP, vmin=-DEPTH, vmax=0, rasterized=True)
+    axis.set(xlabel="time, s", ylabel="range, m")
+    _bar(axis, drawn)
+
+
+def _edges(values: np.ndarray) -> np.ndarray:
+    """Cell borders of evenly or unevenly spaced middles."""
+    values = np.asarray(values, float)
+    if len(values) < 2:
+        return np.array([values[0] - 0.5, values[0] + 0.5])
+    inner = (values[1:] + values[:-1]) / 2
+    return np.concatenate([[2 * values[0] - inner[0]], inner, [2 * values[-1] - inner[-1]]])
+
+
+def _bar(axis, drawn) -> None:
+    bar = axis.figure.colorbar(drawn, ax=axis, shrink=0.85, pad=0.02, aspect=28)
+    bar.outline.set_visible(False)
+    bar.ax.tick_params(labelsize=7, color=INK, labelcolor=INK)
+    bar.set_label("dB", color=INK, fontsize=8)

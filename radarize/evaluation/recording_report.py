@@ -1,0 +1,202 @@
+"""A report of what a recording holds, real or simulated, as far as its antennas allow."""
+
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+
+from radarize.contents import contents
+from radarize.errors import InputError
+from radarize.evaluation.drawings import LEAKAGE, canvas, draw_doppler, draw_fan, draw_profiles
+from radarize.evaluation.page import COLORS, INK, Page
+from radarize.heatmaps import Heatmaps
+from radarize.radar.array import azimuth_row
+from radarize.recording import Recording
+
+#: At most so many profiles over time, and frames with maps: a picture has no room for more.
+_PROFILES, _FRAMES = 400, 3
+#: Largest magnitude of a 16-bit sample.
+_FULL_SCALE = 32767
+
+
+def report_recording(path: Path, output: Path | None = None) -> Path:
+    """Draw a recording.
+
+    Args:
+        path: ``.h5`` file.
+        output: page to write; by default beside the recording, ``.html`` in place of ``.h5``.
+
+    Returns:
+        The page's path.
+
+    Raises:
+        InputError: not a recording, an empty or damaged one.
+    """
+    path = Path(path)
+    found = contents(path)
+    output = Path(output) if output else path.with_suffix(".html")
+    with Recording(path) as recording:
+        if not len(recording):
+            raise InputError(f"{path}: has no whole frame, expected at least one")
+        config = recording.config
+        page = Page(
+            f"Recording {path.name}",
+            f"{len(recording)} frames in {found['duration']:.2f} s · {config.board} · {len(config.tx)} transmitters, "
+            f"{len(config.rx)} receivers, {config.loops} loops, {config.samples} samples",
+        )
+        _headline(page, found, config)
+        maps = Heatmaps(config)
+        _profiles(page, recording, maps)
+        _maps(page, recording, maps)
+        _samples(page, recording)
+        if recording.has("truth/pose"):
+            _trajectory(page, recording)
+    _contents(page, found)
+    return page.write(output)
+
+
+def _headline(page: Page, found: dict, config) -> None:
+    page.headline(
+        [
+            (f"{100 * config.range_resolution:.2f} cm", "range resolution"),
+            (f"{config.max_range:.2f} m", "largest range"),
+            (f"±{config.max_velocity:.2f} m/s", "unambiguous radial speed"),
+            (f"{100 * found['lost_share']:.2g} %", f"chirps lost ({found['lost_chirps']})"),
+        ]
+    )
+
+
+def _batches(recording: Recording, count: int):
+    """Frames spread over the recording, one at a time, as (index, samples, valid)."""
+    for index in np.unique(np.linspace(0, len(recording) - 1, count).astype(int)):
+        yield index, recording.adc(index, index + 1), recording.valid(index, index + 1)
+
+
+def _profiles(page: Page, recording: Recording, maps: Heatmaps) -> None:
+    indices, profiles = [], []
+    for index, adc, valid in _batches(recording, _PROFILES):
+        indices.append(index)
+        profiles.append(maps.range_profile(adc, valid)[0].numpy())
+    power = np.stack(profiles)
+    times = recording.times[indices] - recording.times[0]
+    page.section("Range", "Power over range, all antennas and speeds together; dB below the strongest echo.")
+    if len(times) > 1:
+        figure, axes = canvas(1, height=3.0)
+        draw_profiles(axes[0, 0], times, maps.ranges, power)
+        page.picture(figure, "Range profile over time")
+    mean = power.mean(axis=0)
+    far = maps.ranges >= LEAKAGE
+    top = mean[far].max() if far.any() else mean.max()
+    level = 10 * np.log10(np.maximum(mean, top * 1e-9) / top) if top > 0 else np.zeros(len(mean))
+    peaks = [i for i in np.flatnonzero(far) if 0 < i < len(mean) - 1 and mean[i - 1] < mean[i] >= mean[i + 1]]
+    strongest = sorted(sorted(peaks, key=lambda i: -mean[i])[:6])
+    figure = go.Figure()
+    x = np.round(maps.ranges, 4).tolist()
+    figure.add_scatter(x=x, y=np.round(level, 2).tolist(), line={"color": COLORS["odometry"]}, name="mean")
+    figure.add_scatter(
+        x=[x[i] for i in strongest],
+        y=[round(float(level[i]), 2) for i in strongest],
+        mode="markers+text",
+        text=[f"{x[i]:.2f} m" for i in strongest],
+        textposition="top center",
+        marker={"color": COLORS["slam"], "size": 7},
+        name="strongest echoes",
+    )
+    figure.update_xaxes(title="range, m")
+    figure.update_yaxes(title="mean power, dB", range=[max(level[far].min() - 3, -80) if far.any() else -80, 8])
+    page.plot(figure, height=360)
+
+
+def _maps(page: Page, recording: Recording, maps: Heatmaps) -> None:
+    antennas = len(azimuth_row(recording.config))
+    if antennas < 2:
+        page.section("Azimuth", "A single virtual antenna tells no direction: no maps over azimuth.")
+        return
+    about = f"From the longest row of {antennas} virtual antennas"
+    if maps.pairs is None:
+        about += "; without antennas at two heights there is no elevation-aware map"
+    else:
+        about += f", and {len(maps.pairs)} vertical pairs that weaken ceiling and floor"
+    page.section("Azimuth", about + ". From above: forward is up, left is left. dB below the strongest cell.")
+    for index, adc, valid in _batches(recording, _FRAMES):
+        figure, axes = canvas(2 if maps.pairs is None else 3)
+        axes = list(axes[0])
+        power = maps.range_azimuth(adc, valid)[0].numpy()
+        draw_fan(axes.pop(0), power, maps.ranges, maps.azimuths, "range-azimuth")
+        if maps.pairs is not None:
+            level = maps.elevation_aware(adc, valid)[0].numpy()
+            draw_fan(axes.pop(0), level, maps.ranges, maps.azimuths, "elevation aware")
+        velocity = _true_velocity(recording, index)
+        speeds = maps.doppler_azimuth(adc, valid)[0].numpy()
+        draw_doppler(axes.pop(0), speeds, maps.velocities, maps.azimuths, "Doppler-azimuth", velocity)
+        page.picture(figure, f"Frame {index}, {recording.times[index] - recording.times[0]:.2f} s after the start")
+
+
+def _true_velocity(recording: Recording, index: int) -> np.ndarray | None:
+    if not recording.has("truth/velocity"):
+        return None
+    velocity = recording.read("truth/velocity")
+    return velocity[index, :2] if index < len(velocity) else None
+
+
+def _samples(page: Page, recording: Recording) -> None:
+    edges = np.linspace(-32768, 32768, 257)
+    counts, clipped, total, largest = np.zeros(256), 0, 0, 0
+    for _, adc, _ in _batches(recording, 40):
+        counts += np.histogram(adc, edges)[0]
+        magnitude = np.abs(adc.astype(np.int32))
+        clipped += int((magnitude >= _FULL_SCALE).sum())
+        total += adc.size
+        largest = max(largest, int(magnitude.max()))
+    page.section(
+        "Samples",
+        f"Largest magnitude {largest} of {_FULL_SCALE} ADC counts; {100 * clipped / total:.3g} % of the samples "
+        "are clipped.",
+    )
+    used = np.flatnonzero(counts)
+    first, last = max(used[0] - 2, 0), min(used[-1] + 3, len(counts))
+    figure = go.Figure()
+    middles = (edges[1:] + edges[:-1]) / 2
+    figure.add_bar(x=middles[first:last].tolist(), y=counts[first:last].tolist(), marker={"color": COLORS["map"]})
+    figure.update_layout(bargap=0.05)
+    figure.update_xaxes(title="ADC counts (I and Q)")
+    figure.update_yaxes(title="samples", type="log")
+    page.plot(figure, height=300)
+    valid = recording.valid(0, len(recording))
+    lost = (~valid).sum(axis=(1, 2))
+    if lost.any():
+        figure = go.Figure()
+        time = np.round(recording.times - recording.times[0], 4).tolist()
+        figure.add_bar(x=time, y=lost.tolist(), marker={"color": COLORS["slam"]})
+        figure.update_xaxes(title="time, s")
+        figure.update_yaxes(title="lost chirps a frame")
+        page.plot(figure, height=240)
+
+
+def _trajectory(page: Page, recording: Recording) -> None:
+    page.section("True trajectory")
+    figure = go.Figure()
+    if recording.has("truth/floor_plan"):
+        plan = recording.read("truth/floor_plan")
+        x, y = ([v for a, b in plan[:, (i, i + 2)].round(3).tolist() for v in (a, b, None)] for i in (0, 1))
+        figure.add_scatter(x=x, y=y, name="floor plan", mode="lines", line={"color": COLORS["truth"], "width": 1.2})
+    poses = recording.read("truth/pose")
+    x, y = np.round(poses[:, :2], 3).T.tolist()
+    figure.add_scatter(x=x, y=y, name="sensor", mode="lines", line={"color": COLORS["good"], "width": 2.4})
+    figure.add_scatter(x=x[:1], y=y[:1], name="start", mode="markers", marker={"color": INK, "size": 9})
+    figure.update_xaxes(title="x, m", constrain="domain")
+    figure.update_yaxes(title="y, m", scaleanchor="x")
+    page.plot(figure, height=520)
+
+
+def _contents(page: Page, found: dict) -> None:
+    page.section("What is in it")
+    page.table(
+        ("data set", "shape", "type", "unit", "about"),
+        [
+            (f"/{name}", " x ".join(map(str, item["shape"])), item["dtype"], item["unit"], item["about"])
+            for name, item in found["data_sets"].items()
+        ],
+    )
+    config = {name: value for name, value in found["config"].items() if name != "channel_calibration"}
+    page.columns({"configuration (SI units)": config, "derived": found["derived"], "attributes": found["attributes"]})

@@ -118,7 +118,7 @@ class LoopConfig(_Section):
     distance: float = Field(3.0, gt=0)
     angle: float = Field(0.5, gt=0)
     candidates: int = Field(3, gt=0)
-    every: int = Field(1, gt=0)
+    every: int = Field(2, gt=0)
     min_score: float = Field(0.6, gt=0, lt=1)
     levels: int = Field(5, ge=0, le=8)
     sigma: float = Field(1.0, gt=0)
@@ -169,7 +169,7 @@ PRESETS: dict[str, SlamConfig] = {
             presearch_distance=0.0, presearch_angle=0.0, sigma=3.0, translation_floor=0.03, rotation_floor=0.015
         ),
         loop=LoopConfig(
-            radius=6.0, distance=2.0, angle=0.5, min_score=0.55, levels=4, sigma=3.0,
+            radius=6.0, distance=2.0, angle=0.5, every=1, min_score=0.55, levels=4, sigma=3.0,
             translation_floor=0.1, rotation_floor=0.03,
         ),
     ),

@@ -6,7 +6,6 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from radarize.radar.config import RadarConfig
-from radarsim.physics.scatterers import is_floor_or_ceiling, is_sheet
 from radarsim.scene.scene import Scene
 
 #: Facets below this area (m^2) do not flash: their scatterers stand for them.
@@ -62,10 +61,10 @@ class Facets:
                     area = 4 * half.prod()
                     if area < SMALLEST_PLATE:
                         continue
+                    mirror = area >= SMALLEST_MIRROR
                     rows.append(
-                        (center, normal, u, v, half, is_sheet(mesh), area >= SMALLEST_MIRROR,
-                         is_floor_or_ceiling(item), tables[name])
-                    )  # fmt: skip
+                        (center, normal, u, v, half, item.two_sided, mirror, item.is_floor_or_ceiling, tables[name])
+                    )
         if not rows:
             empty = np.zeros((0, 3))
             none = np.zeros(0, bool)

@@ -75,18 +75,6 @@ class Scatterers:
         return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))
 
 
-def is_sheet(mesh) -> bool:
-    """Whether a mesh is a single flat sheet, which shows both its sides; anything else shows its outer side."""
-    normals = mesh.face_normals
-    offsets = np.einsum("fd,fd->f", mesh.triangles[:, 0] - mesh.triangles[0, 0], normals)
-    return bool(np.all(np.abs(normals @ normals[0]) > 1 - 1e-9) and np.all(np.abs(offsets) < 1e-6))
-
-
-def is_floor_or_ceiling(item) -> bool:
-    """Whether an object belongs to the floor or ceiling, which its name says: ``corridor floor``, ``lamp 3``."""
-    return bool({"floor", "ceiling", "lamp"} & set(item.name.lower().replace("_", " ").split()))
-
-
 def _on_object(item, rng: np.random.Generator, density: float) -> Scatterers:
     mesh = item.mesh
     areas = mesh.area_faces
@@ -103,7 +91,7 @@ def _on_object(item, rng: np.random.Generator, density: float) -> Scatterers:
         normal,
         np.full(count, item.material.sigma0 * total / max(count, 1)),
         rng.uniform(0, 2 * np.pi, count),
-        np.full(count, is_sheet(mesh)),
-        np.full(count, is_floor_or_ceiling(item)),
+        np.full(count, item.two_sided),
+        np.full(count, item.is_floor_or_ceiling),
         np.where(np.arange(count) % BOUNCE_STRIDE == 0, float(BOUNCE_STRIDE), 0.0),
     )

@@ -1,0 +1,93 @@
+"""Whole recordings from the simulator: reproducible, readable, and true to their own truth."""
+
+import hashlib
+
+import numpy as np
+import pytest
+
+from radarize.errors import InputError
+from radarize.recording import Recording
+from radarsim.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    """A second and a half of the office by hand."""
+    return simulate("office", tmp_path_factory.mktemp("sim") / "walk.h5", duration=1.5, seed=5)
+
+
+def digest(path):
+    with Recording(path) as recording:
+        names = [n for n in recording.names()]
+        return {n: hashlib.sha256(np.ascontiguousarray(recording.file[n][:]).tobytes()).hexdigest() for n in names}
+
+
+def test_same_seed_same_bytes(walk, tmp_path):
+    again = simulate("office", tmp_path / "again.h5", duration=1.5, seed=5)
+    other = simulate("office", tmp_path / "other.h5", duration=1.5, seed=6)
+    assert digest(walk) == digest(again)
+    assert digest(walk)["radar/adc"] != digest(other)["radar/adc"]
+
+
+def test_the_recording_says_what_it_is(walk):
+    with Recording(walk) as recording:
+        assert len(recording) == 45
+        assert recording.attributes["scene"] == "office" and recording.attributes["seed"] == 5
+        assert np.allclose(np.diff(recording.times), 33.333e-3)
+        assert recording.valid(0, 45).all()
+        time = recording.read("truth/time")
+        assert np.allclose(time - recording.times, recording.config.burst_center)
+
+
+def test_truth_is_consistent(walk):
+    """Velocity is the derivative of position, in the sensor's frame."""
+    from scipy.spatial.transform import Rotation
+
+    with Recording(walk) as recording:
+        time, pose, velocity = (recording.read(f"truth/{n}") for n in ("time", "pose", "velocity"))
+    between = np.diff(pose[:, :3], axis=0) / np.diff(time)[:, None]
+    turned = Rotation.from_quat(pose[:-1, 3:]).inv().apply(between)
+    assert turned == pytest.approx((velocity[:-1, :3] + velocity[1:, :3]) / 2, abs=0.02)
+
+
+def test_true_scan_meets_the_floor_plan(walk):
+    """The ends of the true scan lie on the walls of the true plan."""
+    from scipy.spatial.transform import Rotation
+
+    with Recording(walk) as recording:
+        pose, scan = recording.read("truth/pose")[0], recording.read("truth/scan")[0]
+        azimuths, plan = recording.read("truth/scan_azimuths"), recording.read("truth/floor_plan")
+    forward = Rotation.from_quat(pose[3:]).apply([1.0, 0, 0])
+    bearing = np.arctan2(forward[1], forward[0]) + azimuths
+    seen = np.isfinite(scan)
+    ends = pose[:2] + scan[seen, None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=1)[seen]
+    start, end = plan[:, :2], plan[:, 2:]
+    along = end - start
+    share = np.clip(np.einsum("esd,sd->es", ends[:, None] - start, along) / np.sum(along**2, axis=1), 0, 1)
+    distance = np.linalg.norm(ends[:, None] - start - share[..., None] * along, axis=2).min(axis=1)
+    assert seen.any() and np.quantile(distance, 0.95) < 0.02
+
+
+def test_causes_are_counted(walk):
+    with Recording(walk) as recording:
+        echoes, power = recording.read("truth/echoes"), recording.read("truth/echo_power")
+    assert (echoes[:, 0] > 500).all() and (echoes[:, 2] > 20).any()
+    assert (power[:, 0] > power[:, 2]).mean() > 0.9  # ghosts are the weaker echoes
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"duration": float("nan")}, "duration is nan"),
+        ({"duration": 1e-3}, "at least one frame"),
+        ({"platform": "drone"}, "drone"),
+        ({"device": "tpu"}, "tpu"),
+        ({"radar": "nothing.cfg"}, "nothing.cfg"),
+        ({"scene": "nowhere"}, "nowhere"),
+    ],
+)
+def test_bad_input_is_refused_in_a_sentence(tmp_path, arguments, words):
+    with pytest.raises(InputError) as caught:
+        simulate(**{"scene": "office", "output": tmp_path / "x.h5", "duration": 1.0, **arguments})
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+    assert not (tmp_path / "x.h5").exists()

@@ -63,11 +63,21 @@ class Pipeline:
             spectrum = self.heatmaps.spectrum(adc, valid)
         track = self.odometry.follow(spectrum, times, self._stage)
         with self._stage("maps"):
-            power = self.heatmaps.range_azimuth_of(spectrum).numpy()
-            level = None if self.heatmaps.pairs is None else self.heatmaps.elevation_aware_of(spectrum).numpy()
+            # Scans want Capon's sharp beams; the horizon is told from two maps of one beamformer, Bartlett's.
+            sharp = self.heatmaps.range_azimuth_of(spectrum, "capon").numpy()
+            level = reference = None
+            if self.heatmaps.pairs is not None:
+                level = self.heatmaps.elevation_aware_of(spectrum).numpy()
+                reference = self.heatmaps.range_azimuth_of(spectrum).numpy()
         with self._stage("scans"):
             ranges = make_scans(
-                power, self.heatmaps.ranges, self.heatmaps.azimuths, level, method=self.scans, config=self.scan_config
+                sharp,
+                self.heatmaps.ranges,
+                self.heatmaps.azimuths,
+                level,
+                reference=reference,
+                method=self.scans,
+                config=self.scan_config,
             )
         with self._stage("slam"):
             for instant, pose, spread, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):

@@ -1,5 +1,6 @@
 """TUM trajectory files: ``time x y z qx qy qz qw`` a line, ``#`` comments."""
 
+import contextlib
 import os
 from pathlib import Path
 
@@ -57,11 +58,13 @@ def write_tum(path: str | Path, times: Float[np.ndarray, "pose"], poses: Float[n
     path = Path(path)
     part = path.with_name(path.name + ".part")
     try:
-        np.savetxt(part, np.column_stack([times, poses]), fmt=["%.6f"] + ["%.9f"] * 7)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        np.savetxt(part, np.column_stack([times, poses]), fmt="%.9f")
         os.replace(part, path)
     except OSError as error:
-        part.unlink(missing_ok=True)
-        raise InputError(f"cannot write {path}: {error.strerror}") from error
+        with contextlib.suppress(OSError):
+            part.unlink()
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     return path
 
 

@@ -5,12 +5,11 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from radarize.errors import InputError
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.dca1000 import encode
 from radarize.recording import Recording
+from radarize.tum import write_tum
 
 _BATCH_BYTES = 16 << 20
 
@@ -65,9 +64,8 @@ def _tum(source: Recording, output: Path) -> Path:
     if not (source.has("truth/time") and source.has("truth/pose")):
         raise InputError(f"{source.path}: has no true poses (/truth/time and /truth/pose) to write as TUM")
     times, poses = source.read("truth/time"), source.read("truth/pose")
-    rows = np.column_stack([times, poses])[: min(len(times), len(poses))]
-    _write(output, lambda file: np.savetxt(file, rows, fmt="%.9f"))
-    return output
+    shared = min(len(times), len(poses))
+    return write_tum(output, times[:shared], poses[:shared])
 
 
 def _write(path: Path, write: Callable) -> None:

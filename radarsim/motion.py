@@ -13,6 +13,7 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from radarize.errors import InputError
+from radarize.tum import read_tum
 
 
 @dataclass(frozen=True)
@@ -104,36 +105,12 @@ def motion_from_tum(path: str | Path) -> Motion:
         InputError: missing file, wrong columns, something that is no finite number, stamps that do not ascend, a
             quaternion that is not of unit length, or fewer than four poses; with the line.
     """
-    path = Path(path)
-    try:
-        lines = path.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as a TUM trajectory ({error})") from error
-    rows: list[list[float]] = []
-    for number, line in enumerate(lines, start=1):
-        fields = line.split("#", 1)[0].replace(",", " ").split()
-        if not fields:
-            continue
-        where = f"{path}, line {number}"
-        if len(fields) != 8:
-            raise InputError(f"{where}: {len(fields)} columns, expected 8: time x y z qx qy qz qw")
-        try:
-            row = [float(value) for value in fields]
-        except ValueError as error:
-            raise InputError(f"{where}: {error}, expected 8 numbers: time x y z qx qy qz qw") from error
-        if not np.all(np.isfinite(row)):
-            raise InputError(f"{where}: {line.strip()!r} holds a value that is not finite, expected 8 finite numbers")
-        if rows and row[0] <= rows[-1][0]:
-            raise InputError(f"{where}: time {row[0]} does not follow {rows[-1][0]}, expected ascending times")
-        if abs(np.linalg.norm(row[4:]) - 1) > 1e-2:
-            raise InputError(f"{where}: quaternion of length {np.linalg.norm(row[4:]):.3g}, expected 1")
-        rows.append(row)
-    if len(rows) < 4:
-        raise InputError(f"{path}: {len(rows)} poses, expected at least 4")
-    data = np.array(rows)
-    times = data[:, 0] - data[0, 0]
+    stamps, poses = read_tum(path)
+    if len(stamps) < 4:
+        raise InputError(f"{path}: {len(stamps)} poses, expected at least 4")
+    times = stamps - stamps[0]
     return Motion(
-        float(times[-1]), CubicSpline(times, data[:, 1:4]), RotationSpline(times, Rotation.from_quat(data[:, 4:]))
+        float(times[-1]), CubicSpline(times, poses[:, :3]), RotationSpline(times, Rotation.from_quat(poses[:, 3:]))
     )
 
 

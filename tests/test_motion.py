@@ -166,13 +166,13 @@ def test_tum(tmp_path):
 @pytest.mark.parametrize(
     ("rows", "complaint"),
     [
-        ([*GOOD[:3], "100.3 nan 0 1 0 0 0 1", *GOOD[4:]], "line 5: .*not finite"),
-        ([*GOOD[:3], GOOD[2]], "line 5: time .* ascending"),
-        (["1 2 3"], "line 2: 3 columns, expected 8"),
-        ([*GOOD[:3], "x 0 0 1 0 0 0 1"], "line 5: could not convert"),
-        ([*GOOD[:3], "100.3 0 0 1 0 0 0 0"], "line 5: quaternion of length 0"),
+        ([*GOOD[:3], "100.3 nan 0 1 0 0 0 1", *GOOD[4:]], "line 5: .*expected finite numbers"),
+        ([*GOOD[:3], GOOD[2]], "line 5: has time .* ascending"),
+        (["1 2 3"], "line 2: .*expected eight numbers"),
+        ([*GOOD[:3], "x 0 0 1 0 0 0 1"], "line 5: .*expected eight numbers"),
+        ([*GOOD[:3], "100.3 0 0 1 0 0 0 0"], "line 5: has a quaternion of length 0"),
         (GOOD[:3], "3 poses, expected at least 4"),
-        ([], "0 poses"),
+        ([], "holds no poses"),
     ],
 )
 def test_bad_tum(tmp_path, rows, complaint):

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from scipy.spatial.transform import Rotation, Slerp
 
 from radarize.errors import InputError
-from radarize.importers.poses import read_tum
+from radarize.tum import read_tum
 
 #: s: stamps this close belong together (the paper's association).
 NEAR = 0.01

@@ -1,5 +1,7 @@
 """Odometry as a function of time: where it says the sensor was, and how sure it is of a motion."""
 
+from bisect import bisect_left
+
 import numpy as np
 from jaxtyping import Float
 
@@ -56,7 +58,7 @@ class Odometry:
 
     def pose(self, time: float) -> Float[np.ndarray, "3"]:
         """Pose at a time, interpolated; before the first entry and after the last the sensor stands still."""
-        after = int(np.searchsorted(self.times, time))
+        after = bisect_left(self.times, time)
         if after == 0:
             return self.poses[0]
         if after == len(self.times):
@@ -71,7 +73,7 @@ class Odometry:
         """
         first, last = self.pose(start), self.pose(end)
         whole = between(first, last)
-        low, high = np.searchsorted(self.times, [start, end])
+        low, high = bisect_left(self.times, start), bisect_left(self.times, end)
         inner = range(max(low, 1), min(high, len(self.times) - 1) + 1)
         steps = [(k, self.covariances[k]) for k in inner]
         if not steps or any(c is None for _, c in steps):

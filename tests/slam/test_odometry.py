@@ -1,0 +1,51 @@
+"""Odometry as a function of time, and covariance of its motions against sampling."""
+
+import numpy as np
+import pytest
+
+from radarize.slam.config import OdometryConfig
+from radarize.slam.odometry import Odometry
+from radarize.slam.pose import between, compose
+
+
+def test_pose_between_entries_and_outside():
+    odometry = Odometry(OdometryConfig())
+    odometry.add(1.0, np.array([0, 0, 3.0]), None)
+    odometry.add(3.0, np.array([2, 1, -3.0]), None)
+    np.testing.assert_allclose(odometry.pose(2.0)[:2], [1, 0.5])
+    assert abs(odometry.pose(2.0)[2]) == pytest.approx(np.pi)
+    np.testing.assert_allclose(odometry.pose(0.0), [0, 0, 3])
+    np.testing.assert_allclose(odometry.pose(9.0), [2, 1, -3])
+    assert not odometry.add(3.0, np.zeros(3), None)
+    assert odometry.covers(3.0) and not odometry.covers(3.1)
+
+
+def test_covariance_of_a_motion_is_that_of_sampled_steps():
+    rng = np.random.default_rng(8)
+    steps = np.array([[0.5, 0.1, 0.3], [0.4, -0.2, -0.5], [0.6, 0.0, 0.2], [0.1, 0.3, 0.8]])
+    root = np.array([[0.02, 0, 0], [0.004, 0.01, 0], [0.002, -0.003, 0.015]])
+    covariance = root @ root.T
+    odometry = Odometry(OdometryConfig())
+    pose = np.array([3.0, -1.0, 2.0])
+    odometry.add(0.0, pose, np.zeros((3, 3)))
+    for k, step in enumerate(steps):
+        pose = compose(pose, step)
+        odometry.add(k + 1.0, pose, covariance)
+    motion, got = odometry.motion(0.0, 4.0)
+    samples = np.zeros((40_000, 3))
+    for step in steps:
+        samples = compose(compose(samples, step), rng.normal(size=(len(samples), 3)) @ root.T)
+    spread = np.sqrt(got.diagonal())
+    sampled = np.cov(between(motion, samples).T)
+    np.testing.assert_allclose(sampled / np.outer(spread, spread), got / np.outer(spread, spread), atol=0.04)
+    _, half = odometry.motion(1.0, 1.5)
+    np.testing.assert_allclose(half, covariance / 2, atol=2e-8)
+
+
+def test_model_without_covariance():
+    config = OdometryConfig(translation=0.03, translation_per_metre=0.04, rotation=0.01)
+    odometry = Odometry(config)
+    odometry.add(0.0, np.zeros(3), None)
+    odometry.add(1.0, np.array([1.0, 0, 0]), None)
+    _, covariance = odometry.motion(0.0, 1.0)
+    assert covariance[0, 0] == pytest.approx(0.05**2)

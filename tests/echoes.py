@@ -17,11 +17,13 @@ def record(
     rng: np.random.Generator,
     noise: float = 0.0,
     block: int = 1,
+    gain: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> np.ndarray:
     """int16 frames (frame, loop, tx, rx, sample, 2) of static points (n, 3) with complex amplitudes in ADC counts.
 
     `pose` maps times to positions (..., 3) and yaws (...). Phases are exact for every chirp and antenna; the beat
-    frequency is held for `block` loops (1: exact as well).
+    frequency is held for `block` loops (1: exact as well). `gain` maps points in the sensor frame at the burst's middle
+    (n, 3) to factors on their amplitudes.
     """
     n = np.arange(config.samples)
     beat = 2 * np.pi * config.slope / SPEED_OF_LIGHT * (n - (config.samples - 1) / 2) / config.sample_rate
@@ -35,6 +37,10 @@ def record(
         boresight = (offset[:, 0] * np.cos(heading) + offset[:, 1] * np.sin(heading)) / distance
         seen = (distance < config.max_range) & (boresight > 0.05)
         target, strength = points[seen], amplitudes[seen]
+        if gain is not None:
+            c, s = np.cos(heading), np.sin(heading)
+            x, y, z = offset[seen].T
+            strength = strength * gain(np.stack([c * x + s * y, c * y - s * x, z], axis=1))
 
         def length(antenna, yaw=yaw, position=position, target=target):
             """Distance of antennas at (..., 3) in the sensor frame to every point."""

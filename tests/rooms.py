@@ -33,6 +33,14 @@ def furnished_room(rng: np.random.Generator, size=(7.0, 5.0), boxes: int = 14, d
     return np.concatenate(points), strengths * np.exp(2j * np.pi * rng.random(len(strengths)))
 
 
+def antenna_gain(points: np.ndarray) -> np.ndarray:
+    """Two-way amplitude for points (n, 3) in the sensor frame: spreading loss and a patch antenna's beam."""
+    distance = np.linalg.norm(points, axis=1)
+    azimuth, elevation = np.arctan2(points[:, 1], points[:, 0]), np.arcsin(points[:, 2] / distance)
+    beam = (azimuth / np.radians(28)) ** 2 + (elevation / np.radians(14)) ** 2  # half power at 28 and 14 deg
+    return np.maximum(np.exp(-np.log(2) / 2 * beam), 0.01) / np.maximum(distance, 0.3) ** 2
+
+
 def walk(rng: np.random.Generator, duration: float, size=(7.0, 5.0), speed=0.8, sway=0.02):
     """Pose function of a smooth tour round the room: position (..., 3) and yaw (...), turning up to about 90 deg/s."""
     knots = np.arange(-1.0, duration + 2.5, 1.0)

@@ -52,7 +52,7 @@ class DopplerSettings:
 
     beams: int = 48
     echoes: int = 160
-    threshold: float = 12.0
+    threshold: float = 20.0
     min_range: float = 0.25
     inlier: float = 0.15
     hypotheses: int = 200
@@ -118,7 +118,7 @@ class DopplerVelocity:
         climb = s.climb if self.pairs is not None else 1e-3
         span = 2 * self.config.max_velocity
         velocity, covariance, inliers = _fit(echoes[:, 1:4], self._draws, noise, climb, s.inlier, span)
-        if np.hypot(*velocity) < s.still and np.median(np.abs(echoes[:, 1])) < 2 * s.still:
+        if inliers and np.hypot(*velocity) < s.still and np.median(np.abs(echoes[:, 1])) < 2 * s.still:
             velocity = np.zeros(2)
         return velocity, covariance, inliers
 
@@ -262,7 +262,7 @@ def _fit(echoes, draws, noise, climb, inlier, span):
         v = np.linalg.solve(normal, right)
         scale = max(squares / max(weights - 2, 1.0), 0.3)
     covariance = np.linalg.inv(normal)[:2, :2] * scale
-    # Few agreeing echoes: the fit may be to something else altogether.
+    # Few agreeing echoes, or few of all: the fit may be to something else altogether.
     share = inliers / count
-    covariance *= 1 + (0.5 / max(share, 0.05)) ** 4
+    covariance *= 1 + (0.5 / max(share, 0.05)) ** 4 + (8 / max(inliers, 1)) ** 4
     return v[:2].copy(), covariance.copy(), inliers

@@ -1,0 +1,95 @@
+"""Ego-velocity from point echoes of a room whose radar moves at a known velocity."""
+
+import numpy as np
+import pytest
+
+from radarize.heatmaps import Heatmaps
+from radarize.odometry.doppler import DopplerVelocity
+from radarize.radar.presets import PRESETS
+from tests.echoes import record
+from tests.rooms import antenna_gain, furnished_room
+
+CONFIG = PRESETS["radarize"]
+VELOCITIES = [(1.0, 0.0), (-1.0, 0.0), (0.0, 0.8), (0.0, -0.8), (0.9, 0.5), (1.5, -0.3), (-0.4, -0.6), (0.2, 0.1)]
+
+
+@pytest.fixture(scope="module")
+def room():
+    points, amplitudes = furnished_room(np.random.default_rng(4), density=12.0)
+    return points, amplitudes
+
+
+def burst(room, velocity, climb=0.0, turn=0.0, yaw=0.3, config=CONFIG, noise=20.0):
+    """A frame in the room's middle, moving at a velocity in the sensor frame at the burst's centre."""
+
+    def pose(t):
+        heading = yaw + turn * (t - config.burst_center)
+        v = np.array([*velocity, climb])
+        world = np.array([np.cos(yaw) * v[0] - np.sin(yaw) * v[1], np.sin(yaw) * v[0] + np.cos(yaw) * v[1], v[2]])
+        return np.array([3.5, 2.5, 0.0]) + (t - config.burst_center)[..., None] * world, heading
+
+    rng = np.random.default_rng(7)
+    return record(config, pose, *room, np.zeros(1), rng, noise, block=16, gain=antenna_gain)
+
+
+def test_velocity_of_either_sign(room):
+    maps = Heatmaps(CONFIG)
+    adc = np.concatenate([burst(room, v, yaw=y) for v in VELOCITIES for y in (0.3, 2.1)])
+    truth = np.repeat(VELOCITIES, 2, axis=0)
+    found = DopplerVelocity(maps).estimate(maps.spectrum(adc))
+    error = np.abs(found.velocity - truth)
+    assert (np.median(error, axis=0) < 0.015).all()
+    assert error.max() < 0.06
+    spread = np.sqrt(found.covariance[:, [0, 1], [0, 1]])
+    assert ((error / spread) ** 2).mean() < 6
+    assert (found.inliers > 15).all()
+
+
+def test_turning_and_climbing_do_not_count(room):
+    maps = Heatmaps(CONFIG)
+    adc = burst(room, (0.8, 0.1), climb=0.15, turn=np.radians(90))
+    found = DopplerVelocity(maps).estimate(maps.spectrum(adc))
+    np.testing.assert_allclose(found.velocity[0], (0.8, 0.1), atol=0.03)
+
+
+def test_standing_still_is_exactly_zero(room):
+    maps = Heatmaps(CONFIG)
+    found = DopplerVelocity(maps).estimate(maps.spectrum(burst(room, (0.0, 0.0))))
+    assert (found.velocity[0] == 0).all()
+    assert found.covariance[0].max() < 0.01
+
+
+def test_people_are_outliers(room):
+    points, amplitudes = room
+    rng = np.random.default_rng(5)
+    person = np.array([3.5, 2.5, 0.0]) + [1.6, 0.8, 0.0] + rng.normal(0, 0.1, (30, 3))
+    still = burst(room, (0.9, 0.0))
+    # Whoever runs at the radar while it drives closes faster: the same echoes from a faster radar.
+    other = burst((person, 100.0 * np.exp(2j * np.pi * rng.random(30))), (0.9 + 0.7, 0.0), noise=0.0)
+    maps = Heatmaps(CONFIG)
+    found = DopplerVelocity(maps).estimate(maps.spectrum(still + other))
+    np.testing.assert_allclose(found.velocity[0], (0.9, 0.0), atol=0.03)
+
+
+def test_without_echoes_the_covariance_is_large():
+    maps = Heatmaps(CONFIG)
+    noise = np.random.default_rng(2).normal(0, 20, (2, *CONFIG.frame_shape)).astype(np.int16)
+    noise[1] = 0
+    found = DopplerVelocity(maps).estimate(maps.spectrum(noise))
+    assert np.isfinite(found.velocity).all()
+    assert (np.linalg.eigvalsh(found.covariance)[:, 0] > 0.2).all()
+
+
+def test_faster_than_the_unambiguous_speed(room):
+    maps = Heatmaps(CONFIG)
+    found = DopplerVelocity(maps).estimate(maps.spectrum(burst(room, (2.0, 0.0))))
+    # Straight ahead the world aliases to receding; to the sides it does not.
+    np.testing.assert_allclose(found.velocity[0], (2.0, 0.0), atol=0.15)
+
+
+@pytest.mark.parametrize("preset", ["long-range", "two-tx"])
+def test_other_configurations(room, preset):
+    config = PRESETS[preset]
+    maps = Heatmaps(config)
+    found = DopplerVelocity(maps).estimate(maps.spectrum(burst(room, (0.8, 0.2), config=config)))
+    np.testing.assert_allclose(found.velocity[0], (0.8, 0.2), atol=0.08)

@@ -1,0 +1,151 @@
+"""Odometry of a handheld walk through a room of point scatterers, and its parts against closed forms."""
+
+import numpy as np
+import pytest
+
+from radarize.errors import InputError
+from radarize.heatmaps import Heatmaps
+from radarize.odometry.doppler import Velocities
+from radarize.odometry.integration import Odometry, VelocityFilter, compose, exponential
+from radarize.odometry.rotation import MapRotation
+from radarize.radar.presets import PRESETS
+from tests.echoes import record
+from tests.rooms import antenna_gain, furnished_room, walk
+
+CONFIG = PRESETS["radarize"]
+
+
+@pytest.fixture(scope="module")
+def walked():
+    """A walk of 5 s: adc, stamps, true poses (x, y, yaw) at burst centres in the first one's frame."""
+    rng = np.random.default_rng(2)
+    points, amplitudes = furnished_room(rng, density=8.0)
+    pose = walk(rng, 5.0)
+    stamps = np.arange(0, 5.0, CONFIG.frame_period)
+    adc = record(CONFIG, pose, points, amplitudes, stamps, rng, noise=20.0, block=16, gain=antenna_gain)
+    position, yaw = pose(stamps + CONFIG.burst_center)
+    c, s = np.cos(yaw[0]), np.sin(yaw[0])
+    x, y = (position[:, :2] - position[0, :2]).T
+    return adc, stamps, np.stack([c * x + s * y, c * y - s * x, yaw - yaw[0]], axis=1)
+
+
+@pytest.fixture(scope="module")
+def track(walked):
+    adc, stamps, _ = walked
+    odometry = Odometry(CONFIG)
+    return [odometry.push(adc[i : i + 50], stamps[i : i + 50]) for i in range(0, len(adc), 50)]
+
+
+def test_walk(walked, track):
+    truth = walked[2]
+    pose = np.concatenate([t.pose for t in track])
+    distance = np.linalg.norm(np.diff(truth[:, :2], axis=0), axis=1).sum()
+    turned = np.abs(np.diff(truth[:, 2])).sum()
+    assert distance > 1.5 and turned > np.radians(50)
+    assert np.linalg.norm(pose[:, :2] - truth[:, :2], axis=1).max() < 0.05 * distance
+    error = np.degrees(pose[:, 2] - truth[:, 2])
+    assert np.abs(error).max() < 5
+    over = error[8:] - error[:-8]  # 0.27 s
+    assert np.median(np.abs(over)) < 0.75 and np.sqrt((over**2).mean()) < 2
+
+
+def test_covariance_of_steps(walked, track):
+    truth = walked[2]
+    step = np.concatenate([t.step for t in track])[1:]
+    covariance = np.concatenate([t.covariance for t in track])[1:]
+    relative = np.diff(truth, axis=0)
+    c, s = np.cos(truth[:-1, 2]), np.sin(truth[:-1, 2])
+    x, y = relative[:, 0].copy(), relative[:, 1].copy()
+    relative[:, 0], relative[:, 1] = c * x + s * y, c * y - s * x
+    ratio = (step - relative) ** 2 / covariance[:, [0, 1, 2], [0, 1, 2]]
+    assert (ratio.mean(axis=0) < 4).all()
+    assert (ratio.mean(axis=0) > 0.02).all()
+
+
+def test_batch_size_does_not_matter(walked, track):
+    adc, stamps, _ = walked
+    odometry = Odometry(CONFIG)
+    parts = [odometry.push(adc[i : i + 7], stamps[i : i + 7]) for i in range(0, 42, 7)]
+    np.testing.assert_allclose(np.concatenate([p.pose for p in parts]), track[0].pose[:42], atol=1e-4)
+
+
+def test_standing_still_does_not_turn():
+    rng = np.random.default_rng(3)
+    points, amplitudes = furnished_room(rng, density=10.0)
+    stamps = np.arange(20) * CONFIG.frame_period
+
+    def still(t):
+        return np.broadcast_to([3.0, 2.0, 0.0], (*t.shape, 3)), np.zeros(t.shape)
+
+    adc = record(CONFIG, still, points, amplitudes, stamps, rng, 20.0, block=16, gain=antenna_gain)
+    result = Odometry(CONFIG).push(adc, stamps)
+    assert np.abs(result.pose[:, :2]).max() < 1e-3
+    assert np.abs(np.degrees(result.pose[:, 2])).max() < 0.5  # of a map match; it does not add up
+
+
+def test_turning_on_the_spot_either_way():
+    rng = np.random.default_rng(3)
+    points, amplitudes = furnished_room(rng, density=10.0)
+    stamps = np.arange(25) * CONFIG.frame_period
+    for rate in np.radians([60, -60]):
+
+        def turning(t, rate=rate):
+            return np.broadcast_to([3.0, 2.0, 0.0], (*t.shape, 3)), rate * t
+
+        adc = record(CONFIG, turning, points, amplitudes, stamps, rng, 20.0, block=16, gain=antenna_gain)
+        result = Odometry(CONFIG).push(adc, stamps)
+        expected = rate * (stamps[-1] - stamps[0])
+        assert result.pose[-1, 2] == pytest.approx(expected, rel=0.06)
+
+
+def test_lost_frames_are_bridged(walked):
+    adc, stamps, truth = walked
+    adc, valid = adc[:80].copy(), np.ones((80, *CONFIG.frame_shape[:2]), bool)
+    adc[40:43], valid[40:43] = 0, False
+    adc[60, 10:20], valid[60, 10:20] = 0, False
+    result = Odometry(CONFIG).push(adc, stamps[:80], valid)
+    assert np.isfinite(result.pose).all() and np.isfinite(result.covariance).all()
+    assert np.linalg.norm(result.pose[-1, :2] - truth[79, :2]) < 0.06
+    assert result.covariance[42, 2, 2] > 2 * result.covariance[39, 2, 2]
+
+
+def test_times_must_ascend(walked):
+    adc, stamps, _ = walked
+    odometry = Odometry(CONFIG)
+    odometry.push(adc[:2], stamps[:2])
+    with pytest.raises(InputError, match="ascending"):
+        odometry.push(adc[:2], stamps[:2])
+
+
+def test_estimators_can_be_swapped(walked):
+    adc, stamps, _ = walked
+
+    class Forward:
+        def estimate(self, spectrum):
+            n = len(spectrum)
+            return Velocities(np.tile([1.0, 0.0], (n, 1)), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.ones(n, int))
+
+    result = Odometry(CONFIG, velocity=Forward(), rotation=MapRotation(Heatmaps(CONFIG))).push(adc[:20], stamps[:20])
+    np.testing.assert_allclose(result.velocity[5:], np.tile([1.0, 0.0], (15, 1)), atol=0.02)
+
+
+def test_a_circle_closes():
+    pose, turns = np.zeros(3), 12
+    for _ in range(turns):
+        pose = compose(pose, exponential(np.array([0.3, 0.0]), 2 * np.pi / turns))
+    np.testing.assert_allclose(pose, [0, 0, 2 * np.pi], atol=1e-12)
+    radius = 0.3 * turns / (2 * np.pi)
+    half = exponential(np.array([0.3 * turns / 2, 0.0]), np.pi)
+    np.testing.assert_allclose(half[:2], [0, 2 * radius], atol=1e-12)
+    np.testing.assert_allclose(exponential(np.array([0.3, 0.1]), 0.0), [0.3, 0.1, 0.0])
+
+
+def test_filter_rejects_an_outlier_and_follows_a_step():
+    times = np.arange(60) / 30
+    truth = np.where(times < 1, 1.0, -0.5)
+    velocity = np.stack([truth, np.zeros(60)], axis=1)
+    velocity[15] = (-1.5, 2.0)
+    measured = Velocities(velocity, np.tile(1e-4 * np.eye(2), (60, 1, 1)), np.full(60, 50))
+    found = VelocityFilter().filter(times, measured).velocity
+    assert np.abs(found[15] - velocity[14]).max() < 0.3
+    np.testing.assert_allclose(found[-1], velocity[-1], atol=0.02)

@@ -123,9 +123,9 @@ def main() -> None:
         "Simulator speed: office, preset radarize",
         [
             row("radarsim", ours, np.mean(counts), "int16 I/Q with noise"),
-            row("- of which finding echoes", float(np.median(echo_seconds)), np.mean(counts), "visibility, ghosts"),
-            row("naive float64 numpy, same echoes", float(np.median(naive_seconds)), np.mean(counts), "samples only"),
-            row("Sionna RT PathSolver", float(np.median(sionna_seconds)), np.mean(found), "paths only, one antenna pair"),
+            row("- of it, finding echoes", float(np.median(echo_seconds)), np.mean(counts), "echoes"),
+            row("naive float64 numpy", float(np.median(naive_seconds)), np.mean(counts), "samples of the same echoes"),
+            row("Sionna RT PathSolver", float(np.median(sionna_seconds)), np.mean(found), "paths, one antenna pair"),
         ],
         seed=options.seed,
         notes=[

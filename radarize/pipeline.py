@@ -124,7 +124,8 @@ def run(
     Raises:
         InputError: unusable recording or unknown method.
     """
-    for name, value, known in (("odometry", odometry, ODOMETRY), ("scans", scans, METHODS), ("settings", settings, SETTINGS)):
+    chosen = (("odometry", odometry, ODOMETRY), ("scans", scans, METHODS), ("settings", settings, SETTINGS))
+    for name, value, known in chosen:
         if value not in known:
             raise InputError(f"{name} is {value!r}, expected one of {', '.join(known)}")
     output = Path(output)

@@ -14,7 +14,7 @@ from radarize.radar.limits import check_limits
 from radarize.recording import Product, RecordingWriter, Stream
 from radarsim.motion import Motion, motion_from_tum, plan_motion
 from radarsim.physics.direct import DirectSum
-from radarsim.physics.echoes import EchoFinder, Echoes, Provenance
+from radarsim.physics.echoes import Echoes, EchoFinder, Provenance
 from radarsim.physics.facets import Facets
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.scatterers import Scatterers

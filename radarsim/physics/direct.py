@@ -12,7 +12,7 @@ from radarsim.physics.synthesis import BurstClock
 
 
 class DirectSum:
-    """Called as a `Synthesizer` is; float64 throughout on the CPU, phases in float64 and products in float32 on CUDA."""
+    """Called as a `Synthesizer` is; float64 throughout on the CPU, products in float32 on CUDA."""
 
     def __init__(self, config: RadarConfig, device: str = "cpu"):
         self.config = config

@@ -1,9 +1,9 @@
 """Echoes of one frame: which paths there are, how strong, and why.
 
 An echo is either a pair of world points (a, b), the scatterer as seen through the mirrors of its outgoing and of its
-returning leg, with the path length |tx - a| + |b - rx|; or an image, an isometry M of the receiver, with the path length
-|tx - M rx|. Points carry the diffuse surface (a = b) and its ghosts (a = s, b = s mirrored, and the reciprocal). Images
-carry plates: the reflection in the plane, a half turn about each edge, an inversion in each corner, which together are
+returning leg, with the path length |tx - a| + |b - rx|; or an image, an isometry M of the receiver, with the path
+length |tx - M rx|. Points carry the diffuse surface (a = b) and its ghosts (a = s, b = s mirrored, and the
+reciprocal). Images carry plates: the reflection in the plane, a half turn about each edge, an inversion in each corner, which together are
 the physical-optics integral over a rectangle. Both stay exact for every antenna and instant while amplitudes and
 visibility are taken once per frame, at the middle of the burst.
 """
@@ -254,7 +254,7 @@ class EchoFinder:
 def _direct_amplitudes(
     place, normal, sigma, two_sided, position, rotation, reach, wavelength, azimuth_table, elevation_table, out
 ):
-    """Radar equation, |a|^2 = G^2 lambda^2 sigma cos^2 / ((4 pi)^3 R^4): a Lambertian surface has cos out and cos back."""
+    """Radar equation, |a|^2 = G^2 lambda^2 sigma cos^2 / ((4 pi)^3 R^4): Lambert has cos out and cos back."""
     scale = wavelength / (4 * np.pi) ** 1.5
     for i in prange(len(place)):
         dx, dy, dz = place[i, 0] - position[0], place[i, 1] - position[1], place[i, 2] - position[2]
@@ -287,7 +287,7 @@ def _ghost_amplitudes(
     place, normal, sigma, two_sided, center, plane, u, v, half, sheet, reflection, position, rotation, reach,
     wavelength, weakest, azimuth_table, elevation_table, out,
 ):  # fmt: skip
-    """Sensor -> scatterer -> mirror -> sensor, for every mirror and scatterer; the reciprocal path has the same value."""
+    """Sensor -> scatterer -> mirror -> sensor, for every mirror and scatterer; the way back has the same value."""
     scale = wavelength / (4 * np.pi) ** 1.5
     up = rotation[:, 2].copy()  # polarisation: the board's patches radiate an upright electric field
     for m in prange(len(center)):
@@ -355,7 +355,7 @@ def _ramp(inside, zone):
 
 @njit(cache=True)
 def _copolar(reflection, arriving, leaving, normal, up):
-    """Reflection coefficient from upright to upright polarisation, by its parts across and in the plane of incidence."""
+    """Reflection coefficient from upright to upright polarisation: parts across and in the plane of incidence."""
     cosine = min(abs(np.dot(arriving, normal)), 1.0)
     at = cosine * (TABLE - 1)
     j = min(int(at), TABLE - 2)

@@ -47,7 +47,7 @@ class Facets:
 
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig) -> "Facets":
-        """The rectangles of a scene: coplanar neighbouring triangles, as a whole or pair by pair (walls with openings)."""
+        """The rectangles of a scene: coplanar neighbouring triangles, as a whole or pair by pair."""
         rows = []
         tables: dict[str, np.ndarray] = {}
         for item in scene.objects:

@@ -1,8 +1,8 @@
 """The coherent echo of flat rectangles: physical optics, from near field to far field, on and off the normal.
 
-The physical-optics integral of a rectangle under a point source is, near the normal, a product of two Fresnel integrals,
-one per side. Each splits into the interior (the wall's flash, if the foot of the perpendicular lies between the edges)
-and one term per edge that decays away from it:
+The physical-optics integral of a rectangle under a point source is, near the normal, a product of two Fresnel
+integrals, one per side. Each splits into the interior (the wall's flash, if the foot of the perpendicular lies between
+the edges) and one term per edge that decays away from it:
 
     F = [G(u)] from u_1 to u_2,  G(u) = (C(u) + j S(u)) / (1 + j) = sign(u) (1/2 - E(|u|)),
     u = +-2 sqrt((L_edge - L_plane) / lambda), L the round trip.

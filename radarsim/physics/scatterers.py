@@ -45,7 +45,10 @@ class Scatterers:
 
     @classmethod
     def points(
-        cls, position: Float[np.ndarray, "n 3"], sigma: Float[np.ndarray, "n"], phase: Float[np.ndarray, "n"] | None = None
+        cls,
+        position: Float[np.ndarray, "n 3"],
+        sigma: Float[np.ndarray, "n"],
+        phase: Float[np.ndarray, "n"] | None = None,
     ) -> "Scatterers":
         """Isotropic scatterers of given cross sections, m^2."""
         position = np.atleast_2d(np.asarray(position, float))
@@ -81,7 +84,7 @@ def _on_object(item, rng: np.random.Generator, density: float) -> Scatterers:
     total = areas.sum()
     count = int(np.floor(total * density + rng.random()))
     along = (np.arange(count) + rng.random(count)) / max(count, 1) * total
-    faces: Int[np.ndarray, "n"] = np.minimum(np.searchsorted(np.cumsum(areas), along), len(areas) - 1)
+    faces: Int[np.ndarray, n] = np.minimum(np.searchsorted(np.cumsum(areas), along), len(areas) - 1)
     r1, r2 = np.sqrt(rng.random(count)), rng.random(count)
     a, b, c = np.moveaxis(mesh.triangles[faces], 1, 0)
     position = (1 - r1)[:, None] * a + (r1 * (1 - r2))[:, None] * b + (r1 * r2)[:, None] * c

@@ -12,7 +12,8 @@ three dimensions come apart:
    is below 10 um for anything a person carries), so the phase of a trace is a polynomial in the loop number.
 2. The tone along the samples has a frequency of b bins, b = (S L + f_c dL/dt) N / (c f_s). Each echo joins the cell
    g = round(b); what is left, |b - g| <= w, is expanded as Jacobi and Anger did:
-       exp(j x u v) = sum_p i_p J_p(x v) T_p(u),  i_0 = 1, i_p = 2 j^p,  u = (b - g) / w, v = (n - n_c) / (N / 2), x = pi w,
+       exp(j x u v) = sum_p i_p J_p(x v) T_p(u),  i_0 = 1, i_p = 2 j^p,
+       u = (b - g) / w,  v = (n - n_c) / (N / 2),  x = pi w,
    which converges faster than exponentially. So an echo adds `orders` numbers per trace to its cell, whatever the
    number of samples,
 3. and a discrete Fourier transform over the cells, once per order, gives the samples. Beat frequencies beyond the
@@ -148,8 +149,8 @@ def _tones(lengths, start, step, loops, per_metre, per_rate):
         cells[e] = np.int64(np.floor(middle / virtual + 0.5))
         for a in range(virtual):
             tone[e, a, 0] -= cells[e]
-            for l in (0, loops - 1):
-                s = start[a] + step * l
+            for loop in (0, loops - 1):
+                s = start[a] + step * loop
                 off = abs(tone[e, a, 0] + s * (tone[e, a, 1] + s * tone[e, a, 2]))
                 width = max(width, off)
     return cells, tone, width
@@ -187,28 +188,28 @@ def _accumulate(moments, edges, order, lengths, amplitudes, aliased, tone, scale
                 u0 = np.float32(t0 + s * (t1 + s * t2)) * scale
                 u1 = np.float32(step * (t1 + 2 * s * t2)) * scale
                 u2 = np.float32(step * step * t2) * scale
-                for l in range(loops):
-                    k = np.float32(l)
+                for loop in range(loops):
+                    k = np.float32(loop)
                     x = p0 + k * (p1 + k * p2)
                     x -= np.floor(x + np.float32(0.5))
                     sine, cosine = _sincos_cycles(x)
-                    re[l] = size * cosine
-                    im[l] = size * sine
-                    u[l] = u0 + k * (u1 + k * u2)
-                    before[l] = u[l]
-                    now[l] = np.float32(1)
+                    re[loop] = size * cosine
+                    im[loop] = size * sine
+                    u[loop] = u0 + k * (u1 + k * u2)
+                    before[loop] = u[loop]
+                    now[loop] = np.float32(1)
                 for p in range(orders):
-                    for l in range(loops):
-                        acc[0, p, a, l] += re[l] * now[l]
-                        acc[1, p, a, l] += im[l] * now[l]
-                        following = np.float32(2) * u[l] * now[l] - before[l]
-                        before[l] = now[l]
-                        now[l] = following
+                    for loop in range(loops):
+                        acc[0, p, a, loop] += re[loop] * now[loop]
+                        acc[1, p, a, loop] += im[loop] * now[loop]
+                        following = np.float32(2) * u[loop] * now[loop] - before[loop]
+                        before[loop] = now[loop]
+                        now[loop] = following
         for p in range(orders):
             for a in range(virtual):
-                for l in range(loops):
-                    moments[cell, p, a, l, 0] = acc[0, p, a, l]
-                    moments[cell, p, a, l, 1] = acc[1, p, a, l]
+                for loop in range(loops):
+                    moments[cell, p, a, loop, 0] = acc[0, p, a, loop]
+                    moments[cell, p, a, loop, 1] = acc[1, p, a, loop]
 
 
 @njit(inline="always", fastmath=True)

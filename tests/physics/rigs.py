@@ -39,7 +39,7 @@ def burst(config, echoes, motion, time=0.0):
 
 
 def locate(config: RadarConfig, signal, guess):
-    """Range, azimuth, elevation (rad), closing speed and amplitude of the strongest echo, by maximising the matched filter.
+    """Range, azimuth, elevation (rad), closing speed and amplitude of the strongest echo, by the matched filter.
 
     A far-field, constant-velocity signal model written from the definitions, not from the synthesis: phase
     -2 pi / lambda (antenna . u) over antennas, closing echoes at exp(-j 4 pi v t / lambda), beat frequency from range

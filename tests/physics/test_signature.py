@@ -15,14 +15,15 @@ SPEED = 1.2
 
 
 def ridge(rig):
-    """Doppler-azimuth map of a ring of clutter around the rig, and its strongest velocity per azimuth, noise included."""
+    """Doppler-azimuth map, noise included, of a ring of clutter around the rig."""
     rng = np.random.default_rng(7)
     n = 4000
     azimuth, range_ = rng.uniform(-np.pi / 2, np.pi / 2, n), rng.uniform(1.5, 4.0, n)
     place = np.stack([range_ * np.cos(azimuth), range_ * np.sin(azimuth), np.zeros(n)], axis=1)
-    center = rig.position(np.array([CONFIG.burst_center]))[0]
+    middle = np.array([CONFIG.burst_center])
+    center, attitude = rig.position(middle)[0], rig.rotation(middle).as_matrix()[0]
     scatterers = Scatterers.points(place + center, 1e-3 * range_**4, rng.uniform(0, 2 * np.pi, n))
-    echoes = EchoFinder(None, scatterers, None, CONFIG)(center, rig.rotation(np.array([CONFIG.burst_center])).as_matrix()[0])
+    echoes = EchoFinder(None, scatterers, None, CONFIG)(center, attitude)
     front = FrontEnd(CONFIG)
     adc = front.digitize(burst(CONFIG, echoes, rig), rng)
     maps = Heatmaps(CONFIG)

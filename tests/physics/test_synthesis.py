@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarsim.physics.direct import DirectSum
 from radarsim.physics.echoes import Echoes
-from radarsim.physics.synthesis import Synthesizer
+from radarsim.physics.synthesis import BurstClock, Synthesizer
 from tests.physics.brute_force import beat
 from tests.physics.rigs import Rig
 
@@ -68,9 +69,6 @@ def test_images_follow_the_mirror():
     image = np.concatenate([matrix, [[2 * wall], [0], [0]]], axis=1)[None]
     echoes = Echoes(np.zeros((0, 2, 3)), image, np.ones(1, complex), np.zeros(1, np.uint8))
     lengths = echoes.lengths(CONFIG, FAST, 0.1)
-    from radarize.radar.array import rx_positions, tx_positions
-    from radarsim.physics.synthesis import BurstClock
-
     clock = BurstClock.of(CONFIG)
     for s in (-0.9, 0.3, 1.0):
         at = np.array([0.1 + clock.middle + s * clock.half])

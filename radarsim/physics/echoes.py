@@ -3,9 +3,9 @@
 An echo is either a pair of world points (a, b), the scatterer as seen through the mirrors of its outgoing and of its
 returning leg, with the path length |tx - a| + |b - rx|; or an image, an isometry M of the receiver, with the path
 length |tx - M rx|. Points carry the diffuse surface (a = b) and its ghosts (a = s, b = s mirrored, and the
-reciprocal). Images carry plates: the reflection in the plane, a half turn about each edge, an inversion in each corner, which together are
-the physical-optics integral over a rectangle. Both stay exact for every antenna and instant while amplitudes and
-visibility are taken once per frame, at the middle of the burst.
+reciprocal). Images carry plates: the reflection in the plane, a half turn about each edge, an inversion in each corner,
+which together are the physical-optics integral over a rectangle. Both stay exact for every antenna and instant while
+amplitudes and visibility are taken once per frame, at the middle of the burst.
 """
 
 from dataclasses import dataclass

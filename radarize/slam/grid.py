@@ -73,7 +73,7 @@ class OccupancyGrid:
 
     def _grow(self, low: Float[np.ndarray, "2"], high: Float[np.ndarray, "2"]) -> None:
         rows, columns = self.probability.shape
-        first, last = self.cells(np.stack([low, high]))
+        first, last = self.cells(np.stack([low, high])) + [[-1], [1]]  # a spread hit reaches one cell further
         if self.probability.size == 1:  # an empty grid starts where its first rays are
             self.origin = (first[::-1] - _MARGIN) * self.resolution + self.origin
             shape = last - first + 1 + 2 * _MARGIN

@@ -76,6 +76,18 @@ def test_growing_keeps_what_is_known():
     np.testing.assert_array_equal(inner, before.probability)
 
 
+@pytest.mark.parametrize("spread", [False, True])
+def test_hits_on_the_edge_of_what_the_grid_holds(spread):
+    # Rays that creep outwards end in every last row and column before the grid grows.
+    grid = OccupancyGrid.empty(0.1)
+    for reach in np.arange(0.5, 9.0, 0.07):
+        for direction in np.array([[1, 0], [0, 1], [-1, 0], [0, -1], [0.7, 0.7], [-0.7, -0.7]]):
+            grid.insert(np.zeros((1, 2)), reach * direction[None], np.ones(1, bool), CONFIG, spread=spread)
+            rows, columns = np.nonzero(grid.probability > 0)
+            reached = np.concatenate([columns * 0.1 + grid.origin[0], rows * 0.1 + grid.origin[1]]) + 0.05
+            assert np.abs(reached).max() < reach + 0.16  # nothing wraps around
+
+
 def test_map_files_put_y_up_and_know_the_unknown(tmp_path):
     grid = OccupancyGrid.empty(0.1)
     # A wall to the north-east, seen from the origin: lower left free, upper right occupied.

@@ -71,26 +71,36 @@ def _first_line(error: BaseException) -> str:
 
 @contextmanager
 def progress(label: str) -> Iterator[Callable[..., None]]:
-    """Progress bars on stderr, moved by calling what this yields with (done, in all) or (stage, done, in all)."""
+    """Progress bars on stderr, moved by calling what this yields with (done, in all) or (stage, done, in all).
+
+    Until the first call, while things are being prepared, a spinner turns; so an error then comes without a bar.
+    """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
     from rich.progress import TimeRemainingColumn as TimeLeftColumn
 
+    console = Console(stderr=True)
+    spinner = console.status(f"{label}: preparing")
     text = TextColumn("{task.description:<20}")
-    columns = (text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeLeftColumn())
-    with Progress(*columns, console=Console(stderr=True)) as bars:
-        tasks = {label: bars.add_task(label, total=None)}
+    bars = Progress(text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeLeftColumn(), console=console)
+    tasks: dict[str, int] = {}
 
-        def move(*where) -> None:
-            *stage, done, total = where
-            name = stage[0] if stage else label
-            if name not in tasks:
-                if label in tasks and not bars.tasks[0].completed:  # the first stage takes the label's place
-                    bars.remove_task(tasks.pop(label))
-                tasks[name] = bars.add_task(name, total=None)
-            bars.update(tasks[name], completed=done, total=total or None)
+    def move(*where) -> None:
+        *stage, done, total = where
+        name = stage[0] if stage else label
+        if not tasks:
+            spinner.stop()
+            bars.start()
+        if name not in tasks:
+            tasks[name] = bars.add_task(name, total=None)
+        bars.update(tasks[name], completed=done, total=total or None)
 
+    spinner.start()
+    try:
         yield move
+    finally:
+        spinner.stop()
+        bars.stop()
 
 
 @contextmanager

@@ -89,7 +89,7 @@ def doctor():
     from radarsim.doctor import examine
 
     if not examine():
-        raise InputError("this machine cannot simulate yet; the table says what to type")
+        raise InputError("this machine cannot simulate yet; the lines above say what to type")
 
 
 def main() -> None:

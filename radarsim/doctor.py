@@ -167,10 +167,14 @@ def examine() -> bool:
     with working("examining this machine"):
         found = findings()
     marks = {"ok": "[green]ok[/]", "missing": "[red]missing[/]", "optional": "[yellow]optional[/]"}
-    table = Table("what", "state", Column("found", overflow="fold"), "type this to get it", header_style="bold")
+    table = Table("what", "state", Column("found", overflow="fold"), header_style="bold")
     for finding in found:
-        table.add_row(finding.what, marks[finding.state], finding.detail, finding.remedy)
+        table.add_row(finding.what, marks[finding.state], finding.detail)
     Console().print(table)
+    # Outside of the table, whole, so that they can be copied.
+    for finding in found:
+        if finding.remedy:
+            print(f"{finding.what} ({finding.state}): {finding.remedy}")
     return not any(finding.state == "missing" for finding in found)
 
 

@@ -27,7 +27,7 @@ DEPTH, LEAKAGE = 45.0, 0.25
 _MAP = "magma"
 
 
-def canvas(columns: int, rows: int = 1, width: float = 11.0, height: float = 3.6):
+def canvas(columns: int, rows: int = 1, width: float = 11.0, height: float = 2.6):
     """A figure in the page's style and its axes as an array (rows, columns)."""
     with plt.rc_context(_STYLE):
         figure, axes = plt.subplots(
@@ -86,6 +86,7 @@ def draw_doppler(
     axis.set(title=title, xlabel="azimuth, deg (left is positive)", ylabel="closing speed, m/s")
     axis.set_xticks(-ticks, ticks)
     axis.set_xlim(-np.degrees(azimuths[-1]), -np.degrees(azimuths[0]))
+    axis.set_box_aspect(0.6)  # about that of a fan, so that a row of pictures is one
     _bar(axis, drawn)
 
 
@@ -120,7 +121,7 @@ def _edges(values: np.ndarray) -> np.ndarray:
 
 
 def _bar(axis, drawn) -> None:
-    bar = axis.figure.colorbar(drawn, ax=axis, shrink=0.85, pad=0.02, aspect=28)
+    bar = axis.figure.colorbar(drawn, ax=axis, pad=0.02, aspect=28)
     bar.outline.set_visible(False)
     bar.ax.tick_params(labelsize=7, color=INK, labelcolor=INK)
     bar.set_label("dB", color=INK, fontsize=8)

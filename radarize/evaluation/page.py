@@ -61,6 +61,10 @@ class Page:
         """Start a section."""
         self._body.append(f"<h2>{_text(title)}</h2>" + (f"<p>{_text(about)}</p>" if about else ""))
 
+    def text(self, words: str) -> None:
+        """A paragraph."""
+        self._body.append(f"<p>{_text(words)}</p>")
+
     def headline(self, figures: Iterable[tuple[str, str]]) -> None:
         """Large figures with what they mean, as (value, words)."""
         cards = "".join(f"<div><b>{_text(value)}</b><span>{_text(words)}</span></div>" for value, words in figures)
@@ -115,6 +119,7 @@ class Page:
             font={"color": INK, "size": 13, "family": "system-ui, sans-serif"},
             legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0},
             hovermode="closest",
+            modebar={"bgcolor": "rgba(0,0,0,0)", "color": GRID, "activecolor": INK},
         )
         figure.update_xaxes(gridcolor=GRID, zeroline=False, linecolor=GRID)
         figure.update_yaxes(gridcolor=GRID, zeroline=False, linecolor=GRID)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
+from scipy.signal import find_peaks
 
 from radarize.contents import contents
 from radarize.errors import InputError
@@ -15,6 +16,8 @@ from radarize.recording import Recording
 
 #: At most so many profiles over time, and frames with maps: a picture has no room for more.
 _PROFILES, _FRAMES = 400, 3
+#: Echoes named in the mean range profile: the most that stand out by so much, dB.
+_ECHOES, _PROMINENCE = 10, 4.0
 #: Largest magnitude of a 16-bit sample.
 _FULL_SCALE = 32767
 
@@ -88,23 +91,19 @@ def _profiles(page: Page, recording: Recording, maps: Heatmaps) -> None:
     far = maps.ranges >= LEAKAGE
     top = mean[far].max() if far.any() else mean.max()
     level = 10 * np.log10(np.maximum(mean, top * 1e-9) / top) if top > 0 else np.zeros(len(mean))
-    peaks = [i for i in np.flatnonzero(far) if 0 < i < len(mean) - 1 and mean[i - 1] < mean[i] >= mean[i + 1]]
-    strongest = sorted(sorted(peaks, key=lambda i: -mean[i])[:6])
+    found, properties = find_peaks(np.where(far, level, level.min()), prominence=_PROMINENCE)
+    strongest = np.sort(found[np.argsort(-properties["prominences"])[:_ECHOES]])
     figure = go.Figure()
-    x = np.round(maps.ranges, 4).tolist()
-    figure.add_scatter(x=x, y=np.round(level, 2).tolist(), line={"color": COLORS["odometry"]}, name="mean")
-    figure.add_scatter(
-        x=[x[i] for i in strongest],
-        y=[round(float(level[i]), 2) for i in strongest],
-        mode="markers+text",
-        text=[f"{x[i]:.2f} m" for i in strongest],
-        textposition="top center",
-        marker={"color": COLORS["slam"], "size": 7},
-        name="strongest echoes",
-    )
+    x, y = np.round(maps.ranges, 4), np.round(level, 2)
+    figure.add_scatter(x=x.tolist(), y=y.tolist(), line={"color": COLORS["odometry"]}, name="mean")
+    marker = {"color": COLORS["slam"], "size": 7}
+    echoes = (x[strongest].tolist(), y[strongest].tolist())
+    figure.add_scatter(x=echoes[0], y=echoes[1], mode="markers", marker=marker, name="echoes")
     figure.update_xaxes(title="range, m")
     figure.update_yaxes(title="mean power, dB", range=[max(level[far].min() - 3, -80) if far.any() else -80, 8])
     page.plot(figure, height=360)
+    if len(strongest):
+        page.text("Echoes: " + ", ".join(f"{r:.2f} m ({p:.0f} dB)" for r, p in zip(*echoes, strict=True)) + ".")
 
 
 def _maps(page: Page, recording: Recording, maps: Heatmaps) -> None:
@@ -140,24 +139,21 @@ def _true_velocity(recording: Recording, index: int) -> np.ndarray | None:
 
 
 def _samples(page: Page, recording: Recording) -> None:
-    edges = np.linspace(-32768, 32768, 257)
-    counts, clipped, total, largest = np.zeros(256), 0, 0, 0
+    counts = np.zeros(1 << 16, int)
     for _, adc, _ in _batches(recording, 40):
-        counts += np.histogram(adc, edges)[0]
-        magnitude = np.abs(adc.astype(np.int32))
-        clipped += int((magnitude >= _FULL_SCALE).sum())
-        total += adc.size
-        largest = max(largest, int(magnitude.max()))
+        counts += np.bincount(adc.ravel().astype(np.int32) + 32768, minlength=len(counts))
+    values = np.arange(-32768, 32768)
+    clipped = counts[np.abs(values) >= _FULL_SCALE].sum() / counts.sum()
+    largest = int(np.abs(values[counts > 0]).max())
     page.section(
         "Samples",
-        f"Largest magnitude {largest} of {_FULL_SCALE} ADC counts; {100 * clipped / total:.3g} % of the samples "
-        "are clipped.",
+        f"Largest magnitude {largest} of {_FULL_SCALE} ADC counts; {100 * clipped:.3g} % of the samples are clipped.",
     )
-    used = np.flatnonzero(counts)
-    first, last = max(used[0] - 2, 0), min(used[-1] + 3, len(counts))
+    step = max(1, largest // 60)
+    edges = np.arange(-largest - step, largest + 2 * step, step)
+    total, _ = np.histogram(values, edges, weights=counts)
     figure = go.Figure()
-    middles = (edges[1:] + edges[:-1]) / 2
-    figure.add_bar(x=middles[first:last].tolist(), y=counts[first:last].tolist(), marker={"color": COLORS["map"]})
+    figure.add_bar(x=edges[:-1].tolist(), y=total.tolist(), offset=0, marker={"color": COLORS["map"]})
     figure.update_layout(bargap=0.05)
     figure.update_xaxes(title="ADC counts (I and Q)")
     figure.update_yaxes(title="samples", type="log")

@@ -120,14 +120,15 @@ def _plan(page: Page, run: Path, scans: dict, errors: dict[str, TrajectoryErrors
     page.section(
         "Trajectory and map",
         "From above, one metre is one metre both ways. Click a name to hide or show it."
-        + (" Everything is laid upon the truth by the alignment of the SLAM trajectory." if errors else ""),
+        + (" Each trajectory is laid upon the truth, the map along with SLAM's." if errors else ""),
     )
     figure = go.Figure()
     turn, shift = (errors["slam"].turn, errors["slam"].shift) if errors else (np.eye(3), np.zeros(3))
     if errors and "truth/floor_plan" in scans:
         plan = scans["truth/floor_plan"]
         x, y = (np.column_stack([plan[:, i], plan[:, i + 2], np.full(len(plan), np.nan)]).ravel() for i in (0, 1))
-        figure.add_scatter(x=_short(x), y=_short(y), name="floor plan", line={"color": COLORS["truth"], "width": 1.2})
+        style = {"color": COLORS["truth"], "width": 1.2}
+        figure.add_scatter(x=_short(x), y=_short(y), name="floor plan", mode="lines", line=style)
     if (run / "map.yaml").is_file():
         grid = read_map(run / "map.yaml")
         cells = grid.centers(grid.occupied)

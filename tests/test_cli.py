@@ -1,0 +1,185 @@
+"""The command lines: instant help, one sentence and exit code 2 for whatever goes wrong, what an interrupt keeps."""
+
+import errno
+import json
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from radarize import cli as radarize_cli
+from radarize.console import run
+from radarize.errors import InputError
+from radarize.radar.presets import PRESETS
+from radarize.recording import RecordingWriter
+from radarsim import cli as radarsim_cli
+
+APPS = {"radarize": radarize_cli.app, "radarsim": radarsim_cli.app}
+
+
+def call(capsys, command: str, *arguments: object) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a command."""
+    name, *rest = command.split()
+    with pytest.raises(SystemExit) as exit_:
+        run(APPS[name], name, [*rest, *map(str, arguments)])
+    out, err = capsys.readouterr()
+    return exit_.value.code, out, err
+
+
+def small_recording(path: Path, frames: int = 2) -> Path:
+    config = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
+    with RecordingWriter(path, config, attributes={"scene": "nowhere"}) as writer:
+        valid = np.ones((frames, 2, 3), bool)
+        valid[0, 0, 0] = False
+        writer.append(np.zeros((frames, *config.frame_shape), np.int16), np.arange(frames) / 30, valid)
+    return path
+
+
+@pytest.mark.parametrize("name", APPS)
+def test_help_is_instant(name):
+    seconds = []
+    for _ in range(3):
+        start = time.perf_counter()
+        done = subprocess.run([Path(sys.executable).parent / name, "--help"], capture_output=True, text=True)
+        seconds.append(time.perf_counter() - start)
+        assert done.returncode == 0 and "Usage" in done.stdout
+    assert min(seconds) < 1
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["radarize import", "radarize info", "radarize run", "radarize evaluate", "radarize report", "radarsim simulate",
+     "radarsim scene", "radarsim scene info", "radarsim scene preview", "radarsim export", "radarsim doctor"],
+)  # fmt: skip
+def test_every_command_explains_itself(capsys, command):
+    code, out, _ = call(capsys, command, "--help")
+    assert code == 0 and "Usage" in out
+
+
+@pytest.mark.parametrize(
+    ("command", "arguments", "expected"),
+    [
+        ("radarize info", ["missing.h5"], "missing.h5: no such file"),
+        ("radarize run", ["missing.h5", "-o", "out"], "missing.h5: no such file"),
+        ("radarize evaluate", ["nowhere"], "has no trajectory.tum"),
+        ("radarize report", ["missing.h5"], "missing.h5: no such file"),
+        ("radarize import", ["missing.bin", "-o", "out.h5"], "missing.bin"),
+        ("radarize import", ["missing.bin", "-o", "out.h5", "--rx", "a,b"], "--rx is 'a,b', expected a count"),
+        ("radarize import", ["missing.bin", "-o", "out.h5", "--config", "bogus"], "bogus: no such radar configuration"),
+        ("radarize info", [], "Missing argument"),
+        ("radarize info", ["a", "--bogus"], "No such option"),
+        ("radarize fly", [], "No such command"),
+        ("radarsim simulate", ["castle", "-o", "out.h5"], "castle"),
+        ("radarsim simulate", ["office", "-o", "out.h5", "--duration", "0"], "duration is 0"),
+        ("radarsim simulate", ["office", "-o", "out.h5", "--platform", "drone"], "drone"),
+        ("radarsim export", ["missing.h5", "--to", "tum", "-o", "x.tum"], "missing.h5: no such file"),
+        ("radarsim scene info", ["castle"], "castle"),
+    ],
+)
+def test_bad_input_is_one_sentence(capsys, tmp_path, monkeypatch, command, arguments, expected):
+    monkeypatch.chdir(tmp_path)
+    code, out, err = call(capsys, command, *arguments)
+    assert code == 2
+    assert expected in err and "Traceback" not in err and len(err.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "x.h5"), "x.h5: no space left on the device"),
+        (PermissionError(errno.EACCES, "Permission denied", "/x"), "/x: Permission denied"),
+        (MemoryError("Unable to allocate 9 GiB"), "not enough memory (Unable to allocate 9 GiB)"),
+        (ValueError("odd\nsecond line"), "internal error, ValueError: odd; --debug"),
+        (InputError("x is 1, expected 2"), "radarsim: x is 1, expected 2"),
+        (KeyboardInterrupt(), "stopped; nothing was written"),
+    ],
+)
+def test_errors_of_libraries_are_one_sentence(capsys, monkeypatch, tmp_path, error, expected):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr("radarsim.export.export", fail)
+    code, _, err = call(capsys, "radarsim export", tmp_path / "a.h5", "--to", "tum", "-o", tmp_path / "b")
+    assert code == 2 and expected in err and "Traceback" not in err
+    with pytest.raises((type(error), SystemExit)):
+        run(APPS["radarsim"], "radarsim", ["export", "a.h5", "--to", "tum", "-o", "b", "--debug"])
+
+
+def test_debug_shows_the_traceback():
+    command = [sys.executable, "-m", "radarize.cli", "info", "missing.h5", "--debug"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode != 0 and "Traceback" in done.stderr and "InputError" in done.stderr
+
+
+def test_an_interrupt_says_what_was_kept(capsys, monkeypatch, tmp_path):
+    def interrupted(scene, output, **_):
+        config = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
+        with RecordingWriter(output, config) as writer:
+            writer.append(np.zeros((3, *config.frame_shape), np.int16), np.arange(3) / 30)
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr("radarsim.simulate.simulate", interrupted)
+    path = tmp_path / "walk.h5"
+    code, _, err = call(capsys, "radarsim simulate", "office", "-o", path)
+    assert code == 2 and f"stopped; 3 whole frames are kept in {path}" in " ".join(err.split())
+
+    def too_early(*_, **__):
+        raise KeyboardInterrupt
+
+    # The old recording is not what this call kept.
+    monkeypatch.setattr("radarsim.simulate.simulate", too_early)
+    code, _, err = call(capsys, "radarsim simulate", "office", "-o", path)
+    assert code == 2 and "stopped; nothing was written" in err
+
+
+def test_import_hands_over_what_was_typed(capsys, monkeypatch, tmp_path):
+    seen = {}
+
+    def record(source, output, **options):
+        seen.update(options, source=source)
+        return small_recording(output)
+
+    monkeypatch.setattr("radarize.importers.import_recording", record)
+    arguments = "--samples 256 --loops 16 --rx 1 --tx 1,3,2 --iq-order qqii --slope 80e12 --frame-period 0.1".split()
+    code, out, _ = call(capsys, "radarize import", "a.bin", "-o", tmp_path / "a.h5", *arguments)
+    assert code == 0 and "2 frames" in out
+    assert seen["overrides"] == {
+        "samples": 256, "loops": 16, "rx": 1, "tx": (0, 2, 1), "iq_order": "qqii", "slope": 80e12, "frame_period": 0.1,
+    }  # fmt: skip
+    assert seen["config"] is None and seen["poses"] is None
+    call(capsys, "radarize import", "a.bin", "-o", tmp_path / "a.h5", "--config", "radarize")
+    assert seen["config"] == PRESETS["radarize"] and "profileCfg" in seen["cfg_text"]
+
+
+def test_info(capsys, tmp_path):
+    path = small_recording(tmp_path / "small.h5")
+    code, out, _ = call(capsys, "radarize info", path, "--json")
+    found = json.loads(out)
+    assert code == 0
+    assert found["frames"] == 2 and found["lost_chirps"] == 1
+    assert found["derived"]["range_resolution"] == pytest.approx(299792458 / 2 / (80e12 * 8 / 2.285e6))
+    assert found["data_sets"]["radar/time"]["unit"] == "s" and found["attributes"]["scene"] == "nowhere"
+    code, out, _ = call(capsys, "radarize info", path)
+    assert code == 0 and "2 frames" in out and "range_resolution" in out and "nowhere" in out
+
+
+def test_a_full_disk_is_one_sentence(tmp_path):
+    """Writes into a small tmpfs, where root can mount one."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    if os.geteuid() != 0 or subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk]).returncode:
+        pytest.skip("needs root and leave to mount a tmpfs")
+    try:
+        source = small_recording(tmp_path / "small.h5", frames=2000)
+        command = [Path(sys.executable).parent / "radarsim", "export", source, "--to", "dca1000", "-o", disk / "x.bin"]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 2
+        assert "x.bin" in done.stderr and "space" in done.stderr.lower() and "Traceback" not in done.stderr
+        assert len(done.stderr.strip().splitlines()) == 1
+    finally:
+        subprocess.run(["umount", disk], check=True)

@@ -51,20 +51,33 @@ def info(scene: SceneName):
 
     with working("loading the scene"):
         loaded = Scene.load(scene)
-    print(loaded.info())
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    low, high = loaded.bounds
+    print(f"{loaded.name}: {len(loaded.objects)} objects, {len(loaded.triangles)} triangles")
+    for axis, start, end in zip("xyz", low, high, strict=True):
+        print(f"  {axis}: {start:.2f} to {end:.2f} m")
+    right = {"justify": "right"}
+    table = Table("material", Column("objects", **right), Column("triangles", **right), Column("area, m2", **right))
+    for name in sorted({item.material.name for item in loaded.objects}):
+        meshes = [item.mesh for item in loaded.objects if item.material.name == name]
+        area = sum(mesh.area for mesh in meshes)
+        table.add_row(name, str(len(meshes)), str(sum(len(mesh.faces) for mesh in meshes)), f"{area:.2f}")
+    Console().print(table)
 
 
 @scene_app.command()
 def preview(
     scene: SceneName,
-    output: Annotated[str, typer.Option("--output", "-o", help="Beginning of the pictures' names.")] = "",
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the pictures.")] = Path("."),
 ):
     """Draw SCENE as pictures: its floor plan and a view into it."""
     from radarsim.scene.preview import preview
     from radarsim.scene.scene import Scene
 
     with working("drawing the scene"):
-        pictures = preview(Scene.load(scene), output or Path(scene).stem)
+        pictures = preview(Scene.load(scene), output)
     for picture in pictures:
         print(picture)
 

@@ -227,9 +227,12 @@ class Heatmaps:
 
     def range_doppler_azimuth(self, adc, valid=None) -> Float32[torch.Tensor, "frame range doppler azimuth"]:
         """Bartlett power over range, speed and azimuth (large: a frame at default settings has 1.5 MB)."""
-        return self._beamformed(self.spectrum(adc, valid), self.row, self._steering)
+        return self.beamformed(self.spectrum(adc, valid), self.row, self._steering)
 
-    def _beamformed(self, spectrum: torch.Tensor, antennas: np.ndarray, steering: torch.Tensor) -> torch.Tensor:
+    def beamformed(
+        self, spectrum: torch.Tensor, antennas: np.ndarray, steering: torch.Tensor
+    ) -> Float32[torch.Tensor, "frame range doppler direction"]:
+        """Windowed-sum power of chosen antennas (flat indices) for any `steering` phasors (antenna, direction)."""
         x = spectrum[..., torch.as_tensor(antennas, device=self.device)]
         beams = steering.conj() * self._tensor(self._taper(len(antennas)), torch.float32)[:, None]
         y = x @ beams

@@ -85,7 +85,7 @@ class DopplerVelocity:
 
     def estimate(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Velocities:
         """Velocities of a batch of frames from their `Heatmaps.spectrum`."""
-        power = self._heatmaps._beamformed(spectrum, self.row, self._steering).cpu().numpy()
+        power = self._heatmaps.beamformed(spectrum, self.row, self._steering).cpu().numpy()
         cells = spectrum.cpu().numpy()
         frames = len(cells)
         velocity, covariance = np.zeros((frames, 2)), np.zeros((frames, 2, 2))
@@ -98,7 +98,7 @@ class DopplerVelocity:
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 5"]:
         """Peaks of one frame: range bin, closing speed (m/s), u_y, u_z, power over the median."""
-        power = self._heatmaps._beamformed(spectrum[None], self.row, self._steering)[0].cpu().numpy()
+        power = self._heatmaps.beamformed(spectrum[None], self.row, self._steering)[0].cpu().numpy()
         return self._echoes(spectrum.cpu().numpy(), power)
 
     def _echoes(self, cells: np.ndarray, power: np.ndarray) -> np.ndarray:

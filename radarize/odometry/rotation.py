@@ -2,8 +2,8 @@
 
 Pairs of frames force a choice: close together they measure every increment with the noise of one match, far apart they
 lose their overlap in turns. A local map that forgets slowly has both spacings at once. Each frame is laid into the map
-at the position that the velocities predict, at a fan of yaws around the predicted one; the likeliest is its yaw, and
-the map is renewed there. As long as landmarks stay in view, errors do not accumulate.
+at the position that the velocities predict, at a fan of yaws around the predicted one; the best correlation
+marks its yaw, and the map is renewed there. As long as landmarks stay in view, errors do not accumulate.
 
 Three things decide what a frame looks like to the matcher (`MapRotation.features`):
 
@@ -58,7 +58,6 @@ class RotationSettings:
         fan, step: rad, half width and spacing of the yaws tried around the prediction.
         jerk: rad/s, standard deviation of the change of turning rate from frame to frame.
         yaw_noise: rad, standard deviation of a match at full correlation.
-        caution: how much correlation a deviation by one standard deviation of the prediction costs.
         least_correlation: a match below it is not believed: turning is taken to go on as before.
     """
 
@@ -75,7 +74,6 @@ class RotationSettings:
     jerk: float = np.radians(12.0)
     yaw_noise: float = np.radians(0.3)
     least_correlation: float = 0.15
-    caution: float = 0.01
 
 
 class MapRotation:
@@ -170,10 +168,9 @@ class MapRotation:
         return self._heading[0] - start, self._spread[0, 0], peak
 
     def _peak(self, correlation: np.ndarray) -> tuple[float, float, float]:
-        """Yaw offset (rad) of the likeliest match, its variance and height; if not believed, the variance is large."""
+        """Yaw offset (rad) of the best match, its variance and height; if not believed, the variance is large."""
         s = self.settings
-        likelihood = correlation - s.caution * self._offsets**2 / (self._spread[0, 0] + s.yaw_noise**2)
-        best = int(np.argmax(likelihood))
+        best = int(np.argmax(correlation))
         peak = float(correlation[best])
         if not 0 < best < len(correlation) - 1 or peak < s.least_correlation:
             return 0.0, (2 * s.fan) ** 2, peak

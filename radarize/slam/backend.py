@@ -226,8 +226,6 @@ class Slam:
 
     def _try(self, number: int, submap: Submap, distance: float, angle: float) -> None:
         guess = between(self.graph.poses[submap.anchor], self.graph.poses[number])
-        found = close(
-            number, self.nodes[number], submap, guess, self.config.loop, distance=distance, angle=angle
-        )
+        found = close(number, self.nodes[number], submap, guess, self.config.loop, distance=distance, angle=angle)
         if found is not None:
             self.graph.add_closure(found.anchor, found.node, found.pose, found.covariance)

@@ -117,7 +117,7 @@ class LoopConfig(_Section):
     radius: float = Field(10.0, gt=0)
     distance: float = Field(3.0, gt=0)
     angle: float = Field(0.5, gt=0)
-    candidates: int = Field(3, gt=0)
+    candidates: int = Field(2, gt=0)
     every: int = Field(2, gt=0)
     min_score: float = Field(0.6, gt=0, lt=1)
     levels: int = Field(5, ge=0, le=8)
@@ -162,15 +162,21 @@ PRESETS: dict[str, SlamConfig] = {
         ),
         node=NodeConfig(distance=0.3, angle=0.2, duration=3.0, scans=10, min_points=25),
         # Cartographer's settings published with Radarize: 0.08 m cells, ranges of 0.3-4.284 m.
-        grid=GridConfig(
-            resolution=0.08, hit=0.6, miss=0.45, min_range=0.3, max_range=4.284, free_range=0.0, nodes=16
-        ),
+        grid=GridConfig(resolution=0.08, hit=0.65, miss=0.45, min_range=0.3, max_range=4.284, free_range=0.0, nodes=16),
         matcher=MatcherConfig(
             presearch_distance=0.0, presearch_angle=0.0, sigma=3.0, translation_floor=0.03, rotation_floor=0.015
         ),
         loop=LoopConfig(
-            radius=6.0, distance=2.0, angle=0.5, every=1, min_score=0.55, levels=4, sigma=3.0,
-            translation_floor=0.1, rotation_floor=0.03,
+            radius=6.0,
+            distance=2.0,
+            angle=0.5,
+            candidates=3,
+            every=1,
+            min_score=0.65,
+            levels=4,
+            sigma=3.0,
+            translation_floor=0.1,
+            rotation_floor=0.03,
         ),
     ),
 }

@@ -194,9 +194,7 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
                 child_bound[c] = -1.0
                 if cx <= 2 * half and cy <= 2 * half:
                     away = _nearest(cx - half, size) ** 2 + _nearest(cy - half, size) ** 2
-                    total = _bound(
-                        buffer, cells[a, level, : inside[a]], (cx >> level) + (cy >> level) * columns[level]
-                    )
+                    total = _bound(buffer, cells[a, level, : inside[a]], (cx >> level) + (cy >> level) * columns[level])
                     child_bound[c] = total * unit - angle_penalty[a] - penalty * away
             for c in np.argsort(child_bound):  # the best child is looked at first
                 if child_bound[c] > best:

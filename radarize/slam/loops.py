@@ -31,9 +31,7 @@ class Closure:
     score: float
 
 
-def candidates(
-    number: int, submaps: list[Submap], poses: list[np.ndarray], config: LoopConfig
-) -> list[Submap]:
+def candidates(number: int, submaps: list[Submap], poses: list[np.ndarray], config: LoopConfig) -> list[Submap]:
     """Finished submaps near to a node that it is not part of, nearest first."""
     found = []
     for submap in submaps:
@@ -56,9 +54,7 @@ def close(
     angle: float,
 ) -> Closure | None:
     """Search a node in a submap around a guess (in the anchor's frame), refine, and check the result again."""
-    found = search(
-        submap.pyramid, node.points, guess, distance=distance, angle=angle, min_score=config.min_score
-    )
+    found = search(submap.pyramid, node.points, guess, distance=distance, angle=angle, min_score=config.min_score)
     if found is None:
         return None
     pose, score = found

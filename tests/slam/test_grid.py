@@ -100,7 +100,7 @@ def test_map_files_put_y_up_and_know_the_unknown(tmp_path):
     assert about["image"] == "map.pgm" and about["negate"] == 0 and about["resolution"] == 0.1
     assert picture.shape == grid.probability.shape
     # map_server: the origin is the lower left pixel's outer corner, picture row 0 is the largest y.
-    (row, column), = np.argwhere(picture == 0)
+    ((row, column),) = np.argwhere(picture == 0)
     x = about["origin"][0] + (column + 0.5) * about["resolution"]
     y = about["origin"][1] + (picture.shape[0] - row - 0.5) * about["resolution"]
     assert (x, y) == (pytest.approx(2.0, abs=0.06), pytest.approx(1.0, abs=0.06))

@@ -62,6 +62,14 @@ def _plain(value: object) -> object:
     return value if isinstance(value, bool | int | float | str) or value is None else str(value)
 
 
+def _readable(value: float, unit: str) -> tuple[str, str]:
+    """A value with its unit, with a prefix where that saves zeros."""
+    for prefix, factor in (("G", 1e9), ("M", 1e6), ("k", 1e3), ("", 1.0), ("m", 1e-3), ("u", 1e-6)):
+        if abs(value) >= factor * 0.9999:
+            return f"{value / factor:.5g}", prefix + unit
+    return f"{value:.5g}", unit
+
+
 def show(found: dict) -> None:
     """Print what `contents` found."""
     from rich.console import Console
@@ -75,7 +83,7 @@ def show(found: dict) -> None:
     )
     derived = Table("derived", Column("value", justify="right"), "unit", header_style="bold")
     for name, value in found["derived"].items():
-        derived.add_row(name, f"{value:.6g}", DERIVED[name])
+        derived.add_row(name, *_readable(value, DERIVED[name]))
     given = Table("configuration", Column("value", overflow="fold"), header_style="bold")
     for name, value in found["config"].items():
         untouched = name == "channel_calibration" and all(tuple(pair) == (1.0, 0.0) for pair in value)

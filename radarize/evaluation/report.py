@@ -154,8 +154,8 @@ def _line(figure: go.Figure, positions: np.ndarray, name: str, color: str, dash:
 
 
 def _short(values: np.ndarray) -> list[float | None]:
-    """Millimetres are enough for a picture, and keep the page small."""
-    return [None if not np.isfinite(value) else round(float(value), 3) for value in values]
+    """Four digits are enough for a picture, and keep the page small."""
+    return [None if not np.isfinite(value) else round(float(value), 4) for value in values]
 
 
 def _over_time(page: Page, errors: dict[str, TrajectoryErrors]) -> None:

@@ -52,7 +52,8 @@ def record(
         out = length(tx_positions(config)[None])  # (loop, tx, point)
         back = np.stack([length(r[None, None]) for r in rx_positions(config)], axis=2)  # (loop, tx, rx, point)
         path = out[:, :, None] + back
-        phasor = (strength * np.exp(1j * ((wavenumber * path) % (2 * np.pi)))).astype(np.complex64)
+        phase = ((wavenumber * path) % (2 * np.pi)).astype(np.float32)
+        phasor = strength.astype(np.complex64) * np.exp(np.complex64(1j) * phase)
         signal = np.empty((*path.shape[:3], config.samples), np.complex64)
         for start in range(0, config.loops, block):
             part = slice(start, start + block)

@@ -201,7 +201,7 @@ class RecordingWriter:
             self.frames += len(times)
         self._pending.clear()
         self._file["radar/time"].flush()
-        if os.path.getsize(self.part) < self._file.id.get_filesize():  # somebody else filled the disk meanwhile
+        if shutil.disk_usage(self.path.parent).free == 0:  # somebody else filled the disk; HDF5 would not say so
             raise OSError(errno.ENOSPC, "no space left on the device")
         self._flushed = clock.monotonic()
 

@@ -1,6 +1,5 @@
 """The radar's configuration: what is transmitted, when, on which antennas, and how it is sampled."""
 
-from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -175,7 +174,7 @@ class RadarConfig(BaseModel):
         """Active part of a frame, s."""
         return self.loop_time * self.loops
 
-    @cached_property
+    @property
     def chirp_times(self) -> Float[np.ndarray, "loop tx"]:
         """Middle of each chirp's ADC window after the frame's stamp, s, transmitters in physical order."""
         slots = np.arange(self.loops)[:, None] * len(self.tx_order) + np.asarray(self.slot)

@@ -124,8 +124,8 @@ def main() -> None:
         [
             row("radarsim", ours, np.mean(counts), "int16 I/Q with noise"),
             row("- of it, finding echoes", float(np.median(echo_seconds)), np.mean(counts), "echoes"),
-            row("naive float64 numpy", float(np.median(naive_seconds)), np.mean(counts), "same echoes, samples"),
-            row("Sionna RT PathSolver", float(np.median(sionna_seconds)), np.mean(found), "paths, one antenna pair"),
+            row("naive numpy, float64", float(np.median(naive_seconds)), np.mean(counts), "same echoes"),
+            row("Sionna RT PathSolver", float(np.median(sionna_seconds)), np.mean(found), "paths, one antenna"),
         ],
         seed=options.seed,
         notes=[

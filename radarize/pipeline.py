@@ -39,7 +39,7 @@ class Pipeline:
         scans: how scans are made, a key of `radarize.mapping.scans.METHODS`.
     """
 
-    def __init__(self, config: RadarConfig, scans: str = "elevation-aware"):
+    def __init__(self, config: RadarConfig, scans: str = "first-echo"):
         self.config, self.scans = config, scans
         self.odometry = Odometry(config)
         self.heatmaps = self.odometry.heatmaps
@@ -48,6 +48,7 @@ class Pipeline:
         self.times: list[np.ndarray] = []
         self.poses: list[np.ndarray] = []
         self.velocities: list[np.ndarray] = []
+        self.velocity_covariances: list[np.ndarray] = []
         self.ranges: list[np.ndarray] = []
         self.stage_seconds: dict[str, float] = defaultdict(float)
 
@@ -66,7 +67,7 @@ class Pipeline:
             # Scans want Capon's sharp beams; the horizon is told from two maps of one beamformer, Bartlett's.
             sharp = self.heatmaps.range_azimuth_of(spectrum, "capon").numpy()
             level = reference = None
-            if self.heatmaps.pairs is not None:
+            if self.scans == "elevation-aware":
                 level = self.heatmaps.elevation_aware_of(spectrum).numpy()
                 reference = self.heatmaps.range_azimuth_of(spectrum).numpy()
         with self._stage("scans"):
@@ -86,6 +87,7 @@ class Pipeline:
         self.times.append(track.time)
         self.poses.append(track.pose)
         self.velocities.append(track.velocity)
+        self.velocity_covariances.append(track.velocity_covariance)
         self.ranges.append(ranges.astype(np.float32))
 
     def finish(self) -> None:
@@ -105,7 +107,7 @@ def run(
     output: Path,
     *,
     odometry: str = "doppler",
-    scans: str = "elevation-aware",
+    scans: str = "first-echo",
     settings: str = "corrected",
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
@@ -132,11 +134,11 @@ def run(
     with Recording(recording) as source:
         if not len(source):
             raise InputError(f"{recording}: has no whole frame, expected at least one")
-        if scans == "elevation-aware" and Pipeline(source.config).heatmaps.pairs is None:
+        pipeline = Pipeline(source.config, scans)
+        if scans == "elevation-aware" and pipeline.heatmaps.pairs is None:
             raise InputError(
                 f"{recording}: its antennas have no vertical pairs, which scans=elevation-aware needs; use first-echo"
             )
-        pipeline = Pipeline(source.config, scans)
         for frames, adc in source.batches(BATCH):
             pipeline.push(adc, source.times[frames], source.valid(frames.start, frames.stop))
             if progress:
@@ -167,7 +169,8 @@ def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[st
         "scan_settings": pipeline.scan_config.model_dump(),
         "slam_settings": pipeline.slam.config.model_dump(),
         "ms_per_frame": {name: 1e3 * seconds / frames for name, seconds in pipeline.stage_seconds.items()},
-        "closures": len(pipeline.slam.graph.closures) if hasattr(pipeline.slam.graph, "closures") else None,
+        "closures": int(pipeline.slam.graph.accepted.sum()),
+        "closures_rejected": int((~pipeline.slam.graph.accepted).sum()),
         "nodes": len(pipeline.slam.nodes),
         "radarize_version": __version__,
         "python": machine.python_version(),
@@ -185,6 +188,7 @@ def _write_scans(pipeline: Pipeline, source: Recording, path: Path, times: np.nd
         put("ranges", np.concatenate(pipeline.ranges), "m, inf: nothing seen")
         put("azimuths", BEARINGS, "rad")
         put("velocity", np.concatenate(pipeline.velocities), "m/s, sensor frame")
+        put("velocity_covariance", np.concatenate(pipeline.velocity_covariances), "m^2/s^2")
         for name in ("velocity", "scan", "scan_azimuths", "floor_plan", "pose", "time"):
             if source.has(f"truth/{name}"):
                 put(f"truth/{name}", source.read(f"truth/{name}"), str(source.describe(f"truth/{name}")["unit"]))

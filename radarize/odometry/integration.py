@@ -15,6 +15,11 @@ from radarize.odometry.doppler import DopplerVelocity, Velocities
 from radarize.odometry.rotation import MapRotation, Rotations
 from radarize.radar.config import RadarConfig
 
+#: Standard deviation of a step's heading as a share of its turn, on top of the estimator's own. A local map that lags
+#: in a turn lags in all its frames: errors of up to 6 deg a corner add up instead of averaging out, and independent
+#: steps can only say so if each claims more.
+TURN_SPREAD = 0.2
+
 
 class VelocityEstimator(Protocol):
     """Sensor velocity per frame from `Heatmaps.spectrum`."""
@@ -38,6 +43,7 @@ class Track:
         step: (frame, 3) motion since the frame before, in its sensor frame: x, y (m), yaw (rad).
         covariance: (frame, 3, 3) of `step`.
         velocity: (frame, 2) filtered, m/s, sensor frame.
+        velocity_covariance: (frame, 2, 2), m^2/s^2.
     """
 
     time: Float[np.ndarray, "frame"]
@@ -45,6 +51,7 @@ class Track:
     step: Float[np.ndarray, "frame 3"]
     covariance: Float[np.ndarray, "frame 3 3"]
     velocity: Float[np.ndarray, "frame 2"]
+    velocity_covariance: Float[np.ndarray, "frame 2 2"]
 
 
 class VelocityFilter:
@@ -154,10 +161,10 @@ class Odometry:
                 dt = times[i] - time
                 step[i] = exponential(dt * (last_velocity + velocity) / 2, rotations.yaw[i])
                 covariance[i, :2, :2] = dt**2 * (last_spread + spread) / 2
-                covariance[i, 2, 2] = rotations.variance[i]
+                covariance[i, 2, 2] = rotations.variance[i] + (TURN_SPREAD * rotations.yaw[i]) ** 2
             self._last = (times[i], velocity, spread)
             self._pose = pose[i] = compose(self._pose, step[i])
-        return Track(times, pose, step, covariance, velocities.velocity)
+        return Track(times, pose, step, covariance, velocities.velocity, velocities.covariance)
 
 
 def exponential(translation: Float[np.ndarray, "2"], turn: float) -> Float[np.ndarray, "3"]:

@@ -1,0 +1,76 @@
+"""Draws the pictures of the README: python -m docs.pictures RUN REC.h5 (the demo's, after `make demo`)."""
+
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from PIL import Image
+
+from radarize.evaluation.drawings import draw_doppler, draw_fan, draw_scan
+from radarize.evaluation.evaluate import trajectory_errors
+from radarize.evaluation.runfiles import read_map, read_scans
+from radarize.heatmaps import Heatmaps
+from radarize.recording import Recording
+from radarsim.scene.preview import preview
+from radarsim.scene.scene import Scene
+
+HERE = Path(__file__).parent / "pictures"
+
+
+def heat_maps(recording: Path, seconds: float) -> plt.Figure:
+    """One heat map of each kind with the true first surfaces and the true ridge."""
+    with Recording(recording) as source:
+        frame = int(np.searchsorted(source.times, seconds))
+        adc = source.adc(frame, frame + 1)
+        azimuths, scan = source.read("truth/scan_azimuths"), source.read("truth/scan")[frame]
+        velocity = source.read("truth/velocity")[frame, :2]
+        maps = Heatmaps(source.config)
+    figure, axes = plt.subplots(1, 4, figsize=(17, 4), layout="constrained")
+    fans = {
+        "range-azimuth (Bartlett)": maps.range_azimuth(adc),
+        "range-azimuth (Capon)": maps.range_azimuth(adc, method="capon"),
+        "elevation-aware": maps.elevation_aware(adc),
+    }
+    for axis, (title, power) in zip(axes, fans.items(), strict=False):
+        draw_fan(axis, power[0].numpy(), maps.ranges, maps.azimuths, title)
+        draw_scan(axis, azimuths, scan, "truth", "true first surface")
+    axes[0].legend(loc="lower left", fontsize=7)
+    power = maps.doppler_azimuth(adc)[0].numpy()
+    draw_doppler(axes[3], power, maps.velocities, maps.azimuths, "Doppler-azimuth", velocity)
+    return figure
+
+
+def trajectory_and_map(run: Path) -> plt.Figure:
+    """Floor plan, map and trajectories from above."""
+    errors, scans = trajectory_errors(run), read_scans(run / "scans.h5")
+    slam = errors["slam"]
+    figure, axis = plt.subplots(figsize=(11, 7.4), layout="constrained")
+    plan = scans["truth/floor_plan"]
+    axis.plot(plan[:, [0, 2]].T, plan[:, [1, 3]].T, color="0.55", lw=0.8)
+    grid = read_map(run / "map.yaml")
+    cells = grid.centers(grid.occupied)
+    cells = np.column_stack([cells, np.zeros(len(cells))]) @ slam.turn.T + slam.shift
+    axis.plot(cells[:, 0], cells[:, 1], "s", color="#7b52c7", ms=1.6, label="map (occupied cells)")
+    for name, item, color in (("odometry", errors["odometry"], "#e4572e"), ("SLAM", slam, "#1f7bd0")):
+        path = item.estimate.positions_xyz
+        axis.plot(path[:, 0], path[:, 1], color=color, lw=1.6, label=f"{name}: mean error {item.position.mean:.2f} m")
+    truth = slam.reference.positions_xyz
+    axis.plot(truth[:, 0], truth[:, 1], "--", color="#128a50", lw=1.2, label="truth")
+    axis.set(aspect="equal", xlabel="x, m", ylabel="y, m")
+    axis.legend(loc="upper right", framealpha=0.9)
+    return figure
+
+
+def main(run: Path, recording: Path) -> None:
+    HERE.mkdir(exist_ok=True)
+    for path in preview(Scene.load("office"), HERE):
+        small = Image.open(path)
+        small.thumbnail((960, 960))
+        small.convert("RGB").quantize(64).save(path, optimize=True)
+    heat_maps(recording, seconds=9.0).savefig(HERE / "heatmaps.png", dpi=70)
+    trajectory_and_map(run).savefig(HERE / "run.png", dpi=75)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -26,7 +26,7 @@ def heat_maps(recording: Path, seconds: float) -> plt.Figure:
         azimuths, scan = source.read("truth/scan_azimuths"), source.read("truth/scan")[frame]
         velocity = source.read("truth/velocity")[frame, :2]
         maps = Heatmaps(source.config)
-    figure, axes = plt.subplots(1, 4, figsize=(17, 4), layout="constrained")
+    figure, axes = plt.subplots(1, 4, figsize=(17, 3), layout="constrained")
     fans = {
         "range-azimuth (Bartlett)": maps.range_azimuth(adc),
         "range-azimuth (Capon)": maps.range_azimuth(adc, method="capon"),
@@ -68,7 +68,7 @@ def main(run: Path, recording: Path) -> None:
         small = Image.open(path)
         small.thumbnail((960, 960))
         small.convert("RGB").quantize(64).save(path, optimize=True)
-    heat_maps(recording, seconds=9.0).savefig(HERE / "heatmaps.png", dpi=70)
+    heat_maps(recording, seconds=5.5).savefig(HERE / "heatmaps.png", dpi=70)
     trajectory_and_map(run).savefig(HERE / "run.png", dpi=75)
 
 

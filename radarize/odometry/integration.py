@@ -13,6 +13,7 @@ from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import DopplerVelocity, Velocities
 from radarize.odometry.rotation import MapRotation, Rotations
+from radarize.pose import compose, exponential
 from radarize.radar.config import RadarConfig
 
 #: Standard deviation of a step's heading as a share of its turn, on top of the estimator's own. A local map that lags
@@ -39,7 +40,7 @@ class Track:
 
     Attributes:
         time: (frame,) burst centres, s.
-        pose: (frame, 3) x, y (m) and yaw (rad, not wrapped), the first frame of all being the origin.
+        pose: (frame, 3) x, y (m) and yaw (rad, wrapped), the first frame of all being the origin.
         step: (frame, 3) motion since the frame before, in its sensor frame: x, y (m), yaw (rad).
         covariance: (frame, 3, 3) of `step`.
         velocity: (frame, 2) filtered, m/s, sensor frame.
@@ -165,19 +166,3 @@ class Odometry:
             self._last = (times[i], velocity, spread)
             self._pose = pose[i] = compose(self._pose, step[i])
         return Track(times, pose, step, covariance, velocities.velocity, velocities.covariance)
-
-
-def exponential(translation: Float[np.ndarray, "2"], turn: float) -> Float[np.ndarray, "3"]:
-    """Motion (x, y, yaw) of a body that moves by `translation` (m, in its own frame) while it turns: exp of SE(2)."""
-    if abs(turn) < 1e-6:
-        a, b = 1.0, turn / 2
-    else:
-        a, b = np.sin(turn) / turn, (1 - np.cos(turn)) / turn
-    x, y = translation
-    return np.array([a * x - b * y, b * x + a * y, turn])
-
-
-def compose(pose: Float[np.ndarray, "3"], step: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """Pose after a step given in its own frame; yaw is not wrapped."""
-    c, s = np.cos(pose[2]), np.sin(pose[2])
-    return pose + np.array([c * step[0] - s * step[1], s * step[0] + c * step[1], step[2]])

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
+from radarize.pose import between, compose, interpolate, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.grid import OccupancyGrid
@@ -17,7 +18,6 @@ from radarize.slam.loops import candidates, close, uncertainty
 from radarize.slam.matcher import match
 from radarize.slam.node import Node, Scan
 from radarize.slam.odometry import Odometry, Stillness
-from radarize.slam.pose import between, compose, interpolate, transform
 from radarize.slam.posegraph import PoseGraph
 from radarize.slam.submap import Submap
 

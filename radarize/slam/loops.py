@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from radarize.pose import between, transform
 from radarize.slam.config import LoopConfig
 from radarize.slam.correlation import search
 from radarize.slam.matcher import Match, match
 from radarize.slam.node import Node
-from radarize.slam.pose import between, transform
 from radarize.slam.submap import Submap
 
 

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
+from radarize.pose import between, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.matcher import thin
-from radarize.slam.pose import between, transform
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
+from radarize.pose import adjoint, between, interpolate, inverse
 from radarize.slam.config import OdometryConfig
-from radarize.slam.pose import adjoint, between, interpolate, inverse
 
 
 class Odometry:

@@ -6,11 +6,11 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
+from radarize.pose import transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid
 from radarize.slam.grid import OccupancyGrid
 from radarize.slam.node import Node
-from radarize.slam.pose import transform
 
 
 @dataclass

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
+from radarize.pose import between, compose
 from radarize.slam.backend import Slam
 from radarize.slam.config import PRESETS, SlamConfig
-from radarize.slam.pose import between, compose
 from tests.slam.world import align, ate, box, ring, scan, walk
 
 RADISH = Path(__file__).parents[3] / "shared" / "recordings" / "radish"

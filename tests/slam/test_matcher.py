@@ -5,11 +5,11 @@ import itertools
 import numpy as np
 import pytest
 
+from radarize.pose import transform, wrap
 from radarize.slam.config import GridConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.grid import OccupancyGrid
 from radarize.slam.matcher import interpolate, match, thin
-from radarize.slam.pose import transform, wrap
 from tests.slam.world import box, ring, scan
 
 # Off the grid's raster: a wall on the very edge of two cells is drawn into either of them by rounding.

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from radarize.pose import between, compose
 from radarize.slam.config import OdometryConfig
 from radarize.slam.odometry import Odometry
-from radarize.slam.pose import between, compose
 
 
 def test_pose_between_entries_and_outside():

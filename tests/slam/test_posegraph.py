@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.slam.pose import between, compose
+from radarize.pose import between, compose
 from radarize.slam.posegraph import PoseGraph
 from tests.slam.world import ate
 

@@ -55,3 +55,13 @@ def interpolate(a: Pose, b: Pose, fraction: np.ndarray | float) -> Pose:
     position = a[..., :2] + fraction[..., None] * (b[..., :2] - a[..., :2])
     yaw = wrap(a[..., 2] + fraction * wrap(b[..., 2] - a[..., 2]))
     return np.concatenate([position, yaw[..., None]], axis=-1)
+
+
+def exponential(translation: Float[np.ndarray, "2"], turn: float) -> Float[np.ndarray, "3"]:
+    """Motion (x, y, yaw) of a body that moves by `translation` (m, in its own frame) while it turns: exp of SE(2)."""
+    if abs(turn) < 1e-6:
+        a, b = 1.0, turn / 2
+    else:
+        a, b = np.sin(turn) / turn, (1 - np.cos(turn)) / turn
+    x, y = translation
+    return np.array([a * x - b * y, b * x + a * y, turn])

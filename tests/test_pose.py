@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radarize.slam.pose import adjoint, between, compose, interpolate, inverse, transform, wrap
+from radarize.pose import adjoint, between, compose, interpolate, inverse, transform, wrap
 
 RNG = np.random.default_rng(0)
 

@@ -7,6 +7,8 @@
       - {name: pipe, shape: cylinder, radius: 0.05, height: 2, position: [2, -1, 1], material: metal}
       - {name: scan, shape: mesh, file: hall.ply, material: {custom: {permittivity: 4, conductivity: 0.2}}}
     building: {kind: office, seed: 7}
+    moving:
+      - {kind: person, name: visitor, path: [[1, 0], [4, 0]], speed: 1.1}
 
 Lengths in m, angles in degrees (this is what people type), mesh files relative to the scene file.
 """
@@ -23,6 +25,7 @@ from radarize.errors import InputError
 from radarsim.scene import shapes
 from radarsim.scene.buildings import Office
 from radarsim.scene.materials import Material, constant, decibel, material
+from radarsim.scene.movers import Mover
 from radarsim.scene.scene import SceneObject
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -130,6 +133,7 @@ class Description(_Strict):
     name: str = ""
     objects: list[Annotated[Box | Rectangle | Cylinder | Sphere | Mesh, Field(discriminator="shape")]] = []
     building: Office | None = None
+    moving: list[Mover] = []
 
 
 def find(path: str | Path) -> Path:
@@ -158,8 +162,8 @@ def shipped() -> Path:
     return packaged if packaged.is_dir() else here.parents[2] / "scenes"
 
 
-def read(path: Path) -> tuple[str, list[SceneObject]]:
-    """Name and objects of a scene file.
+def read(path: Path) -> tuple[str, list[SceneObject], list[Mover]]:
+    """Name, objects and movers of a scene file.
 
     Raises:
         InputError: unreadable, malformed YAML, unknown key, value, material or mesh file.
@@ -183,7 +187,7 @@ def read(path: Path) -> tuple[str, list[SceneObject]]:
         raise InputError(f"{path}: {error}") from error
     if not objects:
         raise InputError(f"{path}: has neither objects nor a building, expected at least one")
-    return description.name or path.stem, objects
+    return description.name or path.stem, objects, description.moving
 
 
 def _material(item: _Item) -> Material:
@@ -199,11 +203,11 @@ def _first(error: ValidationError, data: dict) -> str:
     """The first complaint as one sentence with the field's place in the file."""
     problem = error.errors()[0]
     # Tags of unions are in pydantic's path but not in the file.
-    tags = {"box", "rectangle", "cylinder", "sphere", "mesh", "str", "CustomMaterial"}
+    tags = {"box", "rectangle", "cylinder", "sphere", "mesh", "str", "CustomMaterial", "person", "door", "fan"}
     place = [part for part in problem["loc"] if part not in tags]
     field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).lstrip(".")
-    if len(place) > 1 and place[0] == "objects":
-        item = data["objects"][place[1]]
+    if len(place) > 1 and place[0] in ("objects", "moving"):
+        item = data[place[0]][place[1]]
         field += f" (object {item['name']!r})" if isinstance(item, dict) and "name" in item else ""
     if problem["type"] == "extra_forbidden":
         return f"{field}: unknown key"

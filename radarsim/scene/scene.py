@@ -4,6 +4,7 @@ Rays run on the Mitsuba geometry of a Sionna RT scene (Embree on a CPU, one shap
 within a kilometre of the origin, which is checked, positions are good to 0.06 mm, well under the margin of `occluded`.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -53,6 +54,7 @@ class Scene:
     Args:
         name: for titles and recordings.
         objects: with unique names.
+        movers: things that move by themselves (`movers`); ray tests know the objects only.
 
     Attributes:
         triangles: (T, 3, 3) corners of all triangles, in the order of the objects, m.
@@ -63,8 +65,8 @@ class Scene:
         InputError: no object, a name twice, a mesh without triangles or too far away.
     """
 
-    def __init__(self, name: str, objects: list[SceneObject]):
-        self.name, self.objects = name, list(objects)
+    def __init__(self, name: str, objects: list[SceneObject], movers: Sequence = ()):
+        self.name, self.objects, self.movers = name, list(objects), list(movers)
         if not self.objects:
             raise InputError(f"scene {name}: has no objects, expected at least one")
         seen: set[str] = set()

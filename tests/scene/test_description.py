@@ -98,3 +98,22 @@ def test_room_is_closed():
     distance, triangle = room.hit(np.array([0.3, 0.2, 1.4]), directions)
     assert np.isfinite(distance).all()
     assert np.all(np.sum(room.normals[triangle] * directions, axis=1) < 0)  # faces look inward
+
+
+def test_movers(tmp_path):
+    text = f"objects: [{WALL}]\nmoving:\n  - {{kind: person, name: visitor, path: [[1, 0], [4, 0]], speed: 1.1}}\n"
+    (mover,) = load(tmp_path, text).movers
+    assert mover.name == "visitor" and mover.speed == 1.1
+
+
+@pytest.mark.parametrize(
+    ("mover", "complaint"),
+    [
+        ("{kind: ghost, name: g}", r"moving\[0\]"),
+        ("{kind: person, name: p}", r"moving\[0\].path \(object 'p'\)"),
+        ("{kind: fan, name: f, center: [0, 0, 2], turns_per_second: 50}", r"turns_per_second \(object 'f'\) is 50"),
+    ],
+)
+def test_bad_movers(tmp_path, mover, complaint):
+    with pytest.raises(InputError, match=complaint):
+        load(tmp_path, f"objects: [{WALL}]\nmoving: [{mover}]")

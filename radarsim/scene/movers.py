@@ -9,6 +9,7 @@ carries scatterers that move along, and the parts stand in the way of other echo
       - {kind: fan, name: fan, center: [2, 2, 2.2], radius: 0.5, turns_per_second: 1}
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
@@ -62,20 +63,20 @@ class Part:
         return point, normal
 
 
-class _Mover(BaseModel):
+class _Mover(BaseModel, ABC):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[str, Field(min_length=1)]
     #: Radar cross section of the whole, spread over its surface, m^2.
     cross_section: Length
 
+    @abstractmethod
     def parts(self) -> list[Part]:
         """The rigid parts."""
-        raise NotImplementedError
 
+    @abstractmethod
     def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
         """Rotation (part to world) and centre (m) of every part at times t, s."""
-        raise NotImplementedError
 
 
 class Person(_Mover):

@@ -1,106 +1,81 @@
-"""How strong the echo of a scatterer is, straight and over a mirror: the radar equation, each leg by itself."""
+"""What a ray meets on its way: the antenna's gain, mirrors with edges and polarisation, the surface that scatters it.
+
+Vectors are tuples of three numbers, which compiled code keeps in registers.
+"""
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from radarsim.physics.antenna import amplitude_gain
 from radarsim.physics.facets import TABLE
 
 
-@njit(parallel=True, cache=True)
-def direct_amplitudes(
-    place, normal, sigma, two_sided, position, rotation, reach, wavelength, azimuth_table, elevation_table, out
-):
-    """Radar equation, |a|^2 = G^2 lambda^2 sigma cos^2 / ((4 pi)^3 R^4): Lambert has cos out and cos back."""
-    scale = wavelength / (4 * np.pi) ** 1.5
-    for i in prange(len(place)):
-        dx, dy, dz = place[i, 0] - position[0], place[i, 1] - position[1], place[i, 2] - position[2]
-        square = dx * dx + dy * dy + dz * dz
-        if square > reach * reach or square < 1e-4:
-            continue
-        x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
-        if x <= 0:
-            continue
-        cosine = _facing(normal[i], -dx, -dy, -dz, np.sqrt(square), two_sided[i])
-        if cosine <= 0:
-            continue
-        y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
-        z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
-        gain = amplitude_gain(x, y, z, azimuth_table, elevation_table)
-        out[i] = scale * gain * gain * np.sqrt(sigma[i]) * cosine / square
+@njit(inline="always")
+def vector(array):
+    """The three numbers of an array."""
+    return array[0], array[1], array[2]
 
 
 @njit(inline="always")
-def _facing(normal, dx, dy, dz, length, two_sided):
-    """Cosine between a normal and the direction away from the surface; 1 for an isotropic scatterer."""
+def dot(a, b):
+    """Scalar product, without conjugation."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(inline="always")
+def minus(a, b):
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit(inline="always")
+def along(a, t, b):
+    """a + t b."""
+    return a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]
+
+
+@njit(inline="always")
+def cross(a, b):
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(inline="always")
+def length(a):
+    """Euclidean norm."""
+    return np.sqrt(dot(a, a))
+
+
+@njit(inline="always")
+def unit(a):
+    """The direction of a vector."""
+    size = length(a) + 1e-12
+    return a[0] / size, a[1] / size, a[2] / size
+
+
+@njit(inline="always")
+def gain_towards(direction, rotation, azimuth_table, elevation_table):
+    """Amplitude gain of the antenna towards a direction in the world."""
+    return amplitude_gain(
+        rotation[0, 0] * direction[0] + rotation[1, 0] * direction[1] + rotation[2, 0] * direction[2],
+        rotation[0, 1] * direction[0] + rotation[1, 1] * direction[1] + rotation[2, 1] * direction[2],
+        rotation[0, 2] * direction[0] + rotation[1, 2] * direction[1] + rotation[2, 2] * direction[2],
+        azimuth_table,
+        elevation_table,
+    )
+
+
+@njit(inline="always")
+def facing(normal, towards, two_sided):
+    """Cosine between a normal and the unit vector away from the surface; 1 for an isotropic scatterer."""
     if normal[0] == 0.0 and normal[1] == 0.0 and normal[2] == 0.0:
         return 1.0
-    cosine = (normal[0] * dx + normal[1] * dy + normal[2] * dz) / length
+    cosine = normal[0] * towards[0] + normal[1] * towards[1] + normal[2] * towards[2]
     return abs(cosine) if two_sided else cosine
 
 
-@njit(parallel=True, cache=True)
-def ghost_amplitudes(
-    place, normal, sigma, two_sided, center, plane, u, v, half, sheet, reflection, position, rotation, reach,
-    wavelength, weakest, azimuth_table, elevation_table, out,
-):  # fmt: skip
-    """Sensor -> scatterer -> mirror -> sensor, for every mirror and scatterer; the way back has the same value."""
-    scale = wavelength / (4 * np.pi) ** 1.5
-    up = rotation[:, 2].copy()  # polarisation: the board's patches radiate an upright electric field
-    for m in prange(len(center)):
-        n = plane[m]
-        h = np.dot(position - center[m], n)
-        if h < 0 and not sheet[m]:
-            continue
-        if h < 0:
-            n, h = -n, -h
-        image = position - 2 * h * n
-        for i in range(len(place)):
-            s = place[i]
-            hs = np.dot(s - center[m], n)
-            if hs < 0.01:
-                continue
-            d1 = np.sqrt((s[0] - position[0]) ** 2 + (s[1] - position[1]) ** 2 + (s[2] - position[2]) ** 2)
-            d2 = np.sqrt((s[0] - image[0]) ** 2 + (s[1] - image[1]) ** 2 + (s[2] - image[2]) ** 2)
-            if d1 + d2 > 2 * reach:
-                continue
-            bounce = image + (s - image) * (h / (h + hs))
-            first = d2 * h / (h + hs)
-            last = d2 - first
-            # The mirror's edge acts over about half a Fresnel zone, not at a point.
-            zone = 0.5 * np.sqrt(wavelength * first * last / d2)
-            offset = bounce - center[m]
-            edge = _ramp(half[m, 0] - abs(np.dot(offset, u[m])), zone) * _ramp(
-                half[m, 1] - abs(np.dot(offset, v[m])), zone
-            )
-            if edge == 0:
-                continue
-            arriving, leaving = (bounce - position) / first, (s - bounce) / last
-            face_direct = _facing(
-                normal[i], position[0] - s[0], position[1] - s[1], position[2] - s[2], d1, two_sided[i]
-            )
-            face_mirror = _facing(normal[i], -leaving[0], -leaving[1], -leaving[2], 1.0, two_sided[i])
-            if face_direct <= 0 or face_mirror <= 0:
-                continue
-            gain = 1.0
-            for target in (s, bounce):
-                d = target - position
-                gain *= amplitude_gain(
-                    rotation[0, 0] * d[0] + rotation[1, 0] * d[1] + rotation[2, 0] * d[2],
-                    rotation[0, 1] * d[0] + rotation[1, 1] * d[1] + rotation[2, 1] * d[2],
-                    rotation[0, 2] * d[0] + rotation[1, 2] * d[1] + rotation[2, 2] * d[2],
-                    azimuth_table, elevation_table,
-                )  # fmt: skip
-            size = scale * gain * edge * np.sqrt(sigma[i] * face_direct * face_mirror) / (d1 * d2)
-            if size <= weakest:
-                continue
-            value = size * _copolar(reflection[m], arriving, leaving, n, up)
-            if abs(value) > weakest:
-                out[m, i] = value
-
-
 @njit(inline="always")
-def _ramp(inside, zone):
+def ramp(inside, zone):
     """0 ... 1 as a point moves from `zone` outside an edge to `zone` inside; two abutting mirrors add up to one."""
     x = inside / zone
     if x <= -1:
@@ -110,22 +85,32 @@ def _ramp(inside, zone):
     return 0.5 + 0.25 * x * (3 - x * x)
 
 
-@njit(cache=True)
-def _copolar(reflection, arriving, leaving, normal, up):
-    """Reflection coefficient from upright to upright polarisation: parts across and in the plane of incidence."""
-    cosine = min(abs(np.dot(arriving, normal)), 1.0)
+@njit(inline="always")
+def upright(up, direction):
+    """The field that the board's patches send, or take, along a unit direction: upright and across it."""
+    return unit(along(up, -dot(up, direction), direction))
+
+
+@njit(inline="always")
+def reflected(field, arriving, leaving, normal, reflection):
+    """A transverse field after a mirror: TE and TM parts times their Fresnel coefficients.
+
+    Args:
+        field: complex vector.
+        arriving, leaving: unit directions of travel.
+        normal: of the mirror, on either side.
+        reflection: its table, (TE / TM, cosine).
+    """
+    cosine = min(abs(dot(arriving, normal)), 1.0)
     at = cosine * (TABLE - 1)
     j = min(int(at), TABLE - 2)
     te = reflection[0, j] + (at - j) * (reflection[0, j + 1] - reflection[0, j])
     tm = reflection[1, j] + (at - j) * (reflection[1, j + 1] - reflection[1, j])
-    across = np.cross(arriving, normal)
-    size = np.sqrt(np.dot(across, across))
+    across = cross(arriving, normal)
+    size = length(across)
     if size < 1e-6:
-        return te
-    across /= size
-    sent = up - np.dot(up, arriving) * arriving
-    sent /= np.sqrt(np.dot(sent, sent)) + 1e-12
-    taken = up - np.dot(up, leaving) * leaving
-    taken /= np.sqrt(np.dot(taken, taken)) + 1e-12
-    inside = np.dot(sent, np.cross(across, arriving)) * np.dot(taken, np.cross(across, leaving))
-    return te * np.dot(sent, across) * np.dot(taken, across) + tm * inside
+        return te * field[0], te * field[1], te * field[2]
+    across = (across[0] / size, across[1] / size, across[2] / size)
+    there, back = cross(across, arriving), cross(across, leaving)
+    a, b = te * dot(field, across), tm * dot(field, there)
+    return a * across[0] + b * back[0], a * across[1] + b * back[1], a * across[2] + b * back[2]

@@ -1,14 +1,14 @@
 """Echoes of one frame: which paths there are, how strong, and why.
 
-An echo is either a pair of world points (a, b), the scatterer as seen through the mirrors of its outgoing and of its
-returning leg, with the path length |tx - a| + |b - rx|; or an image, an isometry M of the receiver, with the path
-length |tx - M rx|. Points carry the diffuse surface (a = b) and its ghosts (a = s, b = s mirrored, and the
-reciprocal). Images carry plates: the reflection in the plane, a half turn about each edge, an inversion in each corner,
-which together are the physical-optics integral over a rectangle. Both stay exact for every antenna and instant while
-amplitudes and visibility are taken once per frame, at the middle of the burst.
+An echo is either a pair of legs to a scatterer (`legs`), straight, over mirrors, through slabs: two world points
+(a, b), the scatterer as seen through the mirrors of its outgoing and of its returning leg, with the path length
+|tx - a| + |b - rx|. Or it is an image, an isometry M of the receiver, with the path length |tx - M rx|: plates (the
+reflection in the plane, a half turn about each edge, an inversion in each corner, which together are the
+physical-optics integral over a rectangle) and chains of two and three mirrors (`chains`). Both stay exact for every
+antenna and instant while amplitudes and visibility are taken once per frame, at the middle of the burst.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
@@ -17,16 +17,20 @@ from numba import njit, prange
 
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
-from radarsim.physics import plates
-from radarsim.physics.amplitudes import direct_amplitudes, ghost_amplitudes
+from radarsim.physics import chains, plates
 from radarsim.physics.antenna import gain_tables
 from radarsim.physics.facets import Facets
+from radarsim.physics.legs import Legs, pairs, straight_amplitudes
+from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.slabs import Slabs
 from radarsim.physics.synthesis import BurstClock, parabolas
 from radarsim.scene.scene import Scene
 
 #: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
 CLEARANCE = 5e-3
+#: Of the scatterers seen over mirrors every n-th has echoes of second order.
+SECOND_STRIDE = 4
 
 
 class Provenance(IntEnum):
@@ -34,7 +38,11 @@ class Provenance(IntEnum):
 
     DIRECT = 0
     FLOOR_CEILING = 1
-    GHOST = 2
+    GHOST_1 = 2  #: over one mirror on the way out or back
+    GHOST_2 = 3  #: over two mirrors, or by two mirrors alone
+    GHOST_3 = 4  #: by three mirrors alone
+    THROUGH_SLAB = 5  #: through a wall, pane or door, whatever else
+    MOVING = 6
 
 
 @dataclass(frozen=True)
@@ -141,111 +149,191 @@ class EchoFinder:
         self.scene, self.scatterers, self.facets, self.config = scene, scatterers, facets, config
         self.weakest = weakest
         self.reach = 1.05 * config.max_range if reach is None else reach
+        self.mirrors = None if facets is None or not len(facets) else Mirrors.of(facets, scene, self.reach)
+        self.slabs = None if scene is None else Slabs(scene, config, CLEARANCE)
         self._tables = gain_tables()
         self._phasor = np.exp(1j * scatterers.phase)
+        self._weights = _weights(scatterers.bounces)
 
     def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Echoes:
         """Echoes for one sensor pose (rotation: sensor to world)."""
         return self.batch(np.asarray(position)[None], np.asarray(rotation)[None])[0]
 
-    def batch(
-        self, positions: Float[np.ndarray, "frame 3"], rotations: Float[np.ndarray, "frame 3 3"]
-    ) -> list[Echoes]:
+    def batch(self, positions: Float[np.ndarray, "frame 3"], rotations: Float[np.ndarray, "frame 3 3"]) -> list[Echoes]:
         """Echoes of several frames: one after the other, but for the ray tests, which are quicker in large numbers."""
-        poses = list(zip(np.asarray(positions, float), np.asarray(rotations, float), strict=True))
-        points = self._points(poses)
-        images = self._images(poses)
-        echoes = []
-        for (index, amplitude), ghosts, (transforms, flashes, horizontal) in zip(
-            points, self._ghosts(poses, points), images, strict=True
-        ):
-            s = self.scatterers
-            place = s.position[index]
-            mirrored, bounced, ghost_amplitude = ghosts
-            echoes.append(
-                Echoes(
-                    np.concatenate([
-                        np.stack([place, place], axis=1),
-                        np.stack([bounced, mirrored], axis=1),
-                        np.stack([mirrored, bounced], axis=1),
-                    ]),
-                    transforms,
-                    np.concatenate([amplitude * self._phasor[index], ghost_amplitude, ghost_amplitude, flashes]),
-                    np.concatenate([
-                        np.where(s.horizontal[index], Provenance.FLOOR_CEILING, Provenance.DIRECT),
-                        np.full(2 * len(mirrored), Provenance.GHOST),
-                        np.where(horizontal, Provenance.FLOOR_CEILING, Provenance.DIRECT),
-                    ]).astype(np.uint8),
-                )
-            )  # fmt: skip
-        return echoes
+        positions, rotations = np.asarray(positions, float), np.asarray(rotations, float)
+        near = self._mirrors_in_sight(positions)
+        straight, hidden = self._straight(positions, rotations)
+        legs = Legs.joined([straight, hidden, self._over_mirrors(positions, rotations, straight, near)])
+        return self._echoes(positions, legs, self._images(positions, rotations, near))
 
-    def _seen(self, segments: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
-        """Per frame, which segments (origins, targets) nothing stands in."""
-        counts = np.cumsum([len(targets) for _, targets in segments])
-        if self.scene is None or not counts[-1]:
-            return [np.ones(len(targets), bool) for _, targets in segments]
-        origins = np.concatenate([np.broadcast_to(o, t.shape) for o, t in segments])
-        targets = np.concatenate([t for _, t in segments])
-        return np.split(~self.scene.occluded(origins, targets, margin=CLEARANCE), counts[:-1])
+    def _passages(self, origins, targets, up, allowed) -> tuple[np.ndarray, np.ndarray]:
+        """What is left of waves between points, and their delay (m); slabs are looked for where `allowed`."""
+        factor, delay = np.ones(len(targets), complex), np.zeros(len(targets))
+        if self.scene is None or not len(targets):
+            return factor, delay
+        blocked = self.scene.occluded(origins, targets, margin=CLEARANCE)
+        factor[blocked] = 0
+        through = np.flatnonzero(blocked & allowed)
+        if len(through):
+            factor[through], delay[through] = self.slabs.passage(origins[through], targets[through], up[through])
+        return factor, delay
 
-    def _points(self, poses) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Visible scatterers and their amplitudes."""
-        s = self.scatterers
-        candidates = []
-        for position, rotation in poses:
-            amplitude = np.zeros(len(s))
-            direct_amplitudes(
+    def _unhindered(self, legs: Legs, positions, rotations, allowed) -> Legs:
+        """Those legs that get through, weakened and delayed where they pass slabs."""
+        kept, delay = np.arange(len(legs)), np.zeros(len(legs))
+        amplitude, begin = legs.amplitude.copy(), positions[legs.frame]
+        for k in range(1 + legs.bounces.max(initial=0)):
+            now = kept[legs.bounces[kept] >= k]
+            end = legs.stops[now, k]
+            factor, extra = self._passages(begin[now], end, rotations[legs.frame[now], :, 2], allowed[now])
+            amplitude[now] *= factor
+            delay[now] += extra
+            begin[now] = end
+            kept = kept[amplitude[kept] != 0]
+        # A delay moves the virtual point away.
+        offset = legs.virtual - positions[legs.frame]
+        virtual = legs.virtual + offset * (delay / np.linalg.norm(offset, axis=1))[:, None]
+        return replace(legs, amplitude=amplitude, virtual=virtual, slab=amplitude != legs.amplitude)[kept]
+
+    def _straight(self, positions, rotations) -> tuple[Legs, Legs]:
+        """Straight legs worth an echo: those that are free, and of one scatterer in many those that pass slabs."""
+        s, parts = self.scatterers, []
+        leg, echo = np.empty(len(s)), np.empty(len(s))
+        for frame, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
+            straight_amplitudes(
                 s.position, s.normal, s.sigma, s.two_sided, position, rotation, self.reach, self.config.wavelength,
-                *self._tables, amplitude,
+                *self._tables, leg, echo,
             )  # fmt: skip
-            index = np.flatnonzero(amplitude > self.weakest)
-            candidates.append((index, amplitude[index]))
-        seen = self._seen([(p, s.position[i]) for (p, _), (i, _) in zip(poses, candidates, strict=True)])
-        return [(i[v], a[v]) for (i, a), v in zip(candidates, seen, strict=True)]
+            index = np.flatnonzero(echo > self.weakest)
+            parts.append(Legs.straight(frame, index, leg[index], s.position[index], position))
+        legs = Legs.joined(parts)
+        legs = self._unhindered(legs, positions, rotations, self._weights[legs.scatterer, 2] > 0)
+        return legs[~legs.slab], legs[legs.slab]
 
-    def _ghosts(self, poses, points) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Mirrored scatterers, the scatterers themselves and the amplitude of either way round."""
-        s, f = self.scatterers, self.facets
-        if f is None or not len(f):
-            return [(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, complex))] * len(poses)
-        found = []
-        for (position, rotation), (index, _) in zip(poses, points, strict=True):
-            candidates = index[s.bounces[index] > 0]
-            height = np.einsum("md,md->m", position - f.center, f.normal)
-            away = np.linalg.norm(position - f.center, axis=1) - np.linalg.norm(f.half, axis=1)
-            mirrors = np.flatnonzero(f.mirror & (away < self.reach) & (f.two_sided | (height > 0)))
-            amplitude = np.zeros((len(mirrors), len(candidates)), complex)
-            ghost_amplitudes(
-                s.position[candidates], s.normal[candidates], s.sigma[candidates], s.two_sided[candidates],
-                f.center[mirrors], f.normal[mirrors], f.u[mirrors], f.v[mirrors], f.half[mirrors],
-                f.two_sided[mirrors], f.reflection[mirrors], position, rotation, self.reach, self.config.wavelength,
-                self.weakest, *self._tables, amplitude,
-            )  # fmt: skip
-            m, c = np.nonzero(amplitude)
-            ghost, mirror = candidates[c], mirrors[m]
-            place, normal = s.position[ghost], f.normal[mirror]
-            h = height[mirror, None]
-            hs = np.einsum("ed,ed->e", place - f.center[mirror], normal)[:, None]
-            image_of_sensor = position - 2 * h * normal
-            bounce = image_of_sensor + (place - image_of_sensor) * h / (h + hs)
-            strength = amplitude[m, c] * np.sqrt(s.bounces[ghost]) * self._phasor[ghost]
-            found.append((bounce, place, place - 2 * hs * normal, strength))
-        first = self._seen([(p, bounce) for (p, _), (bounce, *_) in zip(poses, found, strict=True)])
-        found = [tuple(column[v] for column in row) for row, v in zip(found, first, strict=True)]
-        second = self._seen([(bounce, place) for bounce, place, *_ in found])
-        return [(image[v], place[v], a[v]) for (_, place, image, a), v in zip(found, second, strict=True)]
+    def _mirrors_in_sight(self, positions) -> list[np.ndarray]:
+        """Per frame, the mirrors of which something can be seen, and the small plates of corners within reach."""
+        if self.mirrors is None:
+            return [np.zeros(0, int)] * len(positions)
+        found = [self.mirrors.near(p, self.reach) for p in positions]
+        if self.scene is None:
+            return found
+        index, frame = np.concatenate(found), np.repeat(np.arange(len(found)), [len(f) for f in found])
+        small = ~self.mirrors.large[index]
+        points = self.mirrors.spread(index[~small], positions[frame[~small]], self.reach)
+        origins = np.repeat(positions[frame[~small]], points.shape[1], axis=0)
+        clear = ~self.scene.occluded(origins, points.reshape(-1, 3), margin=CLEARANCE)
+        small[~small] = clear.reshape(points.shape[:2]).any(axis=1)
+        return [index[(frame == k) & small] for k in range(len(positions))]
 
-    def _images(self, poses) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Visible parts of plates: isometry, amplitude, whether of a floor or ceiling."""
-        if self.facets is None:
-            return [(np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, bool))] * len(poses)
-        found = [
-            plates.parts(self.facets, p, r, self.reach, self.config.wavelength, self.weakest, self._tables)
-            for p, r in poses
-        ]
-        seen = self._seen([(p, row[1]) for (p, _), row in zip(poses, found, strict=True)])
+    def _over_mirrors(self, positions, rotations, straight: Legs, near: list[np.ndarray]) -> Legs:
+        """Legs over one mirror and over two."""
+        s, parts = self.scatterers, [straight[:0]]
+        thinned = np.flatnonzero(self._weights[:, 1])
+        scale = self.config.wavelength / (4 * np.pi) ** 1.5
+        for frame, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
+            mirrors = near[frame][self.mirrors.large[near[frame]]] if self.mirrors is not None else []
+            if not len(mirrors):
+                continue
+            seen = straight[straight.frame == frame]
+            other = np.zeros(len(s))  # the strongest leg that one over a mirror can be joined with
+            other[seen.scatterer] = np.abs(seen.amplitude)
+            distance = np.linalg.norm(s.position[thinned] - position, axis=1)
+            near_by = distance < self.reach
+            index, distance = thinned[near_by], distance[near_by]
+            # Hidden scatterers are seen over mirrors out and back, which is of second order: fewer of them do.
+            keep = (other[index] > 0) | (self._weights[index, 2] > 0)
+            index, distance = index[keep], distance[keep]
+            free = other[index] > 0
+            best = np.maximum(other[index], 3.35 / distance)  # 3.35: the peak gain
+            # Behind a weak leg there may be a stronger one over a mirror, so the bound is the larger of the two.
+            weakest = self.weakest / (scale * np.sqrt(s.sigma[index]) * best)
+            longest = np.where(free, 2 * self.reach - distance, self.reach)
+            double = free & (self._weights[index, 2] > 0)
+            pairs = np.concatenate([
+                np.stack([np.full(n, m), self.mirrors.following[i : i + n]], axis=1)
+                for m, i, n in zip(mirrors, self.mirrors.first[mirrors],
+                                   self.mirrors.first[mirrors + 1] - self.mirrors.first[mirrors], strict=True)
+            ])  # fmt: skip
+            pairs = pairs[self.mirrors.large[pairs[:, 1]]]
+            pose = position, rotation, self.config.wavelength, self._tables
+            single = np.stack([mirrors, np.full(len(mirrors), -1)], axis=1)
+            parts += [
+                Legs.over_mirrors(
+                    frame, self.mirrors, single, index, s.position[index], longest, weakest, *pose
+                ),
+                Legs.over_mirrors(
+                    frame, self.mirrors, pairs, index[double], s.position[index[double]], longest[double],
+                    weakest[double], *pose,
+                ),
+            ]  # fmt: skip
+        legs = Legs.joined(parts)
+        allowed = (self._weights[legs.scatterer, 2] > 0) & (legs.bounces == 1)
+        return self._unhindered(legs, positions, rotations, allowed)
+
+    def _images(self, positions, rotations, near) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Per frame isometries, amplitudes and provenance of plates and of chains of mirrors."""
+        if self.mirrors is None:
+            return [(np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, int))] * len(positions)
+        frames, isometries, amplitudes, stops, causes = [], [], [], [], []
+        limits = self.reach, self.config.wavelength, self.weakest, self._tables
+        for frame, (p, r) in enumerate(zip(positions, rotations, strict=True)):
+            facet, aim, isometry, amplitude = plates.parts(self.facets, p, r, *limits)
+            cause = np.where(self.facets.horizontal[facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
+            chain, images, strength, course = chains.images(self.mirrors, near[frame], p, r, *limits)
+            isometries += [isometry, images]
+            amplitudes += [amplitude, strength]
+            stops += [np.repeat(aim[:, None], 3, axis=1), course]
+            causes += [cause, np.where(chain[:, 2] < 0, Provenance.GHOST_2, Provenance.GHOST_3)]
+            frames += [np.full(len(amplitude) + len(strength), frame)]
+        frame, isometry, amplitude, stops, cause = map(np.concatenate, (frames, isometries, amplitudes, stops, causes))
+        up, begin = rotations[frame, :, 2], positions[frame]
+        single = cause <= Provenance.FLOOR_CEILING
+        reached, delay = self._passages(begin, stops[:, 0], up, single & (np.abs(amplitude) > 10 * self.weakest))
+        slab = single & (reached != 1) & (reached != 0)
+        amplitude[single] *= reached[single] ** 2  # there and back
+        amplitude[~single] *= reached[~single]
+        cause[slab] = Provenance.THROUGH_SLAB
+        for a, b in ((stops[:, 0], stops[:, 1]), (stops[:, 1], stops[:, 2]), (stops[:, 2], begin)):
+            rest = np.flatnonzero(~single & (amplitude != 0))
+            amplitude[rest] *= self._passages(a[rest], b[rest], up[rest], np.zeros(len(rest), bool))[0]
+        # A delay moves the receiver's image away.
+        away = np.einsum("pij,pj->pi", isometry[:, :, :3], begin) + isometry[:, :, 3] - begin
+        isometry[slab, :, 3] += (2 * delay[:, None] * away / np.linalg.norm(away, axis=1, keepdims=True))[slab]
+        keep = np.abs(amplitude) > self.weakest
+        return [(isometry[k], amplitude[k], cause[k]) for k in (keep & (frame == n) for n in range(len(positions)))]
+
+    def _echoes(self, positions, legs: Legs, images) -> list[Echoes]:
+        """Joins legs to echoes and adds the images."""
+        s = self.scatterers
+        legs = legs[np.lexsort((legs.scatterer, legs.frame))]
+        lengths = np.linalg.norm(legs.virtual - positions[legs.frame], axis=1)
+        ends, amplitude = pairs(legs, lengths, s, self._weights, self.reach, self.config.wavelength, self.weakest)
+        scatterer = legs.scatterer[ends[:, 0]]
+        amplitude = amplitude * self._phasor[scatterer]
+        order = legs.bounces[ends].sum(axis=1)
+        cause = np.where(s.horizontal[scatterer], Provenance.FLOOR_CEILING, Provenance.DIRECT)
+        cause = np.where(order > 0, Provenance.GHOST_1 - 1 + order, cause)
+        cause = np.where(legs.slab[ends].any(axis=1), Provenance.THROUGH_SLAB, cause)
+        points = legs.virtual[ends]
+        edges = np.searchsorted(legs.frame[ends[:, 0]], np.arange(len(positions) + 1))
         return [
-            (images[v], amplitude[v], self.facets.horizontal[facet[v]])
-            for (facet, _, images, amplitude), v in zip(found, seen, strict=True)
-        ]
+            Echoes(
+                points[i:j], isometry, np.concatenate([amplitude[i:j], flashes]),
+                np.concatenate([cause[i:j], why]).astype(np.uint8),
+            )
+            for i, j, (isometry, flashes, why) in zip(edges, edges[1:], images, strict=False)
+        ]  # fmt: skip
+
+
+def _weights(bounces: Float[np.ndarray, "scatterer"]) -> Float[np.ndarray, "scatterer 3"]:
+    """Weights of power in echoes with 0, 1, and 2 or more mirrors and slabs on the way.
+
+    The more of them, the weaker and the more numerous echoes are, so the fewer scatterers have them: of those seen over
+    mirrors at all, of a sampled surface every `SECOND_STRIDE`-th has echoes of second order, with the power of all.
+    """
+    thinned = bounces > 1
+    second = np.where(thinned, 0.0, bounces)
+    chosen = np.flatnonzero(thinned)[::SECOND_STRIDE]
+    second[chosen] = SECOND_STRIDE * bounces[chosen]
+    return np.stack([np.ones(len(bounces)), bounces, second], axis=1)

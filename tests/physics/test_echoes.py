@@ -39,7 +39,7 @@ def finder_with_one_target(scene, place, weakest=0.0):
 def test_ghosts_stand_where_the_image_method_puts_them(corner):
     """A target in front of a wall has one image, reached out on one leg and back on the other, both ways round."""
     place = np.array([2.2, 0.4, 0.1])
-    echoes = finder_with_one_target(corner, place)(HERE, AHEAD).of(Provenance.GHOST)
+    echoes = finder_with_one_target(corner, place)(HERE, AHEAD).of(Provenance.GHOST_1)
     image = place * [1, -1, 1] + [0, 3.0, 0]
     assert len(echoes) == 2
     assert echoes.points[0] == pytest.approx(np.stack([place, image]))
@@ -58,15 +58,15 @@ def test_no_ghost_where_the_bounce_misses_the_mirror():
     mesh = rectangle(tuple(short["position"]), tuple(short["size"]), tuple(short["facing"]))
     scene = Scene("short", [SceneObject("wall", mesh, MATERIALS["metal"])])
     echoes = finder_with_one_target(scene, np.array([2.2, 0.4, 0.1]))(HERE, AHEAD)
-    assert not len(echoes.of(Provenance.GHOST)) and len(echoes.of(Provenance.DIRECT).points) == 1
+    assert not len(echoes.of(Provenance.GHOST_1)) and len(echoes.of(Provenance.DIRECT).points) == 1
 
 
 def test_polarisation_of_the_bounce(corner):
     """Upright fields on an upright wall are TE (a conductor turns the sign), on a conducting floor TM (it does not)."""
-    wall_ghost = finder_with_one_target(corner, np.array([2.2, 0.4, 0.0]))(HERE, AHEAD).of(Provenance.GHOST)
+    wall_ghost = finder_with_one_target(corner, np.array([2.2, 0.4, 0.0]))(HERE, AHEAD).of(Provenance.GHOST_1)
     assert wall_ghost.amplitude[0].real < 0
     floor = Scene("floor", [SceneObject("floor", rectangle((0, 0, -0.3), (20, 20), (0, 0, 1)), MATERIALS["metal"])])
-    floor_ghost = finder_with_one_target(floor, np.array([3.5, 0.0, 0.1]))(HERE, AHEAD).of(Provenance.GHOST)
+    floor_ghost = finder_with_one_target(floor, np.array([3.5, 0.0, 0.1]))(HERE, AHEAD).of(Provenance.GHOST_1)
     assert floor_ghost.amplitude[0].real > 0
 
 
@@ -89,7 +89,7 @@ def test_reciprocity(corner):
     """Swapping the legs of every echo, that is TX and RX, leaves the set of echoes as it was."""
     scatterers = Scatterers.sample(corner, np.random.default_rng(1), density=100.0)
     echoes = EchoFinder(corner, scatterers, Facets.of(corner, CONFIG), CONFIG)(HERE, AHEAD)
-    assert len(echoes.of(Provenance.GHOST)) > 50
+    assert len(echoes.of(Provenance.GHOST_1)) > 50
     key = np.concatenate([echoes.points.reshape(-1, 6), echoes.amplitude[: len(echoes.points), None].view(float)], 1)
     swapped = np.concatenate([echoes.points[:, ::-1].reshape(-1, 6), key[:, 6:]], axis=1)
     assert np.array_equal(np.unique(key, axis=0), np.unique(swapped, axis=0))

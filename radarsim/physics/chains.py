@@ -1,0 +1,342 @@
+"""Echoes by mirrors alone, two or three in a chain: images of the radar itself, corners included.
+
+A chain m_1 ... m_k takes the receiver to M rx, M = R_1 ... R_k the product of the reflections, and the echo's path is
+|tx - M rx|, straight through the mirrors unfolded along it. Two mirrors at right angles make M a half turn about their
+edge and three an inversion in their corner, whose path passes the edge or corner itself for every place of the radar;
+each order of the mirrors then holds its own share of the light.
+
+The mirrors are windows on the unfolded path. A window at distance d from one end of a path of length L diffracts as its
+offset x over sqrt(lambda d (L - d) / (2 L)) says (Fresnel), so in these units all windows of a chain overlap to one
+polygon W, and the amplitude lambda / (4 pi L) of an endless mirror is taken F times,
+
+    F = (1 / 2j) int_W exp(j pi r^2 / 2) dA = (1 / 2 pi) closed int (1 - exp(j pi r^2 / 2)) dphi,
+
+the Kirchhoff integral, here along the edges (Stokes, as Maggi and Rubinowicz did): 1 in the middle of large windows,
+1/2 on an edge, area over lambda times distance for small ones. So a dihedral of plates a x b has
+8 pi a^2 b^2 / lambda^2, and a trihedral of triangles 4 pi a^4 / (3 lambda^2).
+"""
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+from numba import njit
+
+from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length, minus, reflected, unit, upright
+from radarsim.physics.amplitudes import vector as vec
+from radarsim.physics.mirrors import Mirrors
+
+#: Edges this far off the path, in units of the Fresnel integral, begin to fade from the sum, and those are left out:
+#: what they diffract comes on a path of its own, longer by s^2 lambda / 4.
+FADE, FAR = 5.0, 8.0
+#: Most corners that the overlap of three quadrilaterals and a square can have, and one to close it.
+_CORNERS = 20
+
+
+def images(
+    mirrors: Mirrors,
+    near: Int[np.ndarray, "n"],
+    position: Float[np.ndarray, "3"],
+    rotation: Float[np.ndarray, "3 3"],
+    reach: float,
+    wavelength: float,
+    weakest: float,
+    tables: tuple[np.ndarray, np.ndarray],
+) -> tuple[
+    Int[np.ndarray, "image 3"],
+    Float[np.ndarray, "image 3 4"],
+    Complex[np.ndarray, "image"],
+    Float[np.ndarray, "image 3 3"],
+]:
+    """Chains of two and three mirrors that lead from the sensor back to it.
+
+    Args:
+        mirrors: and what can follow what.
+        near: mirrors that can be first and last.
+        position, rotation: sensor pose, rotation from sensor to world.
+        reach: half the longest path, m.
+        wavelength: m.
+        weakest: images below this amplitude are left out.
+        tables: the antenna's gain tables.
+
+    Returns:
+        chain (third mirror -1: none), isometry of the receiver, amplitude, places of reflection of a ray that takes
+        this way (the last one repeated up to three), m.
+    """
+    end = np.zeros(len(mirrors), bool)
+    end[near] = True
+    size = 256
+    while True:
+        chain, isometry = np.full((size, 3), -1), np.empty((size, 3, 4))
+        amplitude, stops = np.empty(size, complex), np.empty((size, 3, 3))
+        count = _search(
+            near, end, mirrors.first, mirrors.following, mirrors.center, mirrors.normal, mirrors.corners,
+            mirrors.two_sided, mirrors.reflection, position, rotation, reach, wavelength, weakest, *tables, chain,
+            isometry, amplitude, stops,
+        )  # fmt: skip
+        if count <= size:
+            return chain[:count], isometry[:count], amplitude[:count], stops[:count]
+        size = count
+
+
+@njit(cache=True)
+def _search(
+    near, end, first, following, center, normal, corners, two_sided, reflection, position, rotation, reach, wavelength,
+    weakest, azimuth_table, elevation_table, chain, isometry, amplitude, stops,
+):  # fmt: skip
+    """Tries all chains whose mirrors can follow one another; returns how many lead back, of which as many as fit."""
+    p = vec(position)
+    up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
+    planes, polygon, spare = np.empty((12, 3)), np.empty((_CORNERS, 2)), np.empty((_CORNERS, 2))
+    way = np.empty(3, np.int64)
+    count = 0
+    for a in near:
+        image_a = _image(p, center[a], normal[a])
+        for ib in range(first[a], first[a + 1]):
+            b = following[ib]
+            image_b = _image(image_a, center[b], normal[b])
+            for ic in range(first[b] - 1, first[b + 1]):
+                order = 2 if ic < first[b] else 3
+                c = b if order == 2 else following[ic]
+                if not end[c]:
+                    continue
+                # The sensor's image in the last mirror: seen from there, the way leads straight to the sensor.
+                image = image_b if order == 2 else _image(image_b, center[c], normal[c])
+                back = minus(p, image)
+                path = length(back)
+                if path > 2 * reach or path < 0.05:
+                    continue
+                back = (back[0] / path, back[1] / path, back[2] / path)
+                gain = gain_towards((-back[0], -back[1], -back[2]), rotation, azimuth_table, elevation_table)
+                strength = wavelength / (4 * np.pi * path) * gain
+                if strength * 3.4 <= weakest:  # 3.4: above the peak gain
+                    continue
+                if not _passes(image, back, path, wavelength, center[c], normal[c], corners[c]):
+                    continue
+                way[0], way[1], way[2] = a, b, c
+                value, ray, e1, e2, off = _chain(
+                    way[:order], p, up, path, back, wavelength, center, normal, corners, two_sided, reflection, planes,
+                    polygon, spare,
+                )  # fmt: skip
+                value *= strength * gain_towards(ray, rotation, azimuth_table, elevation_table)
+                if abs(value) <= weakest:
+                    continue
+                if count < len(amplitude):
+                    for k in range(order):
+                        chain[count, k] = way[k]
+                    _isometry(way[:order], center, normal, isometry[count])
+                    amplitude[count] = value
+                    # A ray through the polygon, which misses the very edge of corners.
+                    zone = np.sqrt(wavelength * path / 8)
+                    aim = along(along(along(p, path / 2, ray), zone * off[0], e1), zone * off[1], e2)
+                    _course(way[:order], p, aim, center, normal, stops[count])
+                count += 1
+    return count
+
+
+@njit(inline="always")
+def _image(p, center, normal):
+    n = vec(normal)
+    return along(p, -2 * dot(minus(p, vec(center)), n), n)
+
+
+@njit(inline="always")
+def _passes(image, back, path, wavelength, center, normal, corners):
+    """Whether the last stretch of a path comes from near its last mirror: a quick test before the full one."""
+    n, c = vec(normal), vec(center)
+    slope = dot(back, n)
+    if abs(slope) < 0.02:
+        return False
+    t = dot(minus(c, image), n) / slope
+    if t <= 0 or t >= path:
+        return False
+    margin = FAR * np.sqrt(wavelength * t * (path - t) / (2 * path)) / abs(slope)
+    offset = minus(along(image, t, back), c)
+    size = 0.0
+    for k in range(4):
+        size = max(size, length(minus(vec(corners[k]), c)))
+    return dot(offset, offset) < (size + margin) ** 2
+
+
+@njit(cache=True)
+def _chain(
+    way, p, up, path, back, wavelength, center, normal, corners, two_sided, reflection, planes, polygon, spare
+):  # fmt: skip
+    """F times the reflection coefficients of a chain, and where it starts: direction, transverse axes, aim in them."""
+    none = 0j, back, back, back, (0.0, 0.0)
+    # The direction at the start is that at the end, taken back through the mirrors.
+    ray = back
+    for k in range(len(way) - 1, -1, -1):
+        n = vec(normal[way[k]])
+        ray = along(ray, -2 * dot(ray, n), n)
+    aside = (0.0, 0.0, 1.0) if abs(ray[2]) < 0.7 else (1.0, 0.0, 0.0)
+    e1 = unit(cross(aside, ray))
+    e2 = cross(ray, e1)
+    sent = upright(up, ray)
+    field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
+    # Instead of unfolding the mirrors, the path and its axes are folded; the start moves to its images.
+    start, now, f1, f2 = p, ray, e1, e2
+    count, before = 0, 0.0
+    for m in way:
+        n, c = vec(normal[m]), vec(center[m])
+        slope = dot(now, n)
+        if abs(slope) < 0.02 or (slope > 0 and not two_sided[m]):
+            return none
+        t = dot(minus(c, start), n) / slope
+        if t <= 0.005 or t >= path - 0.005 or t < before - np.sqrt(wavelength * path):
+            return none
+        before = t
+        for k in range(4):
+            one, two = minus(vec(corners[m, k]), start), minus(vec(corners[m, (k + 1) % 4]), start)
+            x, y = dot(one, f1), dot(one, f2)
+            dx, dy = dot(two, f1) - x, dot(two, f2) - y
+            square = dx * dx + dy * dy
+            if square < 1e-8:
+                continue
+            middle = minus(c, start)
+            side = dx * (dot(middle, f2) - y) - dy * (dot(middle, f1) - x)
+            sign = (1.0 if side < 0 else -1.0) / np.sqrt(square)
+            nx, ny = -dy * sign, dx * sign  # outward
+            offset = nx * x + ny * y
+            share = min(max(-(x * dx + y * dy) / square, 0.0), 1.0)
+            d = (dot(one, now) + share * (dot(two, now) - dot(one, now))) / path
+            if d < 0.02 or d > 0.98:  # an edge beside or behind the radar
+                if offset < 0:
+                    return none
+                continue
+            offset /= np.sqrt(wavelength * path * d * (1 - d) / 2)
+            if offset < -FAR:
+                return none
+            planes[count, 0], planes[count, 1], planes[count, 2] = nx, ny, offset
+            count += 1
+        after = along(now, -2 * slope, n)
+        field = reflected(field, now, after, n, reflection[m])
+        start = _image(start, center[m], normal[m])
+        f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
+        now = after
+    taken = upright(up, now)
+    value = dot(field, taken)
+    corner = _overlap(planes, count, polygon, spare)
+    if corner < 3:
+        return none
+    share = kirchhoff(polygon, corner)
+    # The ray aims at the path itself, or where an edge is near, a little inside the polygon.
+    mx, my = 0.0, 0.0
+    for k in range(corner):
+        mx += polygon[k, 0] / corner
+        my += polygon[k, 1] / corner
+    toward = 0.0
+    for step in (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0):
+        toward = step
+        if _depth(planes, count, step * mx, step * my) > 0.25:
+            break
+    return value * share, ray, e1, e2, (toward * mx, toward * my)
+
+
+@njit(inline="always")
+def _depth(planes, count, x, y):
+    """Distance of a point inside the nearest of some edges."""
+    least = 1e9
+    for k in range(count):
+        least = min(least, planes[k, 2] - planes[k, 0] * x - planes[k, 1] * y)
+    return least
+
+
+@njit(cache=True)
+def _overlap(planes, count, polygon, spare):
+    """Corners, counter-clockwise, of what half planes n . x <= s leave of a wide square; returns their number."""
+    wide = 50.0
+    polygon[0, 0], polygon[0, 1] = -wide, -wide
+    polygon[1, 0], polygon[1, 1] = wide, -wide
+    polygon[2, 0], polygon[2, 1] = wide, wide
+    polygon[3, 0], polygon[3, 1] = -wide, wide
+    corner = 4
+    for k in range(count):
+        nx, ny, s = planes[k]
+        kept = 0
+        for i in range(corner):
+            x0, y0 = polygon[i]
+            x1, y1 = polygon[(i + 1) % corner]
+            d0, d1 = nx * x0 + ny * y0 - s, nx * x1 + ny * y1 - s
+            if d0 <= 0:
+                spare[kept, 0], spare[kept, 1] = x0, y0
+                kept += 1
+            if (d0 <= 0) != (d1 <= 0):
+                t = d0 / (d0 - d1)
+                spare[kept, 0], spare[kept, 1] = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+                kept += 1
+        corner = kept
+        polygon[:corner] = spare[:corner]
+        if corner < 3:
+            return 0
+    return corner
+
+
+@njit(cache=True)
+def kirchhoff(polygon, corners):
+    """(1 / 2j) int exp(j pi r^2 / 2) dA over a convex polygon (counter-clockwise, its first `corners` rows)."""
+    total = 0j
+    for k in range(corners):
+        x0, y0 = polygon[k]
+        x1, y1 = polygon[(k + 1) % corners]
+        size = np.hypot(x1 - x0, y1 - y0)
+        if size < 1e-12:
+            continue
+        dx, dy = (x1 - x0) / size, (y1 - y0) / size
+        s = x0 * dy - y0 * dx  # the origin's distance inside the edge
+        low, high = x0 * dx + y0 * dy, x1 * dx + y1 * dy
+        if s != 0:
+            total += np.arctan(high / s) - np.arctan(low / s)
+        weight = min(max((FAR - abs(s)) / (FAR - FADE), 0.0), 1.0)
+        if weight > 0:
+            total -= weight * weight * (3 - 2 * weight) * _edge(s, max(low, -FAR), min(high, FAR))
+    return total / (2 * np.pi)
+
+
+@njit(cache=True)
+def _edge(s, low, high):
+    """int exp(j pi (s^2 + x^2) / 2) s / (s^2 + x^2) dx, the part that is sharp for small s in closed form."""
+    if high <= low or s == 0:
+        return 0j
+    total = 0j
+    # Gauss-Legendre with four points on stretches over which the phase turns by a radian or less.
+    x = low
+    while x < high:
+        nearest = 0.0 if x < 0 < x + 0.5 else min(abs(x), abs(x + 0.5))
+        step = min(0.5, 1.2 / (nearest + 0.5), high - x)
+        for node, weight in ((-0.8611363116, 0.3478548451), (-0.3399810436, 0.6521451549),
+                             (0.3399810436, 0.6521451549), (0.8611363116, 0.3478548451)):  # fmt: skip
+            at = x + 0.5 * step * (1 + node)
+            angle = 0.5 * np.pi * at * at
+            # exp(j angle) - 1, without loss of digits
+            half = np.sin(angle / 2)
+            total += 0.5 * step * weight * (-2 * half * half + 1j * np.sin(angle)) * s / (s * s + at * at)
+        x += step
+    total += np.arctan(high / s) - np.arctan(low / s)
+    return total * np.exp(0.5j * np.pi * s * s)
+
+
+@njit(cache=True)
+def _isometry(way, center, normal, out):
+    """R_1 ... R_k as matrix | offset."""
+    for column in range(4):
+        if column < 3:
+            x = (1.0 * (column == 0), 1.0 * (column == 1), 1.0 * (column == 2))
+        else:
+            x = (0.0, 0.0, 0.0)
+        for k in range(len(way) - 1, -1, -1):
+            n = vec(normal[way[k]])
+            height = dot(x, n) if column < 3 else dot(minus(x, vec(center[way[k]])), n)
+            x = along(x, -2 * height, n)
+        out[0, column], out[1, column], out[2, column] = x
+
+
+@njit(cache=True)
+def _course(way, p, aim, center, normal, stops):
+    """Where a ray from p through a point meets the mirrors of a chain."""
+    start, now = p, unit(minus(aim, p))
+    for k in range(3):
+        if k < len(way):
+            n = vec(normal[way[k]])
+            t = dot(minus(vec(center[way[k]]), start), n) / dot(now, n)
+            start = along(start, t, now)
+            now = along(now, -2 * dot(now, n), n)
+        stops[k, 0], stops[k, 1], stops[k, 2] = start

@@ -4,14 +4,17 @@ import numpy as np
 from numba import njit, prange
 
 from radarsim.physics.antenna import amplitude_gain
+from radarsim.physics.detail import detail
 from radarsim.physics.facets import TABLE
+from radarsim.physics.lobes import scattering
 
 
 @njit(parallel=True, cache=True)
 def direct_amplitudes(
-    place, normal, sigma, two_sided, position, rotation, reach, wavelength, azimuth_table, elevation_table, out
-):
-    """Radar equation, |a|^2 = G^2 lambda^2 sigma cos^2 / ((4 pi)^3 R^4): Lambert has cos out and cos back."""
+    place, normal, sigma, two_sided, lobe, rank, position, rotation, reach, wavelength, azimuth_table, elevation_table,
+    out,
+):  # fmt: skip
+    """Radar equation, |a|^2 = G^2 lambda^2 sigma / ((4 pi)^3 R^4), sigma by `scattering` and level of `detail`."""
     scale = wavelength / (4 * np.pi) ** 1.5
     for i in prange(len(place)):
         dx, dy, dz = place[i, 0] - position[0], place[i, 1] - position[1], place[i, 2] - position[2]
@@ -21,13 +24,17 @@ def direct_amplitudes(
         x = rotation[0, 0] * dx + rotation[1, 0] * dy + rotation[2, 0] * dz
         if x <= 0:
             continue
-        cosine = _facing(normal[i], -dx, -dy, -dz, np.sqrt(square), two_sided[i])
+        distance = np.sqrt(square)
+        cosine = _facing(normal[i], -dx, -dy, -dz, distance, two_sided[i])
         if cosine <= 0:
+            continue
+        share = detail(rank[i], distance)
+        if share == 0:
             continue
         y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
         z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
         gain = amplitude_gain(x, y, z, azimuth_table, elevation_table)
-        out[i] = scale * gain * gain * np.sqrt(sigma[i]) * cosine / square
+        out[i] = scale * gain * gain * share * np.sqrt(sigma[i] * scattering(cosine, cosine, 1.0, lobe[i])) / square
 
 
 @njit(inline="always")
@@ -41,8 +48,8 @@ def _facing(normal, dx, dy, dz, length, two_sided):
 
 @njit(parallel=True, cache=True)
 def ghost_amplitudes(
-    place, normal, sigma, two_sided, center, plane, u, v, half, sheet, reflection, position, rotation, reach,
-    wavelength, weakest, azimuth_table, elevation_table, out,
+    place, normal, sigma, two_sided, lobe, rank, center, plane, u, v, half, sheet, reflection, position, rotation,
+    reach, wavelength, weakest, azimuth_table, elevation_table, out,
 ):  # fmt: skip
     """Sensor -> scatterer -> mirror -> sensor, for every mirror and scatterer; the way back has the same value."""
     scale = wavelength / (4 * np.pi) ** 1.5
@@ -91,7 +98,9 @@ def ghost_amplitudes(
                     rotation[0, 2] * d[0] + rotation[1, 2] * d[1] + rotation[2, 2] * d[2],
                     azimuth_table, elevation_table,
                 )  # fmt: skip
-            size = scale * gain * edge * np.sqrt(sigma[i] * face_direct * face_mirror) / (d1 * d2)
+            between = np.dot(s - position, leaving) / d1
+            pattern = scattering(face_direct, face_mirror, between, lobe[i])
+            size = scale * gain * edge * detail(rank[i], d1) * np.sqrt(sigma[i] * pattern) / (d1 * d2)
             if size <= weakest:
                 continue
             value = size * _copolar(reflection[m], arriving, leaving, n, up)

@@ -22,6 +22,7 @@ from radarsim.physics.amplitudes import direct_amplitudes, ghost_amplitudes
 from radarsim.physics.antenna import gain_tables
 from radarsim.physics.facets import Facets
 from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import BurstClock, parabolas
 from radarsim.scene.scene import Scene
 
@@ -122,7 +123,7 @@ class EchoFinder:
 
     Args:
         scene: ray tests run on its geometry; None where nothing can stand in the way.
-        scatterers: the diffuse surface.
+        surface: the diffuse surface, or a given set of scatterers.
         facets: mirrors and plates.
         config: radar configuration.
         weakest: echoes below this amplitude are left out.
@@ -132,17 +133,16 @@ class EchoFinder:
     def __init__(
         self,
         scene: Scene | None,
-        scatterers: Scatterers,
+        surface: Surface | Scatterers,
         facets: Facets | None,
         config: RadarConfig,
         weakest: float = 0.0,
         reach: float | None = None,
     ):
-        self.scene, self.scatterers, self.facets, self.config = scene, scatterers, facets, config
+        self.scene, self.surface, self.facets, self.config = scene, surface, facets, config
         self.weakest = weakest
         self.reach = 1.05 * config.max_range if reach is None else reach
         self._tables = gain_tables()
-        self._phasor = np.exp(1j * scatterers.phase)
 
     def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Echoes:
         """Echoes for one sensor pose (rotation: sensor to world)."""
@@ -153,6 +153,7 @@ class EchoFinder:
     ) -> list[Echoes]:
         """Echoes of several frames: one after the other, but for the ray tests, which are quicker in large numbers."""
         poses = list(zip(np.asarray(positions, float), np.asarray(rotations, float), strict=True))
+        self.scatterers = self.surface.near(positions, self.reach)
         points = self._points(poses)
         images = self._images(poses)
         echoes = []
@@ -170,7 +171,9 @@ class EchoFinder:
                         np.stack([mirrored, bounced], axis=1),
                     ]),
                     transforms,
-                    np.concatenate([amplitude * self._phasor[index], ghost_amplitude, ghost_amplitude, flashes]),
+                    np.concatenate([
+                        amplitude * np.exp(1j * s.phase[index]), ghost_amplitude, ghost_amplitude, flashes
+                    ]),
                     np.concatenate([
                         np.where(s.horizontal[index], Provenance.FLOOR_CEILING, Provenance.DIRECT),
                         np.full(2 * len(mirrored), Provenance.GHOST),
@@ -196,8 +199,8 @@ class EchoFinder:
         for position, rotation in poses:
             amplitude = np.zeros(len(s))
             direct_amplitudes(
-                s.position, s.normal, s.sigma, s.two_sided, position, rotation, self.reach, self.config.wavelength,
-                *self._tables, amplitude,
+                s.position, s.normal, s.sigma, s.two_sided, s.lobe, s.rank, position, rotation, self.reach,
+                self.config.wavelength, *self._tables, amplitude,
             )  # fmt: skip
             index = np.flatnonzero(amplitude > self.weakest)
             candidates.append((index, amplitude[index]))
@@ -218,6 +221,7 @@ class EchoFinder:
             amplitude = np.zeros((len(mirrors), len(candidates)), complex)
             ghost_amplitudes(
                 s.position[candidates], s.normal[candidates], s.sigma[candidates], s.two_sided[candidates],
+                s.lobe[candidates], s.rank[candidates],
                 f.center[mirrors], f.normal[mirrors], f.u[mirrors], f.v[mirrors], f.half[mirrors],
                 f.two_sided[mirrors], f.reflection[mirrors], position, rotation, self.reach, self.config.wavelength,
                 self.weakest, *self._tables, amplitude,
@@ -229,7 +233,7 @@ class EchoFinder:
             hs = np.einsum("ed,ed->e", place - f.center[mirror], normal)[:, None]
             image_of_sensor = position - 2 * h * normal
             bounce = image_of_sensor + (place - image_of_sensor) * h / (h + hs)
-            strength = amplitude[m, c] * np.sqrt(s.bounces[ghost]) * self._phasor[ghost]
+            strength = amplitude[m, c] * np.sqrt(s.bounces[ghost]) * np.exp(1j * s.phase[ghost])
             found.append((bounce, place, place - 2 * hs * normal, strength))
         first = self._seen([(p, bounce) for (p, _), (bounce, *_) in zip(poses, found, strict=True)])
         found = [tuple(column[v] for column in row) for row, v in zip(found, first, strict=True)]

@@ -35,10 +35,13 @@ class Material:
             (e^{+jwt}: negative imaginary part), or None for a perfect conductor.
         roughness: RMS height sigma_h of the surface, m.
         sigma0: diffuse backscatter cross-section per area at normal incidence, linear m^2/m^2, without the coherent
-            part; falls off as cos^2 of the incidence angle (Lambert).
+            part; falls off as cos^2 of the incidence angle (Lambert), faster with a directive lobe.
         thickness: of a thin slab that waves pass (a pane, one board of a drywall), m; None: opaque half space.
         color: RGB in 0...1 for pictures.
         source: where the numbers come from.
+        directive, backscatter: shares of the diffuse power in the lobes about the specular direction and back to the
+            source; the rest is Lambertian.
+        lobe_exponent: alpha of both lobes.
     """
 
     name: str
@@ -48,6 +51,9 @@ class Material:
     thickness: float | None = None
     color: tuple[float, float, float] = (0.6, 0.6, 0.6)
     source: str = ""
+    directive: float = 0.0
+    backscatter: float = 0.0
+    lobe_exponent: float = 4.0
 
     @property
     def conductor(self) -> bool:

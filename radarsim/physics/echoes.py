@@ -20,6 +20,7 @@ from radarize.radar.config import RadarConfig
 from radarsim.physics import plates
 from radarsim.physics.amplitudes import direct_amplitudes, ghost_amplitudes
 from radarsim.physics.antenna import gain_tables
+from radarsim.physics.curved import Curved
 from radarsim.physics.facets import Facets
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.surface import Surface
@@ -128,6 +129,7 @@ class EchoFinder:
         config: radar configuration.
         weakest: echoes below this amplitude are left out.
         reach: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
+        curved: round bodies.
     """
 
     def __init__(
@@ -138,9 +140,10 @@ class EchoFinder:
         config: RadarConfig,
         weakest: float = 0.0,
         reach: float | None = None,
+        curved: Curved | None = None,
     ):
         self.scene, self.surface, self.facets, self.config = scene, surface, facets, config
-        self.weakest = weakest
+        self.weakest, self.curved = weakest, curved
         self.reach = 1.05 * config.max_range if reach is None else reach
         self._tables = gain_tables()
 
@@ -244,12 +247,16 @@ class EchoFinder:
         """Visible parts of plates: isometry, amplitude, whether of a floor or ceiling."""
         if self.facets is None:
             return [(np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, bool))] * len(poses)
-        found = [
-            plates.parts(self.facets, p, r, self.reach, self.config.wavelength, self.weakest, self._tables)
-            for p, r in poses
-        ]
-        seen = self._seen([(p, row[1]) for (p, _), row in zip(poses, found, strict=True)])
-        return [
-            (images[v], amplitude[v], self.facets.horizontal[facet[v]])
-            for (facet, _, images, amplitude), v in zip(found, seen, strict=True)
-        ]
+        found = [self._flashes(p, r) for p, r in poses]
+        seen = self._seen([(p, aim) for (p, _), (aim, *_) in zip(poses, found, strict=True)])
+        return [tuple(column[v] for column in row) for (_, *row), v in zip(found, seen, strict=True)]
+
+    def _flashes(self, position, rotation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Parts of plates and round bodies: point, isometry, amplitude, whether of a floor or ceiling."""
+        view = (position, rotation, self.reach, self.config.wavelength, self.weakest, self._tables)
+        facet, *flat = plates.parts(self.facets, *view)
+        flat.append(self.facets.horizontal[facet])
+        if self.curved is None:
+            return tuple(flat)
+        bent = self.curved.parts(*view)
+        return tuple(np.concatenate(pair) for pair in zip(flat, (*bent, np.zeros(len(bent[0]), bool)), strict=True))

@@ -22,13 +22,13 @@ class Scatterers:
     Attributes:
         position: m.
         normal: unit outward normal, or zero for an isotropic scatterer.
-        sigma: radar cross section at normal incidence, m^2 (sigma0 times the area it stands for).
+        sigma: sigma0 times the area it stands for, m^2; an isotropic scatterer's radar cross section.
         phase: rad, uniformly random.
         two_sided: whether it scatters from behind as well (sheets without a volume).
         horizontal: whether it belongs to a floor or ceiling.
         bounces: weight of its power in paths over mirrors. Ghosts are many and weak, so of a sampled surface only
             every fourth scatterer has them, with four times the power.
-        lobe: directive weight, backscatter weight and exponent of its scattering pattern, see `lobes.scattering`.
+        lobe: its scattering pattern, see `lobes.weights`.
         rank: 0...1, which decides from how far it is used, see `detail`; negative: from everywhere.
     """
 
@@ -39,7 +39,7 @@ class Scatterers:
     two_sided: np.ndarray
     horizontal: np.ndarray
     bounces: Float[np.ndarray, "scatterer"]
-    lobe: Float[np.ndarray, "scatterer 3"]
+    lobe: Float[np.ndarray, "scatterer 4"]
     rank: Float[np.ndarray, "scatterer"]
 
     def __len__(self) -> int:

@@ -61,7 +61,7 @@ class Surface:
         self._sigma = np.array([o.material.sigma0 for o in used]) / density
         self._two_sided = np.array([o.two_sided for o in used], bool)
         self._horizontal = np.array([o.is_floor_or_ceiling for o in used], bool)
-        self._lobe = np.array([weights(o.material) for o in used]).reshape(-1, 3)
+        self._lobe = np.array([weights(o.material) for o in used]).reshape(-1, 4)
 
     def __len__(self) -> int:
         """Scatterers there are in all, on average."""

@@ -247,15 +247,16 @@ class EchoFinder:
         """Visible parts of plates: isometry, amplitude, whether of a floor or ceiling."""
         if self.facets is None:
             return [(np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, bool))] * len(poses)
-        found = [self._flashes(p, r) for p, r in poses]
+        near = self.facets.near(np.array([p for p, _ in poses]), self.reach)
+        found = [self._flashes(near, p, r) for p, r in poses]
         seen = self._seen([(p, aim) for (p, _), (aim, *_) in zip(poses, found, strict=True)])
         return [tuple(column[v] for column in row) for (_, *row), v in zip(found, seen, strict=True)]
 
-    def _flashes(self, position, rotation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def _flashes(self, facets: Facets, position, rotation) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Parts of plates and round bodies: point, isometry, amplitude, whether of a floor or ceiling."""
         view = (position, rotation, self.reach, self.config.wavelength, self.weakest, self._tables)
-        facet, *flat = plates.parts(self.facets, *view)
-        flat.append(self.facets.horizontal[facet])
+        facet, *flat = plates.parts(facets, *view)
+        flat.append(facets.horizontal[facet])
         if self.curved is None:
             return tuple(flat)
         bent = self.curved.parts(*view)

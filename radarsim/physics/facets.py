@@ -1,12 +1,14 @@
 """Flat rectangles of the scene: mirrors for ghosts, and plates that flash where they face the radar."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Complex, Float
 
 from radarize.radar.config import RadarConfig
 from radarsim.physics.bodies import recognise
+from radarsim.physics.grid import Grid
 from radarsim.physics.planes import rectangles
 from radarsim.scene.materials import Material
 from radarsim.scene.scene import Scene
@@ -46,6 +48,16 @@ class Facets:
 
     def __len__(self) -> int:
         return len(self.center)
+
+    @cached_property
+    def _grid(self) -> Grid:
+        span = np.abs(self.half[:, :1] * self.u) + np.abs(self.half[:, 1:] * self.v)
+        return Grid(self.center - span, self.center + span)
+
+    def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> "Facets":
+        """Those within `reach` (m) of any of the positions, in the same order."""
+        index, _ = self._grid.near(positions, reach)
+        return Facets(*(getattr(self, field.name)[index] for field in fields(self)))
 
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig) -> "Facets":

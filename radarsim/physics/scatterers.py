@@ -11,7 +11,7 @@ from jaxtyping import Float
 
 from radarsim.physics.lobes import LAMBERT
 
-#: Of a sampled surface every n-th scatterer is seen over mirrors.
+#: Of a sampled surface every n-th scatterer is seen over mirrors, and of those every n-th over two of them.
 BOUNCE_STRIDE = 4
 
 
@@ -26,8 +26,9 @@ class Scatterers:
         phase: rad, uniformly random.
         two_sided: whether it scatters from behind as well (sheets without a volume).
         horizontal: whether it belongs to a floor or ceiling.
-        bounces: weight of its power in paths over mirrors. Ghosts are many and weak, so of a sampled surface only
+        bounces: weight of its power in paths over one mirror. Ghosts are many and weak, so of a sampled surface only
             every fourth scatterer has them, with four times the power.
+        bounces_twice: the same for paths over two mirrors or more: every sixteenth, with sixteen times the power.
         lobe: its scattering pattern, see `lobes.weights`.
         rank: 0...1, which decides from how far it is used, see `detail`; negative: from everywhere.
     """
@@ -39,6 +40,7 @@ class Scatterers:
     two_sided: np.ndarray
     horizontal: np.ndarray
     bounces: Float[np.ndarray, "scatterer"]
+    bounces_twice: Float[np.ndarray, "scatterer"]
     lobe: Float[np.ndarray, "scatterer 4"]
     rank: Float[np.ndarray, "scatterer"]
 
@@ -63,6 +65,7 @@ class Scatterers:
             np.zeros(n) if phase is None else phase,
             zeros,
             zeros,
+            np.ones(n),
             np.ones(n),
             np.tile(LAMBERT, (n, 1)),
             np.full(n, -1.0),

@@ -83,7 +83,7 @@ class Surface:
         ends = np.cumsum(counts)
         total = int(ends[-1]) if len(ends) else 0
         position, triangle = np.empty((total, 3)), np.empty(total, np.int64)
-        phase, rank, bounces = np.empty(total), np.empty(total), np.empty(total)
+        phase, rank, bounces = np.empty(total), np.empty(total), np.empty((2, total))
         _place(
             self.seed, tiles, totals, counts, ends, self._first, self._areas, self._triangles, position, triangle,
             phase, rank, bounces,
@@ -91,7 +91,7 @@ class Surface:
         owner = np.repeat(self._owner[tiles], counts)
         return Scatterers(
             position, self._normals[triangle], self._sigma[owner], phase, self._two_sided[owner],
-            self._horizontal[owner], bounces, self._lobe[owner], rank,
+            self._horizontal[owner], *bounces, self._lobe[owner], rank,
         )  # fmt: skip
 
 
@@ -144,7 +144,7 @@ def _place(
         tile = tiles[i]
         key = _hash(seed, np.uint64(tile))
         shift, shift_across = _uniform(_hash(key, np.uint64(1))), _uniform(_hash(key, np.uint64(2)))
-        bouncing = int(_hash(key, np.uint64(0)) % np.uint64(BOUNCE_STRIDE))
+        bouncing = int(_hash(key, np.uint64(0)) % np.uint64(BOUNCE_STRIDE**2))
         low, high = first[tile], first[tile + 1]
         before = areas[low - 1] if low > 0 else 0.0
         for k in range(counts[i]):
@@ -164,4 +164,5 @@ def _place(
             triangle[j] = t
             phase[j] = 2 * np.pi * _uniform(word)
             rank[j] = (k + _uniform(_hash(word, np.uint64(1)))) / totals[i]
-            bounces[j] = BOUNCE_STRIDE if k % BOUNCE_STRIDE == bouncing else 0.0
+            bounces[0, j] = BOUNCE_STRIDE if (k + bouncing) % BOUNCE_STRIDE == 0 else 0.0
+            bounces[1, j] = BOUNCE_STRIDE**2 if (k + bouncing) % BOUNCE_STRIDE**2 == 0 else 0.0

@@ -13,11 +13,12 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.recording import Product, RecordingWriter, Stream
 from radarsim.motion import Motion, motion_from_tum, plan_motion
+from radarsim.physics.curved import Curved
 from radarsim.physics.direct import DirectSum
 from radarsim.physics.echoes import Echoes, EchoFinder, Provenance
 from radarsim.physics.facets import Facets
 from radarsim.physics.frontend import FrontEnd
-from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
 from radarsim.scene.scene import Scene
 
@@ -44,8 +45,9 @@ class Simulator:
         world, self._noise = rng.spawn(2)
         self.front_end = FrontEnd(config)
         self.finder = EchoFinder(
-            scene, Scatterers.sample(scene, world), Facets.of(scene, config), config, self.front_end.weakest
-        )
+            scene, Surface(scene, world), Facets.of(scene, config), config, self.front_end.weakest,
+            curved=Curved.of(scene, config),
+        )  # fmt: skip
         self.synthesize = Synthesizer(config) if device == "cpu" else DirectSum(config, device)
 
     def echoes(self, times: Float[np.ndarray, "frame"]) -> list[Echoes]:
@@ -127,7 +129,7 @@ def simulate(
         "platform": "trajectory" if trajectory is not None else platform,
         "seed": seed,
         "radarsim_version": __version__,
-        "scatterers": len(simulator.finder.scatterers),
+        "scatterers": len(simulator.finder.surface),
         "facets": len(simulator.finder.facets),
     }
     products = {

@@ -19,18 +19,19 @@ from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarsim.physics import chains, plates
 from radarsim.physics.antenna import gain_tables
+from radarsim.physics.curved import Curved
+from radarsim.physics.detail import details
 from radarsim.physics.facets import Facets
 from radarsim.physics.legs import Legs, pairs, straight_amplitudes
 from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.slabs import Slabs
+from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import BurstClock, parabolas
 from radarsim.scene.scene import Scene
 
 #: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
 CLEARANCE = 5e-3
-#: Of the scatterers seen over mirrors every n-th has echoes of second order.
-SECOND_STRIDE = 4
 
 
 class Provenance(IntEnum):
@@ -130,30 +131,30 @@ class EchoFinder:
 
     Args:
         scene: ray tests run on its geometry; None where nothing can stand in the way.
-        scatterers: the diffuse surface.
+        surface: the diffuse surface, or a given set of scatterers.
         facets: mirrors and plates.
         config: radar configuration.
         weakest: echoes below this amplitude are left out.
         reach: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
+        curved: round bodies.
     """
 
     def __init__(
         self,
         scene: Scene | None,
-        scatterers: Scatterers,
+        surface: Surface | Scatterers,
         facets: Facets | None,
         config: RadarConfig,
         weakest: float = 0.0,
         reach: float | None = None,
+        curved: Curved | None = None,
     ):
-        self.scene, self.scatterers, self.facets, self.config = scene, scatterers, facets, config
-        self.weakest = weakest
+        self.scene, self.surface, self.facets, self.config = scene, surface, facets, config
+        self.weakest, self.curved = weakest, curved
         self.reach = 1.05 * config.max_range if reach is None else reach
         self.mirrors = None if facets is None or not len(facets) else Mirrors.of(facets, scene, self.reach)
         self.slabs = None if scene is None else Slabs(scene, config, CLEARANCE)
         self._tables = gain_tables()
-        self._phasor = np.exp(1j * scatterers.phase)
-        self._weights = _weights(scatterers.bounces)
 
     def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Echoes:
         """Echoes for one sensor pose (rotation: sensor to world)."""
@@ -162,6 +163,9 @@ class EchoFinder:
     def batch(self, positions: Float[np.ndarray, "frame 3"], rotations: Float[np.ndarray, "frame 3 3"]) -> list[Echoes]:
         """Echoes of several frames: one after the other, but for the ray tests, which are quicker in large numbers."""
         positions, rotations = np.asarray(positions, float), np.asarray(rotations, float)
+        s = self.scatterers = self.surface.near(positions, self.reach)
+        # of power in echoes with 0, 1, and 2 or more mirrors and slabs on the way
+        self._weights = np.stack([np.ones(len(s)), s.bounces, s.bounces_twice], axis=1)
         near = self._mirrors_in_sight(positions)
         straight, hidden = self._straight(positions, rotations)
         legs = Legs.joined([straight, hidden, self._over_mirrors(positions, rotations, straight, near)])
@@ -202,8 +206,8 @@ class EchoFinder:
         leg, echo = np.empty(len(s)), np.empty(len(s))
         for frame, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
             straight_amplitudes(
-                s.position, s.normal, s.sigma, s.two_sided, position, rotation, self.reach, self.config.wavelength,
-                *self._tables, leg, echo,
+                s.position, s.normal, s.sigma, s.two_sided, s.lobe, s.rank, position, rotation, self.reach,
+                self.config.wavelength, *self._tables, leg, echo,
             )  # fmt: skip
             index = np.flatnonzero(echo > self.weakest)
             parts.append(Legs.straight(frame, index, leg[index], s.position[index], position))
@@ -247,7 +251,8 @@ class EchoFinder:
             free = other[index] > 0
             best = np.maximum(other[index], 3.35 / distance)  # 3.35: the peak gain
             # Behind a weak leg there may be a stronger one over a mirror, so the bound is the larger of the two.
-            weakest = self.weakest / (scale * np.sqrt(s.sigma[index]) * best)
+            shown = details(s.rank[index], distance) * np.sqrt(s.sigma[index] * s.lobe[index, :3].sum(axis=1))
+            weakest = self.weakest / np.maximum(scale * shown * best, 1e-300)
             longest = np.where(free, 2 * self.reach - distance, self.reach)
             double = free & (self._weights[index, 2] > 0)
             pairs = np.concatenate([
@@ -276,11 +281,17 @@ class EchoFinder:
         if self.mirrors is None:
             return [(np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, int))] * len(positions)
         frames, isometries, amplitudes, stops, causes = [], [], [], [], []
+        facets = self.facets.near(positions, self.reach)
         limits = self.reach, self.config.wavelength, self.weakest, self._tables
         for frame, (p, r) in enumerate(zip(positions, rotations, strict=True)):
-            facet, aim, isometry, amplitude = plates.parts(self.facets, p, r, *limits)
-            cause = np.where(self.facets.horizontal[facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
+            facet, aim, isometry, amplitude = plates.parts(facets, p, r, *limits)
+            cause = np.where(facets.horizontal[facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
             chain, images, strength, course = chains.images(self.mirrors, near[frame], p, r, *limits)
+            if self.curved is not None:
+                flat = aim, isometry, amplitude, cause
+                bent = *self.curved.parts(p, r, *limits), []
+                aim, isometry, amplitude, cause = map(np.concatenate, zip(flat, bent, strict=True))
+                cause = np.pad(cause, (0, len(amplitude) - len(cause)), constant_values=Provenance.DIRECT).astype(int)
             isometries += [isometry, images]
             amplitudes += [amplitude, strength]
             stops += [np.repeat(aim[:, None], 3, axis=1), course]
@@ -308,9 +319,11 @@ class EchoFinder:
         s = self.scatterers
         legs = legs[np.lexsort((legs.scatterer, legs.frame))]
         lengths = np.linalg.norm(legs.virtual - positions[legs.frame], axis=1)
-        ends, amplitude = pairs(legs, lengths, s, self._weights, self.reach, self.config.wavelength, self.weakest)
+        away = np.linalg.norm(legs.stops[:, 2] - positions[legs.frame], axis=1)
+        limits = self.reach, self.config.wavelength, self.weakest
+        ends, amplitude = pairs(legs, lengths, away, s, self._weights, *limits)
         scatterer = legs.scatterer[ends[:, 0]]
-        amplitude = amplitude * self._phasor[scatterer]
+        amplitude = amplitude * np.exp(1j * s.phase[scatterer])
         order = legs.bounces[ends].sum(axis=1)
         cause = np.where(s.horizontal[scatterer], Provenance.FLOOR_CEILING, Provenance.DIRECT)
         cause = np.where(order > 0, Provenance.GHOST_1 - 1 + order, cause)
@@ -324,16 +337,3 @@ class EchoFinder:
             )
             for i, j, (isometry, flashes, why) in zip(edges, edges[1:], images, strict=False)
         ]  # fmt: skip
-
-
-def _weights(bounces: Float[np.ndarray, "scatterer"]) -> Float[np.ndarray, "scatterer 3"]:
-    """Weights of power in echoes with 0, 1, and 2 or more mirrors and slabs on the way.
-
-    The more of them, the weaker and the more numerous echoes are, so the fewer scatterers have them: of those seen over
-    mirrors at all, of a sampled surface every `SECOND_STRIDE`-th has echoes of second order, with the power of all.
-    """
-    thinned = bounces > 1
-    second = np.where(thinned, 0.0, bounces)
-    chosen = np.flatnonzero(thinned)[::SECOND_STRIDE]
-    second[chosen] = SECOND_STRIDE * bounces[chosen]
-    return np.stack([np.ones(len(bounces)), bounces, second], axis=1)

@@ -17,6 +17,8 @@ from numba import njit, prange
 
 from radarsim.physics.amplitudes import along, dot, facing, gain_towards, length, minus, ramp, reflected, unit, upright
 from radarsim.physics.amplitudes import vector as vec
+from radarsim.physics.detail import detail
+from radarsim.physics.lobes import scattering
 from radarsim.physics.mirrors import Mirrors
 
 #: Mirrors over which both legs of an echo go, together.
@@ -103,8 +105,9 @@ class Legs:
 
 @njit(parallel=True, cache=True)
 def straight_amplitudes(
-    place, normal, sigma, two_sided, position, rotation, reach, wavelength, azimuth_table, elevation_table, legs, echoes
-):
+    place, normal, sigma, two_sided, lobe, rank, position, rotation, reach, wavelength, azimuth_table, elevation_table,
+    legs, echoes,
+):  # fmt: skip
     """Amplitude of the straight leg to every scatterer, and of the echo there and back by it; 0 out of reach."""
     scale = wavelength / (4 * np.pi) ** 1.5
     for i in prange(len(place)):
@@ -120,7 +123,8 @@ def straight_amplitudes(
             continue
         leg = gain_towards(d, rotation, azimuth_table, elevation_table) / away
         legs[i] = leg
-        echoes[i] = scale * leg * leg * np.sqrt(sigma[i]) * cosine
+        shown = detail(rank[i], away) * np.sqrt(sigma[i] * scattering(cosine, cosine, 1.0, lobe[i]))
+        echoes[i] = scale * leg * leg * shown
 
 
 @njit(inline="always")
@@ -238,14 +242,15 @@ def _courses(chains, place, center, normal, position, stops, virtual, towards):
 
 
 def pairs(
-    legs: Legs, lengths: Float[np.ndarray, "leg"], scatterers, weights: Float[np.ndarray, "scatterer 3"], reach: float,
-    wavelength: float, weakest: float,
+    legs: Legs, lengths: Float[np.ndarray, "leg"], away: Float[np.ndarray, "leg"], scatterers,
+    weights: Float[np.ndarray, "scatterer 3"], reach: float, wavelength: float, weakest: float,
 ) -> tuple[Int[np.ndarray, "echo 2"], Complex[np.ndarray, "echo"]]:  # fmt: skip
     """Echoes: pairs of legs to the same scatterer, in either order, and their amplitudes without the scatterer's phase.
 
     Args:
         legs: sorted by frame, then scatterer.
         lengths: of the legs, m.
+        away: straight distance from the sensor to the leg's scatterer, m.
         scatterers: what they lead to.
         weights: of a scatterer's power in echoes with 0, 1, and 2 or more mirrors and slabs on the way.
         reach: half the longest path, m.
@@ -259,20 +264,21 @@ def pairs(
     s = scatterers
     n = _pairs(
         np.append(first, len(key)), legs.scatterer, legs.bounces, legs.amplitude, legs.towards, legs.slab, lengths,
-        s.normal, s.sigma, s.two_sided, weights, reach, wavelength / (4 * np.pi) ** 1.5, weakest, index, amplitude,
+        away, s.normal, s.sigma, s.two_sided, s.lobe, s.rank, weights, reach, wavelength / (4 * np.pi) ** 1.5, weakest,
+        index, amplitude,
     )  # fmt: skip
     return index[:n], amplitude[:n]
 
 
 @njit(cache=True)
 def _pairs(
-    first, scatterer, bounces, amplitude, towards, slab, lengths, normal, sigma, two_sided, weights, reach, scale,
-    weakest, index, out,
+    first, scatterer, bounces, amplitude, towards, slab, lengths, away, normal, sigma, two_sided, lobe, rank,
+    weights, reach, scale, weakest, index, out,
 ):  # fmt: skip
     n = 0
     for group in range(len(first) - 1):
         s = scatterer[first[group]]
-        size = scale * np.sqrt(sigma[s])
+        size = scale * detail(rank[s], away[first[group]]) * np.sqrt(sigma[s])
         for i in range(first[group], first[group + 1]):
             there = facing(normal[s], vec(towards[i]), two_sided[s])
             if there <= 0:
@@ -284,7 +290,8 @@ def _pairs(
                 if back <= 0:
                     continue
                 order = min(bounces[i] + bounces[j] + slab[i] + slab[j], 2)
-                value = (size * np.sqrt(there * back)) * (amplitude[i] * amplitude[j])
+                between = dot(vec(towards[i]), vec(towards[j]))
+                value = size * np.sqrt(scattering(there, back, between, lobe[s])) * (amplitude[i] * amplitude[j])
                 # what the weight adds stands for scatterers left out: it makes no echo worth keeping
                 if weights[s, order] > 0 and abs(value) > weakest:
                     index[n, 0] = i

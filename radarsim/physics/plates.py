@@ -22,6 +22,9 @@ from scipy.special import fresnel
 from radarsim.physics.antenna import amplitude_gain
 from radarsim.physics.facets import Facets
 
+#: Above the antenna's gain both ways, as an amplitude: for a first sieve.
+PEAK_GAIN = 12.0
+
 
 def parts(
     facets: Facets,
@@ -64,17 +67,17 @@ def parts(
     # distance from the foot to the part along u and along v, by (facet, part of that side: interior, edge -, edge +)
     across = np.stack([np.zeros_like(foot), -half - foot, half - foot], axis=-1)
     slant = np.hypot(h[:, None, None], across)
-    size = _side_terms(across, slant, h, wavelength)
+    size = side_terms(across, slant, h, wavelength)
     amplitude = size[:, 0, :, None] * size[:, 1, None, :]
     distance = np.sqrt(h[:, None, None] ** 2 + across[:, 0, :, None] ** 2 + across[:, 1, None, :] ** 2)
     amplitude = amplitude * wavelength / (8 * np.pi * h[:, None, None]) * _oblique(h, slant, distance)
     amplitude = amplitude * facets.reflection[near, 0, -1][:, None, None]
-    f, i, j = np.nonzero((distance < reach) & (np.abs(amplitude) * 12 > weakest))  # 12: above the peak gain
+    f, i, j = np.nonzero((distance < reach) & (np.abs(amplitude) * PEAK_GAIN > weakest))
     amplitude = amplitude[f, i, j]
     along_u, along_v = (foot[f, 0] + across[f, 0, i])[:, None], (foot[f, 1] + across[f, 1, j])[:, None]
     point = center[f] + along_u * u[f] + along_v * v[f]
     towards = (point - position) @ rotation
-    amplitude = amplitude * _gains(towards, *tables) ** 2
+    amplitude = amplitude * gains(towards, *tables) ** 2
     keep = np.abs(amplitude) > weakest
     f, i, j, point, amplitude = f[keep], i[keep], j[keep], point[keep], amplitude[keep]
     # The part's isometry flips the normal and each side direction on whose edge it lies.
@@ -88,7 +91,7 @@ def parts(
     return near[f], aim, np.concatenate([matrix, offset[:, :, None]], axis=2), amplitude
 
 
-def _side_terms(across, slant, h, wavelength) -> Complex[np.ndarray, "facet side part"]:
+def side_terms(across, slant, h, wavelength) -> Complex[np.ndarray, "facet side part"]:
     """Interior and edge terms of the Fresnel integral along each side, phases referred to the part's own path."""
     u = 2 * np.sqrt(2 * np.maximum(slant - h[:, None, None], 0) / wavelength)
     sine, cosine = fresnel(u)
@@ -116,7 +119,7 @@ def _oblique(h, slant, distance) -> Float[np.ndarray, "facet part part"]:
 
 
 @njit(cache=True)
-def _gains(directions, azimuth_table, elevation_table):
+def gains(directions, azimuth_table, elevation_table):
     out = np.empty(len(directions))
     for i in range(len(directions)):
         out[i] = amplitude_gain(

@@ -1,19 +1,17 @@
 """World-anchored point scatterers: what stands for the diffuse echo of every surface.
 
-They are drawn once, when the scene is built, each with its place, normal, area and random phase. So speckle is a
-property of the world: it stays coherent while the sensor moves over it, as on a real wall.
+Each has its place, normal, cross section and random phase in the world. So speckle is a property of the world: it stays
+coherent while the sensor moves over it, as on a real wall. `Surface` draws those of a scene.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
-from radarsim.scene.scene import Scene
+from radarsim.physics.lobes import LAMBERT
 
-#: Scatterers per square metre: about ten per range-azimuth cell of the `radarize` preset on a wall 2 m away.
-DENSITY = 150.0
-#: Of a sampled surface every n-th scatterer is seen over mirrors.
+#: Of a sampled surface every n-th scatterer is seen over mirrors, and of those every n-th over two of them.
 BOUNCE_STRIDE = 4
 
 
@@ -24,12 +22,15 @@ class Scatterers:
     Attributes:
         position: m.
         normal: unit outward normal, or zero for an isotropic scatterer.
-        sigma: radar cross section at normal incidence, m^2 (sigma0 times the area it stands for).
+        sigma: sigma0 times the area it stands for, m^2; an isotropic scatterer's radar cross section.
         phase: rad, uniformly random.
         two_sided: whether it scatters from behind as well (sheets without a volume).
         horizontal: whether it belongs to a floor or ceiling.
-        bounces: weight of its power in paths over mirrors. Ghosts are many and weak, so of a sampled surface only
+        bounces: weight of its power in paths over one mirror. Ghosts are many and weak, so of a sampled surface only
             every fourth scatterer has them, with four times the power.
+        bounces_twice: the same for paths over two mirrors or more: every sixteenth, with sixteen times the power.
+        lobe: its scattering pattern, see `lobes.weights`.
+        rank: 0...1, which decides from how far it is used, see `detail`; negative: from everywhere.
     """
 
     position: Float[np.ndarray, "scatterer 3"]
@@ -39,6 +40,9 @@ class Scatterers:
     two_sided: np.ndarray
     horizontal: np.ndarray
     bounces: Float[np.ndarray, "scatterer"]
+    bounces_twice: Float[np.ndarray, "scatterer"]
+    lobe: Float[np.ndarray, "scatterer 4"]
+    rank: Float[np.ndarray, "scatterer"]
 
     def __len__(self) -> int:
         return len(self.position)
@@ -62,39 +66,11 @@ class Scatterers:
             zeros,
             zeros,
             np.ones(n),
+            np.ones(n),
+            np.tile(LAMBERT, (n, 1)),
+            np.full(n, -1.0),
         )
 
-    @classmethod
-    def sample(cls, scene: Scene, rng: np.random.Generator, density: float = DENSITY) -> "Scatterers":
-        """Scatterers on all surfaces of a scene, `density` per square metre.
-
-        Each object's surface is cut into equal areas along its faces and gets one scatterer in each (systematic
-        sampling), which keeps the density even without a lattice. An object with sigma0 = 0 gets none.
-        """
-        parts = [_on_object(item, rng, density) for item in scene.objects if item.material.sigma0 > 0]
-        parts = [p for p in parts if len(p)]
-        if not parts:
-            return cls.points(np.zeros((0, 3)), np.zeros(0))
-        return cls(*(np.concatenate([getattr(p, name) for p in parts]) for name in cls.__dataclass_fields__))
-
-
-def _on_object(item, rng: np.random.Generator, density: float) -> Scatterers:
-    mesh = item.mesh
-    areas = mesh.area_faces
-    total = areas.sum()
-    count = int(np.floor(total * density + rng.random()))
-    along = (np.arange(count) + rng.random(count)) / max(count, 1) * total
-    faces: Int[np.ndarray, n] = np.minimum(np.searchsorted(np.cumsum(areas), along), len(areas) - 1)
-    r1, r2 = np.sqrt(rng.random(count)), rng.random(count)
-    a, b, c = np.moveaxis(mesh.triangles[faces], 1, 0)
-    position = (1 - r1)[:, None] * a + (r1 * (1 - r2))[:, None] * b + (r1 * r2)[:, None] * c
-    normal = mesh.face_normals[faces]
-    return Scatterers(
-        position,
-        normal,
-        np.full(count, item.material.sigma0 * total / max(count, 1)),
-        rng.uniform(0, 2 * np.pi, count),
-        np.full(count, item.two_sided),
-        np.full(count, item.is_floor_or_ceiling),
-        np.where(np.arange(count) % BOUNCE_STRIDE == 0, float(BOUNCE_STRIDE), 0.0),
-    )
+    def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> "Scatterers":
+        """All of them: a given set is taken as it is, a `Surface` draws what is needed."""
+        return self

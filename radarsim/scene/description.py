@@ -44,13 +44,16 @@ class Custom(_Strict):
     conductivity: Annotated[float, Field(ge=0)] = 0.0  # S/m
     conductor: bool = False
     roughness: Annotated[float, Field(ge=0)] = 0.0  # RMS height, m
-    sigma0_db: float = -60.0  # diffuse backscatter at normal incidence, dB m^2/m^2
+    sigma0_db: float = -60.0  # four times the share of power scattered diffusely, dB
+    directive: Annotated[float, Field(ge=0, le=0.5)] = 0.0  # shares of it in lobes, see Material
+    backscatter: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     thickness: Length | None = None
 
     def material(self, name: str) -> Material:
         law = None if self.conductor else constant(self.permittivity, self.conductivity)
         sigma0 = decibel(self.sigma0_db)
-        return Material(name, law, self.roughness, sigma0, self.thickness, source="scene file")
+        lobes = {"directive": self.directive, "backscatter": self.backscatter}
+        return Material(name, law, self.roughness, sigma0, self.thickness, source="scene file", **lobes)
 
 
 class CustomMaterial(_Strict):

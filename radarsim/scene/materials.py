@@ -5,11 +5,17 @@ gives eps' = a f^b and sigma = c f^d (f in GHz) with bands of validity, read fro
 lies outside every band (brick, plywood, marble, vinyl, carpet, asphalt, acrylic) see `itu_permittivity`.
 
 Reflection and the diffuse floor share one energy budget. Roughness takes the factor
-rho = exp(-8 (pi sigma_h cos(theta) / lambda)^2) from the coherent amplitude, and what it takes comes back as Lambertian
-scattering of backscatter coefficient 4 (1 - rho^2) |Gamma|^2 cos^2(theta) (effective roughness, Degli-Esposti et al.,
-IEEE TAP 55(1), 2007). The table's `sigma0` at normal incidence are these values rounded, and a few dB less for coarse
-or porous surfaces (carpet, fabric, mineral fibre, asphalt), which absorb part of what they take. RMS heights are
-estimates for common finishes; expect sigma0 within some 5 dB of a given real wall.
+rho = exp(-8 (pi sigma_h cos(theta) / lambda)^2) from the coherent amplitude, and what it takes comes back as diffuse
+scattering, sigma0 = 4 (1 - rho^2) |Gamma|^2: the backscatter coefficient at normal incidence were it all Lambertian
+(effective roughness, Degli-Esposti et al., IEEE TAP 55(1), 2007). The table's `sigma0` are these values rounded, and a
+few dB less for coarse or porous surfaces (carpet, fabric, mineral fibre, asphalt), which absorb part of what they take.
+RMS heights are estimates for common finishes; expect sigma0 within some 5 dB of a given real wall.
+
+Lobes share out the same power (`radarsim.physics.lobes`). Plain surfaces, whose roughness is gentle, scatter about the
+specular direction; the paper's measured walls ask for such a lobe, of exponent 4. Masonry and aggregate have joints and
+pits that face the source and throw more back; cloth, fibre and foam are volumes and follow Lambert. The shares
+(`_LOBES`) are estimates; against Lambert they raise backscatter by 1.5 dB at normal incidence and lower it by as much
+at grazing.
 """
 
 from collections.abc import Callable
@@ -34,11 +40,14 @@ class Material:
         permittivity: relative permittivity: a name in ITU-R P.2040, a function of the frequency in Hz that returns it
             (e^{+jwt}: negative imaginary part), or None for a perfect conductor.
         roughness: RMS height sigma_h of the surface, m.
-        sigma0: diffuse backscatter cross-section per area at normal incidence, linear m^2/m^2, without the coherent
-            part; falls off as cos^2 of the incidence angle (Lambert).
+        sigma0: four times the share of power scattered diffusely, linear m^2/m^2: without lobes the backscatter cross
+            section per area at normal incidence, falling off as cos^2 of the incidence angle (Lambert).
         thickness: of a thin slab that waves pass (a pane, one board of a drywall), m; None: opaque half space.
         color: RGB in 0...1 for pictures.
         source: where the numbers come from.
+        directive, backscatter: shares of the diffuse power in the lobes about the specular direction and back to the
+            source; the rest is Lambertian.
+        lobe_exponent: alpha of both lobes.
     """
 
     name: str
@@ -48,6 +57,9 @@ class Material:
     thickness: float | None = None
     color: tuple[float, float, float] = (0.6, 0.6, 0.6)
     source: str = ""
+    directive: float = 0.0
+    backscatter: float = 0.0
+    lobe_exponent: float = 4.0
 
     @property
     def conductor(self) -> bool:
@@ -199,8 +211,14 @@ _TABLE = {
     "metal": (None, 0.02e-3, -22, None, (0.45, 0.48, 0.53), "perfect conductor; roughness of painted sheet"),
 }
 
+#: Directive and backscatter shares of the diffuse power; none: Lambert.
+_LOBES = dict.fromkeys(
+    ["concrete", "plasterboard", "wood", "plywood", "chipboard", "floorboard", "glass", "marble", "vinyl", "acrylic",
+     "metal"], (0.4, 0.1),
+) | dict.fromkeys(["brick", "asphalt"], (0.2, 0.3))  # fmt: skip
+
 MATERIALS: dict[str, Material] = {
-    name: Material(name, eps, rms, decibel(db), thickness, color, source)
+    name: Material(name, eps, rms, decibel(db), thickness, color, source, *_LOBES.get(name, (0.0, 0.0)))
     for name, (eps, rms, db, thickness, color, source) in _TABLE.items()
 }
 

@@ -10,6 +10,7 @@ from radarsim.physics.antenna import amplitude_gain, gain_tables
 from radarsim.physics.echoes import EchoFinder, Provenance
 from radarsim.physics.facets import Facets
 from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
 from radarsim.scene.shapes import rectangle
@@ -72,7 +73,7 @@ def test_polarisation_of_the_bounce(corner):
 
 def test_the_hidden_are_not_seen(corner):
     """Scatterers of the board behind the box give no direct echo; those beside the box do."""
-    scatterers = Scatterers.sample(corner, np.random.default_rng(0), density=400.0)
+    scatterers = Surface(corner, np.random.default_rng(0), density=400.0).all()
     echoes = EchoFinder(corner, scatterers, None, CONFIG)(HERE, AHEAD)
     seen = echoes.points[:, 0]
     board = scatterers.position[np.abs(scatterers.position[:, 0] - 3.5) < 1e-9]
@@ -87,7 +88,7 @@ def test_the_hidden_are_not_seen(corner):
 
 def test_reciprocity(corner):
     """Swapping the legs of every echo, that is TX and RX, leaves the set of echoes as it was."""
-    scatterers = Scatterers.sample(corner, np.random.default_rng(1), density=100.0)
+    scatterers = Surface(corner, np.random.default_rng(1), density=100.0).all()
     echoes = EchoFinder(corner, scatterers, Facets.of(corner, CONFIG), CONFIG)(HERE, AHEAD)
     assert len(echoes.of(Provenance.GHOST_1)) > 50
     key = np.concatenate([echoes.points.reshape(-1, 6), echoes.amplitude[: len(echoes.points), None].view(float)], 1)
@@ -97,7 +98,7 @@ def test_reciprocity(corner):
 
 def test_speckle_is_the_same_world_from_elsewhere(corner):
     """After a shift of d the field equals that of the same frozen scatterers: nothing is drawn anew."""
-    scatterers = Scatterers.sample(corner, np.random.default_rng(2), density=150.0)
+    scatterers = Surface(corner, np.random.default_rng(2), density=150.0).all()
     finder = EchoFinder(corner, scatterers, None, CONFIG)
     reference = finder(HERE, AHEAD)
     for shift in (1e-4, 5e-4, 2e-3, 1e-2):
@@ -136,7 +137,7 @@ def test_power_does_not_depend_on_the_number_of_scatterers(corner):
     for density in (150.0, 300.0):
         power = []
         for seed in range(8):
-            scatterers = Scatterers.sample(corner, np.random.default_rng(seed), density)
+            scatterers = Surface(corner, np.random.default_rng(seed), density).all()
             echoes = EchoFinder(corner, scatterers, None, CONFIG)(HERE, AHEAD)
             power.append(np.sum(np.abs(echoes.amplitude) ** 2))
         levels.append(10 * np.log10(np.mean(power)))

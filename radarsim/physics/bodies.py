@@ -1,0 +1,80 @@
+"""Spheres and cylinders in a tessellated mesh, known by their normals and corners.
+
+As plates, the facets of a pipe or a lamp would flash one after the other; as a round body it has one steady echo. Only
+whole bodies count: closed spheres, and cylinders that go all the way round, with caps or without.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from jaxtyping import Bool, Float, Int
+
+#: A prism with at least this many sides stands for a cylinder.
+FEWEST_SIDES = 8
+#: Corners lie on the round surface within this share of its radius.
+ROUND = 0.02
+
+
+@dataclass(frozen=True)
+class RoundBody:
+    """A sphere (axis zero, half zero) or a cylinder about an axis, `half` its half length, m."""
+
+    center: Float[np.ndarray, "3"]
+    axis: Float[np.ndarray, "3"]
+    radius: float
+    half: float
+
+
+def recognise(mesh: trimesh.Trimesh) -> tuple[list[RoundBody], Bool[np.ndarray, "face"]]:
+    """Round bodies of a mesh, and which of its faces are their round sides."""
+    bodies, taken = [], np.zeros(len(mesh.faces), bool)
+    for faces in trimesh.graph.connected_components(mesh.face_adjacency, nodes=np.arange(len(mesh.faces)), min_len=8):
+        body, sides = _sphere(mesh, faces) or _cylinder(mesh, faces) or (None, None)
+        if body is not None:
+            bodies.append(body)
+            taken[sides] = True
+    return bodies, taken
+
+
+def _sphere(mesh, faces: Int[np.ndarray, "face"]):
+    corners = mesh.vertices[np.unique(mesh.faces[faces])]
+    center, radius = _round(corners)
+    outward = mesh.triangles_center[faces] - center
+    facing = np.einsum("fd,fd->f", outward, mesh.face_normals[faces]) > 0.9 * np.linalg.norm(outward, axis=1)
+    even = np.abs(np.linalg.norm(corners - center, axis=1) - radius).max() < ROUND * radius
+    covers = mesh.area_faces[faces].sum() > 0.85 * 4 * np.pi * radius**2
+    return (RoundBody(center, np.zeros(3), radius, 0.0), faces) if even and covers and facing.all() else None
+
+
+def _cylinder(mesh, faces: Int[np.ndarray, "face"]):
+    normals, areas = mesh.face_normals[faces], mesh.area_faces[faces]
+    for axis in np.linalg.eigh((normals * areas[:, None]).T @ normals)[1].T:
+        tilt = np.abs(normals @ axis)
+        sides = tilt < 0.01
+        if not np.all(sides | (tilt > 0.999)) or sides.sum() < FEWEST_SIDES:
+            continue
+        corners = mesh.vertices[np.unique(mesh.faces[faces[sides]])]
+        u = np.linalg.svd(axis[None])[2][1:]
+        center, radius = _round(corners @ u.T)
+        apart = corners @ u.T - center
+        if np.abs(np.linalg.norm(apart, axis=1) - radius).max() > ROUND * radius:
+            continue
+        outward = mesh.triangles_center[faces[sides]] @ u.T - center
+        angles = np.sort(np.arctan2(outward[:, 1], outward[:, 0]))
+        gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
+        convex = np.all(np.einsum("fd,fd->f", outward, normals[sides] @ u.T) > 0)
+        if not convex or gaps.max() > 2 * np.pi / FEWEST_SIDES * 1.01:
+            continue
+        z = corners @ axis
+        middle = center @ u + axis * (z.max() + z.min()) / 2
+        return RoundBody(middle, axis, radius, np.ptp(z) / 2), faces[sides]
+    return None
+
+
+def _round(points: Float[np.ndarray, "n d"]) -> tuple[Float[np.ndarray, "d"], float]:
+    """Center and radius of the circle or sphere through points: |p|^2 = 2 p . c + (r^2 - |c|^2), least squares."""
+    middle = points.mean(axis=0)
+    p = points - middle
+    solved = np.linalg.lstsq(np.column_stack([2 * p, np.ones(len(p))]), np.sum(p * p, axis=1), 1e-9)[0]
+    return middle + solved[:-1], float(np.sqrt(max(solved[-1] + solved[:-1] @ solved[:-1], 0.0)))

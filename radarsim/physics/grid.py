@@ -1,0 +1,43 @@
+"""A hash grid: which of many boxes are near, at a cost that does not grow with the world."""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+
+class Grid:
+    """Axis-aligned boxes by the cells of space that they reach into.
+
+    Args:
+        low, high: corners, m.
+        cell: edge of a cell, m.
+    """
+
+    def __init__(self, low: Float[np.ndarray, "box 3"], high: Float[np.ndarray, "box 3"], cell: float = 4.0):
+        self.low, self.high, self.cell = low, high, cell
+        self._boxes: dict[tuple[int, int, int], list[int]] = {}
+        first, last = np.floor(low / cell).astype(int), np.floor(high / cell).astype(int)
+        for box, (a, b) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
+            for key in _cells(a, b):
+                self._boxes.setdefault(key, []).append(box)
+
+    def near(
+        self, positions: Float[np.ndarray, "position 3"], reach: float
+    ) -> tuple[Int[np.ndarray, "near"], Float[np.ndarray, "near"]]:
+        """Boxes within `reach` (m) of any position, in ascending order, and their distance to the nearest one."""
+        positions = np.atleast_2d(positions)
+        first, last = (np.floor((positions + s * reach) / self.cell).astype(int).tolist() for s in (-1, 1))
+        keys = {key for a, b in zip(first, last, strict=True) for key in _cells(a, b)}
+        found = np.unique([box for key in keys for box in self._boxes.get(key, ())]).astype(int)
+        outside = np.maximum(self.low[found] - positions[:, None], positions[:, None] - self.high[found])
+        distance = np.linalg.norm(np.maximum(outside, 0), axis=2).min(axis=0, initial=np.inf)
+        keep = distance <= reach
+        return found[keep], distance[keep]
+
+
+def _cells(first, last):
+    return [
+        (i, j, k)
+        for i in range(first[0], last[0] + 1)
+        for j in range(first[1], last[1] + 1)
+        for k in range(first[2], last[2] + 1)
+    ]

@@ -1,0 +1,208 @@
+"""Flat regions of a mesh, scanned and noisy ones included, and the rectangles that cover them.
+
+A scanned wall is thousands of triangles that lie a millimetre off and a few degrees askew. Each by itself would be a
+mirror that points somewhere else, and the wall would sparkle. So triangles join their neighbours as long as they stay
+near one plane, and the region echoes as that plane. What is left over, the distance of the corners from the plane, is
+an artefact of scanning (half a millimetre RMS would cost 11 dB as roughness), and not told apart from true roughness
+by its size; true roughness is the material's, so the residual is left out of the response altogether. Regions that
+bend within a Fresnel zone are no planes: of them only the exactly flat parts count.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+import trimesh
+from jaxtyping import Bool, Float, Int
+from numba import njit
+
+#: Corners of a region's triangles are within this of its plane, m: six times the 0.5 mm RMS of a good scan.
+OFFSET = 3e-3
+#: Normals of a region's triangles are within this of its normal, cosine of 12 deg: below the step of a 24-sided column.
+ASKEW = np.cos(np.deg2rad(12))
+#: A region whose radius of curvature is below this bends by more than lambda / 8 in a Fresnel zone at 2 m, m.
+STRAIGHT = 2.0
+#: A rectangle fills this share of the bounding rectangle of its region; other regions are cut into strips.
+SMALLEST_FILL = 0.97
+#: Thickness of strips along slanted edges, m: below a Fresnel zone's width.
+STRIP = 0.05
+
+
+@dataclass(frozen=True)
+class Rectangle:
+    """A flat rectangle: center, unit normal, unit directions of its sides, half lengths along them (m)."""
+
+    center: Float[np.ndarray, "3"]
+    normal: Float[np.ndarray, "3"]
+    u: Float[np.ndarray, "3"]
+    v: Float[np.ndarray, "3"]
+    half: Float[np.ndarray, "2"]
+
+
+def rectangles(mesh: trimesh.Trimesh, among: Bool[np.ndarray, "face"], smallest: float) -> list[Rectangle]:
+    """Rectangles that cover the flat regions of a mesh.
+
+    Args:
+        mesh: triangles that share corners where they join.
+        among: which triangles to take.
+        smallest: regions of less area are left out, m^2.
+    """
+    found = []
+    if not among.all():
+        mesh = trimesh.Trimesh(mesh.vertices, mesh.faces[among], process=False)
+    for faces in regions(mesh):
+        if mesh.area_faces[faces].sum() >= smallest:
+            found += _cover(mesh, faces)
+    return found
+
+
+def regions(mesh: trimesh.Trimesh) -> list[Int[np.ndarray, "face"]]:
+    """Groups of neighbouring triangles near one plane, by their numbers, those with the largest triangles first."""
+    pairs = np.concatenate([mesh.face_adjacency, mesh.face_adjacency[:, ::-1]])
+    pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
+    first = np.searchsorted(pairs[:, 0], np.arange(len(mesh.faces) + 1))
+    seeds = np.argsort(-mesh.area_faces.round(9), kind="stable")
+    label = _grow(
+        seeds, first, np.ascontiguousarray(pairs[:, 1]), np.ascontiguousarray(mesh.triangles),
+        np.ascontiguousarray(mesh.face_normals), np.ascontiguousarray(mesh.area_faces),
+    )  # fmt: skip
+    order = np.argsort(label, kind="stable")
+    groups = np.split(order, np.flatnonzero(np.diff(label[order])) + 1)
+    return [part for faces in groups for part in (_flat_parts(mesh, faces) if _bends(mesh, faces) else [faces])]
+
+
+@njit(cache=True)
+def _grow(seeds, first, neighbours, triangles, normals, areas):
+    """Region number of each triangle. A region's plane is the mean of its triangles so far, weighted by area."""
+    label = np.full(len(triangles), -1)
+    queue = np.empty(len(triangles), np.int64)
+    regions = 0
+    for seed in seeds:
+        if label[seed] >= 0:
+            continue
+        label[seed] = regions
+        queue[0], head, tail = seed, 0, 1
+        normal, moment, area = normals[seed] * areas[seed], np.zeros(3), 0.0
+        while head < tail:
+            face = queue[head]
+            head += 1
+            area += areas[face]
+            for corner in range(3):
+                moment += triangles[face, corner] * (areas[face] / 3)
+            if face != seed:
+                normal += normals[face] * areas[face]
+            n = normal / (np.sqrt(np.dot(normal, normal)) + 1e-300)
+            level = np.dot(n, moment) / max(area, 1e-300)
+            for other in neighbours[first[face] : first[face + 1]]:
+                if label[other] >= 0 or np.dot(normals[other], n) < ASKEW:
+                    continue
+                near = True
+                for corner in range(3):
+                    near &= abs(np.dot(triangles[other, corner], n) - level) < OFFSET
+                if near:
+                    label[other] = regions
+                    queue[tail] = other
+                    tail += 1
+        regions += 1
+    return label
+
+
+def _plane(mesh, faces) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Unit normal of a region and a point on its plane: means over its area."""
+    area = mesh.area_faces[faces][:, None]
+    normal = (area * mesh.face_normals[faces]).sum(axis=0)
+    return normal / np.linalg.norm(normal), (area * mesh.triangles_center[faces]).sum(axis=0) / area.sum()
+
+
+def _frame(normal: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2 3"]:
+    """Two directions in the plane, the first one horizontal where it can be."""
+    u = np.cross([0.0, 0.0, 1.0], normal)
+    u = np.array([1.0, 0.0, 0.0]) if np.linalg.norm(u) < 1e-6 else u / np.linalg.norm(u)
+    return np.stack([u, np.cross(normal, u)])
+
+
+def _bends(mesh, faces) -> bool:
+    """Whether a paraboloid through the corners of a region has a curvature that a radar would notice."""
+    corners = np.unique(mesh.faces[faces])
+    if len(corners) < 7:
+        return False
+    normal, center = _plane(mesh, faces)
+    offset = mesh.vertices[corners] - center
+    height = offset @ normal
+    if np.abs(height).max() < 1e-4:
+        return False
+    a, b = offset @ _frame(normal).T[:, 0], offset @ _frame(normal).T[:, 1]
+    scale = max(np.ptp(a), np.ptp(b))
+    a, b = a / scale, b / scale
+    _, _, _, aa, ab, bb = np.linalg.lstsq(np.stack([np.ones_like(a), a, b, a * a, a * b, b * b], 1), height, 1e-9)[0]
+    curvature = np.abs(np.linalg.eigvalsh([[2 * aa, ab], [ab, 2 * bb]])).max() / scale**2
+    return bool(curvature * STRAIGHT > 1)
+
+
+def _flat_parts(mesh, faces) -> list[Int[np.ndarray, "face"]]:
+    """The exactly coplanar groups of triangles of a region, and its other triangles one by one."""
+    inside = set(faces.tolist())
+    groups = [np.array(group) for group in mesh.facets if inside.issuperset(group.tolist())]
+    return groups + [np.array([face]) for face in sorted(inside.difference(*(g.tolist() for g in groups)))]
+
+
+def _cover(mesh, faces) -> list[Rectangle]:
+    """The rectangle that a region is, or strips that add up to its area."""
+    normal, center = _plane(mesh, faces)
+    axes = _frame(normal)
+    flat = (mesh.triangles[faces] - center) @ axes.T
+    outline = shapely.minimum_rotated_rectangle(shapely.MultiPoint(flat.reshape(-1, 2)))
+    corners = shapely.get_coordinates(outline)
+    sides = np.diff(corners[:3], axis=0)
+    lengths = np.linalg.norm(sides, axis=1)
+    if len(corners) < 5 or lengths.min() < 1e-6:
+        return []
+    turn = sides[0] / lengths[0]
+    turn = np.array([turn, [-turn[1], turn[0]]])
+    area = mesh.area_faces[faces].sum()
+    if area >= SMALLEST_FILL * lengths.prod():
+        boxes = [(*(corners @ turn.T).min(axis=0), *(corners @ turn.T).max(axis=0))]
+    else:
+        region = shapely.union_all(shapely.polygons(flat @ turn.T), grid_size=1e-6)
+        boxes = strips(shapely.simplify(region, OFFSET))
+    u, v = turn @ axes
+    return [
+        Rectangle(
+            center + (x0 + x1) / 2 * u + (y0 + y1) / 2 * v, normal, u, v, np.array([x1 - x0, y1 - y0]) / 2
+        )
+        for x0, y0, x1, y1 in boxes
+    ]  # fmt: skip
+
+
+def strips(region: shapely.Geometry) -> list[tuple[float, float, float, float]]:
+    """Disjoint rectangles x0 y0 x1 y1 of the area of a region, holes respected, along x or y, whichever takes fewer.
+
+    Cuts run through all corners, so a region with right angles only is covered exactly; along slanted or round edges
+    the rectangles are stairs of `STRIP` high through the middles of the steps.
+    """
+    along_x = _strips(region)
+    along_y = [(x0, y0, x1, y1) for y0, x0, y1, x1 in _strips(shapely.transform(region, lambda xy: xy[:, ::-1]))]
+    return min(along_x, along_y, key=len)
+
+
+def _strips(region) -> list[tuple[float, float, float, float]]:
+    levels = np.sort(shapely.get_coordinates(region)[:, 1])
+    levels = levels[np.diff(levels, prepend=-np.inf) > 1e-6]
+    found = []
+    for low, high in zip(levels[:-1], levels[1:], strict=True):
+        margin = min(1e-6, (high - low) / 10)
+        below, above = _crossings(region, low + margin), _crossings(region, high - margin)
+        slant = np.max(np.abs(below - above)) if below.shape == above.shape and len(below) else STRIP
+        steps = int(np.ceil((high - low) / STRIP)) if slant > OFFSET else 1
+        edges = np.linspace(low, high, steps + 1)
+        for y0, y1 in zip(edges[:-1], edges[1:], strict=True):
+            found += [(x0, y0, x1, y1) for x0, x1 in _crossings(region, (y0 + y1) / 2)]
+    return found
+
+
+def _crossings(region, y: float) -> Float[np.ndarray, "interval 2"]:
+    """Intervals of x in which a region is crossed by a line of constant y."""
+    x0, _, x1, _ = region.bounds
+    cut = shapely.intersection(region, shapely.LineString([(x0 - 1, y), (x1 + 1, y)]))
+    intervals = [np.sort(shapely.get_coordinates(part)[:, 0])[[0, -1]] for part in shapely.get_parts(cut)]
+    return np.array(sorted(i.tolist() for i in intervals if i[1] - i[0] > OFFSET)).reshape(-1, 2)

@@ -13,6 +13,7 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.recording import Product, RecordingWriter, Stream
 from radarsim.motion import Motion, motion_from_tum, plan_motion
+from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
 from radarsim.physics.direct import DirectSum
 from radarsim.physics.echoes import Echoes, EchoFinder, Provenance
@@ -42,18 +43,18 @@ class Simulator:
         self, scene: Scene, motion: Motion, config: RadarConfig, rng: np.random.Generator, device: str = "cpu"
     ):
         self.motion, self.config = motion, config
-        world, self._noise = rng.spawn(2)
+        world, crowd, self._noise = rng.spawn(3)
         self.front_end = FrontEnd(config)
         self.finder = EchoFinder(
             scene, Surface(scene, world), Facets.of(scene, config), config, self.front_end.weakest,
-            curved=Curved.of(scene, config),
+            curved=Curved.of(scene, config), crowd=Crowd(scene.movers, crowd),
         )  # fmt: skip
         self.synthesize = Synthesizer(config) if device == "cpu" else DirectSum(config, device)
 
     def echoes(self, times: Float[np.ndarray, "frame"]) -> list[Echoes]:
         """Echoes of the frames that start at `times` (s), found at the middle of each burst."""
         middle = np.asarray(times) + self.config.burst_center
-        return self.finder.batch(self.motion.position(middle), self.motion.rotation(middle).as_matrix())
+        return self.finder.batch(self.motion.position(middle), self.motion.rotation(middle).as_matrix(), middle)
 
     def frames(
         self, times: Float[np.ndarray, "frame"]

@@ -8,7 +8,7 @@ physical-optics integral over a rectangle) and chains of two and three mirrors (
 antenna and instant while amplitudes and visibility are taken once per frame, at the middle of the burst.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import IntEnum
 
 import numpy as np
@@ -19,6 +19,7 @@ from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarsim.physics import chains, plates
 from radarsim.physics.antenna import gain_tables
+from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
 from radarsim.physics.detail import details
 from radarsim.physics.facets import Facets
@@ -27,7 +28,7 @@ from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.slabs import Slabs
 from radarsim.physics.surface import Surface
-from radarsim.physics.synthesis import BurstClock, parabolas
+from radarsim.physics.synthesis import NODES, BurstClock, parabolas
 from radarsim.scene.scene import Scene
 
 #: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
@@ -48,10 +49,11 @@ class Provenance(IntEnum):
 
 @dataclass(frozen=True)
 class Echoes:
-    """The echoes of a frame, points first, then images.
+    """The echoes of a frame, points first, those of movers last among them, then images.
 
     Attributes:
-        points: a and b of point echoes, world, m.
+        points: a and b of point echoes, world, m, at the middle of the burst.
+        moves: of the last points, how far a and b have moved at the burst's three nodes (`synthesis.NODES`), m.
         images: 3 x 4 isometries (matrix | offset) of the receiver, world.
         amplitude: square root of received over transmitted power, with phase, as in the beat signal.
         provenance: a `Provenance` each.
@@ -61,6 +63,7 @@ class Echoes:
     images: Float[np.ndarray, "image 3 4"]
     amplitude: Complex[np.ndarray, "echo"]
     provenance: UInt8[np.ndarray, "echo"]
+    moves: Float[np.ndarray, "moving 2 3 3"] = field(default_factory=lambda: np.zeros((0, 2, 3, 3)))
 
     def __len__(self) -> int:
         return len(self.amplitude)
@@ -69,7 +72,13 @@ class Echoes:
         """The echoes of one cause."""
         keep = self.provenance == provenance
         n = len(self.points)
-        return Echoes(self.points[keep[:n]], self.images[keep[n:]], self.amplitude[keep], self.provenance[keep])
+        return Echoes(
+            self.points[keep[:n]],
+            self.images[keep[n:]],
+            self.amplitude[keep],
+            self.provenance[keep],
+            self.moves[keep[n - len(self.moves) : n]],
+        )
 
     def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "echo virtual 3"]:
         """Path length of each echo and virtual antenna over the burst of the frame that starts at `time`.
@@ -87,23 +96,27 @@ class Echoes:
         tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1)
         rx = position[:, None] + rx_positions(config) @ rotation.transpose(0, 2, 1)
         values = np.empty((len(self), tx.shape[1] * rx.shape[1], 3))
-        _point_lengths(self.points, tx, rx, values)
+        _point_lengths(self.points, self.moves, tx, rx, values)
         _image_lengths(self.images, tx, rx, values[len(self.points) :])
         return parabolas(values)
 
 
 @njit(parallel=True, cache=True)
-def _point_lengths(points, tx, rx, out):
+def _point_lengths(points, moves, tx, rx, out):
     nodes, n_tx, _ = tx.shape
     n_rx = rx.shape[1]
+    still = len(points) - len(moves)
     for e in prange(len(points)):
         back = np.empty(n_rx)
+        a, b = points[e, 0].copy(), points[e, 1].copy()
         for i in range(nodes):
+            if e >= still:
+                a, b = points[e, 0] + moves[e - still, 0, i], points[e, 1] + moves[e - still, 1, i]
             for r in range(n_rx):
-                d = points[e, 1] - rx[i, r]
+                d = b - rx[i, r]
                 back[r] = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
             for k in range(n_tx):
-                d = points[e, 0] - tx[i, k]
+                d = a - tx[i, k]
                 there = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
                 for r in range(n_rx):
                     out[e, k * n_rx + r, i] = there + back[r]
@@ -137,6 +150,7 @@ class EchoFinder:
         weakest: echoes below this amplitude are left out.
         reach: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
         curved: round bodies.
+        crowd: what moves by itself.
     """
 
     def __init__(
@@ -148,22 +162,34 @@ class EchoFinder:
         weakest: float = 0.0,
         reach: float | None = None,
         curved: Curved | None = None,
+        crowd: Crowd | None = None,
     ):
         self.scene, self.surface, self.facets, self.config = scene, surface, facets, config
-        self.weakest, self.curved = weakest, curved
+        self.weakest, self.curved, self.crowd = weakest, curved, crowd
         self.reach = 1.05 * config.max_range if reach is None else reach
         self.mirrors = None if facets is None or not len(facets) else Mirrors.of(facets, scene, self.reach)
         self.slabs = None if scene is None else Slabs(scene, config, CLEARANCE)
         self._tables = gain_tables()
 
-    def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Echoes:
-        """Echoes for one sensor pose (rotation: sensor to world)."""
-        return self.batch(np.asarray(position)[None], np.asarray(rotation)[None])[0]
+    def __call__(
+        self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"], time: float = 0.0
+    ) -> Echoes:
+        """Echoes for one sensor pose (rotation: sensor to world) in the middle of a burst at `time`, s."""
+        return self.batch(np.asarray(position)[None], np.asarray(rotation)[None], np.array([time]))[0]
 
-    def batch(self, positions: Float[np.ndarray, "frame 3"], rotations: Float[np.ndarray, "frame 3 3"]) -> list[Echoes]:
-        """Echoes of several frames: one after the other, but for the ray tests, which are quicker in large numbers."""
+    def batch(
+        self,
+        positions: Float[np.ndarray, "frame 3"],
+        rotations: Float[np.ndarray, "frame 3 3"],
+        times: Float[np.ndarray, "frame"],
+    ) -> list[Echoes]:
+        """Echoes of several frames: one after the other, but for the ray tests, which are quicker in large numbers.
+
+        Args:
+            positions, rotations, times: of the sensor in the middle of each burst; m, sensor to world, s.
+        """
         positions, rotations = np.asarray(positions, float), np.asarray(rotations, float)
-        s = self.scatterers = self.surface.near(positions, self.reach)
+        s = self.scatterers = self._with_movers(self.surface.near(positions, self.reach), times)
         # of power in echoes with 0, 1, and 2 or more mirrors and slabs on the way
         self._weights = np.stack([np.ones(len(s)), s.bounces, s.bounces_twice], axis=1)
         near = self._mirrors_in_sight(positions)
@@ -171,16 +197,47 @@ class EchoFinder:
         legs = Legs.joined([straight, hidden, self._over_mirrors(positions, rotations, straight, near)])
         return self._echoes(positions, legs, self._images(positions, rotations, near))
 
-    def _passages(self, origins, targets, up, allowed) -> tuple[np.ndarray, np.ndarray]:
+    def _with_movers(self, surface: Scatterers, times) -> Scatterers:
+        """The surface's scatterers and, once per frame, those of the movers where they are then."""
+        self._times, self._still = times, len(surface)
+        self._owner = np.full(len(surface), -1)  # the frame that a scatterer is for; -1: all
+        if self.crowd is None or not len(self.crowd):
+            return surface
+        self._owner = np.concatenate([self._owner, np.repeat(np.arange(len(times)), len(self.crowd))])
+        parts = [surface, *(self.crowd.scatterers(t) for t in times)]
+        return Scatterers(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Scatterers)))
+
+    def _meant_for(self, frame: int) -> np.ndarray:
+        return (self._owner < 0) | (self._owner == frame)
+
+    def _moves(self, legs: Legs, ends, scatterer, positions) -> Float[np.ndarray, "moving 2 3 3"]:
+        """How far the virtual points of movers' echoes are from where they are in the middle, at the burst's nodes."""
+        owner, carried = self._owner[scatterer], (scatterer - self._still) % max(len(self.crowd or ()), 1)
+        offsets = BurstClock.of(self.config).half * NODES
+        out = np.empty((len(ends), 2, 3, 3))
+        for frame in np.unique(owner):
+            rows = np.flatnonzero(owner == frame)
+            places = self.crowd.positions(self._times[frame] + np.append(offsets, 0.0))[:, carried[rows]]
+            moved = (places[:3] - places[3]).transpose(1, 0, 2)  # echo, node, axis
+            for way in (0, 1):
+                turn = legs[ends[rows, way]].turn(positions)
+                out[rows, way] = np.einsum("eij,enj->eni", turn, moved)
+        return out
+
+    def _passages(self, origins, targets, frame, rotations, allowed) -> tuple[np.ndarray, np.ndarray]:
         """What is left of waves between points, and their delay (m); slabs are looked for where `allowed`."""
         factor, delay = np.ones(len(targets), complex), np.zeros(len(targets))
-        if self.scene is None or not len(targets):
-            return factor, delay
-        blocked = self.scene.occluded(origins, targets, margin=CLEARANCE)
-        factor[blocked] = 0
-        through = np.flatnonzero(blocked & allowed)
-        if len(through):
-            factor[through], delay[through] = self.slabs.passage(origins[through], targets[through], up[through])
+        if self.scene is not None and len(targets):
+            blocked = self.scene.occluded(origins, targets, margin=CLEARANCE)
+            factor[blocked] = 0
+            through = np.flatnonzero(blocked & allowed)
+            if len(through):
+                up = rotations[frame[through], :, 2]
+                factor[through], delay[through] = self.slabs.passage(origins[through], targets[through], up)
+        if self.crowd is not None and len(self.crowd):
+            for k in np.unique(frame):
+                open_ = np.flatnonzero((frame == k) & (factor != 0))
+                factor[open_[self.crowd.occluded(origins[open_], targets[open_], self._times[k])]] = 0
         return factor, delay
 
     def _unhindered(self, legs: Legs, positions, rotations, allowed) -> Legs:
@@ -190,7 +247,7 @@ class EchoFinder:
         for k in range(1 + legs.bounces.max(initial=0)):
             now = kept[legs.bounces[kept] >= k]
             end = legs.stops[now, k]
-            factor, extra = self._passages(begin[now], end, rotations[legs.frame[now], :, 2], allowed[now])
+            factor, extra = self._passages(begin[now], end, legs.frame[now], rotations, allowed[now])
             amplitude[now] *= factor
             delay[now] += extra
             begin[now] = end
@@ -209,7 +266,7 @@ class EchoFinder:
                 s.position, s.normal, s.sigma, s.two_sided, s.lobe, s.rank, position, rotation, self.reach,
                 self.config.wavelength, *self._tables, leg, echo,
             )  # fmt: skip
-            index = np.flatnonzero(echo > self.weakest)
+            index = np.flatnonzero((echo > self.weakest) & self._meant_for(frame))
             parts.append(Legs.straight(frame, index, leg[index], s.position[index], position))
         legs = Legs.joined(parts)
         legs = self._unhindered(legs, positions, rotations, self._weights[legs.scatterer, 2] > 0)
@@ -243,7 +300,7 @@ class EchoFinder:
             other = np.zeros(len(s))  # the strongest leg that one over a mirror can be joined with
             other[seen.scatterer] = np.abs(seen.amplitude)
             distance = np.linalg.norm(s.position[thinned] - position, axis=1)
-            near_by = distance < self.reach
+            near_by = (distance < self.reach) & self._meant_for(frame)[thinned]
             index, distance = thinned[near_by], distance[near_by]
             # Hidden scatterers are seen over mirrors out and back, which is of second order: fewer of them do.
             keep = (other[index] > 0) | (self._weights[index, 2] > 0)
@@ -298,16 +355,18 @@ class EchoFinder:
             causes += [cause, np.where(chain[:, 2] < 0, Provenance.GHOST_2, Provenance.GHOST_3)]
             frames += [np.full(len(amplitude) + len(strength), frame)]
         frame, isometry, amplitude, stops, cause = map(np.concatenate, (frames, isometries, amplitudes, stops, causes))
-        up, begin = rotations[frame, :, 2], positions[frame]
+        begin = positions[frame]
         single = cause <= Provenance.FLOOR_CEILING
-        reached, delay = self._passages(begin, stops[:, 0], up, single & (np.abs(amplitude) > 10 * self.weakest))
+        reached, delay = self._passages(
+            begin, stops[:, 0], frame, rotations, single & (np.abs(amplitude) > 10 * self.weakest)
+        )
         slab = single & (reached != 1) & (reached != 0)
         amplitude[single] *= reached[single] ** 2  # there and back
         amplitude[~single] *= reached[~single]
         cause[slab] = Provenance.THROUGH_SLAB
         for a, b in ((stops[:, 0], stops[:, 1]), (stops[:, 1], stops[:, 2]), (stops[:, 2], begin)):
             rest = np.flatnonzero(~single & (amplitude != 0))
-            amplitude[rest] *= self._passages(a[rest], b[rest], up[rest], np.zeros(len(rest), bool))[0]
+            amplitude[rest] *= self._passages(a[rest], b[rest], frame[rest], rotations, np.zeros(len(rest), bool))[0]
         # A delay moves the receiver's image away.
         away = np.einsum("pij,pj->pi", isometry[:, :, :3], begin) + isometry[:, :, 3] - begin
         isometry[slab, :, 3] += (2 * delay[:, None] * away / np.linalg.norm(away, axis=1, keepdims=True))[slab]
@@ -328,12 +387,15 @@ class EchoFinder:
         cause = np.where(s.horizontal[scatterer], Provenance.FLOOR_CEILING, Provenance.DIRECT)
         cause = np.where(order > 0, Provenance.GHOST_1 - 1 + order, cause)
         cause = np.where(legs.slab[ends].any(axis=1), Provenance.THROUGH_SLAB, cause)
-        points = legs.virtual[ends]
+        moving = scatterer >= self._still
+        cause = np.where(moving, Provenance.MOVING, cause)
+        points, moves = legs.virtual[ends], self._moves(legs, ends[moving], scatterer[moving], positions)
+        first = np.concatenate([[0], np.cumsum(moving)])
         edges = np.searchsorted(legs.frame[ends[:, 0]], np.arange(len(positions) + 1))
         return [
             Echoes(
                 points[i:j], isometry, np.concatenate([amplitude[i:j], flashes]),
-                np.concatenate([cause[i:j], why]).astype(np.uint8),
+                np.concatenate([cause[i:j], why]).astype(np.uint8), moves[first[i] : first[j]],
             )
             for i, j, (isometry, flashes, why) in zip(edges, edges[1:], images, strict=False)
         ]  # fmt: skip

@@ -54,6 +54,21 @@ class Legs:
     def __getitem__(self, index) -> "Legs":
         return Legs(*(getattr(self, f.name)[index] for f in fields(self)))
 
+    def turn(self, positions: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "leg 3 3"]:
+        """How the virtual point moves when the scatterer does: the product of the mirrors' reflections.
+
+        A mirror's normal is along the difference of the directions before and after it.
+        """
+        way = np.diff(np.concatenate([positions[self.frame][:, None], self.stops], axis=1), axis=1)
+        way /= np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-12)
+        turn = np.tile(np.eye(3), (len(self), 1, 1))
+        for k in (0, 1):
+            normal = way[:, k + 1] - way[:, k]
+            normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+            normal[self.bounces <= k] = 0
+            turn = turn @ (np.eye(3) - 2 * normal[:, :, None] * normal[:, None])
+        return turn
+
     @classmethod
     def joined(cls, parts: list["Legs"]) -> "Legs":
         """All legs of several tables."""

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from jaxtyping import Bool, Float
-from numba import njit, prange
+from jaxtyping import Float
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.spatial.transform import Rotation
 
@@ -63,7 +62,7 @@ class Part:
         return point, normal
 
 
-class _Mover(BaseModel, ABC):
+class MovingThing(BaseModel, ABC):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[str, Field(min_length=1)]
@@ -79,7 +78,7 @@ class _Mover(BaseModel, ABC):
         """Rotation (part to world) and centre (m) of every part at times t, s."""
 
 
-class Person(_Mover):
+class Person(MovingThing):
     """Somebody who walks to and fro along a polyline, arms and legs swinging.
 
     Ten capsules: trunk, head, upper and lower arms and legs. Hips and shoulders swing as sines at the step frequency,
@@ -167,7 +166,7 @@ class Person(_Mover):
         return place, bearing @ weight
 
 
-class Door(_Mover):
+class Door(MovingThing):
     """A leaf that swings about a vertical hinge between two angles, as a sine."""
 
     kind: Literal["door"] = "door"
@@ -191,7 +190,7 @@ class Door(_Mover):
         return turn.as_matrix()[:, None], (np.asarray(self.hinge) + turn.apply([self.width / 2, 0, 0]))[:, None]
 
 
-class Fan(_Mover):
+class Fan(MovingThing):
     """Blades that turn about an axis."""
 
     kind: Literal["fan"] = "fan"
@@ -228,127 +227,3 @@ class Fan(_Mover):
 
 
 Mover = Annotated[Person | Door | Fan, Field(discriminator="kind")]
-
-
-class Crowd:
-    """All movers of a scene: their scatterers at any time, and what they hide.
-
-    Args:
-        movers: of the scene.
-        rng: draws places and phases of scatterers, once.
-        density: scatterers per square metre of surface.
-
-    Attributes:
-        part: (scatterer,) index of the part that carries it.
-        sigma, phase: (scatterer,) m^2, rad.
-    """
-
-    def __init__(self, movers: list[_Mover], rng: np.random.Generator, density: float = 150.0):
-        self.movers = movers
-        self._parts = [part for mover in movers for part in mover.parts()]
-        place, normal, part, sigma = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, int)], [np.zeros(0)]
-        number = 0
-        for mover in movers:
-            # Half of a convex body faces the radar, Lambert's squared cosine averages 1/2 over a hemisphere's outline.
-            per_area = 4 * mover.cross_section / sum(p.area for p in mover.parts())
-            for each in mover.parts():
-                count = max(int(round(density * each.area)), 4)
-                points, normals = each.sample(count, rng)
-                place.append(points)
-                normal.append(normals)
-                part.append(np.full(count, number))
-                sigma.append(np.full(count, per_area * each.area / count))
-                number += 1
-        self._place, self._normal = np.concatenate(place), np.concatenate(normal)
-        self.part, self.sigma = np.concatenate(part), np.concatenate(sigma)
-        self.phase = rng.uniform(0, 2 * np.pi, len(self.part))
-        self._half = np.array([p.half for p in self._parts]).reshape(-1, 3)
-        self._capsule = np.array([p.capsule for p in self._parts], bool)
-
-    def __len__(self) -> int:
-        return len(self.part)
-
-    def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
-        """Rotation and centre of every part of every mover."""
-        if not self.movers:
-            return np.zeros((len(t), 0, 3, 3)), np.zeros((len(t), 0, 3))
-        poses = [mover.poses(t) for mover in self.movers]
-        return np.concatenate([p[0] for p in poses], axis=1), np.concatenate([p[1] for p in poses], axis=1)
-
-    def positions(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n scatterer 3"]:
-        """Places of the scatterers at times t (s), m."""
-        turn, center = self.poses(t)
-        return np.einsum("nsij,sj->nsi", turn[:, self.part], self._place) + center[:, self.part]
-
-    def normals(self, t: float) -> Float[np.ndarray, "scatterer 3"]:
-        """Outward unit normals at a time, s."""
-        turn, _ = self.poses(np.array([t]))
-        return np.einsum("sij,sj->si", turn[0, self.part], self._normal)
-
-    def occluded(
-        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float, margin: float = 0.01
-    ) -> Bool[np.ndarray, "n"]:
-        """Whether a part stands in a segment at time t, both ends shortened by `margin`, m."""
-        origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
-        hidden = np.zeros(len(origins), bool)
-        if len(self._parts) and len(origins):
-            turn, center = self.poses(np.array([t]))
-            _hide(origins, targets, turn[0], center[0], self._half, self._capsule, margin, hidden)
-        return hidden
-
-
-@njit(parallel=True, cache=True)
-def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
-    """In each part's frame: a segment against a box by its slabs, against a capsule by the distance of two segments."""
-    for i in prange(len(origins)):
-        way = targets[i] - origins[i]
-        length = np.sqrt(np.dot(way, way))
-        if length <= 2 * margin:
-            continue
-        way = way / length
-        for p in range(len(center)):
-            # Quick rejection by the bounding sphere.
-            towards = center[p] - origins[i]
-            along = min(max(np.dot(towards, way), 0.0), length)
-            near = towards - along * way
-            reach = half[p, 2] + half[p, 0] if capsule[p] else np.sqrt(np.dot(half[p], half[p]))
-            if np.dot(near, near) > reach * reach:
-                continue
-            a = np.zeros(3)
-            d = np.zeros(3)
-            for k in range(3):
-                for j in range(3):
-                    a[k] -= turn[p, j, k] * (towards[j] - margin * way[j])
-                    d[k] += turn[p, j, k] * way[j]
-            span = length - 2 * margin
-            if _meets_capsule(a, d, span, half[p]) if capsule[p] else _meets_box(a, d, span, half[p]):
-                hidden[i] = True
-                break
-
-
-@njit(inline="always")
-def _meets_box(a, d, span, half):
-    low, high = 0.0, span
-    for k in range(3):
-        if abs(d[k]) < 1e-12:
-            if abs(a[k]) > half[k]:
-                return False
-            continue
-        first, second = (-half[k] - a[k]) / d[k], (half[k] - a[k]) / d[k]
-        low, high = max(low, min(first, second)), min(high, max(first, second))
-    return low <= high
-
-
-@njit(inline="always")
-def _meets_capsule(a, d, span, half):
-    """Closest approach of the segment a + s d, 0 <= s <= span, to the axis |z| <= half length, by alternation."""
-    s = span / 2
-    across = d[0] * d[0] + d[1] * d[1]
-    if across > 1e-12:
-        s = min(max(-(a[0] * d[0] + a[1] * d[1]) / across, 0.0), span)
-    for _ in range(8):
-        z = min(max(a[2] + s * d[2], -half[2]), half[2])
-        s = min(max(-(a[0] * d[0] + a[1] * d[1] + (a[2] - z) * d[2]), 0.0), span)
-    z = min(max(a[2] + s * d[2], -half[2]), half[2])
-    x, y, w = a[0] + s * d[0], a[1] + s * d[1], a[2] + s * d[2] - z
-    return x * x + y * y + w * w < half[0] * half[0]

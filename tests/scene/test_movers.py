@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from radarsim.scene.movers import Crowd, Door, Fan, Part, Person
+from radarsim.scene.movers import Door, Fan, Part, Person
 
 WALKER = Person(name="walker", path=((0, 0), (10, 0)), speed=1.2)
 
@@ -79,40 +79,6 @@ def test_points_spread_evenly_over_surfaces(part):
         assert (on_face >= 1).all() and np.mean(on_face == 1) > 0.99
         share = np.mean(np.isclose(np.abs(points[:, 0]), 0.1))
         assert share == pytest.approx(8 * 0.3 * 0.5 / part.area, abs=0.01)
-
-
-def test_scatterers_are_carried_along():
-    """A scatterer keeps its distance from every other of the same part."""
-    crowd = Crowd([WALKER, Fan(name="f", center=(3, 1, 2))], np.random.default_rng(1))
-    places = crowd.positions(np.array([0.3, 1.7]))
-    for part in (0, 3, 10):
-        own = places[:, crowd.part == part]
-        gaps = np.linalg.norm(own[:, :, None] - own[:, None], axis=3)
-        assert gaps[0] == pytest.approx(gaps[1], abs=1e-9)
-    assert crowd.sigma[crowd.part < 10].sum() == pytest.approx(4 * WALKER.cross_section)
-
-
-def test_occlusion_against_brute_force():
-    """Segments against capsules and boxes: the same as sampling a thousand points along each segment."""
-    rng = np.random.default_rng(2)
-    movers = [WALKER, Door(name="d", hinge=(2, 0.5, 1)), Fan(name="f", center=(1, -0.5, 1.5))]
-    crowd = Crowd(movers, rng)
-    origins, targets = rng.uniform([-1, -1.5, 0], [4, 1.5, 2], (2, 1500, 3))
-    hidden = crowd.occluded(origins, targets, t=0.9, margin=0.0)
-    turn, center = crowd.poses(np.array([0.9]))
-    along = origins[:, None] + np.linspace(0, 1, 1001)[:, None] * (targets - origins)[:, None]
-    truth, border = np.zeros(1500, bool), np.zeros(1500, bool)
-    for k, part in enumerate(part for mover in movers for part in mover.parts()):
-        local = (along - center[0, k]) @ turn[0, k]
-        if part.capsule:
-            axis = local - np.clip(local[..., 2], -part.half[2], part.half[2])[..., None] * [0, 0, 1]
-            depth = part.half[0] - np.linalg.norm(axis, axis=2)
-        else:
-            depth = (np.asarray(part.half) - np.abs(local)).min(axis=2)
-        truth |= (depth > 0).any(axis=1)
-        border |= np.abs(depth.max(axis=1)) < 3e-3
-    assert 0.1 < truth.mean() < 0.9
-    assert np.array_equal(hidden[~border], truth[~border])
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,150 @@
+"""The movers of a scene as the radar meets them: scatterers that are carried along, and parts that stand in the way."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numba import njit, prange
+
+from radarsim.physics.lobes import LAMBERT
+from radarsim.physics.scatterers import BOUNCE_STRIDE, Scatterers
+from radarsim.scene.movers import MovingThing
+
+
+class Crowd:
+    """All movers of a scene: their scatterers at any time, and what they hide.
+
+    Args:
+        movers: of the scene.
+        rng: draws places and phases of scatterers, once.
+        density: scatterers per square metre of surface.
+
+    Attributes:
+        part: (scatterer,) index of the part that carries it.
+        sigma, phase: (scatterer,) m^2, rad.
+    """
+
+    def __init__(self, movers: list[MovingThing], rng: np.random.Generator, density: float = 150.0):
+        self.movers = movers
+        self._parts = [part for mover in movers for part in mover.parts()]
+        place, normal, part, sigma = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, int)], [np.zeros(0)]
+        number = 0
+        for mover in movers:
+            # Half of an upright round body faces the radar, and there Lambert's squared cosine averages 1/2.
+            per_area = 4 * mover.cross_section / sum(p.area for p in mover.parts())
+            for each in mover.parts():
+                count = max(int(round(density * each.area)), 4)
+                points, normals = each.sample(count, rng)
+                place.append(points)
+                normal.append(normals)
+                part.append(np.full(count, number))
+                sigma.append(np.full(count, per_area * each.area / count))
+                number += 1
+        self._place, self._normal = np.concatenate(place), np.concatenate(normal)
+        self.part, self.sigma = np.concatenate(part), np.concatenate(sigma)
+        self.phase = rng.uniform(0, 2 * np.pi, len(self.part))
+        self._half = np.array([p.half for p in self._parts]).reshape(-1, 3)
+        self._capsule = np.array([p.capsule for p in self._parts], bool)
+
+    def __len__(self) -> int:
+        return len(self.part)
+
+    def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
+        """Rotation and centre of every part of every mover."""
+        if not self.movers:
+            return np.zeros((len(t), 0, 3, 3)), np.zeros((len(t), 0, 3))
+        poses = [mover.poses(t) for mover in self.movers]
+        return np.concatenate([p[0] for p in poses], axis=1), np.concatenate([p[1] for p in poses], axis=1)
+
+    def positions(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n scatterer 3"]:
+        """Places of the scatterers at times t (s), m."""
+        turn, center = self.poses(t)
+        return np.einsum("nsij,sj->nsi", turn[:, self.part], self._place) + center[:, self.part]
+
+    def normals(self, t: float) -> Float[np.ndarray, "scatterer 3"]:
+        """Outward unit normals at a time, s."""
+        turn, _ = self.poses(np.array([t]))
+        return np.einsum("sij,sj->si", turn[0, self.part], self._normal)
+
+    def scatterers(self, t: float) -> Scatterers:
+        """The scatterers as they are at time t, s."""
+        n = len(self)
+        every = np.arange(n)
+        return Scatterers(
+            position=self.positions(np.array([t]))[0],
+            normal=self.normals(t),
+            sigma=self.sigma,
+            phase=self.phase,
+            two_sided=np.zeros(n, bool),
+            horizontal=np.zeros(n, bool),
+            bounces=np.where(every % BOUNCE_STRIDE == 0, float(BOUNCE_STRIDE), 0.0),
+            bounces_twice=np.where(every % BOUNCE_STRIDE**2 == 0, float(BOUNCE_STRIDE**2), 0.0),
+            lobe=np.tile(LAMBERT, (n, 1)),
+            rank=np.full(n, -1.0),
+        )
+
+    def occluded(
+        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float, margin: float = 0.01
+    ) -> Bool[np.ndarray, "n"]:
+        """Whether a part stands in a segment at time t, both ends shortened by `margin`, m."""
+        origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
+        hidden = np.zeros(len(origins), bool)
+        if len(self._parts) and len(origins):
+            turn, center = self.poses(np.array([t]))
+            _hide(origins, targets, turn[0], center[0], self._half, self._capsule, margin, hidden)
+        return hidden
+
+
+@njit(parallel=True, cache=True)
+def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
+    """In each part's frame: a segment against a box by its slabs, against a capsule by the distance of two segments."""
+    for i in prange(len(origins)):
+        way = targets[i] - origins[i]
+        length = np.sqrt(np.dot(way, way))
+        if length <= 2 * margin:
+            continue
+        way = way / length
+        for p in range(len(center)):
+            # Quick rejection by the bounding sphere.
+            towards = center[p] - origins[i]
+            along = min(max(np.dot(towards, way), 0.0), length)
+            near = towards - along * way
+            reach = half[p, 2] + half[p, 0] if capsule[p] else np.sqrt(np.dot(half[p], half[p]))
+            if np.dot(near, near) > reach * reach:
+                continue
+            a = np.zeros(3)
+            d = np.zeros(3)
+            for k in range(3):
+                for j in range(3):
+                    a[k] -= turn[p, j, k] * (towards[j] - margin * way[j])
+                    d[k] += turn[p, j, k] * way[j]
+            span = length - 2 * margin
+            if _meets_capsule(a, d, span, half[p]) if capsule[p] else _meets_box(a, d, span, half[p]):
+                hidden[i] = True
+                break
+
+
+@njit(inline="always")
+def _meets_box(a, d, span, half):
+    low, high = 0.0, span
+    for k in range(3):
+        if abs(d[k]) < 1e-12:
+            if abs(a[k]) > half[k]:
+                return False
+            continue
+        first, second = (-half[k] - a[k]) / d[k], (half[k] - a[k]) / d[k]
+        low, high = max(low, min(first, second)), min(high, max(first, second))
+    return low <= high
+
+
+@njit(inline="always")
+def _meets_capsule(a, d, span, half):
+    """Closest approach of the segment a + s d, 0 <= s <= span, to the axis |z| <= half length, by alternation."""
+    s = span / 2
+    across = d[0] * d[0] + d[1] * d[1]
+    if across > 1e-12:
+        s = min(max(-(a[0] * d[0] + a[1] * d[1]) / across, 0.0), span)
+    for _ in range(8):
+        z = min(max(a[2] + s * d[2], -half[2]), half[2])
+        s = min(max(-(a[0] * d[0] + a[1] * d[1] + (a[2] - z) * d[2]), 0.0), span)
+    z = min(max(a[2] + s * d[2], -half[2]), half[2])
+    x, y, w = a[0] + s * d[0], a[1] + s * d[1], a[2] + s * d[2] - z
+    return x * x + y * y + w * w < half[0] * half[0]

@@ -31,6 +31,8 @@ from radarsim.scene.scene import Scene
 CLEARANCE = 5e-3
 #: Of the scatterers seen over mirrors every n-th has echoes of second order.
 SECOND_STRIDE = 4
+#: Slabs are looked for in the way of echoes that are at least this much stronger than the weakest of interest.
+LEAST_LOSS = 2.0
 
 
 class Provenance(IntEnum):
@@ -154,6 +156,7 @@ class EchoFinder:
         self._tables = gain_tables()
         self._phasor = np.exp(1j * scatterers.phase)
         self._weights = _weights(scatterers.bounces)
+        self._mirrored = np.flatnonzero(scatterers.bounces)
 
     def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Echoes:
         """Echoes for one sensor pose (rotation: sensor to world)."""
@@ -163,8 +166,8 @@ class EchoFinder:
         """Echoes of several frames: one after the other, but for the ray tests, which are quicker in large numbers."""
         positions, rotations = np.asarray(positions, float), np.asarray(rotations, float)
         near = self._mirrors_in_sight(positions)
-        straight, hidden = self._straight(positions, rotations)
-        legs = Legs.joined([straight, hidden, self._over_mirrors(positions, rotations, straight, near)])
+        straight, hidden, nearby = self._straight(positions, rotations)
+        legs = Legs.joined([straight, hidden, self._over_mirrors(positions, rotations, straight, near, nearby)])
         return self._echoes(positions, legs, self._images(positions, rotations, near))
 
     def _passages(self, origins, targets, up, allowed) -> tuple[np.ndarray, np.ndarray]:
@@ -179,13 +182,13 @@ class EchoFinder:
             factor[through], delay[through] = self.slabs.passage(origins[through], targets[through], up[through])
         return factor, delay
 
-    def _unhindered(self, legs: Legs, positions, rotations, allowed) -> Legs:
-        """Those legs that get through, weakened and delayed where they pass slabs."""
+    def _unhindered(self, legs: Legs, stops, positions, rotations, allowed) -> Legs:
+        """Those legs that get through from stop to stop, weakened and delayed where they pass slabs."""
         kept, delay = np.arange(len(legs)), np.zeros(len(legs))
         amplitude, begin = legs.amplitude.copy(), positions[legs.frame]
         for k in range(1 + legs.bounces.max(initial=0)):
             now = kept[legs.bounces[kept] >= k]
-            end = legs.stops[now, k]
+            end = stops[now, k]
             factor, extra = self._passages(begin[now], end, rotations[legs.frame[now], :, 2], allowed[now])
             amplitude[now] *= factor
             delay[now] += extra
@@ -196,20 +199,25 @@ class EchoFinder:
         virtual = legs.virtual + offset * (delay / np.linalg.norm(offset, axis=1))[:, None]
         return replace(legs, amplitude=amplitude, virtual=virtual, slab=amplitude != legs.amplitude)[kept]
 
-    def _straight(self, positions, rotations) -> tuple[Legs, Legs]:
-        """Straight legs worth an echo: those that are free, and of one scatterer in many those that pass slabs."""
-        s, parts = self.scatterers, []
-        leg, echo = np.empty(len(s)), np.empty(len(s))
+    def _straight(self, positions, rotations) -> tuple[Legs, Legs, list[tuple[np.ndarray, np.ndarray]]]:
+        """Straight legs worth an echo: those that are free, and those that pass slabs. Then, per frame, which scatterers
+        within reach may be seen over mirrors, and their distances."""
+        s, parts, strong, nearby = self.scatterers, [], [], []
+        leg, echo, distance = np.empty((3, len(s)))
         for frame, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
             straight_amplitudes(
                 s.position, s.normal, s.sigma, s.two_sided, position, rotation, self.reach, self.config.wavelength,
-                *self._tables, leg, echo,
+                *self._tables, leg, echo, distance,
             )  # fmt: skip
             index = np.flatnonzero(echo > self.weakest)
             parts.append(Legs.straight(frame, index, leg[index], s.position[index], position))
+            strong.append(echo[index] > LEAST_LOSS * self.weakest)
+            within = self._mirrored[distance[self._mirrored] < self.reach]
+            nearby.append((within, distance[within]))
         legs = Legs.joined(parts)
-        legs = self._unhindered(legs, positions, rotations, self._weights[legs.scatterer, 2] > 0)
-        return legs[~legs.slab], legs[legs.slab]
+        allowed = np.concatenate(strong) & (self._weights[legs.scatterer, 1] > 0)
+        legs = self._unhindered(legs, legs.virtual[:, None], positions, rotations, allowed)
+        return legs[~legs.slab], legs[legs.slab], nearby
 
     def _mirrors_in_sight(self, positions) -> list[np.ndarray]:
         """Per frame, the mirrors of which something can be seen, and the small plates of corners within reach."""
@@ -226,27 +234,24 @@ class EchoFinder:
         small[~small] = clear.reshape(points.shape[:2]).any(axis=1)
         return [index[(frame == k) & small] for k in range(len(positions))]
 
-    def _over_mirrors(self, positions, rotations, straight: Legs, near: list[np.ndarray]) -> Legs:
+    def _over_mirrors(self, positions, rotations, straight: Legs, near, nearby) -> Legs:
         """Legs over one mirror and over two."""
-        s, parts = self.scatterers, [straight[:0]]
-        thinned = np.flatnonzero(self._weights[:, 1])
+        s, parts = self.scatterers, [(straight[:0], np.zeros((0, 3, 3)))]
+        edges = np.searchsorted(straight.frame, np.arange(len(positions) + 1))
         scale = self.config.wavelength / (4 * np.pi) ** 1.5
         for frame, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
             mirrors = near[frame][self.mirrors.large[near[frame]]] if self.mirrors is not None else []
             if not len(mirrors):
                 continue
-            seen = straight[straight.frame == frame]
-            other = np.zeros(len(s))  # the strongest leg that one over a mirror can be joined with
-            other[seen.scatterer] = np.abs(seen.amplitude)
-            distance = np.linalg.norm(s.position[thinned] - position, axis=1)
-            near_by = distance < self.reach
-            index, distance = thinned[near_by], distance[near_by]
+            index, distance = nearby[frame]
+            seen = slice(edges[frame], edges[frame + 1])
+            other = np.zeros(len(s))
+            other[straight.scatterer[seen]] = straight.amplitude[seen].real
             # Hidden scatterers are seen over mirrors out and back, which is of second order: fewer of them do.
             keep = (other[index] > 0) | (self._weights[index, 2] > 0)
             index, distance = index[keep], distance[keep]
             free = other[index] > 0
-            best = np.maximum(other[index], 3.35 / distance)  # 3.35: the peak gain
-            # Behind a weak leg there may be a stronger one over a mirror, so the bound is the larger of the two.
+            best = 3.4 / distance  # the other leg of an echo is weaker: 3.4 is above the peak gain
             weakest = self.weakest / (scale * np.sqrt(s.sigma[index]) * best)
             longest = np.where(free, 2 * self.reach - distance, self.reach)
             double = free & (self._weights[index, 2] > 0)
@@ -267,41 +272,55 @@ class EchoFinder:
                     weakest[double], *pose,
                 ),
             ]  # fmt: skip
-        legs = Legs.joined(parts)
+        legs, stops = Legs.joined([legs for legs, _ in parts]), np.concatenate([stops for _, stops in parts])
         allowed = (self._weights[legs.scatterer, 2] > 0) & (legs.bounces == 1)
-        return self._unhindered(legs, positions, rotations, allowed)
+        return self._unhindered(legs, stops, positions, rotations, allowed)
 
     def _images(self, positions, rotations, near) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Per frame isometries, amplitudes and provenance of plates and of chains of mirrors."""
+        """Per frame isometries, amplitudes and causes of plates and of chains of mirrors."""
         if self.mirrors is None:
             return [(np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, int))] * len(positions)
-        frames, isometries, amplitudes, stops, causes = [], [], [], [], []
+        plate = self._plates(positions, rotations)
+        chain = self._chains(positions, rotations, near)
+        frame, *columns = (np.concatenate(pair) for pair in zip(plate, chain, strict=True))
+        return [tuple(column[frame == k] for column in columns) for k in range(len(positions))]
+
+    def _plates(self, positions, rotations) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Flashes: frame, isometry, amplitude, cause."""
         limits = self.reach, self.config.wavelength, self.weakest, self._tables
-        for frame, (p, r) in enumerate(zip(positions, rotations, strict=True)):
-            facet, aim, isometry, amplitude = plates.parts(self.facets, p, r, *limits)
-            cause = np.where(self.facets.horizontal[facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
-            chain, images, strength, course = chains.images(self.mirrors, near[frame], p, r, *limits)
-            isometries += [isometry, images]
-            amplitudes += [amplitude, strength]
-            stops += [np.repeat(aim[:, None], 3, axis=1), course]
-            causes += [cause, np.where(chain[:, 2] < 0, Provenance.GHOST_2, Provenance.GHOST_3)]
-            frames += [np.full(len(amplitude) + len(strength), frame)]
-        frame, isometry, amplitude, stops, cause = map(np.concatenate, (frames, isometries, amplitudes, stops, causes))
-        up, begin = rotations[frame, :, 2], positions[frame]
-        single = cause <= Provenance.FLOOR_CEILING
-        reached, delay = self._passages(begin, stops[:, 0], up, single & (np.abs(amplitude) > 10 * self.weakest))
-        slab = single & (reached != 1) & (reached != 0)
-        amplitude[single] *= reached[single] ** 2  # there and back
-        amplitude[~single] *= reached[~single]
-        cause[slab] = Provenance.THROUGH_SLAB
-        for a, b in ((stops[:, 0], stops[:, 1]), (stops[:, 1], stops[:, 2]), (stops[:, 2], begin)):
-            rest = np.flatnonzero(~single & (amplitude != 0))
-            amplitude[rest] *= self._passages(a[rest], b[rest], up[rest], np.zeros(len(rest), bool))[0]
+        found = [plates.parts(self.facets, p, r, *limits) for p, r in zip(positions, rotations, strict=True)]
+        frame = np.repeat(np.arange(len(found)), [len(f[0]) for f in found])
+        facet, aim, isometry, amplitude = (np.concatenate(column) for column in zip(*found, strict=True))
+        begin = positions[frame]
+        worth = np.abs(amplitude) > LEAST_LOSS * self.weakest
+        factor, delay = self._passages(begin, aim, rotations[frame, :, 2], worth)
+        cause = np.where(self.facets.horizontal[facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
+        cause[factor != 1] = Provenance.THROUGH_SLAB
+        amplitude = amplitude * factor**2  # there and back
         # A delay moves the receiver's image away.
         away = np.einsum("pij,pj->pi", isometry[:, :, :3], begin) + isometry[:, :, 3] - begin
-        isometry[slab, :, 3] += (2 * delay[:, None] * away / np.linalg.norm(away, axis=1, keepdims=True))[slab]
+        isometry[:, :, 3] += (2 * delay / np.linalg.norm(away, axis=1))[:, None] * away
         keep = np.abs(amplitude) > self.weakest
-        return [(isometry[k], amplitude[k], cause[k]) for k in (keep & (frame == n) for n in range(len(positions)))]
+        return frame[keep], isometry[keep], amplitude[keep], cause[keep]
+
+    def _chains(self, positions, rotations, near) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Chains of mirrors, either way round: frame, isometry, amplitude, cause."""
+        limits = self.reach, self.config.wavelength, self.weakest, self._tables
+        found = [
+            chains.images(self.mirrors, n, p, r, *limits) for n, p, r in zip(near, positions, rotations, strict=True)
+        ]
+        frame = np.repeat(np.arange(len(found)), [len(f[0]) for f in found])
+        chain, isometry, amplitude, stops = (np.concatenate(column) for column in zip(*found, strict=True))
+        place = [positions[frame], *stops.transpose(1, 0, 2), positions[frame]]
+        free = np.arange(len(frame))
+        for a, b in zip(place, place[1:], strict=False):
+            if self.scene is not None and len(free):
+                free = free[~self.scene.occluded(a[free], b[free], margin=CLEARANCE)]
+        both = free[chain[free, 0] != chain[free, 2]]
+        cause = np.where(chain[:, 1] == chain[:, 2], Provenance.GHOST_2, Provenance.GHOST_3)
+        isometry = np.concatenate([isometry[free], chains.reverse(isometry[both])])
+        free = np.concatenate([free, both])
+        return frame[free], isometry, amplitude[free], cause[free]
 
     def _echoes(self, positions, legs: Legs, images) -> list[Echoes]:
         """Joins legs to echoes and adds the images."""
@@ -327,7 +346,7 @@ class EchoFinder:
 
 
 def _weights(bounces: Float[np.ndarray, "scatterer"]) -> Float[np.ndarray, "scatterer 3"]:
-    """Weights of power in echoes with 0, 1, and 2 or more mirrors and slabs on the way.
+    """Weights of power in echoes with 0, 1, and 2 or more mirrors on the way; slabs, however many, are one more.
 
     The more of them, the weaker and the more numerous echoes are, so the fewer scatterers have them: of those seen over
     mirrors at all, of a sampled surface every `SECOND_STRIDE`-th has echoes of second order, with the power of all.

@@ -193,6 +193,11 @@ def _chain(
         if t <= 0.005 or t >= path - 0.005 or t < before - np.sqrt(wavelength * path):
             return none
         before = t
+        x, y = 0.0, 0.0  # the middle of the window
+        for k in range(4):
+            one = minus(vec(corners[m, k]), start)
+            x, y = x + dot(one, f1) / 4, y + dot(one, f2) / 4
+        middle = (x, y)
         for k in range(4):
             one, two = minus(vec(corners[m, k]), start), minus(vec(corners[m, (k + 1) % 4]), start)
             x, y = dot(one, f1), dot(one, f2)
@@ -200,8 +205,7 @@ def _chain(
             square = dx * dx + dy * dy
             if square < 1e-8:
                 continue
-            middle = minus(c, start)
-            side = dx * (dot(middle, f2) - y) - dy * (dot(middle, f1) - x)
+            side = dx * (middle[1] - y) - dy * (middle[0] - x)
             sign = (1.0 if side < 0 else -1.0) / np.sqrt(square)
             nx, ny = -dy * sign, dx * sign  # outward
             offset = nx * x + ny * y

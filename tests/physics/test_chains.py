@@ -68,7 +68,7 @@ def direction(azimuth, elevation):
 @pytest.mark.parametrize("off", [-20, -10, 0, 7, 20])
 @pytest.mark.parametrize(("a", "b"), [(0.03, 0.03), (0.04, 0.02)])
 def test_dihedral(off, a, b):
-    """sigma = 8 pi a^2 b^2 / lambda^2 head on; off by an angle, the part that both plates share: 2 a b min(sin, cos)."""
+    """sigma = 8 pi a^2 b^2 / lambda^2 head on; off it, by the width that both plates share, 2 a min(sin, cos)."""
     azimuth = np.deg2rad(45 + off)
     area = 2 * a * b * min(np.sin(azimuth), np.cos(azimuth))
     found = cross_section(corner(2, a, b), direction(azimuth, 0))

@@ -46,7 +46,10 @@ def images(
     Complex[np.ndarray, "image"],
     Float[np.ndarray, "image 3 3"],
 ]:
-    """Chains of two and three mirrors that lead from the sensor back to it.
+    """Chains of two and three mirrors that lead from the sensor back to it, each in one of its two directions.
+
+    The other direction (`reverse`) has the same amplitude and the inverse isometry; a chain with the same mirror at
+    either end is its own reverse.
 
     Args:
         mirrors: and what can follow what.
@@ -58,14 +61,14 @@ def images(
         tables: the antenna's gain tables.
 
     Returns:
-        chain (third mirror -1: none), isometry of the receiver, amplitude, places of reflection of a ray that takes
-        this way (the last one repeated up to three), m.
+        chain (of two: the second mirror twice), isometry of the receiver, amplitude, places of reflection of a ray that
+        takes this way (the last one repeated up to three), m.
     """
     end = np.zeros(len(mirrors), bool)
     end[near] = True
     size = 256
     while True:
-        chain, isometry = np.full((size, 3), -1), np.empty((size, 3, 4))
+        chain, isometry = np.empty((size, 3), np.int64), np.empty((size, 3, 4))
         amplitude, stops = np.empty(size, complex), np.empty((size, 3, 3))
         count = _search(
             near, end, mirrors.first, mirrors.following, mirrors.center, mirrors.normal, mirrors.corners,
@@ -75,6 +78,12 @@ def images(
         if count <= size:
             return chain[:count], isometry[:count], amplitude[:count], stops[:count]
         size = count
+
+
+def reverse(isometry: Float[np.ndarray, "image 3 4"]) -> Float[np.ndarray, "image 3 4"]:
+    """Isometries of chains taken the other way round: the inverse."""
+    back = isometry[:, :, :3].transpose(0, 2, 1)
+    return np.concatenate([back, -back @ isometry[:, :, 3:]], axis=2)
 
 
 @njit(cache=True)
@@ -96,7 +105,7 @@ def _search(
             for ic in range(first[b] - 1, first[b + 1]):
                 order = 2 if ic < first[b] else 3
                 c = b if order == 2 else following[ic]
-                if not end[c]:
+                if c < a or not end[c]:  # the way back through the same mirrors is not searched for
                     continue
                 # The sensor's image in the last mirror: seen from there, the way leads straight to the sensor.
                 image = image_b if order == 2 else _image(image_b, center[c], normal[c])
@@ -120,8 +129,8 @@ def _search(
                 if abs(value) <= weakest:
                     continue
                 if count < len(amplitude):
-                    for k in range(order):
-                        chain[count, k] = way[k]
+                    for k in range(3):
+                        chain[count, k] = way[min(k, order - 1)]
                     _isometry(way[:order], center, normal, isometry[count])
                     amplitude[count] = value
                     # A ray through the polygon, which misses the very edge of corners.
@@ -184,6 +193,11 @@ def _chain(
         if t <= 0.005 or t >= path - 0.005 or t < before - np.sqrt(wavelength * path):
             return none
         before = t
+        x, y = 0.0, 0.0  # the middle of the window
+        for k in range(4):
+            one = minus(vec(corners[m, k]), start)
+            x, y = x + dot(one, f1) / 4, y + dot(one, f2) / 4
+        middle = (x, y)
         for k in range(4):
             one, two = minus(vec(corners[m, k]), start), minus(vec(corners[m, (k + 1) % 4]), start)
             x, y = dot(one, f1), dot(one, f2)
@@ -191,8 +205,7 @@ def _chain(
             square = dx * dx + dy * dy
             if square < 1e-8:
                 continue
-            middle = minus(c, start)
-            side = dx * (dot(middle, f2) - y) - dy * (dot(middle, f1) - x)
+            side = dx * (middle[1] - y) - dy * (middle[0] - x)
             sign = (1.0 if side < 0 else -1.0) / np.sqrt(square)
             nx, ny = -dy * sign, dx * sign  # outward
             offset = nx * x + ny * y

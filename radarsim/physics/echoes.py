@@ -33,6 +33,8 @@ from radarsim.scene.scene import Scene
 
 #: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
 CLEARANCE = 5e-3
+#: Slabs are looked for in the way of echoes that are at least this much stronger than the weakest of interest.
+LEAST_LOSS = 2.0
 
 
 class Provenance(IntEnum):
@@ -53,10 +55,10 @@ class Echoes:
 
     Attributes:
         points: a and b of point echoes, world, m, at the middle of the burst.
-        moves: of the last points, how far a and b have moved at the burst's three nodes (`synthesis.NODES`), m.
         images: 3 x 4 isometries (matrix | offset) of the receiver, world.
         amplitude: square root of received over transmitted power, with phase, as in the beat signal.
         provenance: a `Provenance` each.
+        moves: of the last points, how far a and b have moved at the burst's three nodes (`synthesis.NODES`), m.
     """
 
     points: Float[np.ndarray, "point 2 3"]
@@ -190,11 +192,12 @@ class EchoFinder:
         """
         positions, rotations = np.asarray(positions, float), np.asarray(rotations, float)
         s = self.scatterers = self._with_movers(self.surface.near(positions, self.reach), times)
-        # of power in echoes with 0, 1, and 2 or more mirrors and slabs on the way
+        # of power in echoes with 0, 1, and 2 or more mirrors on the way; slabs, however many, are one more
         self._weights = np.stack([np.ones(len(s)), s.bounces, s.bounces_twice], axis=1)
+        self._mirrored = np.flatnonzero(s.bounces)
         near = self._mirrors_in_sight(positions)
-        straight, hidden = self._straight(positions, rotations)
-        legs = Legs.joined([straight, hidden, self._over_mirrors(positions, rotations, straight, near)])
+        straight, hidden, nearby = self._straight(positions, rotations)
+        legs = Legs.joined([straight, hidden, self._over_mirrors(positions, rotations, straight, near, nearby)])
         return self._echoes(positions, legs, self._images(positions, rotations, near))
 
     def _with_movers(self, surface: Scatterers, times) -> Scatterers:
@@ -207,10 +210,7 @@ class EchoFinder:
         parts = [surface, *(self.crowd.scatterers(t) for t in times)]
         return Scatterers(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Scatterers)))
 
-    def _meant_for(self, frame: int) -> np.ndarray:
-        return (self._owner < 0) | (self._owner == frame)
-
-    def _moves(self, legs: Legs, ends, scatterer, positions) -> Float[np.ndarray, "moving 2 3 3"]:
+    def _moves(self, legs: Legs, ends, scatterer) -> Float[np.ndarray, "moving 2 3 3"]:
         """How far the virtual points of movers' echoes are from where they are in the middle, at the burst's nodes."""
         owner, carried = self._owner[scatterer], (scatterer - self._still) % max(len(self.crowd or ()), 1)
         offsets = BurstClock.of(self.config).half * NODES
@@ -220,7 +220,7 @@ class EchoFinder:
             places = self.crowd.positions(self._times[frame] + np.append(offsets, 0.0))[:, carried[rows]]
             moved = (places[:3] - places[3]).transpose(1, 0, 2)  # echo, node, axis
             for way in (0, 1):
-                turn = legs[ends[rows, way]].turn(positions)
+                turn = legs[ends[rows, way]].turn(places[3])
                 out[rows, way] = np.einsum("eij,enj->eni", turn, moved)
         return out
 
@@ -234,19 +234,25 @@ class EchoFinder:
             if len(through):
                 up = rotations[frame[through], :, 2]
                 factor[through], delay[through] = self.slabs.passage(origins[through], targets[through], up)
-        if self.crowd is not None and len(self.crowd):
-            for k in np.unique(frame):
-                open_ = np.flatnonzero((frame == k) & (factor != 0))
-                factor[open_[self.crowd.occluded(origins[open_], targets[open_], self._times[k])]] = 0
+        factor[self._shadowed(origins, targets, frame)] = 0
         return factor, delay
 
-    def _unhindered(self, legs: Legs, positions, rotations, allowed) -> Legs:
-        """Those legs that get through, weakened and delayed where they pass slabs."""
+    def _shadowed(self, origins, targets, frame) -> np.ndarray:
+        """Whether a mover stands in the way."""
+        hidden = np.zeros(len(targets), bool)
+        if self.crowd is not None and len(self.crowd):
+            for k in np.unique(frame):
+                now = frame == k
+                hidden[now] = self.crowd.occluded(origins[now], targets[now], self._times[k])
+        return hidden
+
+    def _unhindered(self, legs: Legs, stops, positions, rotations, allowed) -> Legs:
+        """Those legs that get through from stop to stop, weakened and delayed where they pass slabs."""
         kept, delay = np.arange(len(legs)), np.zeros(len(legs))
         amplitude, begin = legs.amplitude.copy(), positions[legs.frame]
         for k in range(1 + legs.bounces.max(initial=0)):
             now = kept[legs.bounces[kept] >= k]
-            end = legs.stops[now, k]
+            end = stops[now, k]
             factor, extra = self._passages(begin[now], end, legs.frame[now], rotations, allowed[now])
             amplitude[now] *= factor
             delay[now] += extra
@@ -257,20 +263,26 @@ class EchoFinder:
         virtual = legs.virtual + offset * (delay / np.linalg.norm(offset, axis=1))[:, None]
         return replace(legs, amplitude=amplitude, virtual=virtual, slab=amplitude != legs.amplitude)[kept]
 
-    def _straight(self, positions, rotations) -> tuple[Legs, Legs]:
-        """Straight legs worth an echo: those that are free, and of one scatterer in many those that pass slabs."""
-        s, parts = self.scatterers, []
-        leg, echo = np.empty(len(s)), np.empty(len(s))
+    def _straight(self, positions, rotations) -> tuple[Legs, Legs, list[tuple[np.ndarray, np.ndarray]]]:
+        """Straight legs worth an echo: those that are free, and those that pass slabs. Then, per frame, which scatterers
+        within reach may be seen over mirrors, and their distances."""
+        s, parts, strong, nearby = self.scatterers, [], [], []
+        leg, echo, distance = np.empty((3, len(s)))
         for frame, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
             straight_amplitudes(
                 s.position, s.normal, s.sigma, s.two_sided, s.lobe, s.rank, position, rotation, self.reach,
-                self.config.wavelength, *self._tables, leg, echo,
+                self.config.wavelength, *self._tables, leg, echo, distance,
             )  # fmt: skip
-            index = np.flatnonzero((echo > self.weakest) & self._meant_for(frame))
+            meant = (self._owner < 0) | (self._owner == frame)
+            index = np.flatnonzero((echo > self.weakest) & meant)
             parts.append(Legs.straight(frame, index, leg[index], s.position[index], position))
+            strong.append(echo[index] > LEAST_LOSS * self.weakest)
+            within = self._mirrored[(distance[self._mirrored] < self.reach) & meant[self._mirrored]]
+            nearby.append((within, distance[within]))
         legs = Legs.joined(parts)
-        legs = self._unhindered(legs, positions, rotations, self._weights[legs.scatterer, 2] > 0)
-        return legs[~legs.slab], legs[legs.slab]
+        allowed = np.concatenate(strong) & (self._weights[legs.scatterer, 1] > 0)
+        legs = self._unhindered(legs, legs.virtual[:, None], positions, rotations, allowed)
+        return legs[~legs.slab], legs[legs.slab], nearby
 
     def _mirrors_in_sight(self, positions) -> list[np.ndarray]:
         """Per frame, the mirrors of which something can be seen, and the small plates of corners within reach."""
@@ -287,27 +299,24 @@ class EchoFinder:
         small[~small] = clear.reshape(points.shape[:2]).any(axis=1)
         return [index[(frame == k) & small] for k in range(len(positions))]
 
-    def _over_mirrors(self, positions, rotations, straight: Legs, near: list[np.ndarray]) -> Legs:
+    def _over_mirrors(self, positions, rotations, straight: Legs, near, nearby) -> Legs:
         """Legs over one mirror and over two."""
-        s, parts = self.scatterers, [straight[:0]]
-        thinned = np.flatnonzero(self._weights[:, 1])
+        s, parts = self.scatterers, [(straight[:0], np.zeros((0, 3, 3)))]
+        edges = np.searchsorted(straight.frame, np.arange(len(positions) + 1))
         scale = self.config.wavelength / (4 * np.pi) ** 1.5
         for frame, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
             mirrors = near[frame][self.mirrors.large[near[frame]]] if self.mirrors is not None else []
             if not len(mirrors):
                 continue
-            seen = straight[straight.frame == frame]
-            other = np.zeros(len(s))  # the strongest leg that one over a mirror can be joined with
-            other[seen.scatterer] = np.abs(seen.amplitude)
-            distance = np.linalg.norm(s.position[thinned] - position, axis=1)
-            near_by = (distance < self.reach) & self._meant_for(frame)[thinned]
-            index, distance = thinned[near_by], distance[near_by]
+            index, distance = nearby[frame]
+            seen = slice(edges[frame], edges[frame + 1])
+            other = np.zeros(len(s))
+            other[straight.scatterer[seen]] = straight.amplitude[seen].real
             # Hidden scatterers are seen over mirrors out and back, which is of second order: fewer of them do.
             keep = (other[index] > 0) | (self._weights[index, 2] > 0)
             index, distance = index[keep], distance[keep]
             free = other[index] > 0
-            best = np.maximum(other[index], 3.35 / distance)  # 3.35: the peak gain
-            # Behind a weak leg there may be a stronger one over a mirror, so the bound is the larger of the two.
+            best = 3.4 / distance  # the other leg of an echo is weaker: 3.4 is above the peak gain
             shown = details(s.rank[index], distance) * np.sqrt(s.sigma[index] * s.lobe[index, :3].sum(axis=1))
             weakest = self.weakest / np.maximum(scale * shown * best, 1e-300)
             longest = np.where(free, 2 * self.reach - distance, self.reach)
@@ -329,56 +338,70 @@ class EchoFinder:
                     weakest[double], *pose,
                 ),
             ]  # fmt: skip
-        legs = Legs.joined(parts)
+        legs, stops = Legs.joined([legs for legs, _ in parts]), np.concatenate([stops for _, stops in parts])
         allowed = (self._weights[legs.scatterer, 2] > 0) & (legs.bounces == 1)
-        return self._unhindered(legs, positions, rotations, allowed)
+        return self._unhindered(legs, stops, positions, rotations, allowed)
 
     def _images(self, positions, rotations, near) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-        """Per frame isometries, amplitudes and provenance of plates and of chains of mirrors."""
+        """Per frame isometries, amplitudes and causes of plates and of chains of mirrors."""
         if self.mirrors is None:
             return [(np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, int))] * len(positions)
-        frames, isometries, amplitudes, stops, causes = [], [], [], [], []
-        facets = self.facets.near(positions, self.reach)
+        plate = self._plates(positions, rotations)
+        chain = self._chains(positions, rotations, near)
+        frame, *columns = (np.concatenate(pair) for pair in zip(plate, chain, strict=True))
+        return [tuple(column[frame == k] for column in columns) for k in range(len(positions))]
+
+    def _plates(self, positions, rotations) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Flashes: frame, isometry, amplitude, cause."""
         limits = self.reach, self.config.wavelength, self.weakest, self._tables
-        for frame, (p, r) in enumerate(zip(positions, rotations, strict=True)):
-            facet, aim, isometry, amplitude = plates.parts(facets, p, r, *limits)
+        facets, found = self.facets.near(positions, self.reach), []
+        for pose in zip(positions, rotations, strict=True):
+            facet, *flat = plates.parts(facets, *pose, *limits)
             cause = np.where(facets.horizontal[facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
-            chain, images, strength, course = chains.images(self.mirrors, near[frame], p, r, *limits)
+            found.append((*flat, cause))
             if self.curved is not None:
-                flat = aim, isometry, amplitude, cause
-                bent = *self.curved.parts(p, r, *limits), []
-                aim, isometry, amplitude, cause = map(np.concatenate, zip(flat, bent, strict=True))
-                cause = np.pad(cause, (0, len(amplitude) - len(cause)), constant_values=Provenance.DIRECT).astype(int)
-            isometries += [isometry, images]
-            amplitudes += [amplitude, strength]
-            stops += [np.repeat(aim[:, None], 3, axis=1), course]
-            causes += [cause, np.where(chain[:, 2] < 0, Provenance.GHOST_2, Provenance.GHOST_3)]
-            frames += [np.full(len(amplitude) + len(strength), frame)]
-        frame, isometry, amplitude, stops, cause = map(np.concatenate, (frames, isometries, amplitudes, stops, causes))
+                round_ = self.curved.parts(*pose, *limits)
+                bent = (*round_, np.full(len(round_[0]), Provenance.DIRECT))
+                found[-1] = tuple(np.concatenate(pair) for pair in zip(found[-1], bent, strict=True))
+        frame = np.repeat(np.arange(len(found)), [len(f[0]) for f in found])
+        aim, isometry, amplitude, cause = (np.concatenate(column) for column in zip(*found, strict=True))
         begin = positions[frame]
-        single = cause <= Provenance.FLOOR_CEILING
-        reached, delay = self._passages(
-            begin, stops[:, 0], frame, rotations, single & (np.abs(amplitude) > 10 * self.weakest)
-        )
-        slab = single & (reached != 1) & (reached != 0)
-        amplitude[single] *= reached[single] ** 2  # there and back
-        amplitude[~single] *= reached[~single]
-        cause[slab] = Provenance.THROUGH_SLAB
-        for a, b in ((stops[:, 0], stops[:, 1]), (stops[:, 1], stops[:, 2]), (stops[:, 2], begin)):
-            rest = np.flatnonzero(~single & (amplitude != 0))
-            amplitude[rest] *= self._passages(a[rest], b[rest], frame[rest], rotations, np.zeros(len(rest), bool))[0]
+        worth = np.abs(amplitude) > LEAST_LOSS * self.weakest
+        factor, delay = self._passages(begin, aim, frame, rotations, worth)
+        cause[factor != 1] = Provenance.THROUGH_SLAB
+        amplitude = amplitude * factor**2  # there and back
         # A delay moves the receiver's image away.
         away = np.einsum("pij,pj->pi", isometry[:, :, :3], begin) + isometry[:, :, 3] - begin
-        isometry[slab, :, 3] += (2 * delay[:, None] * away / np.linalg.norm(away, axis=1, keepdims=True))[slab]
+        isometry[:, :, 3] += (2 * delay / np.linalg.norm(away, axis=1))[:, None] * away
         keep = np.abs(amplitude) > self.weakest
-        return [(isometry[k], amplitude[k], cause[k]) for k in (keep & (frame == n) for n in range(len(positions)))]
+        return frame[keep], isometry[keep], amplitude[keep], cause[keep]
+
+    def _chains(self, positions, rotations, near) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Chains of mirrors, either way round: frame, isometry, amplitude, cause."""
+        limits = self.reach, self.config.wavelength, self.weakest, self._tables
+        found = [
+            chains.images(self.mirrors, n, p, r, *limits) for n, p, r in zip(near, positions, rotations, strict=True)
+        ]
+        frame = np.repeat(np.arange(len(found)), [len(f[0]) for f in found])
+        chain, isometry, amplitude, stops = (np.concatenate(column) for column in zip(*found, strict=True))
+        place = [positions[frame], *stops.transpose(1, 0, 2), positions[frame]]
+        free = np.arange(len(frame))
+        for a, b in zip(place, place[1:], strict=False):
+            if self.scene is not None and len(free):
+                free = free[~self.scene.occluded(a[free], b[free], margin=CLEARANCE)]
+            free = free[~self._shadowed(a[free], b[free], frame[free])]
+        both = free[chain[free, 0] != chain[free, 2]]
+        cause = np.where(chain[:, 1] == chain[:, 2], Provenance.GHOST_2, Provenance.GHOST_3)
+        isometry = np.concatenate([isometry[free], chains.reverse(isometry[both])])
+        free = np.concatenate([free, both])
+        return frame[free], isometry, amplitude[free], cause[free]
 
     def _echoes(self, positions, legs: Legs, images) -> list[Echoes]:
         """Joins legs to echoes and adds the images."""
         s = self.scatterers
         legs = legs[np.lexsort((legs.scatterer, legs.frame))]
         lengths = np.linalg.norm(legs.virtual - positions[legs.frame], axis=1)
-        away = np.linalg.norm(legs.stops[:, 2] - positions[legs.frame], axis=1)
+        away = np.linalg.norm(s.position[legs.scatterer] - positions[legs.frame], axis=1)
         limits = self.reach, self.config.wavelength, self.weakest
         ends, amplitude = pairs(legs, lengths, away, s, self._weights, *limits)
         scatterer = legs.scatterer[ends[:, 0]]
@@ -389,7 +412,7 @@ class EchoFinder:
         cause = np.where(legs.slab[ends].any(axis=1), Provenance.THROUGH_SLAB, cause)
         moving = scatterer >= self._still
         cause = np.where(moving, Provenance.MOVING, cause)
-        points, moves = legs.virtual[ends], self._moves(legs, ends[moving], scatterer[moving], positions)
+        points, moves = legs.virtual[ends], self._moves(legs, ends[moving], scatterer[moving])
         first = np.concatenate([[0], np.cumsum(moving)])
         edges = np.searchsorted(legs.frame[ends[:, 0]], np.arange(len(positions) + 1))
         return [

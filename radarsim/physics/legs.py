@@ -33,7 +33,6 @@ class Legs:
         frame, scatterer: indices.
         bounces: number of mirrors, 0 to 2.
         amplitude: see above, 1/m; phase as in the beat signal.
-        stops: the places of reflection in order, then the scatterer (repeated up to three), m.
         virtual: the scatterer as seen through the mirrors, m.
         towards: unit vector from the scatterer back along the leg.
         slab: whether it passes a slab.
@@ -43,7 +42,6 @@ class Legs:
     scatterer: Int[np.ndarray, "leg"]
     bounces: Int[np.ndarray, "leg"]
     amplitude: Complex[np.ndarray, "leg"]
-    stops: Float[np.ndarray, "leg 3 3"]
     virtual: Float[np.ndarray, "leg 3"]
     towards: Float[np.ndarray, "leg 3"]
     slab: Bool[np.ndarray, "leg"]
@@ -54,20 +52,14 @@ class Legs:
     def __getitem__(self, index) -> "Legs":
         return Legs(*(getattr(self, f.name)[index] for f in fields(self)))
 
-    def turn(self, positions: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "leg 3 3"]:
-        """How the virtual point moves when the scatterer does: the product of the mirrors' reflections.
+    def turn(self, places: Float[np.ndarray, "leg 3"]) -> Float[np.ndarray, "leg 3 3"]:
+        """How the virtual point moves when the scatterer does: the mirror's reflection, for legs over at most one.
 
-        A mirror's normal is along the difference of the directions before and after it.
+        A mirror's normal is along the line from the scatterer to its image.
         """
-        way = np.diff(np.concatenate([positions[self.frame][:, None], self.stops], axis=1), axis=1)
-        way /= np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-12)
-        turn = np.tile(np.eye(3), (len(self), 1, 1))
-        for k in (0, 1):
-            normal = way[:, k + 1] - way[:, k]
-            normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-            normal[self.bounces <= k] = 0
-            turn = turn @ (np.eye(3) - 2 * normal[:, :, None] * normal[:, None])
-        return turn
+        normal = (places - self.virtual) * (self.bounces == 1)[:, None]
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        return np.eye(3) - 2 * normal[:, :, None] * normal[:, None]
 
     @classmethod
     def joined(cls, parts: list["Legs"]) -> "Legs":
@@ -81,15 +73,14 @@ class Legs:
         towards = position - place
         towards /= np.linalg.norm(towards, axis=1, keepdims=True)
         return cls(
-            np.full(n, frame), index, np.zeros(n, int), amplitude.astype(complex), np.repeat(place[:, None], 3, axis=1),
-            place, towards, np.zeros(n, bool),
-        )  # fmt: skip
+            np.full(n, frame), index, np.zeros(n, int), amplitude.astype(complex), place, towards, np.zeros(n, bool)
+        )
 
     @classmethod
     def over_mirrors(
         cls, frame: int, mirrors: Mirrors, chains: Int[np.ndarray, "chain 2"], index: np.ndarray, place: np.ndarray,
         longest: np.ndarray, weakest: np.ndarray, position, rotation, wavelength: float, tables,
-    ) -> "Legs":  # fmt: skip
+    ) -> tuple["Legs", Float[np.ndarray, "leg 3 3"]]:  # fmt: skip
         """Legs over chains of mirrors (m, -1) or (m, n) to scatterers, not yet tested for what is in the way.
 
         Args:
@@ -100,39 +91,46 @@ class Legs:
             position, rotation: sensor pose.
             wavelength: m.
             tables: the antenna's gain tables.
+
+        Returns:
+            the legs, and the places of reflection on each in order, followed by the scatterer's (up to three), m.
         """
-        strength = np.zeros((len(chains), len(index)), complex)
+        count, shape = np.zeros(len(chains), np.int64), (len(chains), len(index))
+        target, strength = np.empty(shape, np.int32), np.empty(shape, complex)
         rectangles = (mirrors.center, mirrors.normal, mirrors.u, mirrors.v, mirrors.half, mirrors.two_sided)
         if strength.size:
             _strengths(
                 chains, place, longest, weakest, *rectangles, mirrors.reflection, position, rotation, wavelength,
-                *tables, strength,
+                *tables, count, target, strength,
             )  # fmt: skip
-        chain, which = np.nonzero(strength)
-        n = len(chain)
+        n = int(count.sum())
+        which, amplitude = np.empty(n, np.int64), np.empty(n, complex)
         stops, virtual, towards = np.empty((n, 3, 3)), np.empty((n, 3)), np.empty((n, 3))
-        _courses(chains[chain], place[which], *rectangles[:2], position, stops, virtual, towards)
-        return cls(
-            np.full(n, frame), index[which], 1 + (chains[chain, 1] >= 0), strength[chain, which], stops, virtual,
-            towards, np.zeros(n, bool),
-        )  # fmt: skip
+        _courses(
+            chains, place, *rectangles[:2], position, count, target, strength, which, amplitude, stops, virtual, towards
+        )
+        bounces = np.repeat(1 + (chains[:, 1] >= 0), count)
+        legs = cls(np.full(n, frame), index[which], bounces, amplitude, virtual, towards, np.zeros(n, bool))
+        return legs, stops
 
 
 @njit(parallel=True, cache=True)
 def straight_amplitudes(
     place, normal, sigma, two_sided, lobe, rank, position, rotation, reach, wavelength, azimuth_table, elevation_table,
-    legs, echoes,
+    legs, echoes, distances,
 ):  # fmt: skip
-    """Amplitude of the straight leg to every scatterer, and of the echo there and back by it; 0 out of reach."""
+    """Amplitude of the straight leg to every scatterer and of the echo there and back by it, 0 out of reach, and
+    distance."""
     scale = wavelength / (4 * np.pi) ** 1.5
     for i in prange(len(place)):
         d = minus(vec(place[i]), vec(position))
         square = dot(d, d)
         legs[i] = 0.0
         echoes[i] = 0.0
+        distances[i] = np.sqrt(square)
         if square > reach * reach or square < 1e-4:
             continue
-        away = np.sqrt(square)
+        away = distances[i]
         cosine = facing(normal[i], (-d[0] / away, -d[1] / away, -d[2] / away), two_sided[i])
         if cosine <= 0:
             continue
@@ -168,9 +166,9 @@ def _cover(stop, center, u, v, half, zone):
 @njit(parallel=True, cache=True)
 def _strengths(
     chains, place, longest, weakest, center, normal, u, v, half, two_sided, reflection, position, rotation, wavelength,
-    azimuth_table, elevation_table, out,
+    azimuth_table, elevation_table, count, target, out,
 ):  # fmt: skip
-    """Amplitude of the leg over every chain to every place; 0 where there is none."""
+    """Legs over every chain: their number, which places they lead to, and their amplitudes."""
     p = vec(position)
     up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
     for k in prange(len(chains)):
@@ -227,33 +225,44 @@ def _strengths(
             field = reflected(field, now, after, nl, reflection[last])
             value = size * dot(field, upright(up, after))
             if abs(value) > weakest[i]:
-                out[k, i] = value
+                target[k, count[k]] = i
+                out[k, count[k]] = value
+                count[k] += 1
 
 
 @njit(cache=True)
-def _courses(chains, place, center, normal, position, stops, virtual, towards):
-    """Places of reflection, virtual point and direction of the legs that exist."""
-    p = vec(position)
-    for e in range(len(chains)):
-        one, two = chains[e]
-        s = vec(place[e])
-        c1, n1 = vec(center[one]), vec(normal[one])
-        source = _image(p, c1, n1)
-        if two < 0:
-            begin = _crossing(source, s, c1, n1)
-            last, seen = begin, _image(s, c1, n1)
-        else:
-            c2, n2 = vec(center[two]), vec(normal[two])
-            last = _crossing(_image(source, c2, n2), s, c2, n2)
-            begin = _crossing(source, last, c1, n1)
-            seen = _image(_image(s, c2, n2), c1, n1)
-        back = unit(minus(last, s))
-        for d in range(3):
-            stops[e, 0, d] = begin[d]
-            stops[e, 1, d] = last[d] if two >= 0 else s[d]
-            stops[e, 2, d] = s[d]
-            virtual[e, d] = seen[d]
-            towards[e, d] = back[d]
+def _courses(
+    chains, place, center, normal, position, count, target, strength, which, amplitude, stops, virtual, towards
+):  # fmt: skip
+    """The legs that exist, in a row: place, amplitude, places of reflection, virtual point and direction."""
+    e = 0
+    for k in range(len(chains)):
+        for j in range(count[k]):
+            which[e], amplitude[e] = target[k, j], strength[k, j]
+            s, one, two = vec(place[target[k, j]]), chains[k, 0], chains[k, 1]
+            _course(one, two, vec(position), s, center, normal, stops[e], virtual[e], towards[e])
+            e += 1
+
+
+@njit(inline="always")
+def _course(one, two, p, s, center, normal, stops, virtual, towards):
+    c1, n1 = vec(center[one]), vec(normal[one])
+    source = _image(p, c1, n1)
+    if two < 0:
+        begin = _crossing(source, s, c1, n1)
+        last, seen = begin, _image(s, c1, n1)
+    else:
+        c2, n2 = vec(center[two]), vec(normal[two])
+        last = _crossing(_image(source, c2, n2), s, c2, n2)
+        begin = _crossing(source, last, c1, n1)
+        seen = _image(_image(s, c2, n2), c1, n1)
+    back = unit(minus(last, s))
+    for d in range(3):
+        stops[0, d] = begin[d]
+        stops[1, d] = last[d] if two >= 0 else s[d]
+        stops[2, d] = s[d]
+        virtual[d] = seen[d]
+        towards[d] = back[d]
 
 
 def pairs(
@@ -267,7 +276,7 @@ def pairs(
         lengths: of the legs, m.
         away: straight distance from the sensor to the leg's scatterer, m.
         scatterers: what they lead to.
-        weights: of a scatterer's power in echoes with 0, 1, and 2 or more mirrors and slabs on the way.
+        weights: of a scatterer's power in echoes with 0, 1, and 2 or more mirrors on the way; slabs are one more.
         reach: half the longest path, m.
         wavelength: m.
         weakest: echoes below are left out.
@@ -304,7 +313,7 @@ def _pairs(
                 back = facing(normal[s], vec(towards[j]), two_sided[s])
                 if back <= 0:
                     continue
-                order = min(bounces[i] + bounces[j] + slab[i] + slab[j], 2)
+                order = min(bounces[i] + bounces[j] + (slab[i] or slab[j]), 2)
                 between = dot(vec(towards[i]), vec(towards[j]))
                 value = size * np.sqrt(scattering(there, back, between, lobe[s])) * (amplitude[i] * amplitude[j])
                 # what the weight adds stands for scatterers left out: it makes no echo worth keeping

@@ -1,0 +1,185 @@
+"""Images of the radar in two and three mirrors: box rooms, dihedral and trihedral corners."""
+
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from radarize.radar.presets import PRESETS
+from radarsim.physics import chains
+from radarsim.physics.facets import TABLE, Facets
+from radarsim.physics.mirrors import Mirrors
+from radarsim.scene.scene import Scene
+
+CONFIG = PRESETS["radarize"]
+LAMBDA = CONFIG.wavelength
+ISOTROPIC = (np.ones(181), np.ones(181))
+
+
+def conductors(*plates):
+    """Conducting rectangles: (centre, side directions u and v, half sides); the normal is u x v."""
+    center, u, v, half = (np.array(column, float) for column in zip(*plates, strict=True))
+    none, n = np.zeros(len(plates), bool), len(plates)
+    gamma = np.broadcast_to(np.array([-1.0, 1.0])[:, None], (n, 2, TABLE)).astype(complex)
+    return Facets(center, np.cross(u, v), u, v, half, none, none, none, gamma)
+
+
+def corner(count, a, b, triangles=False):
+    """Two or three plates at right angles that meet in the origin, open towards (1, 1, 1); b: length of the edge."""
+    x, y, z = np.eye(3)
+    lift = b / 2 if count == 3 else 0.0
+    plates = [(a / 2 * y + lift * z, y, z, (a / 2, b / 2)), (a / 2 * x + lift * z, z, x, (b / 2, a / 2)),
+              (a / 2 * (x + y), x, y, (a / 2, a / 2))]  # fmt: skip
+    facets = conductors(*plates[:count])
+    mirrors = Mirrors.of(facets, None, 100.0)
+    if triangles:
+        legs = [(y, z), (z, x), (x, y)]
+        shape = np.array([[0 * p, a * p, a * q, 0 * p] for p, q in legs])
+        mirrors = replace(mirrors, corners=shape)
+    return mirrors
+
+
+def looking(direction, roll=0.0):
+    """Rotation of a sensor whose boresight has a direction."""
+    yaw, pitch = np.arctan2(direction[1], direction[0]), -np.arcsin(direction[2])
+    return Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
+
+
+def cross_section(mirrors, direction, distance=6.0, roll=0.0):
+    """RCS of all chains, as |a|^2 (4 pi)^3 R^4 / lambda^2, seen from a unit direction."""
+    position = distance * np.asarray(direction)
+    chain, isometry, amplitude, _ = chains.images(
+        mirrors, np.arange(len(mirrors)), position, looking(-position / distance, roll), 100.0, LAMBDA, 0.0, ISOTROPIC
+    )
+    both = chain[:, 0] != chain[:, 2]
+    isometry = np.concatenate([isometry, chains.reverse(isometry[both])])
+    amplitude = np.concatenate([amplitude, amplitude[both]])
+    path = np.linalg.norm(position - isometry[:, :, :3] @ position - isometry[:, :, 3], axis=1)
+    field = np.sum(amplitude * np.exp(2j * np.pi * path / LAMBDA))
+    return abs(field) ** 2 * (4 * np.pi) ** 3 * distance**4 / LAMBDA**2
+
+
+def direction(azimuth, elevation):
+    return np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+
+
+@pytest.mark.parametrize("off", [-20, -10, 0, 7, 20])
+@pytest.mark.parametrize(("a", "b"), [(0.03, 0.03), (0.04, 0.02)])
+def test_dihedral(off, a, b):
+    """sigma = 8 pi a^2 b^2 / lambda^2 head on; off it, by the width that both plates share, 2 a min(sin, cos)."""
+    azimuth = np.deg2rad(45 + off)
+    area = 2 * a * b * min(np.sin(azimuth), np.cos(azimuth))
+    found = cross_section(corner(2, a, b), direction(azimuth, 0))
+    assert 10 * np.log10(found / (4 * np.pi * area**2 / LAMBDA**2)) == pytest.approx(0, abs=0.2)
+    if off == 0:
+        assert 10 * np.log10(found / (8 * np.pi * a**2 * b**2 / LAMBDA**2)) == pytest.approx(0, abs=0.2)
+
+
+def test_dihedral_turns_polarisation():
+    """Rolled by 45 deg against its edge, a dihedral sends everything back crosswise; by 90 deg, nothing is lost."""
+    mirrors, ahead = corner(2, 0.03, 0.03), direction(np.pi / 4, 0)
+    level = cross_section(mirrors, ahead)
+    assert cross_section(mirrors, ahead, roll=np.pi / 4) < 1e-4 * level
+    assert cross_section(mirrors, ahead, roll=np.pi / 2) == pytest.approx(level, rel=1e-3)
+
+
+@pytest.mark.parametrize("off", [(0, 0), (20, 0), (-12, 0), (0, 15), (0, -20), (14, 14), (-9, 11)])
+def test_trihedral(off):
+    """Triangles: 4 pi a^4 / (3 lambda^2) head on, and Robertson's projected area off it (BSTJ 26, 1947)."""
+    a = 0.04
+    azimuth, elevation = np.pi / 4 + np.deg2rad(off[0]), np.arcsin(1 / np.sqrt(3)) + np.deg2rad(off[1])
+    towards = direction(azimuth, elevation)
+    low, middle, high = np.sort(towards)
+    total = low + middle + high
+    area = a**2 * (total - 2 / total if low + middle >= high else 4 * low * middle / total)
+    found = cross_section(corner(3, a, a, triangles=True), towards)
+    assert 10 * np.log10(found / (4 * np.pi * area**2 / LAMBDA**2)) == pytest.approx(0, abs=0.3)
+    if off == (0, 0):
+        assert 10 * np.log10(found / (4 * np.pi * a**4 / (3 * LAMBDA**2))) == pytest.approx(0, abs=0.2)
+
+
+def test_square_trihedral():
+    """Squares: 12 pi a^4 / lambda^2."""
+    found = cross_section(corner(3, 0.03, 0.03), np.ones(3) / np.sqrt(3))
+    assert 10 * np.log10(found / (12 * np.pi * 0.03**4 / LAMBDA**2)) == pytest.approx(0, abs=0.2)
+
+
+def test_wide_corner_is_the_image_in_its_edge():
+    """From near, a corner of two walls echoes as one endless mirror at the edge would: lambda / (4 pi 2 R)."""
+    for azimuth in np.deg2rad([20, 45, 63]):
+        found = cross_section(corner(2, 5.0, 3.0), direction(azimuth, 0.0), distance=2.0)
+        expected = (LAMBDA / (8 * np.pi * 2)) ** 2 * (4 * np.pi) ** 3 * 2**4 / LAMBDA**2
+        assert 10 * np.log10(found / expected) == pytest.approx(0, abs=0.2)
+
+
+def test_no_step_as_the_image_leaves_the_corner():
+    """Sliding past the end of a dihedral's edge in tenths of a millimetre, the echo never jumps."""
+    mirrors = corner(2, 1.0, 1.0)
+    values = []
+    for z in 0.5 + np.arange(-100, 100) * 1e-3:
+        position = np.array([1.4, 1.4, z])
+        _, _, amplitude, _ = chains.images(
+            mirrors, np.arange(2), position, looking(np.array([-1, -1, 0]) / np.sqrt(2)), 50.0, LAMBDA, 0.0, ISOTROPIC
+        )
+        values.append(np.sum(amplitude))
+    assert np.max(np.abs(np.diff(values))) < 0.03 * np.max(np.abs(values))
+    assert abs(values[0]) > 10 * abs(values[-1])
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_kirchhoff_integral(seed):
+    """The sum over edges is the integral over the polygon, wherever the path passes it."""
+    rng = np.random.default_rng(seed)
+    angles = np.sort(rng.uniform(0, 2 * np.pi, 5))
+    polygon = rng.uniform(0.3, 2.5) * np.stack([np.cos(angles), np.sin(angles)], 1) + rng.uniform(-1.5, 1.5, 2)
+    low, high, n = polygon.min(0), polygon.max(0), 1500
+    x, y = (low + (high - low) * ((np.arange(n) + 0.5) / n)[:, None]).T
+    inside = np.ones((n, n), bool)
+    for (x0, y0), (x1, y1) in zip(polygon, np.roll(polygon, -1, 0), strict=True):
+        inside &= (x1 - x0) * (y[:, None] - y0) - (y1 - y0) * (x - x0) > 0
+    cell = np.prod(high - low) / n**2
+    truth = np.sum(inside * np.exp(0.5j * np.pi * (x**2 + y[:, None] ** 2))) * cell / 2j
+    assert chains.kirchhoff(polygon, 5) == pytest.approx(truth, abs=3e-3)
+
+
+def test_box_room_has_all_its_images(monkeypatch):
+    """18 images of second and 38 of third order, edges and corners included, with delay, sign and strength.
+
+    The reference is the lattice of images, and each one's path followed through the walls as a straight line in the
+    lattice: a conductor turns the field E into 2 (E n) n - E. The antenna is made isotropic, and tilted, because two
+    opposite walls send the wave out in front and take it in from behind.
+    """
+    monkeypatch.setattr(chains, "gain_towards", lambda *_: 1.0)
+    monkeypatch.setattr(chains, "_search", chains._search.py_func)
+    scene = Scene.load("physics/room")
+    low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
+    p, pose = np.array([0.37, -0.21, 1.23]), Rotation.from_euler("ZYX", [0.3, 0.4, 0.5]).as_matrix()
+    mirrors = Mirrors.of(Facets.of(scene, CONFIG), scene, 50.0)
+    chain, isometry, amplitude, _ = chains.images(mirrors, np.arange(6), p, pose, 50.0, LAMBDA, 0.0, ISOTROPIC)
+    both = chain[:, 0] != chain[:, 2]
+    isometry = np.concatenate([isometry, chains.reverse(isometry[both])])
+    amplitude = np.concatenate([amplitude, amplitude[both]])
+    found = isometry[:, :, :3] @ p + isometry[:, :, 3]
+
+    counted = {2: 0, 3: 0}
+    for cell in product(range(-3, 4), repeat=3):
+        order = int(np.abs(cell).sum())
+        if order not in counted:
+            continue
+        even = np.array(cell) % 2 == 0
+        image = low + cell * (high - low) + np.where(even, p - low, high - p)
+        turns = np.where(even, 1.0, -1.0)  # the product of reflections in a box is diagonal
+        path = np.linalg.norm(image - p)
+        out = (image - p) / path
+        sent = pose[:, 2] - pose[:, 2] @ out * out
+        arriving = turns * out
+        taken = pose[:, 2] - pose[:, 2] @ arriving * arriving
+        turned = (-1) ** order * turns * sent / np.linalg.norm(sent)
+        expected = LAMBDA / (4 * np.pi * path) * turned @ taken / np.linalg.norm(taken)
+        here = np.linalg.norm(found - image, axis=1) < 1e-6
+        assert here.any(), cell
+        counted[order] += 1
+        assert np.sum(amplitude[here]) == pytest.approx(expected, abs=0.023 * LAMBDA / (4 * np.pi * path)), cell
+    assert counted == {2: 18, 3: 38}

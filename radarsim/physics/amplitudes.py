@@ -4,7 +4,7 @@ import numpy as np
 from numba import njit, prange
 
 from radarsim.physics.antenna import amplitude_gain
-from radarsim.physics.detail import detail
+from radarsim.physics.detail import FULL_DETAIL, detail, share
 from radarsim.physics.facets import TABLE
 from radarsim.physics.lobes import scattering
 
@@ -28,13 +28,14 @@ def direct_amplitudes(
         cosine = _facing(normal[i], -dx, -dy, -dz, distance, two_sided[i])
         if cosine <= 0:
             continue
-        share = detail(rank[i], distance)
-        if share == 0:
+        if rank[i] * distance >= 2 * FULL_DETAIL:
             continue
         y = rotation[0, 1] * dx + rotation[1, 1] * dy + rotation[2, 1] * dz
         z = rotation[0, 2] * dx + rotation[1, 2] * dy + rotation[2, 2] * dz
         gain = amplitude_gain(x, y, z, azimuth_table, elevation_table)
-        out[i] = scale * gain * gain * share * np.sqrt(sigma[i] * scattering(cosine, cosine, 1.0, lobe[i])) / square
+        leg = gain / distance
+        weight = detail(rank[i], share(gain, distance))
+        out[i] = scale * leg * leg * weight * np.sqrt(sigma[i] * scattering(cosine, cosine, 1.0, lobe[i]))
 
 
 @njit(inline="always")
@@ -100,7 +101,8 @@ def ghost_amplitudes(
                 )  # fmt: skip
             between = np.dot(s - position, leaving) / d1
             pattern = scattering(face_direct, face_mirror, between, lobe[i])
-            size = scale * gain * edge * detail(rank[i], d1) * np.sqrt(sigma[i] * pattern) / (d1 * d2)
+            weight = detail(rank[i], share(np.sqrt(gain), np.sqrt(d1 * d2)))
+            size = scale * gain * edge * weight * np.sqrt(sigma[i] * pattern) / (d1 * d2)
             if size <= weakest:
                 continue
             value = size * _copolar(reflection[m], arriving, leaving, n, up)

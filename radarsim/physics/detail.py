@@ -15,7 +15,7 @@ from numba import njit
 from radarsim.physics.antenna import PEAK_DBI
 
 #: Distance up to which about all scatterers in the middle of the beam are used, m.
-FULL_DETAIL = 1.0
+FULL_DETAIL = 1.1
 _PEAK = 10 ** (PEAK_DBI / 20)
 
 

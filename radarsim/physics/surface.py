@@ -21,7 +21,7 @@ from radarsim.scene.scene import Scene
 
 #: Scatterers per square metre at full detail; with level of detail some fifteen are left in a range-azimuth cell of
 #: the `radarize` preset in an office.
-DENSITY = 400.0
+DENSITY = 300.0
 #: Edge of the cells that tiles are gathered in, and longest edge of a triangle, m.
 TILE = 1.0
 # Steps of the R2 sequence: powers of the inverse of the plastic number.

@@ -61,9 +61,10 @@ def _cylinder(mesh, faces: Int[np.ndarray, "face"]):
         if np.abs(np.linalg.norm(apart, axis=1) - radius).max() > ROUND * radius:
             continue
         outward = mesh.triangles_center[faces[sides]] @ u.T - center
-        angles = np.sort(np.arctan2(outward[:, 1], outward[:, 0]))
+        facing = normals[sides] @ u.T
+        angles = np.sort(np.arctan2(facing[:, 1], facing[:, 0]))
         gaps = np.diff(angles, append=angles[0] + 2 * np.pi)
-        convex = np.all(np.einsum("fd,fd->f", outward, normals[sides] @ u.T) > 0)
+        convex = np.all(np.einsum("fd,fd->f", outward, facing) > 0)
         if not convex or gaps.max() > 2 * np.pi / FEWEST_SIDES * 1.01:
             continue
         z = corners @ axis

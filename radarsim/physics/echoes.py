@@ -21,7 +21,6 @@ from radarsim.physics import chains, plates
 from radarsim.physics.antenna import gain_tables
 from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
-from radarsim.physics.detail import details
 from radarsim.physics.facets import Facets
 from radarsim.physics.legs import Legs, pairs, straight_amplitudes
 from radarsim.physics.mirrors import Mirrors
@@ -264,14 +263,17 @@ class EchoFinder:
         return replace(legs, amplitude=amplitude, virtual=virtual, slab=amplitude != legs.amplitude)[kept]
 
     def _straight(self, positions, rotations) -> tuple[Legs, Legs, list[tuple[np.ndarray, np.ndarray]]]:
-        """Straight legs worth an echo: those that are free, and those that pass slabs. Then, per frame, which scatterers
-        within reach may be seen over mirrors, and their distances."""
+        """Straight legs worth an echo: those that are free, and those that pass slabs.
+
+        Then, per frame, which scatterers within reach may be seen over mirrors, and their distances.
+        """
         s, parts, strong, nearby = self.scatterers, [], [], []
         leg, echo, distance = np.empty((3, len(s)))
+        self._shown = np.empty((len(positions), len(s)))  # amplitude factor by level of detail
         for frame, (position, rotation) in enumerate(zip(positions, rotations, strict=True)):
             straight_amplitudes(
                 s.position, s.normal, s.sigma, s.two_sided, s.lobe, s.rank, position, rotation, self.reach,
-                self.config.wavelength, *self._tables, leg, echo, distance,
+                self.config.wavelength, *self._tables, leg, echo, distance, self._shown[frame],
             )  # fmt: skip
             meant = (self._owner < 0) | (self._owner == frame)
             index = np.flatnonzero((echo > self.weakest) & meant)
@@ -317,7 +319,7 @@ class EchoFinder:
             index, distance = index[keep], distance[keep]
             free = other[index] > 0
             best = 3.4 / distance  # the other leg of an echo is weaker: 3.4 is above the peak gain
-            shown = details(s.rank[index], distance) * np.sqrt(s.sigma[index] * s.lobe[index, :3].sum(axis=1))
+            shown = self._shown[frame, index] * np.sqrt(s.sigma[index] * s.lobe[index, :3].sum(axis=1))
             weakest = self.weakest / np.maximum(scale * shown * best, 1e-300)
             longest = np.where(free, 2 * self.reach - distance, self.reach)
             double = free & (self._weights[index, 2] > 0)
@@ -401,9 +403,8 @@ class EchoFinder:
         s = self.scatterers
         legs = legs[np.lexsort((legs.scatterer, legs.frame))]
         lengths = np.linalg.norm(legs.virtual - positions[legs.frame], axis=1)
-        away = np.linalg.norm(s.position[legs.scatterer] - positions[legs.frame], axis=1)
         limits = self.reach, self.config.wavelength, self.weakest
-        ends, amplitude = pairs(legs, lengths, away, s, self._weights, *limits)
+        ends, amplitude = pairs(legs, lengths, self._shown[legs.frame, legs.scatterer], s, self._weights, *limits)
         scatterer = legs.scatterer[ends[:, 0]]
         amplitude = amplitude * np.exp(1j * s.phase[scatterer])
         order = legs.bounces[ends].sum(axis=1)

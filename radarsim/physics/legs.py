@@ -17,7 +17,7 @@ from numba import njit, prange
 
 from radarsim.physics.amplitudes import along, dot, facing, gain_towards, length, minus, ramp, reflected, unit, upright
 from radarsim.physics.amplitudes import vector as vec
-from radarsim.physics.detail import detail
+from radarsim.physics.detail import detail, share
 from radarsim.physics.lobes import scattering
 from radarsim.physics.mirrors import Mirrors
 
@@ -117,27 +117,29 @@ class Legs:
 @njit(parallel=True, cache=True)
 def straight_amplitudes(
     place, normal, sigma, two_sided, lobe, rank, position, rotation, reach, wavelength, azimuth_table, elevation_table,
-    legs, echoes, distances,
+    legs, echoes, distances, shown,
 ):  # fmt: skip
-    """Amplitude of the straight leg to every scatterer and of the echo there and back by it, 0 out of reach, and
-    distance."""
+    """Amplitude of the straight leg to every scatterer and of the echo there and back by it, 0 out of reach; distance;
+    amplitude factor by level of detail."""
     scale = wavelength / (4 * np.pi) ** 1.5
     for i in prange(len(place)):
         d = minus(vec(place[i]), vec(position))
         square = dot(d, d)
         legs[i] = 0.0
         echoes[i] = 0.0
+        shown[i] = 0.0
         distances[i] = np.sqrt(square)
         if square > reach * reach or square < 1e-4:
             continue
         away = distances[i]
+        gain = gain_towards(d, rotation, azimuth_table, elevation_table)
+        shown[i] = detail(rank[i], share(gain, away))
         cosine = facing(normal[i], (-d[0] / away, -d[1] / away, -d[2] / away), two_sided[i])
         if cosine <= 0:
             continue
-        leg = gain_towards(d, rotation, azimuth_table, elevation_table) / away
+        leg = gain / away
         legs[i] = leg
-        shown = detail(rank[i], away) * np.sqrt(sigma[i] * scattering(cosine, cosine, 1.0, lobe[i]))
-        echoes[i] = scale * leg * leg * shown
+        echoes[i] = scale * leg * leg * shown[i] * np.sqrt(sigma[i] * scattering(cosine, cosine, 1.0, lobe[i]))
 
 
 @njit(inline="always")
@@ -266,7 +268,7 @@ def _course(one, two, p, s, center, normal, stops, virtual, towards):
 
 
 def pairs(
-    legs: Legs, lengths: Float[np.ndarray, "leg"], away: Float[np.ndarray, "leg"], scatterers,
+    legs: Legs, lengths: Float[np.ndarray, "leg"], shown: Float[np.ndarray, "leg"], scatterers,
     weights: Float[np.ndarray, "scatterer 3"], reach: float, wavelength: float, weakest: float,
 ) -> tuple[Int[np.ndarray, "echo 2"], Complex[np.ndarray, "echo"]]:  # fmt: skip
     """Echoes: pairs of legs to the same scatterer, in either order, and their amplitudes without the scatterer's phase.
@@ -274,7 +276,7 @@ def pairs(
     Args:
         legs: sorted by frame, then scatterer.
         lengths: of the legs, m.
-        away: straight distance from the sensor to the leg's scatterer, m.
+        shown: amplitude factor of the leg's scatterer by level of detail.
         scatterers: what they lead to.
         weights: of a scatterer's power in echoes with 0, 1, and 2 or more mirrors on the way; slabs are one more.
         reach: half the longest path, m.
@@ -288,7 +290,7 @@ def pairs(
     s = scatterers
     n = _pairs(
         np.append(first, len(key)), legs.scatterer, legs.bounces, legs.amplitude, legs.towards, legs.slab, lengths,
-        away, s.normal, s.sigma, s.two_sided, s.lobe, s.rank, weights, reach, wavelength / (4 * np.pi) ** 1.5, weakest,
+        shown, s.normal, s.sigma, s.two_sided, s.lobe, weights, reach, wavelength / (4 * np.pi) ** 1.5, weakest,
         index, amplitude,
     )  # fmt: skip
     return index[:n], amplitude[:n]
@@ -296,13 +298,13 @@ def pairs(
 
 @njit(cache=True)
 def _pairs(
-    first, scatterer, bounces, amplitude, towards, slab, lengths, away, normal, sigma, two_sided, lobe, rank,
+    first, scatterer, bounces, amplitude, towards, slab, lengths, shown, normal, sigma, two_sided, lobe,
     weights, reach, scale, weakest, index, out,
 ):  # fmt: skip
     n = 0
     for group in range(len(first) - 1):
         s = scatterer[first[group]]
-        size = scale * detail(rank[s], away[first[group]]) * np.sqrt(sigma[s])
+        size = scale * shown[first[group]] * np.sqrt(sigma[s])
         for i in range(first[group], first[group + 1]):
             there = facing(normal[s], vec(towards[i]), two_sided[s])
             if there <= 0:

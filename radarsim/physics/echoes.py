@@ -33,7 +33,7 @@ from radarsim.scene.scene import Scene
 #: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
 CLEARANCE = 5e-3
 #: Slabs are looked for in the way of echoes that are at least this much stronger than the weakest of interest.
-LEAST_LOSS = 2.0
+LEAST_LOSS = 4.0
 
 
 class Provenance(IntEnum):
@@ -194,7 +194,7 @@ class EchoFinder:
         # of power in echoes with 0, 1, and 2 or more mirrors on the way; slabs, however many, are one more
         self._weights = np.stack([np.ones(len(s)), s.bounces, s.bounces_twice], axis=1)
         self._mirrored = np.flatnonzero(s.bounces)
-        near = self._mirrors_in_sight(positions)
+        near = self._mirrors_in_sight(positions, rotations)
         straight, hidden, nearby = self._straight(positions, rotations)
         legs = Legs.joined([straight, hidden, self._over_mirrors(positions, rotations, straight, near, nearby)])
         return self._echoes(positions, legs, self._images(positions, rotations, near))
@@ -257,10 +257,12 @@ class EchoFinder:
             delay[now] += extra
             begin[now] = end
             kept = kept[amplitude[kept] != 0]
-        # A delay moves the virtual point away.
-        offset = legs.virtual - positions[legs.frame]
-        virtual = legs.virtual + offset * (delay / np.linalg.norm(offset, axis=1))[:, None]
-        return replace(legs, amplitude=amplitude, virtual=virtual, slab=amplitude != legs.amplitude)[kept]
+        slab = amplitude != legs.amplitude
+        legs, delay = replace(legs, amplitude=amplitude, slab=slab)[kept], delay[kept]
+        late = np.flatnonzero(legs.slab)  # a delay moves the virtual point away
+        offset = legs.virtual[late] - positions[legs.frame[late]]
+        legs.virtual[late] += offset * (delay[late] / np.linalg.norm(offset, axis=1))[:, None]
+        return legs
 
     def _straight(self, positions, rotations) -> tuple[Legs, Legs, list[tuple[np.ndarray, np.ndarray]]]:
         """Straight legs worth an echo: those that are free, and those that pass slabs.
@@ -286,11 +288,11 @@ class EchoFinder:
         legs = self._unhindered(legs, legs.virtual[:, None], positions, rotations, allowed)
         return legs[~legs.slab], legs[legs.slab], nearby
 
-    def _mirrors_in_sight(self, positions) -> list[np.ndarray]:
+    def _mirrors_in_sight(self, positions, rotations) -> list[np.ndarray]:
         """Per frame, the mirrors of which something can be seen, and the small plates of corners within reach."""
         if self.mirrors is None:
             return [np.zeros(0, int)] * len(positions)
-        found = [self.mirrors.near(p, self.reach) for p in positions]
+        found = [self.mirrors.near(p, r[:, 0], self.reach) for p, r in zip(positions, rotations, strict=True)]
         if self.scene is None:
             return found
         index, frame = np.concatenate(found), np.repeat(np.arange(len(found)), [len(f) for f in found])
@@ -323,26 +325,37 @@ class EchoFinder:
             weakest = self.weakest / np.maximum(scale * shown * best, 1e-300)
             longest = np.where(free, 2 * self.reach - distance, self.reach)
             double = free & (self._weights[index, 2] > 0)
-            pairs = np.concatenate([
-                np.stack([np.full(n, m), self.mirrors.following[i : i + n]], axis=1)
-                for m, i, n in zip(mirrors, self.mirrors.first[mirrors],
-                                   self.mirrors.first[mirrors + 1] - self.mirrors.first[mirrors], strict=True)
-            ])  # fmt: skip
-            pairs = pairs[self.mirrors.large[pairs[:, 1]]]
             pose = position, rotation, self.config.wavelength, self._tables
             single = np.stack([mirrors, np.full(len(mirrors), -1)], axis=1)
+            bounds = longest[double], weakest[double]
             parts += [
+                Legs.over_mirrors(frame, self.mirrors, single, s, index, longest, weakest, *pose),
                 Legs.over_mirrors(
-                    frame, self.mirrors, single, index, s.position[index], longest, weakest, *pose
+                    frame, self.mirrors, self.mirrors.pairs(mirrors, position), s, index[double], *bounds, *pose
                 ),
-                Legs.over_mirrors(
-                    frame, self.mirrors, pairs, index[double], s.position[index[double]], longest[double],
-                    weakest[double], *pose,
-                ),
-            ]  # fmt: skip
+            ]
         legs, stops = Legs.joined([legs for legs, _ in parts]), np.concatenate([stops for _, stops in parts])
+        strength = self._strongest_echoes(straight, legs)
+        worth = strength > self.weakest
+        legs, stops, strength = legs[worth], stops[worth], strength[worth]
         allowed = (self._weights[legs.scatterer, 2] > 0) & (legs.bounces == 1)
+        allowed &= strength > LEAST_LOSS * self.weakest
         return self._unhindered(legs, stops, positions, rotations, allowed)
+
+    def _strongest_echoes(self, straight: Legs, legs: Legs) -> np.ndarray:
+        """Amplitude that no echo which each leg over mirrors can be part of exceeds."""
+        s = self.scatterers
+        both = Legs.joined([straight, legs])
+        size = np.abs(both.amplitude)
+        key = both.frame * len(s) + both.scatterer
+        order = np.argsort(key, kind="stable")
+        first = np.flatnonzero(np.diff(key[order], prepend=-1))
+        best = np.empty(len(both))
+        best[order] = np.repeat(np.maximum.reduceat(size[order], first), np.diff(np.append(first, len(key))))
+        scale = self.config.wavelength / (4 * np.pi) ** 1.5
+        n = len(straight)
+        surface = self._shown[legs.frame, legs.scatterer] ** 2 * (s.sigma * s.lobe[:, :3].sum(axis=1))[legs.scatterer]
+        return scale * np.sqrt(surface) * size[n:] * best[n:]
 
     def _images(self, positions, rotations, near) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
         """Per frame isometries, amplitudes and causes of plates and of chains of mirrors."""
@@ -387,11 +400,11 @@ class EchoFinder:
         frame = np.repeat(np.arange(len(found)), [len(f[0]) for f in found])
         chain, isometry, amplitude, stops = (np.concatenate(column) for column in zip(*found, strict=True))
         place = [positions[frame], *stops.transpose(1, 0, 2), positions[frame]]
-        free = np.arange(len(frame))
-        for a, b in zip(place, place[1:], strict=False):
-            if self.scene is not None and len(free):
-                free = free[~self.scene.occluded(a[free], b[free], margin=CLEARANCE)]
-            free = free[~self._shadowed(a[free], b[free], frame[free])]
+        begins, ends = np.concatenate(place[:-1]), np.concatenate(place[1:])
+        blocked = self._shadowed(begins, ends, np.tile(frame, 4))
+        if self.scene is not None and len(frame):
+            blocked |= self.scene.occluded(begins, ends, margin=CLEARANCE)
+        free = np.flatnonzero(~blocked.reshape(4, -1).any(axis=0))
         both = free[chain[free, 0] != chain[free, 2]]
         cause = np.where(chain[:, 1] == chain[:, 2], Provenance.GHOST_2, Provenance.GHOST_3)
         isometry = np.concatenate([isometry[free], chains.reverse(isometry[both])])

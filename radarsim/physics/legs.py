@@ -78,7 +78,7 @@ class Legs:
 
     @classmethod
     def over_mirrors(
-        cls, frame: int, mirrors: Mirrors, chains: Int[np.ndarray, "chain 2"], index: np.ndarray, place: np.ndarray,
+        cls, frame: int, mirrors: Mirrors, chains: Int[np.ndarray, "chain 2"], scatterers, index: np.ndarray,
         longest: np.ndarray, weakest: np.ndarray, position, rotation, wavelength: float, tables,
     ) -> tuple["Legs", Float[np.ndarray, "leg 3 3"]]:  # fmt: skip
         """Legs over chains of mirrors (m, -1) or (m, n) to scatterers, not yet tested for what is in the way.
@@ -86,8 +86,9 @@ class Legs:
         Args:
             frame: index for the table.
             mirrors, chains: which mirrors in which order, from the sensor on.
-            index, place: scatterers and where they are, m.
-            longest, weakest: bounds on a leg's length (m) and amplitude (1/m), per scatterer.
+            scatterers, index: which of them the legs lead to.
+            longest, weakest: bounds on a leg's length (m) and on its amplitude times the root of the cosine at the
+                scatterer (1/m), for each of these.
             position, rotation: sensor pose.
             wavelength: m.
             tables: the antenna's gain tables.
@@ -95,13 +96,14 @@ class Legs:
         Returns:
             the legs, and the places of reflection on each in order, followed by the scatterer's (up to three), m.
         """
+        place, normal, two_sided = (getattr(scatterers, n)[index] for n in ("position", "normal", "two_sided"))
         count, shape = np.zeros(len(chains), np.int64), (len(chains), len(index))
         target, strength = np.empty(shape, np.int32), np.empty(shape, complex)
         rectangles = (mirrors.center, mirrors.normal, mirrors.u, mirrors.v, mirrors.half, mirrors.two_sided)
         if strength.size:
             _strengths(
-                chains, place, longest, weakest, *rectangles, mirrors.reflection, position, rotation, wavelength,
-                *tables, count, target, strength,
+                chains, place, normal, two_sided, longest, weakest, *rectangles, mirrors.reflection, position, rotation,
+                wavelength, *tables, count, target, strength,
             )  # fmt: skip
         n = int(count.sum())
         which, amplitude = np.empty(n, np.int64), np.empty(n, complex)
@@ -167,8 +169,8 @@ def _cover(stop, center, u, v, half, zone):
 
 @njit(parallel=True, cache=True)
 def _strengths(
-    chains, place, longest, weakest, center, normal, u, v, half, two_sided, reflection, position, rotation, wavelength,
-    azimuth_table, elevation_table, count, target, out,
+    chains, place, face, open_face, longest, weakest, center, normal, u, v, half, two_sided, reflection, position,
+    rotation, wavelength, azimuth_table, elevation_table, count, target, out,
 ):  # fmt: skip
     """Legs over every chain: their number, which places they lead to, and their amplitudes."""
     p = vec(position)
@@ -194,6 +196,9 @@ def _strengths(
             full = length(way)
             if full > longest[i] or full < 1e-2:
                 continue
+            cosine = facing(face[i], (-way[0] / full, -way[1] / full, -way[2] / full), open_face[i])
+            if cosine <= 0:
+                continue
             share = h / (h + hs)  # of the way at which the last mirror lies
             stop = along(image, share, way)
             zone = 0.5 * np.sqrt(wavelength * full * share * (1 - share))
@@ -214,7 +219,8 @@ def _strengths(
                     continue
             leaving = minus(begin, p)
             size = cover * gain_towards(leaving, rotation, azimuth_table, elevation_table) / full
-            if size <= weakest[i]:
+            least = weakest[i] / np.sqrt(cosine)
+            if size <= least:
                 continue
             now = unit(leaving)
             sent = upright(up, now)
@@ -226,7 +232,7 @@ def _strengths(
             after = unit(minus(s, stop))
             field = reflected(field, now, after, nl, reflection[last])
             value = size * dot(field, upright(up, after))
-            if abs(value) > weakest[i]:
+            if abs(value) > least:
                 target[k, count[k]] = i
                 out[k, count[k]] = value
                 count[k] += 1

@@ -62,12 +62,35 @@ class Mirrors:
             number[pairs[:, 1]],
         )
 
-    def near(self, position: Float[np.ndarray, "3"], reach: float) -> Int[np.ndarray, "n"]:
-        """Mirrors with a part within reach that turn their face to a position."""
+    def near(
+        self, position: Float[np.ndarray, "3"], forward: Float[np.ndarray, "3"], reach: float
+    ) -> Int[np.ndarray, "n"]:
+        """Mirrors with a part within reach and in front that turn their face to a position."""
         height = np.einsum("md,md->m", position - self.center, self.normal)
         away = np.linalg.norm(_beyond(self, position), axis=1)
         faced = (np.abs(height) > 0.01) & (self.two_sided | (height > 0))
-        return np.flatnonzero(faced & (np.hypot(height, away) < reach))
+        ahead = (self.corners @ forward).max(axis=1) > position @ forward
+        return np.flatnonzero(faced & ahead & (np.hypot(height, away) < reach))
+
+    def pairs(self, firsts: Int[np.ndarray, "n"], position: Float[np.ndarray, "3"]) -> Int[np.ndarray, "pair 2"]:
+        """Pairs of large mirrors, the first one of `firsts`, of which light from a position can reach the second."""
+        size = self.first[firsts + 1] - self.first[firsts]
+        one = np.repeat(firsts, size)
+        two = self.following[np.arange(len(one)) + np.repeat(self.first[firsts] - np.cumsum(size) + size, size)]
+        one, two = one[self.large[two]], two[self.large[two]]
+        # Seen from the first image, the second mirror must overlap the first, as a window.
+        normal, center = self.normal[one], self.center[one]
+        height = np.einsum("pd,pd->p", position - center, normal)[:, None]
+        image = (position - 2 * height * normal)[:, None]
+        level = np.einsum("pkd,pd->pk", self.corners[two] - center[:, None], normal) * np.sign(height)
+        share = np.abs(height) / (np.abs(height) + np.maximum(level, 0))
+        seen = image + share[..., None] * (self.corners[two] - image) - center[:, None]
+        ok = np.ones(len(one), bool)
+        for axis, half in ((self.u[one], self.half[one, 0]), (self.v[one], self.half[one, 1])):
+            at = np.einsum("pkd,pd->pk", seen, axis)
+            ok &= (at.min(axis=1) < half + 0.1) & (at.max(axis=1) > -half - 0.1)
+        ok |= level.min(axis=1) < -1e-3  # partly behind the first mirror: not bounded by its corners
+        return np.stack([one[ok], two[ok]], axis=1)
 
     def spread(self, mirrors: Int[np.ndarray, "n"], around: Float[np.ndarray, "3"], reach: float) -> np.ndarray:
         """`SAMPLES` points on each of some mirrors, on the part within a square of +-`reach` around a position, m."""

@@ -1,5 +1,7 @@
 """Legs over mirrors and through slabs: phantoms where the image method puts them, transmission, reciprocity."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -11,6 +13,7 @@ from radarsim.physics.antenna import amplitude_gain, gain_tables
 from radarsim.physics.echoes import EchoFinder, Provenance
 from radarsim.physics.facets import Facets
 from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
 from radarsim.scene.shapes import box, rectangle
@@ -178,8 +181,8 @@ def test_walls_and_doors():
 @pytest.fixture(scope="module")
 def office():
     scene = Scene.load("office")
-    scatterers = Scatterers.sample(scene, np.random.default_rng(0), 60.0)
-    return EchoFinder(scene, scatterers, Facets.of(scene, CONFIG), CONFIG, 7.5e-9)
+    surface = Surface(scene, np.random.default_rng(0), 60.0)
+    return EchoFinder(scene, surface, Facets.of(scene, CONFIG), CONFIG, 7.5e-9)
 
 
 @pytest.mark.parametrize(("place", "yaw"), [((6.0, 6.0, 1.2), 0.1), ((3.0, 3.0, 1.3), 2.0), ((13.0, 9.0, 1.1), -1.0)])
@@ -209,8 +212,9 @@ def test_thinning_keeps_the_power_of_ghosts():
     facets = Facets.of(scene, CONFIG)
     power = {"thinned": np.zeros(2), "whole": np.zeros(2)}
     for seed in range(12):
-        scatterers = Scatterers.sample(scene, np.random.default_rng(seed), 800.0)
-        whole = type(scatterers)(**{**vars(scatterers), "bounces": np.ones(len(scatterers))})
+        scatterers = Surface(scene, np.random.default_rng(seed), 800.0).all()
+        ones = np.ones(len(scatterers))
+        whole = replace(scatterers, bounces=ones, bounces_twice=ones)
         for name, some in (("thinned", scatterers), ("whole", whole)):
             echoes = EchoFinder(scene, some, facets, CONFIG)(HERE, AHEAD)
             for k, cause in enumerate((Provenance.GHOST_1, Provenance.GHOST_2)):

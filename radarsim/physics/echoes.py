@@ -19,7 +19,7 @@ from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarsim.physics import plates
 from radarsim.physics.amplitudes import direct_amplitudes, ghost_amplitudes
-from radarsim.physics.antenna import gain_tables
+from radarsim.physics.antenna import Antenna, gain_tables
 from radarsim.physics.facets import Facets
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.synthesis import BurstClock, parabolas
@@ -127,6 +127,7 @@ class EchoFinder:
         config: radar configuration.
         weakest: echoes below this amplitude are left out.
         reach: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
+        antenna: the elements' pattern; default: the IWR1843BOOST's.
     """
 
     def __init__(
@@ -137,11 +138,12 @@ class EchoFinder:
         config: RadarConfig,
         weakest: float = 0.0,
         reach: float | None = None,
+        antenna: Antenna | None = None,
     ):
         self.scene, self.scatterers, self.facets, self.config = scene, scatterers, facets, config
         self.weakest = weakest
         self.reach = 1.05 * config.max_range if reach is None else reach
-        self._tables = gain_tables()
+        self._tables = gain_tables(antenna)
         self._phasor = np.exp(1j * scatterers.phase)
 
     def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Echoes:

@@ -26,8 +26,10 @@ AZIMUTHS = np.radians(np.arange(-60.0, 61.0))
 class Heatmaps:
     """Heat maps for one radar configuration; holds windows and steering matrices.
 
-    Windows trade resolution for sidelobes: Hamming (-43 dB) over samples and loops, because a wall's flash is 40 dB
-    above furniture; Taylor (-25 dB) over the few antennas, which widens the 12.8 deg beam of 8 elements to 15 deg.
+    Windows trade resolution for sidelobes: Hann over samples, whose sidelobes fall by 18 dB an octave, because the
+    transmitter's leakage in the lowest bins must not show at every range as something that stands still; Hamming
+    (-43 dB) over loops, because a wall's flash is 40 dB above furniture; Taylor (-25 dB) over the few antennas, which
+    widens the 12.8 deg beam of 8 elements to 15 deg.
 
     Args:
         config: radar configuration.
@@ -54,7 +56,7 @@ class Heatmaps:
         bins = np.arange(config.loops) - config.loops // 2
         self.velocities = bins * config.velocity_resolution
 
-        self._range_window = self._tensor(windows.hamming(config.samples), torch.float32)
+        self._range_window = self._tensor(windows.hann(config.samples), torch.float32)
         self._range_window /= self._range_window.sum()
         self._loop_window = self._tensor(windows.hamming(config.loops), torch.float32)
         # A closing target's phase falls: frequency -2 v / wavelength. A slot's delay is turned back at that rate.

@@ -25,6 +25,19 @@ def simulate(
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
     device: Annotated[Literal["cpu", "cuda"], typer.Option(help="Where the echoes are summed.")] = "cpu",
+    frontend: Annotated[
+        Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else an IWR1843BOOST.")
+    ] = None,
+    provenance: Annotated[
+        bool, typer.Option("--provenance", help="Also write I/Q split by cause, before noise (a much larger file).")
+    ] = False,
+    engine: Annotated[
+        Literal["radarsim", "sionna"],
+        typer.Option(
+            help="sionna: paths of Sionna RT's own solver, to compare with. It misses corners and half of the ghosts, "
+            "makes every facet an infinite mirror, and draws speckle anew in every frame: do not train on it."
+        ),
+    ] = "radarsim",
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth."""
     from radarsim.simulate import simulate
@@ -39,9 +52,28 @@ def simulate(
             seed=seed,
             radar=radar,
             device=device,
+            frontend=frontend,
+            provenance=provenance,
+            engine=engine,
             progress=report,
         )
     print(written)
+
+
+@app.command()
+def calibrate(
+    recording: Annotated[Path, typer.Argument(metavar="REAL.h5", help="Recording of a real radar, best at rest.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Front-end file to write (.yaml).")],
+    frames: Annotated[int, typer.Option(min=1, help="Frames to look at.")] = 8,
+):
+    """Fit the simulated front end to a real radar: noise, band edge, leakage, channels."""
+    from radarsim.calibrate import calibrate
+
+    with working(f"calibrating on {recording.name}"):
+        found = calibrate(recording, output, frames)
+    for remark in found.remarks:
+        print(remark)
+    print(output)
 
 
 @scene_app.command()

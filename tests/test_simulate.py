@@ -1,13 +1,16 @@
 """Whole recordings from the simulator: reproducible, readable, and true to their own truth."""
 
 import hashlib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from radarize.errors import InputError
 from radarize.recording import Recording
-from radarsim.simulate import simulate
+from radarsim.physics.echoes import Provenance
+from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.simulate import CAUSES, simulate
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +78,55 @@ def test_causes_are_counted(walk):
     assert (power[:, 0] > power[:, 2]).mean() > 0.9  # ghosts are the weaker echoes
 
 
+def test_iq_by_cause_adds_up(tmp_path):
+    """Without noise, phase noise and clipping, the parts' sum is the recording itself, to rounding."""
+    settings = FrontEndConfig(noise=False, phase_noise=None)
+    settings.save(tmp_path / "quiet.yaml")
+    path = simulate(
+        "office", tmp_path / "x.h5", duration=0.15, seed=3, frontend=tmp_path / "quiet.yaml", provenance=True
+    )
+    with Recording(path) as recording:
+        parts = recording.read("truth/adc_by_cause").astype(np.float32)
+        adc = recording.adc(0, len(recording)).astype(np.float32)
+        about = recording.describe("truth/adc_by_cause")["about"]
+        count = recording.read("truth/echoes")
+    assert parts.shape == (len(adc), len(CAUSES), *adc.shape[1:])
+    assert all(p.name.lower() in about for p in Provenance) and "leakage" in about
+    inside = np.abs(adc).max(axis=-1, keepdims=True) < 32767
+    error = (parts.sum(axis=1) - adc) * inside
+    # half a count of rounding, and float16's 11 bits of each part
+    assert np.sqrt(np.mean(error**2)) < 0.5
+    assert np.abs(error).max() < 1 + 2**-10 * np.abs(parts).max()
+    for k in range(len(Provenance)):
+        assert np.any(parts[:, k]) == np.any(count[:, k])
+
+
+def test_frames_do_not_depend_on_the_split(tmp_path):
+    """The recording is the same with and without provenance, to the rounding of a float32 sum."""
+    whole = simulate("office", tmp_path / "a.h5", duration=0.1, seed=3)
+    split = simulate("office", tmp_path / "b.h5", duration=0.1, seed=3, provenance=True)
+    with Recording(whole) as a, Recording(split) as b:
+        difference = a.adc(0, 3).astype(int) - b.adc(0, 3)
+    assert np.sqrt(np.mean(difference**2)) < 0.3
+
+
+def test_sionna_engine(tmp_path):
+    """Sionna's paths make a recording of the same shape, and it says whose they are."""
+    path = simulate("physics/wall", tmp_path / "x.h5", engine="sionna", trajectory=still(tmp_path), duration=0.1)
+    with Recording(path) as recording:
+        assert recording.attributes["engine"] == "sionna"
+        adc = recording.adc(0, 1)[0].astype(float)
+        ranges = recording.config.ranges
+    power = np.abs(np.fft.fft(adc[..., 0] + 1j * adc[..., 1], axis=-1)).mean(axis=(0, 1, 2))
+    assert ranges[power.argmax()] == pytest.approx(3.0, abs=0.05)
+
+
+def still(folder):
+    path = folder / "still.tum"
+    path.write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(5)))
+    return path
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -83,6 +135,8 @@ def test_causes_are_counted(walk):
         ({"platform": "drone"}, "drone"),
         ({"device": "tpu"}, "tpu"),
         ({"radar": "nothing.cfg"}, "nothing.cfg"),
+        ({"engine": "unreal"}, "unreal"),
+        ({"frontend": Path("nowhere.yaml")}, "nowhere.yaml"),
         ({"scene": "nowhere"}, "nowhere"),
     ],
 )

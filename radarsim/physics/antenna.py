@@ -3,24 +3,66 @@
 import numpy as np
 from jaxtyping import Float
 from numba import njit
-
-#: IWR1843BOOST (SPRUIM4, figures of the radiation pattern): 10.5 dBi, -3 dB at 28 deg azimuth and 14 deg elevation,
-#: -6 dB at 50 and 20 deg. Beyond the published points the fall continues at the same pace: an estimate.
-PEAK_DBI = 10.5
-AZIMUTH_DEG = np.array([0.0, 10.0, 20.0, 28.0, 40.0, 50.0, 60.0, 75.0, 90.0])
-AZIMUTH_LOSS_DB = np.array([0.0, 0.4, 1.55, 3.0, 4.7, 6.0, 8.2, 13.0, 20.0])
-ELEVATION_DEG = np.array([0.0, 5.0, 10.0, 14.0, 20.0, 30.0, 45.0, 60.0, 90.0])
-ELEVATION_LOSS_DB = np.array([0.0, 0.4, 1.55, 3.0, 6.0, 11.0, 17.0, 22.0, 27.0])
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 
-def gain_tables() -> tuple[Float[np.ndarray, "181"], Float[np.ndarray, "181"]]:
+class Cut(BaseModel):
+    """Gain below the peak along one axis, linear between its points.
+
+    Attributes:
+        degrees: angle from boresight, either side, ascending from 0 to 90.
+        loss_db: there, dB below the peak.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    degrees: tuple[float, ...]
+    loss_db: tuple[float, ...]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Cut":
+        d = self.degrees
+        if len(d) < 2 or len(d) != len(self.loss_db):
+            raise ValueError(f"has {len(d)} degrees and {len(self.loss_db)} loss_db, expected as many, at least 2")
+        if d[0] != 0 or d[-1] != 90 or np.any(np.diff(d) <= 0):
+            raise ValueError(f"degrees is {list(d)}, expected ascending from 0 to 90")
+        return self
+
+
+class Antenna(BaseModel):
+    """An element's pattern: the product of an azimuth and an elevation cut.
+
+    The defaults are the IWR1843BOOST's (SPRUIM4, figures of the radiation pattern): 10.5 dBi, -3 dB at 28 deg azimuth
+    and 14 deg elevation, -6 dB at 50 and 20 deg. Beyond the published points the fall continues at the same pace: an
+    estimate.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    peak_dbi: float = Field(10.5, ge=-30, le=40)
+    azimuth: Cut = Cut(
+        degrees=(0, 10, 20, 28, 40, 50, 60, 75, 90), loss_db=(0, 0.4, 1.55, 3.0, 4.7, 6.0, 8.2, 13.0, 20.0)
+    )
+    elevation: Cut = Cut(
+        degrees=(0, 5, 10, 14, 20, 30, 45, 60, 90), loss_db=(0, 0.4, 1.55, 3.0, 6.0, 11.0, 17.0, 22.0, 27.0)
+    )
+
+
+#: Equal gain in all directions in front of the board.
+ISOTROPIC = Antenna(
+    peak_dbi=0, azimuth=Cut(degrees=(0, 90), loss_db=(0, 0)), elevation=Cut(degrees=(0, 90), loss_db=(0, 0))
+)
+
+
+def gain_tables(antenna: Antenna | None = None) -> tuple[Float[np.ndarray, "181"], Float[np.ndarray, "181"]]:
     """Amplitude gain (square root of power gain) against |azimuth| and against |elevation| in steps of half a degree.
 
-    The element's amplitude gain is the product of both; the peak gain is in the first.
+    The element's amplitude gain is the product of both; the peak gain is in the first. Default: the IWR1843BOOST's.
     """
+    antenna = antenna or Antenna()
     degrees = np.linspace(0, 90, 181)
-    azimuth = PEAK_DBI - np.interp(degrees, AZIMUTH_DEG, AZIMUTH_LOSS_DB)
-    elevation = -np.interp(degrees, ELEVATION_DEG, ELEVATION_LOSS_DB)
+    azimuth = antenna.peak_dbi - np.interp(degrees, antenna.azimuth.degrees, antenna.azimuth.loss_db)
+    elevation = -np.interp(degrees, antenna.elevation.degrees, antenna.elevation.loss_db)
     return 10 ** (azimuth / 20), 10 ** (elevation / 20)
 
 

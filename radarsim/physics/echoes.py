@@ -18,7 +18,7 @@ from numba import njit, prange
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarsim.physics import chains, plates
-from radarsim.physics.antenna import gain_tables
+from radarsim.physics.antenna import Antenna, gain_tables
 from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
 from radarsim.physics.facets import Facets
@@ -150,6 +150,7 @@ class EchoFinder:
         config: radar configuration.
         weakest: echoes below this amplitude are left out.
         reach: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
+        antenna: the elements' pattern; default: the IWR1843BOOST's.
         curved: round bodies.
         crowd: what moves by itself.
     """
@@ -162,6 +163,7 @@ class EchoFinder:
         config: RadarConfig,
         weakest: float = 0.0,
         reach: float | None = None,
+        antenna: Antenna | None = None,
         curved: Curved | None = None,
         crowd: Crowd | None = None,
     ):
@@ -170,7 +172,7 @@ class EchoFinder:
         self.reach = 1.05 * config.max_range if reach is None else reach
         self.mirrors = None if facets is None or not len(facets) else Mirrors.of(facets, scene, self.reach)
         self.slabs = None if scene is None else Slabs(scene, config, CLEARANCE)
-        self._tables = gain_tables()
+        self._tables = gain_tables(antenna)
 
     def __call__(
         self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"], time: float = 0.0

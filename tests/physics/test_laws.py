@@ -8,6 +8,7 @@ from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import gain_tables
 from radarsim.physics.echoes import EchoFinder
 from radarsim.physics.frontend import FrontEnd
+from radarsim.physics.frontend_config import Band, FrontEndConfig
 from radarsim.physics.scatterers import Scatterers
 from tests.physics.rigs import Rig, burst, locate, polar
 
@@ -116,7 +117,7 @@ def test_range_doppler_coupling():
 
 def test_noise_floor_is_ktbf():
     """Noise alone: k T B F at the input, times gain, in counts; white over the flat part of the band."""
-    front = FrontEnd(CONFIG)
+    front = FrontEnd(CONFIG, FrontEndConfig.ideal(noise=True, band=Band()))
     silence = np.zeros((CONFIG.loops, 3, 4, CONFIG.samples), np.complex64)
     iq = front.digitize(silence, np.random.default_rng(3)).astype(float)
     spectrum = np.abs(np.fft.fft(iq[..., 0] + 1j * iq[..., 1], axis=-1)) ** 2 / CONFIG.samples
@@ -137,7 +138,7 @@ def test_noise_is_seeded():
 
 
 def test_saturation_clips_and_never_wraps():
-    front = FrontEnd(CONFIG, noise=False)
+    front = FrontEnd(CONFIG, FrontEndConfig.ideal())
     loud = np.full((CONFIG.loops, 3, 4, CONFIG.samples), 1.0 - 1.0j, np.complex64)
     iq = front.digitize(loud, np.random.default_rng(0))
     assert (iq[..., 0] == 32767).all() and (iq[..., 1] == -32768).all()

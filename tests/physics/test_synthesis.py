@@ -45,6 +45,19 @@ def test_against_direct_sum():
     assert error_db(Synthesizer(CONFIG)(lengths, echoes.amplitude), DirectSum(CONFIG)(lengths, echoes.amplitude)) < -60
 
 
+def test_direct_sum_of_several_frames_in_blocks():
+    """The code that a GPU runs, on a CPU in float64: any number of frames, echoes and blocks gives the same sum."""
+    clouds = [cloud(np.random.default_rng(k), n) for k, n in enumerate((9, 0, 25))]
+    lengths = [c.lengths(CONFIG, FAST, 0.1 * k) for k, c in enumerate(clouds)]
+    amplitudes = [c.amplitude for c in clouds]
+    whole = DirectSum(CONFIG).batch(lengths, amplitudes)
+    for block in (1, 3 << 20, 40 << 20):
+        assert np.allclose(DirectSum(CONFIG, block_bytes=block).batch(lengths, amplitudes), whole, rtol=1e-12)
+    assert not whole[1].any()
+    truth = beat(CONFIG, FAST, 0.2, clouds[2].points, clouds[2].amplitude)
+    assert error_db(whole[2], truth) < -55  # what parabolas leave out
+
+
 @pytest.mark.parametrize(
     "changes",
     [

@@ -1,0 +1,47 @@
+"""Sionna RT's paths turned into samples: right where the solver is right."""
+
+import numpy as np
+import pytest
+
+from radarize.radar.presets import PRESETS
+from radarsim.physics.antenna import ISOTROPIC
+from radarsim.physics.pathsolver import PathSolverFinder
+from radarsim.physics.synthesis import Synthesizer
+from radarsim.scene.materials import MATERIALS
+from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.shapes import rectangle
+from tests.physics.rigs import Rig, locate
+
+CONFIG = PRESETS["radarize"]
+
+
+@pytest.fixture(scope="module")
+def wall():
+    """One metal wall, its foot point 20 deg to the left and 2.5 m away."""
+    normal = np.array([np.cos(np.deg2rad(20)), np.sin(np.deg2rad(20)), 0])
+    mesh = rectangle(tuple(2.5 * normal), (8, 8), tuple(-normal))
+    return Scene("wall", [SceneObject("wall", mesh, MATERIALS["metal"])])
+
+
+def test_wall_flash(wall):
+    """lambda / (8 pi R) at the foot point, approached at v cos(20 deg) by a sensor that moves ahead."""
+    rig = Rig(velocity=(0.8, 0, 0))
+    middle = np.array([CONFIG.burst_center])
+    paths = PathSolverFinder(wall, CONFIG, antenna=ISOTROPIC)(rig.position(middle)[0], np.eye(3))
+    flash = np.argmax(np.abs(paths.amplitude))
+    single = np.arange(len(paths)) == flash
+    lengths = paths.lengths(CONFIG, rig, 0.0)[single]
+    signal = Synthesizer(CONFIG)(lengths, paths.amplitude[single])
+    away = 2.5 - 0.8 * CONFIG.burst_center * np.cos(np.deg2rad(20))
+    speed = 0.8 * np.cos(np.deg2rad(20))
+    range_, azimuth, elevation, closing, amplitude = locate(CONFIG, signal, (away, np.deg2rad(20), 0.0, speed))
+    assert range_ == pytest.approx(away, abs=3e-3)  # seen from the array's origin, 3 mm from its centre
+    assert np.rad2deg([azimuth, elevation]) == pytest.approx([20, 0], abs=0.2)
+    assert closing == pytest.approx(speed, abs=0.005)
+    assert 20 * np.log10(abs(amplitude) * 8 * np.pi * away / CONFIG.wavelength) == pytest.approx(0, abs=0.2)
+
+
+def test_same_pose_same_paths(wall):
+    finder = PathSolverFinder(wall, CONFIG)
+    first, again = finder(np.zeros(3), np.eye(3)), finder(np.zeros(3), np.eye(3))
+    assert len(first) > 0 and np.array_equal(np.sort(first.length), np.sort(again.length))

@@ -12,11 +12,11 @@ scatterer comes and goes smoothly over a doubling of range: nothing pops, and sp
 import numpy as np
 from numba import njit
 
-from radarsim.physics.antenna import PEAK_DBI
+from radarsim.physics.antenna import Antenna
 
 #: Distance up to which about all scatterers in the middle of the beam are used, m.
 FULL_DETAIL = 1.1
-_PEAK = 10 ** (PEAK_DBI / 20)
+_PEAK = 10 ** (Antenna().peak_dbi / 20)
 
 
 #: Where the antenna does not look at all, mirrors may show a scatterer all the same: least gain that is reckoned with.

@@ -101,7 +101,7 @@ class PathSolverFinder:
         rotations: Float[np.ndarray, "frame 3 3"],
         times: Float[np.ndarray, "frame"],
     ) -> list[Paths]:
-        """Paths of several frames, one solver call each; the solver knows nothing that moves, so times do not matter."""
+        """Paths of several frames, one solver call each; nothing moves in the solver's world, so times do not matter."""
         return [self(p, r) for p, r in zip(positions, rotations, strict=True)]
 
     def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Paths:
@@ -125,7 +125,7 @@ class PathSolverFinder:
         amplitude *= gain[0] * gain[1] if len(amplitude) else 1
         keep = (np.abs(amplitude) > self.weakest) & (delay > 0)
         keep &= SPEED_OF_LIGHT * delay < 2 * 1.05 * self.config.max_range
-        provenance = np.where(bounces > 1, Provenance.GHOST, Provenance.DIRECT).astype(np.uint8)
+        provenance = np.where(bounces > 1, Provenance.GHOST_1, Provenance.DIRECT).astype(np.uint8)
         return Paths(
             SPEED_OF_LIGHT * delay[keep].astype(float), departure[keep], arrival[keep], tx, rx, amplitude[keep],
             provenance[keep],

@@ -39,13 +39,13 @@ LEAST_LOSS = 4.0
 class Provenance(IntEnum):
     """Why there is an echo."""
 
-    DIRECT = 0
+    DIRECT = 0  #: corners of two or three mirrors at right angles, too: they echo from where they stand
     FLOOR_CEILING = 1
     GHOST_1 = 2  #: over one mirror on the way out or back
-    GHOST_2 = 3  #: over two mirrors, or by two mirrors alone
-    GHOST_3 = 4  #: by three mirrors alone
+    GHOST_2 = 3  #: over two mirrors, or by two mirrors alone that form no corner
+    GHOST_3 = 4  #: by three mirrors alone that form no corner
     THROUGH_SLAB = 5  #: through a wall, pane or door, whatever else
-    MOVING = 6
+    MOVING = 6  #: reserved
 
 
 @dataclass(frozen=True)
@@ -408,7 +408,12 @@ class EchoFinder:
             blocked |= self.scene.occluded(begins, ends, margin=CLEARANCE)
         free = np.flatnonzero(~blocked.reshape(4, -1).any(axis=0))
         both = free[chain[free, 0] != chain[free, 2]]
-        cause = np.where(chain[:, 1] == chain[:, 2], Provenance.GHOST_2, Provenance.GHOST_3)
+        two = chain[:, 1] == chain[:, 2]
+        a, b, c = self.mirrors.normal[chain].transpose(1, 0, 2)
+        slant = np.abs(np.einsum("cd,cd->c", a, b)) + np.abs(np.einsum("cd,cd->c", a, c))
+        slant += np.where(two, 0, np.abs(np.einsum("cd,cd->c", b, c)))
+        cause = np.where(two, Provenance.GHOST_2, Provenance.GHOST_3)
+        cause[slant < 1e-3] = Provenance.DIRECT
         isometry = np.concatenate([isometry[free], chains.reverse(isometry[both])])
         free = np.concatenate([free, both])
         return frame[free], isometry, amplitude[free], cause[free]

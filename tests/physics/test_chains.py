@@ -9,8 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics import chains
+from radarsim.physics.echoes import EchoFinder, Provenance
 from radarsim.physics.facets import TABLE, Facets
 from radarsim.physics.mirrors import Mirrors
+from radarsim.physics.scatterers import Scatterers
 from radarsim.scene.scene import Scene
 
 CONFIG = PRESETS["radarize"]
@@ -183,3 +185,18 @@ def test_box_room_has_all_its_images(monkeypatch):
         counted[order] += 1
         assert np.sum(amplitude[here]) == pytest.approx(expected, abs=0.023 * LAMBDA / (4 * np.pi * path)), cell
     assert counted == {2: 18, 3: 38}
+
+
+def test_causes_in_a_box_room():
+    """Edges and corners of a room echo from where they stand; images behind its walls are ghosts, by order."""
+    scene = Scene.load("physics/room")
+    finder = EchoFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Facets.of(scene, CONFIG), CONFIG)
+    position = np.array([0.37, -0.21, 1.23])
+    finder.reach = 8.0
+    echoes = finder(position, looking(direction(0.2, 0.1)))
+    apparent = (position + echoes.images[:, :, :3] @ position + echoes.images[:, :, 3]) / 2
+    low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
+    inside = np.all((apparent > low - 1e-6) & (apparent < high + 1e-6), axis=1)
+    real = echoes.provenance <= Provenance.FLOOR_CEILING
+    assert np.array_equal(inside, real)
+    assert len(echoes.of(Provenance.GHOST_3)) and real.sum() > 10

@@ -192,11 +192,25 @@ def _strips(region) -> list[tuple[float, float, float, float]]:
     for low, high in zip(levels[:-1], levels[1:], strict=True):
         margin = min(1e-6, (high - low) / 10)
         below, above = _crossings(region, low + margin), _crossings(region, high - margin)
-        slant = np.max(np.abs(below - above)) if below.shape == above.shape and len(below) else STRIP
-        steps = int(np.ceil((high - low) / STRIP)) if slant > OFFSET else 1
-        edges = np.linspace(low, high, steps + 1)
-        for y0, y1 in zip(edges[:-1], edges[1:], strict=True):
-            found += [(x0, y0, x1, y1) for x0, x1 in _crossings(region, (y0 + y1) / 2)]
+        if high - low <= STRIP or below.shape != above.shape:  # they differ where a part is thinner than the margin
+            found += [(x0, low, x1, high) for x0, x1 in _crossings(region, (low + high) / 2)]
+            continue
+        for (left, right), (left_above, right_above) in zip(below, above, strict=True):
+            found += _trapezoid(low, high, (left, right), (left_above, right_above))
+    return found
+
+
+def _trapezoid(low: float, high: float, below: tuple[float, float], above: tuple[float, float]):
+    """The widest upright rectangle in a trapezoid between two levels, and stairs on its slanted sides."""
+    inner = max(below[0], above[0]), min(below[1], above[1])
+    upright = inner[1] - inner[0] > OFFSET
+    found = [(inner[0], low, inner[1], high)] if upright else []
+    edges = np.linspace(low, high, int(np.ceil((high - low) / STRIP)) + 1)
+    for y0, y1 in zip(edges[:-1], edges[1:], strict=True):
+        part = ((y0 + y1) / 2 - low) / (high - low)
+        left, right = (b + part * (a - b) for b, a in zip(below, above, strict=True))
+        sides = ((left, inner[0]), (inner[1], right)) if upright else ((left, right),)
+        found += [(x0, y0, x1, y1) for x0, x1 in sides if x1 - x0 > OFFSET / 3]
     return found
 
 
@@ -205,4 +219,4 @@ def _crossings(region, y: float) -> Float[np.ndarray, "interval 2"]:
     x0, _, x1, _ = region.bounds
     cut = shapely.intersection(region, shapely.LineString([(x0 - 1, y), (x1 + 1, y)]))
     intervals = [np.sort(shapely.get_coordinates(part)[:, 0])[[0, -1]] for part in shapely.get_parts(cut)]
-    return np.array(sorted(i.tolist() for i in intervals if i[1] - i[0] > OFFSET)).reshape(-1, 2)
+    return np.array(sorted(i.tolist() for i in intervals if i[1] > i[0])).reshape(-1, 2)

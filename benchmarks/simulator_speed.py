@@ -131,7 +131,7 @@ def main() -> None:
         notes=[
             f"Fast synthesis against the naive sum of the same echoes: error power {max(error):.1f} dB (worst frame).",
             f"The radar makes {CONFIG.frame_rate:.0f} frames/s: the simulator runs at "
-            f"{1 / ours / CONFIG.frame_rate:.2f} of real time. First {BATCH} frames after {first:.1f} s, scene included.",
+            f"{1 / ours / CONFIG.frame_rate:.2f} of real time. First {BATCH} frames, scene included: {first:.1f} s.",
             f"Medians over {options.frames}, {options.naive_frames} and {options.sionna_frames} frames; peak memory "
             f"{memory:.0f} MB before the references ran.",
             f"PathSolver: {options.rays:.0e} rays, depth 3, diffuse reflection.",

@@ -101,7 +101,7 @@ class PathSolverFinder:
         rotations: Float[np.ndarray, "frame 3 3"],
         times: Float[np.ndarray, "frame"],
     ) -> list[Paths]:
-        """Paths of several frames, one solver call each; nothing moves in the solver's world, so times do not matter."""
+        """Paths of several frames, one solver call each; nothing moves in the solver's world."""
         return [self(p, r) for p, r in zip(positions, rotations, strict=True)]
 
     def __call__(self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"]) -> Paths:

@@ -35,6 +35,12 @@ def peak_memory_mb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 
+def memory_mb() -> float:
+    """Resident size of this process now, MB."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 1e6
+
+
 def publish(name: str, title: str, rows: list[dict[str, object]], *, seed: int, notes: list[str]) -> None:
     """Write and print a table.
 

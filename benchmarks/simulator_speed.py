@@ -1,18 +1,21 @@
-"""How fast the simulator is, and how exact, on the office with the `radarize` preset.
+"""How fast the simulator is, and how exact, on three scenes with the `radarize` preset.
 
-Three ways to the same frames in one run: this simulator; the same echoes summed naively in float64 numpy; and Sionna
-RT's own PathSolver at the same poses, which finds paths only and would still have to be turned into samples.
+Three ways to the frames of the first scene in one run: this simulator; the same echoes summed naively in float64
+numpy; and `--engine sionna`, the paths of Sionna RT's own solver at the same poses.
 """
 
 import argparse
 import time
+from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.results import peak_memory_mb, publish
+from benchmarks.results import memory_mb, peak_memory_mb, publish
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.motion import plan_motion
+from radarsim.physics.pathsolver import DEPTH, RAYS
+from radarsim.physics.surface import DENSITY, Surface
 from radarsim.physics.synthesis import BurstClock
 from radarsim.scene.scene import Scene
 from radarsim.simulate import Simulator
@@ -39,104 +42,162 @@ def naive(lengths: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
     return out
 
 
-def sionna_paths(scene: Scene, position: np.ndarray, yaw: float, rays: int, seed: int) -> int:
-    """Paths that Sionna RT's PathSolver finds between two antennas a centimetre apart; diffuse, depth 3."""
-    import sionna.rt as rt
-
-    world = scene.sionna
-    for name in list(world.transmitters):
-        world.remove(name)
-    for name in list(world.receivers):
-        world.remove(name)
-    world.frequency = CONFIG.center_frequency
-    world.tx_array = world.rx_array = rt.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
-    beside = 0.006 * np.array([-np.sin(yaw), np.cos(yaw), 0])
-    world.add(rt.Transmitter("tx", [float(x) for x in position + beside]))
-    world.add(rt.Receiver("rx", [float(x) for x in position - beside]))
-    paths = rt.PathSolver()(
-        world, max_depth=3, samples_per_src=rays, diffuse_reflection=True, refraction=False, seed=seed
-    )
-    return int(paths.a[0].numpy().size)
+def walk(scene: Scene, frames: int, seed: int) -> tuple[Simulator, np.ndarray]:
+    """A simulator on a handheld walk, and the frames' stamps."""
+    route, physics = np.random.default_rng(seed).spawn(2)
+    motion = plan_motion(scene, "handheld", frames * CONFIG.frame_period + 1, route)
+    return Simulator(scene, motion, CONFIG, physics), np.arange(frames) * CONFIG.frame_period
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--frames", type=int, default=240)
-    parser.add_argument("--naive-frames", type=int, default=2)
-    parser.add_argument("--sionna-frames", type=int, default=20)
-    parser.add_argument("--rays", type=int, default=100_000)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+@dataclass
+class Pace:
+    """Medians over a walk.
 
+    Attributes:
+        frame, finding: s per frame, in all and for its echoes.
+        echoes: mean number.
+        first: s from nothing to the first frames.
+        memory: peak of the process so far, MB.
+    """
+
+    frame: float
+    finding: float
+    echoes: float
+    first: float
+    memory: float
+
+
+def pace(name: str, frames: int, seed: int) -> tuple[Pace, Simulator, np.ndarray]:
+    """Speed on one scene."""
     start = time.perf_counter()
-    scene = Scene.load("office")
-    route, physics = np.random.default_rng(options.seed).spawn(2)
-    motion = plan_motion(scene, "handheld", options.frames * CONFIG.frame_period + 1, route)
-    simulator = Simulator(scene, motion, CONFIG, physics)
-    times = np.arange(options.frames) * CONFIG.frame_period
+    simulator, times = walk(Scene.load(name), frames, seed)
     simulator.frames(times[:BATCH])
     first = time.perf_counter() - start
-
-    spent, echo_seconds, counts = [], [], []
-    for k in range(0, options.frames, BATCH):
+    spent, finding, counts = [], [], []
+    for k in range(0, frames, BATCH):
         start = time.perf_counter()
         _, echoes = simulator.frames(times[k : k + BATCH])
         spent.append((time.perf_counter() - start) / len(echoes))
         counts += [len(e) for e in echoes]
         start = time.perf_counter()
         simulator.echoes(times[k : k + BATCH])
-        echo_seconds.append((time.perf_counter() - start) / len(echoes))
-    ours, memory = float(np.median(spent)), peak_memory_mb()
+        finding.append((time.perf_counter() - start) / len(echoes))
+    found = Pace(float(np.median(spent)), float(np.median(finding)), np.mean(counts), first, peak_memory_mb())
+    return found, simulator, times
+
+
+def memory_growth(simulator: Simulator, frames: int) -> str:
+    """Resident memory early and late in a long run, MB."""
+    levels = []
+    for k in range(0, frames, BATCH):
+        simulator.frames((np.arange(k, k + BATCH) * CONFIG.frame_period) % (simulator.motion.duration - 1))
+        levels.append(memory_mb())
+    tenth = max(len(levels) // 10, 1)
+    early, late = np.mean(levels[tenth : 2 * tenth]), np.mean(levels[-tenth:])
+    return f"{early:.0f} MB early, {late:.0f} MB late, over {frames} frames"
+
+
+def cell_power(simulator: Simulator, times: np.ndarray) -> np.ndarray:
+    """Mean power by range bin over frames, linear, from 0.5 m to the maximum range."""
+    power = []
+    for t in times:
+        present = simulator.echoes([t])[0]
+        lengths = present.lengths(CONFIG, simulator.motion, t)
+        signal = simulator.synthesize(lengths, present.amplitude)
+        spectrum = np.fft.fft(signal * np.hanning(CONFIG.samples), axis=-1)
+        power.append(np.mean(np.abs(spectrum) ** 2, axis=(0, 1, 2))[12:])
+    return np.mean(power, axis=0)
+
+
+def density_error(name: str, frames: int, seed: int) -> str:
+    """Power per cell against ten times the scatterers, one draw each, the same walk."""
+    scene = Scene.load(name)
+    simulator, times = walk(scene, 30 * frames, seed)
+    some = times[:: max(len(times) // frames, 1)][:frames]
+    plain = cell_power(simulator, some)
+    simulator.finder.surface = Surface(scene, np.random.default_rng(seed), 10 * DENSITY)
+    simulator.finder.weakest /= np.sqrt(10)
+    off = 10 * np.log10(plain / cell_power(simulator, some))
+    return (
+        f"{10 * np.log10(np.mean(10 ** (off / 10))):+.2f} dB in the mean of all range cells, {np.std(off):.2f} dB RMS "
+        f"from cell to cell, {frames} frames along a walk"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor"], help="the first in detail")
+    parser.add_argument("--frames", type=int, default=240)
+    parser.add_argument("--naive-frames", type=int, default=2)
+    parser.add_argument("--sionna-frames", type=int, default=20)
+    parser.add_argument("--memory-frames", type=int, default=0, help="frames of a long run that watches memory")
+    parser.add_argument("--dense-frames", type=int, default=0, help="frames compared with ten times the scatterers")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+
+    rows, notes = [], []
+    for name in options.scenes:
+        found, *rest = pace(name, options.frames, options.seed)
+        if not rows:
+            main_pace, simulator, times = found, *rest
+        rows.append(row(f"{name}: radarsim", found.frame, main_pace, found.echoes, "int16 I/Q with noise"))
+        rows.append(row(f"{name}: of it, finding echoes", found.finding, main_pace, found.echoes, "echoes"))
+        notes.append(
+            f"{name}: first {BATCH} frames after {found.first:.1f} s; peak memory {found.memory:.0f} MB so far."
+        )
 
     naive_seconds, error = [], []
     for t in times[:: max(options.frames // options.naive_frames, 1)][: options.naive_frames]:
         present = simulator.echoes([t])[0]
-        lengths = present.lengths(CONFIG, motion, t)
+        lengths = present.lengths(CONFIG, simulator.motion, t)
         fast = simulator.synthesize(lengths, present.amplitude)
         start = time.perf_counter()
         truth = naive(lengths, present.amplitude)
         naive_seconds.append(time.perf_counter() - start)
         error.append(10 * np.log10(np.sum(np.abs(fast - truth) ** 2) / np.sum(np.abs(truth) ** 2)))
+    first = options.scenes[0]
+    seconds = float(np.median(naive_seconds))
+    rows.append(row(f"{first}: naive float64 numpy", seconds, main_pace, main_pace.echoes, "the same echoes, samples"))
 
-    sionna_seconds, found = [], []
+    _, physics = np.random.default_rng(options.seed).spawn(2)
+    other = Simulator(Scene.load(first), simulator.motion, CONFIG, physics, engine="sionna")
+    seconds, counts = [], []
     for k, t in enumerate(np.linspace(0, times[-1], options.sionna_frames + 2)):
-        position, rotation = motion.position(np.array([t]))[0], motion.rotation(np.array([t]))
-        forward = rotation.apply([1.0, 0.0, 0.0])[0]
         start = time.perf_counter()
-        paths = sionna_paths(scene, position, float(np.arctan2(forward[1], forward[0])), options.rays, options.seed)
+        _, paths = other.frames(np.array([t]))
         if k >= 2:  # the first calls compile kernels
-            sionna_seconds.append(time.perf_counter() - start)
-            found.append(paths)
-
-    def row(way: str, seconds: float, echoes: float, remark: str) -> dict[str, object]:
-        return {
-            "way": way,
-            "ms per frame": 1e3 * seconds,
-            "frames/s": 1 / seconds,
-            "times slower": seconds / ours,
-            "echoes or paths": int(echoes),
-            "gives": remark,
-        }
-
-    publish(
-        "simulator_speed",
-        "Simulator speed: office, preset radarize",
-        [
-            row("radarsim", ours, np.mean(counts), "int16 I/Q with noise"),
-            row("- of it, finding echoes", float(np.median(echo_seconds)), np.mean(counts), "echoes"),
-            row("naive numpy, float64", float(np.median(naive_seconds)), np.mean(counts), "same echoes"),
-            row("Sionna RT PathSolver", float(np.median(sionna_seconds)), np.mean(found), "paths, one antenna"),
-        ],
-        seed=options.seed,
-        notes=[
-            f"Fast synthesis against the naive sum of the same echoes: error power {max(error):.1f} dB (worst frame).",
-            f"The radar makes {CONFIG.frame_rate:.0f} frames/s: the simulator runs at "
-            f"{1 / ours / CONFIG.frame_rate:.2f} of real time. First {BATCH} frames, scene included: {first:.1f} s.",
-            f"Medians over {options.frames}, {options.naive_frames} and {options.sionna_frames} frames; peak memory "
-            f"{memory:.0f} MB before the references ran.",
-            f"PathSolver: {options.rays:.0e} rays, depth 3, diffuse reflection.",
-        ],
+            seconds.append(time.perf_counter() - start)
+            counts.append(len(paths[0]))
+    rows.append(
+        row(f"{first}: --engine sionna", float(np.median(seconds)), main_pace, np.mean(counts), "int16 I/Q with noise")
     )
+
+    notes += [
+        f"Fast synthesis against the naive sum of the same echoes: error power {max(error):.1f} dB (worst frame).",
+        f"The radar makes {CONFIG.frame_rate:.0f} frames/s: {first} runs at "
+        f"{1 / main_pace.frame / CONFIG.frame_rate:.2f} of real time.",
+        f"Medians over {options.frames}, {options.naive_frames} and {options.sionna_frames} frames.",
+        f"Sionna RT's PathSolver: {RAYS:.0e} rays, depth {DEPTH}, diffuse reflection; its paths above the noise, "
+        "turned into samples by the same synthesis.",
+    ]
+    if options.memory_frames:
+        notes.append(f"{first}: memory {memory_growth(simulator, options.memory_frames)}.")
+    if options.dense_frames:
+        off = density_error(first, options.dense_frames, options.seed)
+        notes.append(f"{first}: power against ten times the scatterers {off}.")
+    publish("simulator_speed", "Simulator speed, preset radarize", rows, seed=options.seed, notes=notes)
+
+
+def row(way: str, seconds: float, ours: Pace, echoes: float, gives: str) -> dict[str, object]:
+    """A row of the table."""
+    return {
+        "way": way,
+        "ms per frame": 1e3 * seconds,
+        "frames/s": 1 / seconds,
+        "times slower": seconds / ours.frame,
+        "echoes or paths": int(echoes),
+        "gives": gives,
+    }
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ def simulate(
     duration: Annotated[float, typer.Option(min=0.0, help="Length of the walk, s.")] = 40.0,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
-    device: Annotated[Literal["cpu", "cuda"], typer.Option(help="Where the echoes are summed.")] = "cpu",
+    device: Annotated[Literal["cpu", "cuda"], typer.Option(help="Where echoes are summed; cuda is untried.")] = "cpu",
     frontend: Annotated[
         Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else an IWR1843BOOST.")
     ] = None,

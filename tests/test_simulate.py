@@ -8,8 +8,10 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.recording import Recording
+from radarsim.motion import plan_motion
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.scene.scene import Scene
 from radarsim.simulate import CAUSES, simulate
 
 
@@ -119,6 +121,14 @@ def test_sionna_engine(tmp_path):
         ranges = recording.config.ranges
     power = np.abs(np.fft.fft(adc[..., 0] + 1j * adc[..., 1], axis=-1)).mean(axis=(0, 1, 2))
     assert ranges[power.argmax()] == pytest.approx(3.0, abs=0.05)
+
+
+@pytest.mark.parametrize(("name", "size"), [("corridor", (40, 9.6)), ("floor", (50, 30))])
+def test_large_scenes_can_be_walked(name, size):
+    """The benchmark's buildings have their size, and a tour through them."""
+    scene = Scene.load(name)
+    assert np.ptp(scene.bounds, axis=0)[:2] == pytest.approx(size)
+    assert plan_motion(scene, "handheld", 5.0, np.random.default_rng(0)).duration == 5.0
 
 
 def still(folder):

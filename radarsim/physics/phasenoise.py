@@ -94,6 +94,7 @@ def density(mask: PhaseNoise, carrier: float, offset: Float[np.ndarray, "*n"]) -
 
 @njit(parallel=True, fastmath=True, cache=True)
 def _add_skirts(bins, theta, difference, weakest, out):
+    """out[chirp, rx, m] += sum over cells k of bins[chirp, rx, k] theta[chirp, m - k] difference[k, m]."""
     chirps, rx, n = bins.shape
     for c in prange(chirps):
         for k in range(n):
@@ -103,8 +104,8 @@ def _add_skirts(bins, theta, difference, weakest, out):
                 strongest = max(strongest, s.real * s.real + s.imag * s.imag)
             if strongest <= weakest[k]:
                 continue
-            start = n - 1 - k
+            skirt = theta[c, n - 1 - k : 2 * n - 1 - k] * difference[k]
             for r in range(rx):
                 s = bins[c, r, k]
                 for m in range(n):
-                    out[c, r, m] += s * (theta[c, start + m] * difference[k, m])
+                    out[c, r, m] += s * skirt[m]

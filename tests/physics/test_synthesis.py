@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import torch
 
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
@@ -54,6 +55,9 @@ def test_direct_sum_of_several_frames_in_blocks():
     for block in (1, 3 << 20, 40 << 20):
         assert np.allclose(DirectSum(CONFIG, block_bytes=block).batch(lengths, amplitudes), whole, rtol=1e-12)
     assert not whole[1].any()
+    single = DirectSum(CONFIG)
+    single.real, single.complex = torch.float32, torch.complex64  # as on CUDA
+    assert error_db(single.batch(lengths, amplitudes), whole) < -100
     truth = beat(CONFIG, FAST, 0.2, clouds[2].points, clouds[2].amplitude)
     assert error_db(whole[2], truth) < -55  # what parabolas leave out
 

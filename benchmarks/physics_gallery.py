@@ -1,0 +1,367 @@
+"""The gallery of physical laws: docs/physics.md and its plots, each law's closed form against the simulator.
+
+    python -m benchmarks.physics_gallery
+
+A law is a function that draws on two axes' worth of paper and returns what it measured. To add one, write it and name
+it in `LAWS`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy import stats
+
+from radarize.heatmaps import Heatmaps
+from radarize.radar.array import rx_positions, tx_positions, virtual_positions
+from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.radar.presets import PRESETS
+from radarsim.physics.antenna import ISOTROPIC
+from radarsim.physics.echoes import Echoes, EchoFinder, Provenance
+from radarsim.physics.facets import Facets
+from radarsim.physics.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
+from radarsim.physics.frontend_config import FrontEndConfig, PhaseNoise
+from radarsim.physics.phasenoise import density
+from radarsim.physics.scatterers import Scatterers
+from radarsim.scene.materials import material
+from radarsim.scene.scene import Scene
+from tests.physics.rigs import Rig, burst, locate, polar
+
+CONFIG = PRESETS["radarize"]
+LAMBDA = CONFIG.wavelength
+HERE, AHEAD = np.zeros(3), np.eye(3)
+NOWHERE = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+DOCS = Path(__file__).parents[1] / "docs"
+THEORY = {"color": "black", "lw": 1, "label": "theory"}
+FOUND = {"color": "tab:red", "marker": "o", "ms": 3.5, "ls": "", "label": "simulated"}
+
+
+def db(power):
+    """Decibels of a power."""
+    return 10 * np.log10(power)
+
+
+def field(echoes: Echoes, position: np.ndarray) -> complex:
+    """Sum of all echoes at one antenna at `position`, at the centre frequency."""
+    away = np.linalg.norm(echoes.points - position, axis=2).sum(axis=1)
+    mirrored = np.einsum("eij,j->ei", echoes.images[:, :, :3], position) + echoes.images[:, :, 3]
+    lengths = np.concatenate([away, np.linalg.norm(position - mirrored, axis=1)])
+    return complex(np.sum(echoes.amplitude * np.exp(2j * np.pi * lengths / LAMBDA)))
+
+
+def clutter(rng: np.random.Generator, count: int) -> Scatterers:
+    """A patch of wall 3 m ahead, as scatterers of random phase with one cross section in all."""
+    place = np.stack([np.full(count, 3.0), rng.uniform(-3, 3, count), rng.uniform(-1, 1, count)], axis=1)
+    return Scatterers.points(place, np.full(count, 12.0 / count), rng.uniform(0, 2 * np.pi, count))
+
+
+def point_target(axis) -> str:
+    """|a|^2 = lambda^2 sigma / ((4 pi)^3 R^4): twice as far, 12 dB less."""
+    ranges, found, off = np.geomspace(0.6, 4.2, 15), [], []
+    center = virtual_positions(CONFIG).mean(axis=(0, 1)) / 2  # from here the array sees directions
+    for r in ranges:
+        place = center + polar(r, 15, 5)
+        finder = EchoFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG, antenna=ISOTROPIC)
+        guess = (np.linalg.norm(place) + 0.01, *np.deg2rad([16, 4]), 0.02)
+        measured = locate(CONFIG, burst(CONFIG, finder(HERE, AHEAD), Rig()), guess)
+        found.append(2 * db(np.abs(measured[4])))
+        away = 1e3 * (measured[0] - np.linalg.norm(place))
+        off.append([away, *(np.rad2deg(measured[1:3]) - (15, 5)), measured[3]])
+    theory = db(LAMBDA**2 / ((4 * np.pi) ** 3 * ranges**4))
+    axis.semilogx(ranges, theory, **THEORY)
+    axis.semilogx(ranges, found, **FOUND)
+    axis.set(xlabel="range, m", ylabel="received / transmitted, dB")
+    far = np.abs(np.array(off))[ranges > 2].max(axis=0)
+    return (
+        f"Worst of 15 ranges: {np.abs(found - theory).max():.3f} dB. Beyond 2 m (nearer, wave fronts are curved), by a "
+        f"far-field filter: range {far[0]:.3f} mm, azimuth {far[1]:.3f} deg, elevation {far[2]:.3f} deg, velocity "
+        f"{far[3]:.4f} m/s."
+    )
+
+
+def wall_flash(axis) -> str:
+    """|a| = lambda |Gamma| / (4 pi 2R): a large wall mirrors the radar, twice as far, 6 dB less."""
+    scene = Scene.load("physics/wall")
+    facets = Facets.of(scene, CONFIG)
+    away, found = np.linspace(0.5, 2.9, 13), []
+    finder = EchoFinder(None, NOWHERE, facets, CONFIG, antenna=ISOTROPIC)
+    for r in away:
+        found.append(2 * db(np.abs(finder(np.array([3 - r, 0, 0]), AHEAD).amplitude).max()))
+    what = material("concrete")
+    gamma = abs(what.fresnel(np.array(1.0), CONFIG.center_frequency)[0])
+    gamma *= np.exp(-8 * (np.pi * what.roughness / LAMBDA) ** 2)
+    theory = 20 * np.log10(LAMBDA * gamma / (8 * np.pi * away))
+    axis.plot(away, theory, **THEORY)
+    axis.plot(away, found, **FOUND)
+    axis.set(xlabel="distance of a concrete wall, m", ylabel="received / transmitted, dB")
+    return f"Worst of 13 distances: {np.abs(found - theory).max():.3f} dB."
+
+
+def plate(axis) -> str:
+    """A 10 cm metal plate from a circle of 3 m around it: physical optics, summed point by point."""
+    finder = EchoFinder(None, NOWHERE, Facets.of(Scene.load("physics/plate"), CONFIG), CONFIG, antenna=ISOTROPIC)
+    angles, side = np.linspace(-20, 20, 321), 0.1
+    grid = (np.arange(400) + 0.5) / 400 * side - side / 2
+    found, theory = [], []
+    for angle in np.deg2rad(angles):
+        position = np.array([3 - 3 * np.cos(angle), 3 * np.sin(angle), 0.0])
+        found.append(field(finder(position, AHEAD), position))
+        rho = np.sqrt((3 - position[0]) ** 2 + (position[1] - grid[:, None]) ** 2 + grid**2)
+        part = (3 - position[0]) / rho**3 * np.exp(4j * np.pi * rho / LAMBDA)
+        theory.append(part.sum() * (side / 400) ** 2 / (4 * np.pi))
+    found, theory = (20 * np.log10(np.abs(x)) for x in (found, theory))
+    axis.plot(angles, theory, **THEORY)
+    axis.plot(angles, found, color="tab:red", lw=0.8, ls="--", label="simulated")
+    axis.set(xlabel="angle off the normal, deg", ylabel="received / transmitted, dB", ylim=(theory.max() - 45, None))
+    lobes = theory > theory.max() - 30
+    return (
+        f"Within 30 dB of the peak: median {np.median(np.abs(found - theory)[lobes]):.3f} dB off, 95 % within "
+        f"{np.quantile(np.abs(found - theory)[lobes], 0.95):.2f} dB."
+    )
+
+
+def doppler(axis) -> str:
+    """The static world draws v cos(phi - theta) into the Doppler-azimuth map of a moving radar."""
+    rng = np.random.default_rng(7)
+    azimuth, range_ = rng.uniform(-np.pi / 2, np.pi / 2, 4000), rng.uniform(1.5, 4.0, 4000)
+    place = np.stack([range_ * np.cos(azimuth), range_ * np.sin(azimuth), 0 * range_], axis=1)
+    rig = Rig(velocity=(0.85, 0.85, 0))
+    center = rig.position(np.array([CONFIG.burst_center]))[0]
+    scatterers = Scatterers.points(place + center, 1e-3 * range_**4, rng.uniform(0, 2 * np.pi, 4000))
+    signal = burst(CONFIG, EchoFinder(None, scatterers, None, CONFIG)(center, AHEAD), rig)
+    maps = Heatmaps(CONFIG)
+    power = maps.doppler_azimuth(FrontEnd(CONFIG).digitize(signal, rng)[None])[0].numpy()
+    axis.pcolormesh(np.rad2deg(maps.azimuths), maps.velocities, db(power), vmin=db(power.max()) - 25, rasterized=True)
+    theory = 0.85 * np.cos(maps.azimuths) + 0.85 * np.sin(maps.azimuths)
+    axis.plot(np.rad2deg(maps.azimuths), theory, color="white", lw=1, label="0.85 cos + 0.85 sin")
+    axis.set(xlabel="azimuth, deg (left positive)", ylabel="closing speed, m/s")
+    bins = np.clip(power.argmax(axis=0) + np.arange(-1, 2)[:, None], 0, len(maps.velocities) - 1)
+    weight = np.take_along_axis(power, bins, axis=0)
+    error = ((maps.velocities[bins] * weight).sum(axis=0) / weight.sum(axis=0) - theory)[np.abs(maps.azimuths) < 0.87]
+    return f"The ridge lies {abs(np.median(error)):.4f} m/s off the curve in the median of all columns within 50 deg."
+
+
+def tdm(axis) -> str:
+    """TX3 fires one slot after TX1 and TX2 two: a closing echo's phase has moved by -4 pi v Tc / lambda a slot."""
+    speeds = np.linspace(-1.8, 1.8, 13)
+    finder = EchoFinder(None, Scatterers.points(polar(3.0), np.ones(1)), None, CONFIG)
+    echoes, middle = finder(HERE, AHEAD), CONFIG.samples // 2
+    still, found = burst(CONFIG, echoes, Rig())[:, :, 0, middle], []
+    for v in speeds:
+        turn = np.angle(burst(CONFIG, echoes, Rig(velocity=(v, 0, 0)))[:, :, 0, middle] * still.conj())
+        found.append(np.angle(np.exp(1j * (turn - turn[:, :1])).mean(axis=0)))
+    found = np.array(found)
+    theory = -4 * np.pi * np.outer(speeds, CONFIG.slot) * CONFIG.chirp_time / LAMBDA
+    for k, name in ((2, "TX3"), (1, "TX2")):
+        axis.plot(speeds, np.rad2deg(theory[:, k]), color="black", lw=1)
+        axis.plot(speeds, np.rad2deg(np.unwrap(found[:, k])), ls="", marker="o", ms=3.5, label=name)
+    axis.set(xlabel="closing speed, m/s", ylabel="phase against TX1, deg")
+    error = np.rad2deg(np.abs(np.angle(np.exp(1j * (found - theory)))).max())
+    return f"Worst slot phase: {error:.2f} deg off. Speeds are unambiguous to {CONFIG.max_velocity:.3f} m/s."
+
+
+def range_walk(axis) -> str:
+    """An echo moves through range bins within one burst, chirp by chirp."""
+    speed, n = 1.6, np.arange(CONFIG.samples) / CONFIG.sample_rate
+    echoes = EchoFinder(None, Scatterers.points(polar(3.0), np.ones(1)), None, CONFIG)(HERE, AHEAD)
+    signal = burst(CONFIG, echoes, Rig(velocity=(speed, 0, 0)))[:, 0, 0]
+    expected = 2 * CONFIG.slope * 3.0 / SPEED_OF_LIGHT
+    phase = np.unwrap(np.angle(signal * np.exp(-2j * np.pi * expected * n)), axis=1)
+    found = 3 + np.polyfit(n, phase.T, 1)[0] / (2 * np.pi) * SPEED_OF_LIGHT / (2 * CONFIG.slope)
+    # the Doppler shift within the ramp makes range read f_c v / S too short
+    theory = 3 - speed * CONFIG.chirp_times[:, 0] - CONFIG.center_frequency * speed / CONFIG.slope
+    axis.plot(theory, **THEORY)
+    axis.plot(found, **FOUND)
+    axis.set(xlabel="loop", ylabel="range that the beat frequency stands for, m")
+    walk = 1e3 * (found[0] - found[-1])
+    return (
+        f"At 1.6 m/s the echo walks {walk:.2f} mm of {1e3 * CONFIG.range_resolution:.1f} mm bins; worst chirp "
+        f"{1e3 * np.abs(found - theory).max():.3f} mm off, range-Doppler coupling included."
+    )
+
+
+def noise(axis) -> str:
+    """k T B F, with the noise figure of the receive gain (Friis's formula through 15.6 dB at 30, 15 dB at 48 dB)."""
+    gains, found = np.arange(24.0, 50, 4), []
+    silence = np.zeros(CONFIG.frame_shape[:-1], np.complex64)
+    later = (10**1.56 - 10**1.5) / (10**-3.0 - 10**-4.8)
+    theory = 10**1.5 + later * (10 ** (-gains / 10) - 10**-4.8)
+    for gain in gains:
+        front = FrontEnd(CONFIG.model_copy(update={"rx_gain_db": gain}), FrontEndConfig.ideal(noise=True))
+        counts = front.receive(silence, np.random.default_rng(0))
+        watts = np.mean(np.abs(counts) ** 2) / front.counts**2
+        found.append(watts / (BOLTZMANN * ROOM_TEMPERATURE * CONFIG.sample_rate))
+    axis.plot(gains, db(theory), **THEORY)
+    axis.plot(gains, db(np.array(found)), **FOUND)
+    axis.set(xlabel="receive gain, dB", ylabel="noise over k T B, dB")
+    return f"Worst of {len(gains)} gains: {np.abs(db(found / theory)).max():.3f} dB."
+
+
+def phase_noise(axis) -> str:
+    """4 L(f) sin^2(pi f tau): the skirt of an echo vanishes with its delay."""
+    n, worst = CONFIG.samples, 0.0
+    step = CONFIG.sample_rate / n
+    for cell, color in ((10, "tab:blue"), (40, "tab:orange"), (90, "tab:green")):
+        tone = 0.01 * np.exp(2j * np.pi * cell * np.arange(n) / n) * np.ones(CONFIG.frame_shape[:-1])
+        front = FrontEnd(CONFIG, FrontEndConfig.ideal(phase_noise=PhaseNoise()))
+        counts = front.receive(tone.astype(np.complex64), np.random.default_rng(0))
+        power = np.mean(np.abs(np.fft.fft(counts, axis=-1) / n) ** 2, axis=(0, 1, 2))
+        off = step * np.abs(np.arange(n) - cell)
+        theory = density(PhaseNoise(), CONFIG.center_frequency, off) * 4
+        theory *= np.sin(np.pi * off * cell / CONFIG.bandwidth) ** 2
+        skirt = power / power[cell] / step
+        beside = off > 0
+        axis.plot(np.arange(n)[beside], db(theory[beside]), color="black", lw=1)
+        label = f"echo at {CONFIG.ranges[cell]:.2f} m"
+        axis.plot(np.arange(n)[beside], db(skirt[beside]), ".", ms=4, color=color, label=label)
+        far = off > 4 * step
+        worst = max(worst, abs(db(skirt[far].mean() / theory[far].mean())))
+    axis.set(xlabel="range bin", ylabel="dBc/Hz", ylim=(-150, -98))
+    return f"Mean level of each skirt: {worst:.2f} dB off at worst."
+
+
+def speckle(axis) -> str:
+    """Many scatterers in a cell: Rayleigh amplitudes."""
+    finder = EchoFinder(None, clutter(np.random.default_rng(5), 20000), None, CONFIG, reach=10.0, antenna=ISOTROPIC)
+    amplitude = []
+    for k in range(150):
+        position = np.array([0.0, (0.2 * k) % 3 - 1.5, 0.1 * (0.2 * k // 3) - 0.4])
+        amplitude.append(abs(field(finder(position, AHEAD), position)))
+    amplitude /= np.sqrt(np.mean(np.square(amplitude)) / 2)
+    x = np.linspace(0, 4, 200)
+    axis.plot(x, stats.rayleigh.cdf(x), **THEORY)
+    axis.plot(np.sort(amplitude), (np.arange(150) + 0.5) / 150, **FOUND | {"ms": 2})
+    axis.set(xlabel="amplitude over its scale", ylabel="share of cells below")
+    return f"Kolmogorov-Smirnov: p = {stats.kstest(amplitude, stats.rayleigh.cdf).pvalue:.2f} over 150 positions."
+
+
+def decorrelation(axis) -> str:
+    """Speckle belongs to the world: what a moved radar finds anew is the field of the same frozen scatterers."""
+    shifts = np.geomspace(1e-4, 0.1, 16)
+    own, frozen, kept = [], [], []
+    finders = [EchoFinder(None, clutter(np.random.default_rng(k), 3000), None, CONFIG, reach=9.0) for k in range(40)]
+    first = [f(HERE, AHEAD) for f in finders]
+    start = np.array([field(e, HERE) for e in first])
+    for shift in shifts:
+        moved = np.array([0.0, shift, 0.0])
+        anew = np.array([field(f(moved, AHEAD), moved) for f in finders])
+        same = np.array([field(e, moved) for e in first])
+        for values, pair in ((own, (start, anew)), (frozen, (start, same)), (kept, (same, anew))):
+            values.append(abs(np.vdot(*pair)) / np.linalg.norm(pair[0]) / np.linalg.norm(pair[1]))
+    axis.semilogx(1e3 * shifts, frozen, **THEORY | {"label": "frozen scatterers"})
+    axis.semilogx(1e3 * shifts, own, **FOUND | {"label": "found anew"})
+    axis.set(xlabel="sideways displacement, mm", ylabel="correlation with the field at rest")
+    near = np.array(kept)[shifts <= 0.0101]
+    return (
+        f"Correlation of the field found anew with that of the frozen scatterers: at least {near.min():.5f} up to 10 "
+        f"mm, {np.min(kept):.5f} up to 10 cm (amplitudes follow the antenna pattern)."
+    )
+
+
+def convergence(axis) -> str:
+    """More scatterers, the same mean power per range cell of the coherent sum."""
+    counts, draws, levels = [250, 500, 1000, 2000, 4000, 8000], 300, []
+    once = CONFIG.model_copy(update={"loops": 1, "tx_order": (0,)})
+    for count in counts:
+        power = []
+        for seed in range(draws):
+            finder = EchoFinder(None, clutter(np.random.default_rng((count, seed)), count), None, once, reach=9.0)
+            spectrum = np.fft.fft(burst(once, finder(HERE, AHEAD), Rig()), axis=-1)
+            power.append(np.mean(np.abs(spectrum[..., 67:85]) ** 2))  # 3 to 3.8 m
+        levels.append(db(np.mean(power)))
+    axis.axhline(0, **THEORY)
+    axis.semilogx(counts, np.array(levels) - np.mean(levels), base=2, **FOUND)
+    axis.set(xlabel="scatterers on 12 m2 of wall", ylabel="mean power per cell, dB", ylim=(-0.5, 0.5))
+    return f"Doubling the scatterers changes it by at most {np.abs(np.diff(levels)).max():.2f} dB ({draws} draws each)."
+
+
+def reciprocity(axis) -> str:
+    """Swapping TX and RX leaves the field as it was, for every cause of echoes in the office."""
+    scene = Scene.load("office")
+    surface = Surface(scene, np.random.default_rng(1), density=60.0)
+    position = np.array([8.0, 6.0, 1.2])
+    echoes = EchoFinder(scene, surface, Facets.of(scene, CONFIG), CONFIG, 1e-7)(position, AHEAD)
+    names, levels = [], []
+    for cause in Provenance:
+        some = echoes.of(cause)
+        if not len(some):
+            continue
+        there, back = (signal_between(some, position, *swap) for swap in ((0, 1), (1, 0)))
+        names.append(f"{cause.name.lower()} ({len(some)})".replace("_", " "))
+        levels.append(db(np.sum(np.abs(there - back) ** 2) / np.sum(np.abs(there) ** 2) + 1e-30))
+    axis.barh(names, levels, color="tab:red")
+    axis.axvline(-60, color="black", lw=1)
+    axis.set(xlabel="power of the difference over the field's, dB", xlim=(min(levels) * 1.1, 0))
+    axis.figure.subplots_adjust(left=0.3)
+    return f"Worst cause: {max(levels):.0f} dB."
+
+
+def signal_between(echoes: Echoes, position, first: int, second: int) -> np.ndarray:
+    """Field from each TX to each RX place, or the other way round, over a few frequencies of the sweep."""
+    ends = [position + tx_positions(CONFIG)[:, None], position + rx_positions(CONFIG)[None]]
+    sender, taker = np.broadcast_arrays(ends[first], ends[second])
+    out = []
+    for p, q in zip(sender.reshape(-1, 3), taker.reshape(-1, 3), strict=True):
+        legs = np.linalg.norm(echoes.points[:, 0] - p, axis=1) + np.linalg.norm(echoes.points[:, 1] - q, axis=1)
+        mirrored = np.einsum("eij,j->ei", echoes.images[:, :, :3], q) + echoes.images[:, :, 3]
+        lengths = np.concatenate([legs, np.linalg.norm(p - mirrored, axis=1)])
+        for f in CONFIG.center_frequency + CONFIG.bandwidth * np.linspace(-0.5, 0.5, 5):
+            out.append(np.sum(echoes.amplitude * np.exp(2j * np.pi * f / SPEED_OF_LIGHT * lengths)))
+    return np.array(out)
+
+
+@dataclass(frozen=True)
+class Law:
+    """A section of the page: heading, and the function that draws and measures."""
+
+    title: str
+    draw: Callable
+
+
+LAWS = [
+    Law("Point target", point_target),
+    Law("Wall", wall_flash),
+    Law("Plate", plate),
+    Law("Doppler signature", doppler),
+    Law("TDM slots", tdm),
+    Law("Within a burst", range_walk),
+    Law("Thermal noise", noise),
+    Law("Phase noise", phase_noise),
+    Law("Speckle", speckle),
+    Law("Speckle under motion", decorrelation),
+    Law("Convergence", convergence),
+    Law("Reciprocity", reciprocity),
+]
+
+
+def main() -> None:
+    pictures = DOCS / "physics"
+    pictures.mkdir(parents=True, exist_ok=True)
+    page = [
+        "# The physics, law by law",
+        "",
+        "Each plot sets a closed form, or an independent sum, against what the simulator makes of it, with the "
+        f"`radarize` preset (centre {CONFIG.center_frequency / 1e9:.2f} GHz). Text, figures and plots are written by "
+        "`python -m benchmarks.physics_gallery`; the same laws are tests in `tests/physics`.",
+    ]
+    for law in LAWS:
+        figure, axis = plt.subplots(figsize=(5.4, 3.2))
+        measured = law.draw(axis)
+        print(f"{law.title}: {measured}")
+        axis.grid(alpha=0.3)
+        if axis.get_legend_handles_labels()[0]:
+            axis.legend(fontsize=8)
+        figure.savefig(pictures / f"{law.draw.__name__}.png", dpi=90, bbox_inches="tight")
+        plt.close(figure)
+        about = " ".join((law.draw.__doc__ or "").split())
+        page += ["", f"## {law.title}", "", about, "", f"![{law.title}](physics/{law.draw.__name__}.png)", "", measured]
+    (DOCS / "physics.md").write_text("\n".join(page) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

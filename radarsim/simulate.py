@@ -1,10 +1,12 @@
 """One recording from one scene and one motion: the simulator's main loop."""
 
 from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Complex, Float, Int16
+from threadpoolctl import ThreadpoolController
 
 from radarize import __version__
 from radarize.errors import InputError
@@ -32,6 +34,17 @@ CAUSES = (*(p.name.lower() for p in Provenance), "leakage")
 _BATCH = 8
 
 
+def _on_one_blas_thread(method: Callable) -> Callable:
+    """Numba's and Mitsuba's threads spin for work; a BLAS that wakes threads of its own beside them costs a third."""
+
+    @wraps(method)
+    def limited(self, *arguments):
+        with self._threads.limit(limits=1, user_api="blas"):
+            return method(self, *arguments)
+
+    return limited
+
+
 class Simulator:
     """A radar in a scene: echoes, synthesis and front end for the frame at any instant of a motion.
 
@@ -56,6 +69,7 @@ class Simulator:
         engine: str = "radarsim",
     ):
         self.motion, self.config = motion, config
+        self._threads = ThreadpoolController()
         world, crowd, self._noise, board = rng.spawn(4)
         self.front_end = FrontEnd(config, front_end, board)
         weakest, antenna = self.front_end.weakest, self.front_end.settings.pattern
@@ -68,11 +82,13 @@ class Simulator:
             )  # fmt: skip
         self.synthesize = Synthesizer(config) if device == "cpu" else DirectSum(config, device)
 
+    @_on_one_blas_thread
     def echoes(self, times: Float[np.ndarray, "frame"]) -> list[Echoes]:
         """Echoes of the frames that start at `times` (s), found at the middle of each burst."""
         middle = np.asarray(times) + self.config.burst_center
         return self.finder.batch(self.motion.position(middle), self.motion.rotation(middle).as_matrix(), middle)
 
+    @_on_one_blas_thread
     def frames(
         self, times: Float[np.ndarray, "frame"]
     ) -> tuple[Int16[np.ndarray, "frame loop tx rx sample 2"], list[Echoes]]:
@@ -81,6 +97,7 @@ class Simulator:
         signals = self.synthesize.batch(*self._received(times, echoes))
         return np.stack([self.front_end.digitize(signal, self._noise) for signal in signals]), echoes
 
+    @_on_one_blas_thread
     def frames_by_cause(
         self, times: Float[np.ndarray, "frame"]
     ) -> tuple[

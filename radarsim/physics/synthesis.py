@@ -70,10 +70,10 @@ class Synthesizer:
 
     Args:
         config: radar configuration.
-        accuracy: amplitude error of the expansion relative to each echo, about; -60 dB is below every noise here.
+        accuracy: bound on the amplitude error of the expansion, relative to each echo; most stay far below it.
     """
 
-    def __init__(self, config: RadarConfig, accuracy: float = 1e-3):
+    def __init__(self, config: RadarConfig, accuracy: float = 4e-3):
         self.config = config
         self.accuracy = accuracy
         clock = BurstClock.of(config)

@@ -22,8 +22,9 @@ from radarize.radar.array import rx_positions, tx_positions, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import ISOTROPIC
-from radarsim.physics.echoes import Echoes, EchoFinder, Provenance
+from radarsim.physics.echoes import Echoes, Provenance
 from radarsim.physics.facets import Facets
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig, PhaseNoise
 from radarsim.physics.phasenoise import density

@@ -18,8 +18,9 @@ from radarsim.motion import Motion, motion_from_tum, plan_motion
 from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
 from radarsim.physics.direct import DirectSum
-from radarsim.physics.echoes import Echoes, EchoFinder, Provenance
+from radarsim.physics.echoes import Echoes, Provenance
 from radarsim.physics.facets import Facets
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.physics.pathsolver import PathSolverFinder

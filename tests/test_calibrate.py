@@ -9,7 +9,7 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
 from radarsim.calibrate import calibrate
-from radarsim.physics.echoes import EchoFinder
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import Band, FrontEndConfig, Leakage, Mismatch
 from radarsim.physics.scatterers import Scatterers

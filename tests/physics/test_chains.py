@@ -9,8 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics import chains
-from radarsim.physics.echoes import EchoFinder, Provenance
+from radarsim.physics.echoes import Provenance
 from radarsim.physics.facets import TABLE, Facets
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene.scene import Scene

@@ -6,8 +6,8 @@ import pytest
 from radarize.radar.presets import PRESETS
 from radarsim.physics.bodies import recognise
 from radarsim.physics.curved import Curved
-from radarsim.physics.echoes import EchoFinder
 from radarsim.physics.facets import Facets
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS

@@ -7,8 +7,9 @@ from scipy import stats
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import amplitude_gain, gain_tables
-from radarsim.physics.echoes import EchoFinder, Provenance
+from radarsim.physics.echoes import Provenance
 from radarsim.physics.facets import Facets
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS

@@ -6,7 +6,7 @@ import pytest
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import gain_tables
-from radarsim.physics.echoes import EchoFinder
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import Band, FrontEndConfig
 from radarsim.physics.scatterers import Scatterers

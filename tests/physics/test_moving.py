@@ -8,8 +8,9 @@ from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import amplitude_gain, gain_tables
 from radarsim.physics.crowd import Crowd
-from radarsim.physics.echoes import EchoFinder, Provenance
+from radarsim.physics.echoes import Provenance
 from radarsim.physics.facets import Facets
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.synthesis import BurstClock, Synthesizer
 from radarsim.scene.materials import MATERIALS

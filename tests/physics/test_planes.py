@@ -7,8 +7,8 @@ import trimesh
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics import planes
-from radarsim.physics.echoes import EchoFinder
 from radarsim.physics.facets import Facets
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS

@@ -5,7 +5,7 @@ import pytest
 
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
-from radarsim.physics.echoes import EchoFinder
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.scatterers import Scatterers
 from tests.physics.rigs import Rig, burst

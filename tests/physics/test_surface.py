@@ -9,7 +9,7 @@ from scipy import stats
 from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import amplitude_gain, gain_tables
 from radarsim.physics.detail import detail, share
-from radarsim.physics.echoes import EchoFinder
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.surface import DENSITY, Surface
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS

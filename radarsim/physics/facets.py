@@ -83,7 +83,6 @@ class Facets:
 
 
 def reflection_table(material: Material, config: RadarConfig) -> Complex[np.ndarray, "2 cosine"]:
-    """Fresnel coefficients with the Rayleigh roughness factor exp(-8 (pi sigma_h cos / lambda)^2), ITU-R P.2040."""
-    cosine = np.linspace(0, 1, TABLE)
-    rough = np.exp(-8 * (np.pi * material.roughness * cosine / config.wavelength) ** 2)
-    return np.conj(np.stack(material.fresnel(cosine, config.center_frequency))) * rough
+    """Fresnel coefficients with the factor that roughness leaves (`Material.coherent_factor`), ITU-R P.2040."""
+    cosine, frequency = np.linspace(0, 1, TABLE), config.center_frequency
+    return np.conj(np.stack(material.fresnel(cosine, frequency))) * material.coherent_factor(cosine, frequency)

@@ -26,9 +26,9 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from radarize.errors import InputError
+from radarize.radar.config import SPEED_OF_LIGHT
 
 EPS0 = 8.8541878128e-12
-SPEED_OF_LIGHT = 299792458.0
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import trimesh
 from jaxtyping import Bool, Float, Int
 
 from radarize.errors import InputError
-from radarsim.scene.materials import Material
+from radarsim.scene.materials import EPS0, Material
 
 FREQUENCY = 77e9  # at which Sionna RT's own solvers start out
 _REACH = 1000.0
@@ -261,7 +261,7 @@ def _radio_material(material: Material):
         if material.conductor:
             return mi.Float(1.0), mi.Float(1e7)
         eps = material.permittivity_at(hertz)
-        return mi.Float(eps.real), mi.Float(-eps.imag * 2 * dr.pi * hertz * 8.8541878128e-12)
+        return mi.Float(eps.real), mi.Float(-eps.imag * 2 * dr.pi * hertz * EPS0)
 
     gamma = abs(complex(material.fresnel(np.array(1.0), FREQUENCY)[0]))
     return rt.RadioMaterial(

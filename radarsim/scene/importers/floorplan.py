@@ -1,0 +1,153 @@
+"""From an occupancy grid to a building: walls, what stands about, floor and ceiling."""
+
+import numpy as np
+import shapely
+import trimesh
+from jaxtyping import Bool
+from scipy import ndimage
+from shapely.geometry import MultiPolygon, Polygon
+from shapely.geometry import box as rectangle
+
+from radarize.errors import InputError
+from radarsim.scene import shapes
+from radarsim.scene.importers.faces import Face, faces, rooms
+from radarsim.scene.importers.grid import OccupancyGrid
+from radarsim.scene.importers.part import Part
+
+#: Things that are no walls (chair legs, boxes, people who stood still) are this high, m.
+CLUTTER = 1.0
+#: Fewer occupied cells together are noise.
+_SPECK = 4
+#: Floor and ceiling are drawn in squares of this size, m: few rectangles rather than an exact edge, which walls hide.
+_TILE = 0.5
+
+
+def parts(grid: OccupancyGrid, height: float, thickness: float, source: str) -> list[Part]:
+    """The parts of a building with the plan of a grid: ``walls``, ``clutter``, ``floor`` and ``ceiling``.
+
+    Args:
+        grid: what is occupied and what is free.
+        height: floor to ceiling, m.
+        thickness: of the thinnest wall, m.
+        source: for messages.
+
+    Raises:
+        InputError: no free ground, or nothing occupied around it.
+    """
+    inside = rooms(grid)
+    if not inside.any():
+        raise InputError(f"{source}: has no square metre of free ground together, expected the map of a building")
+    found = faces(grid, inside)
+    if not found:
+        raise InputError(f"{source}: has no straight wall beside its free ground, expected the map of a building")
+    solid = walls(found, thickness, grid, inside)
+    rest = clutter(grid, inside, solid)
+    built = [Part("walls", upright(_placed(solid, grid), height), "plasterboard", solid=True)]
+    if rest:
+        low = _placed(MultiPolygon(rest), grid)
+        built.append(Part("clutter", upright(low, min(CLUTTER, height), lid=True), "wood", solid=True))
+    tiles = _tiles(grid, inside)
+    floor = shapes.joined(*(_lying(tile, grid, 0.0, 1) for tile in tiles))
+    ceiling = shapes.joined(*(_lying(tile, grid, height, -1) for tile in tiles))
+    return [*built, Part("floor", floor, "vinyl"), Part("ceiling", ceiling, "ceiling board")]
+
+
+def walls(found: list[Face], thickness: float, grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]):
+    """The area that walls cover: behind each face, as deep as `thickness` or to the middle of a thinner wall."""
+    bodies = []
+    for number, face in enumerate(found):
+        behind = _depth(face, thickness, grid, inside)
+        front = max(0.0, (thickness - behind) / 2) if behind < thickness else 0.0
+        low = face.low - _overlap(face, face.low, -1, found, number, thickness)
+        high = face.high + _overlap(face, face.high, 1, found, number, thickness)
+        along, across = face.direction, face.normal
+        corners = [(low, front), (high, front), (high, front - thickness), (low, front - thickness)]
+        bodies.append(Polygon([face.center + a * along + b * across for a, b in corners]))
+    union = shapely.union_all(shapely.set_precision(bodies, 1e-4))
+    # Slits and teeth of less than a few centimetres are where lines do not quite meet.
+    union = union.buffer(0.03, join_style="mitre").buffer(-0.06, join_style="mitre").buffer(0.03, join_style="mitre")
+    return shapely.simplify(union, 0.01)
+
+
+def _depth(face: Face, thickness: float, grid: OccupancyGrid, inside) -> float:
+    """How far behind a face free ground begins again, m, at most `thickness`."""
+    steps = np.arange(1.0, np.ceil(thickness / grid.resolution) + 2)
+    along = np.linspace(face.low, face.high, max(3, int(face.length / grid.resolution)))
+    at = face.center + along[:, None, None] * face.direction - steps[:, None] * grid.resolution * face.normal
+    i, j = np.clip((at / grid.resolution).astype(int), 0, np.array(inside.shape) - 1).transpose(2, 0, 1)
+    free = inside[i, j].mean(axis=0) > 0.5
+    return min(thickness, float(steps[free.argmax()] - 0.5) * grid.resolution) if free.any() else thickness
+
+
+def _overlap(face: Face, end: float, sign: int, found: list[Face], number: int, thickness: float) -> float:
+    """How far a wall's body runs on beyond the end of its face, m: into the wall that it meets there."""
+    corner = face.center + end * face.direction
+    for other, mate in enumerate(found):
+        if other == number:
+            continue
+        offset = corner - mate.center
+        if abs(offset @ mate.normal) < 1e-6 and mate.low - 1e-6 <= offset @ mate.direction <= mate.high + 1e-6:
+            if sign * (face.direction @ mate.normal) < -0.1:
+                return thickness
+    return 0.0
+
+
+def clutter(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"], solid) -> list[Polygon]:
+    """Outlines of what stands on free ground apart from the walls."""
+    cell = grid.resolution
+    near = ndimage.binary_dilation(inside, iterations=2)
+    labels, count = ndimage.label(grid.occupied & near, np.ones((3, 3)))
+    taken = solid.buffer(1.5 * cell)
+    shapely.prepare(taken)
+    found = []
+    i, j = np.nonzero(labels)
+    loose = ~shapely.contains_xy(taken, (i + 0.5) * cell, (j + 0.5) * cell)
+    mask = np.zeros(labels.shape, bool)
+    mask[i[loose], j[loose]] = True
+    labels, count = ndimage.label(mask, np.ones((3, 3)))
+    for index, window in enumerate(ndimage.find_objects(labels), 1):
+        i, j = np.nonzero(labels[window] == index)
+        if len(i) < _SPECK:
+            continue
+        x, y = (i + window[0].start) * cell, (j + window[1].start) * cell
+        blob = shapely.union_all(shapely.box(x, y, x + cell, y + cell))
+        hull = shapely.minimum_rotated_rectangle(blob)
+        found.append(hull if blob.area > 0.5 * hull.area else shapely.simplify(blob.buffer(cell / 2), cell))
+    apart = shapely.difference(shapely.union_all(found), solid) if found else MultiPolygon()
+    return [part for part in shapely.get_parts(apart) if isinstance(part, Polygon) and part.area > cell**2]
+
+
+def upright(area, height: float, lid: bool = False) -> trimesh.Trimesh:
+    """The upright sides of an area from the floor to `height` (m), seen from outside; its top too if `lid`."""
+    pieces = []
+    for part in shapely.get_parts(area):
+        part = shapely.geometry.polygon.orient(part)
+        for ring in (part.exterior, *part.interiors):
+            at = np.asarray(ring.coords)[:, :2]
+            for a, b in zip(at[:-1], at[1:], strict=True):
+                corners = [(*a, 0.0), (*b, 0.0), (*b, height), (*a, height)]
+                pieces.append(trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False))
+        if lid:
+            pieces.append(shapes.polygon(part, (0, 0, height)))
+    return shapes.joined(*pieces)
+
+
+def _placed(area, grid: OccupancyGrid):
+    return shapely.transform(area, grid.to_world)
+
+
+def _tiles(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Polygon]:
+    """Few rectangles that cover the free ground and a little of what bounds it."""
+    from radarsim.physics.planes import strips
+
+    size = max(1, round(_TILE / grid.resolution))
+    around = np.pad(inside, [(0, -n % size) for n in inside.shape])
+    coarse = around.reshape(around.shape[0] // size, size, around.shape[1] // size, size).any(axis=(1, 3))
+    i, j = np.nonzero(ndimage.binary_fill_holes(coarse))
+    step = size * grid.resolution
+    return [rectangle(*b) for b in strips(shapely.union_all(shapely.box(i * step, j * step, (i + 1) * step, (j + 1) * step)))]
+
+
+def _lying(tile: Polygon, grid: OccupancyGrid, level: float, facing: int) -> trimesh.Trimesh:
+    corners = grid.to_world(np.asarray(tile.exterior.coords)[:4, :2][:: 1 if tile.exterior.is_ccw else -1][::facing])
+    return trimesh.Trimesh(np.column_stack([corners, np.full(4, level)]), [[0, 1, 2], [0, 2, 3]], process=False)

@@ -1,0 +1,28 @@
+"""An occupancy grid: what a ROS map is and what a lidar log becomes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+
+@dataclass(frozen=True)
+class OccupancyGrid:
+    """Cells that are occupied, free, or neither: unknown.
+
+    Attributes:
+        occupied, free: (ix, iy).
+        resolution: side of a cell, m.
+        origin: x, y (m) and yaw (rad) of the outer corner of cell (0, 0) in the world.
+    """
+
+    occupied: Bool[np.ndarray, "x y"]
+    free: Bool[np.ndarray, "x y"]
+    resolution: float
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def to_world(self, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+        """Points in metres along the grid's sides, in the world."""
+        x, y, yaw = self.origin
+        turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
+        return np.asarray(points, float) @ turn.T + [x, y]

@@ -114,6 +114,50 @@ def preview(
         print(picture)
 
 
+@scene_app.command("import")
+def import_(
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A mesh (.glb .gltf .obj .ply .stl), a Mitsuba or Sionna scene (.xml), a ROS map (.yaml or its "
+            "picture), or a lidar log (CARMEN .log[.gz], .scans.npz).",
+        ),
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Scene to write (.yaml), or a folder for it.")],
+    materials: Annotated[
+        Path | None, typer.Option(help="YAML of 'pattern: material'; the first to match a part's name decides.")
+    ] = None,
+    default: Annotated[str, typer.Option(help="Material of parts whose names say nothing.")] = "plasterboard",
+    units: Annotated[str | None, typer.Option(help="m, cm, mm, in or ft; else m, if that is plausible.")] = None,
+    up: Annotated[str | None, typer.Option(help="y or z; else y for glTF and z for others.")] = None,
+    floor: Annotated[bool, typer.Option(help="Bring a mesh's floor to z = 0.")] = True,
+    budget: Annotated[int, typer.Option(help="Decimate a mesh to this many triangles.")] = 300_000,
+    height: Annotated[float, typer.Option(help="Floor to ceiling of a map or log, m.")] = 2.7,
+    thickness: Annotated[float, typer.Option(help="Thinnest wall of a map or log, m.")] = 0.1,
+    resolution: Annotated[float, typer.Option(help="Cells of a log, m.")] = 0.05,
+):
+    """Make a scene of a mesh, a Mitsuba scene, a ROS map or a lidar log."""
+    from radarsim.scene.importers import import_scene
+
+    with progress(f"import {source.stem}") as report:
+        done = import_scene(
+            source, output, materials=materials, default=default, units=units, up=up, floor=floor, budget=budget,
+            height=height, thickness=thickness, resolution=resolution, progress=report,
+        )  # fmt: skip
+    from rich.console import Console
+    from rich.table import Column, Table
+
+    right = {"justify": "right"}
+    table = Table("part", "material", "by", Column("triangles", **right), Column("area, m2", **right))
+    for row in done.rows:
+        table.add_row(row.part, row.material, row.chosen_by, str(row.triangles), f"{row.area:.2f}")
+    Console().print(table)
+    for remark in done.remarks:
+        print(f"note: {remark}")
+    print(done.path)
+
+
 @app.command()
 def export(
     recording: Annotated[Path, typer.Argument(metavar="REC.h5", help="Recording to convert.")],

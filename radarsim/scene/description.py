@@ -64,6 +64,7 @@ class _Item(_Strict):
     name: Annotated[str, Field(min_length=1)]
     material: str | CustomMaterial
     position: Vector = (0.0, 0.0, 0.0)
+    solid: bool = False  # part of the surface of a body, though open: seen from its outside only
 
 
 class _Turned(_Item):
@@ -181,7 +182,7 @@ def read(path: Path) -> tuple[str, list[SceneObject], list[Mover]]:
         raise InputError(f"{path}: holds {type(data).__name__}, expected keys such as objects and building")
     try:
         description = Description.model_validate(data)
-        objects = [SceneObject(o.name, o.mesh(path.parent), _material(o)) for o in description.objects]
+        objects = [SceneObject(o.name, o.mesh(path.parent), _material(o), o.solid) for o in description.objects]
         if description.building:
             objects += description.building.build()
     except ValidationError as error:

@@ -1,0 +1,280 @@
+"""Scenes from foreign files, one module per format.
+
+A format reads its file as `Part`s. What follows is the same for all: metres, z up, floor at z = 0, clean triangles, a
+material each, and a scene file with its meshes in a folder beside it.
+"""
+
+import os
+import re
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import trimesh
+import yaml
+
+from radarize.errors import InputError
+from radarsim.scene.importers import carmen, floorplan, meshes, mitsuba, rosmap
+from radarsim.scene.importers.cleaning import clean, decimate, edges_of_many
+from radarsim.scene.importers.naming import Choice, MaterialMap
+from radarsim.scene.importers.part import Part
+
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+#: Largest extent of a building, m; what seems larger or smaller is likely in other units.
+_LIKELY = (1.5, 300.0)
+#: Scenes that lie further from the origin are moved to it, m.
+_FAR = 500.0
+
+
+@dataclass(frozen=True)
+class Row:
+    """What became of a part: its name, material, why that material, triangles, area (m^2)."""
+
+    part: str
+    material: str
+    chosen_by: str
+    triangles: int
+    area: float
+
+
+@dataclass
+class Imported:
+    """A scene file that was written, what became of each part, and what the user should know."""
+
+    path: Path
+    rows: list[Row]
+    remarks: list[str] = field(default_factory=list)
+
+
+def import_scene(
+    source: Path,
+    output: Path,
+    *,
+    materials: Path | None = None,
+    default: str = "plasterboard",
+    units: str | None = None,
+    up: str | None = None,
+    floor: bool = True,
+    budget: int = 300_000,
+    height: float = 2.7,
+    thickness: float = 0.1,
+    resolution: float = 0.05,
+    progress: Callable[..., None] | None = None,
+) -> Imported:
+    """Write a scene file from a mesh, a Mitsuba scene, a ROS map or a lidar log.
+
+    Args:
+        source: ``.glb .gltf .obj .ply .stl``, a Mitsuba or Sionna ``.xml``, a ROS map's ``.yaml`` or picture, a CARMEN
+            ``.log`` or ``.log.gz``, or ``.scans.npz`` with its ``.truth.tum``.
+        output: scene file (.yaml), or a folder for one with the source's name. Its meshes go to `NAME.meshes` beside.
+        materials: YAML file of patterns, see `MaterialMap`.
+        default: material of parts whose names say nothing.
+        units: of a mesh or XML scene, one of `UNITS`; default: m unless that is implausible for a building.
+        up: ``y`` or ``z``; default: y for glTF, z otherwise.
+        floor: bring the floor of a mesh or XML scene to z = 0.
+        budget: triangles; larger meshes are decimated.
+        height: of the walls of a map or log, m.
+        thickness: of its thinnest walls, m.
+        resolution: of a log's cells, m.
+        progress: called with a stage's name, steps done, steps in all.
+
+    Raises:
+        InputError: nothing usable in the source, or options that do not fit it.
+    """
+    source, output = Path(source), Path(output)
+    if not source.is_file():
+        raise InputError(f"{source}: no such file, expected a mesh, a Mitsuba scene, a ROS map or a lidar log")
+    for name, value, low, high in (
+        ("height", height, 1.0, 20.0), ("thickness", thickness, 0.02, 1.0), ("resolution", resolution, 0.01, 0.5),
+        ("budget", budget, 100, 5_000_000),
+    ):  # fmt: skip
+        if not low <= value <= high:
+            raise InputError(f"--{name} is {value:g}, expected {low:g} to {high:g}")
+    if units not in (None, *UNITS):
+        raise InputError(f"--units is {units!r}, expected one of: {', '.join(UNITS)}")
+    if up not in (None, "y", "z"):
+        raise InputError(f"--up is {up!r}, expected y or z")
+    chosen = MaterialMap.read(materials, default)
+    path = output if output.suffix.lower() in (".yaml", ".yml") else output / f"{_stem(source)}.yaml"
+    if path.resolve() == source.resolve():
+        raise InputError(f"{path}: is the source itself, expected another output file")
+
+    remarks: list[str] = []
+    kind = _kind(source)
+    if kind in ("map", "log"):
+        grid = rosmap.grid(source) if kind == "map" else carmen.grid(source, resolution, progress)
+        parts = floorplan.parts(grid, height, thickness, str(source))
+    else:
+        parts = mitsuba.parts(source) if kind == "mitsuba" else meshes.parts(source)
+        up = up or ("y" if source.suffix.lower() in (".glb", ".gltf") else "z")
+        parts = _fit(parts, source, units, up, floor, budget, remarks, progress)
+    rows = []
+    for number, part in enumerate(parts, 1):
+        part.material, why = chosen.choose(part)
+        name = part.material if isinstance(part.material, str) else "custom"
+        rows.append(Row(part.name, name, why, len(part.mesh.faces), float(part.mesh.area)))
+        if progress and number == len(parts):
+            progress("materials", number, number)
+    if unsure := sum(row.chosen_by == "default" for row in rows):
+        remarks.append(f"{unsure} of {len(rows)} parts got the default material {default}; --materials can name theirs")
+    _write(path, parts, source)
+    return Imported(path, rows, remarks)
+
+
+def _stem(source: Path) -> str:
+    name = source.name
+    for ending in (".gz", ".log", ".npz", ".scans", "-corrected", source.suffix):
+        name = name.removesuffix(ending)
+    return name or source.stem
+
+
+def _kind(source: Path) -> str:
+    suffix, name = source.suffix.lower(), source.name.lower()
+    if suffix in meshes.SUFFIXES:
+        return "mesh"
+    if suffix == ".xml":
+        return "mitsuba"
+    if suffix in (".pgm", ".png") or (suffix in (".yaml", ".yml") and rosmap.is_map(source)):
+        return "map"
+    if name.endswith((".log", ".log.gz", ".scans.npz")):
+        return "log"
+    raise InputError(
+        f"{source}: unknown format, expected a mesh ({' '.join(meshes.SUFFIXES)}), a Mitsuba .xml, a ROS map's .yaml "
+        "with an image, or a lidar log (.log .log.gz .scans.npz)"
+    )
+
+
+def _fit(parts, source, units, up, floor, budget, remarks, progress) -> list[Part]:
+    """Clean, scale, turn and place the parts of a mesh."""
+    if up == "y":
+        for part in parts:
+            part.mesh.vertices = np.asarray(part.mesh.vertices)[:, [0, 2, 1]] * [1, -1, 1]
+    extent = np.ptp(_corners(parts), axis=0)
+    extent = np.where(np.isfinite(extent), extent, 0)
+    if units is None:
+        units = _guess(extent, remarks)
+    elif not _LIKELY[0] <= extent.max() * UNITS[units] <= _LIKELY[1]:
+        remarks.append(f"in {units} it is {extent.max() * UNITS[units]:.3g} m long, which is odd for a building")
+    if extent[2] > 2 * extent[:2].max() and extent[2] * UNITS[units] > 2:
+        remarks.append(f"it is higher than long with {up} up; --up {'z' if up == 'y' else 'y'} may be meant")
+    found = []
+    for number, part in enumerate(parts, 1):
+        part.mesh.vertices = np.asarray(part.mesh.vertices) * UNITS[units]
+        found.append(clean(part, str(source)))
+        if progress:
+            progress("cleaning", number, len(parts))
+    before = sum(len(part.mesh.faces) for part in parts)
+    parts = [part for part in found if part is not None]
+    if not parts:
+        raise InputError(f"{source}: holds no triangle with an area")
+    if left := before - sum(len(part.mesh.faces) for part in parts):
+        remarks.append(f"{left} degenerate or repeated triangles removed")
+    if many := sum(edges_of_many(part.mesh) for part in parts):
+        remarks.append(f"{many} edges have more than two triangles; each is traced as a sheet")
+    _place(parts, floor, remarks)
+    total = sum(len(part.mesh.faces) for part in parts)
+    if total > budget:
+        if progress:
+            progress("decimating", 0, 1)
+        parts, moved = decimate(parts, budget, str(source))
+        if progress:
+            progress("decimating", 1, 1)
+        left = sum(len(part.mesh.faces) for part in parts)
+        remarks.append(f"decimated from {total} to {left} triangles; 99 % of the surface moved less than {moved:.4f} m")
+    return parts
+
+
+def _corners(parts: list[Part]) -> np.ndarray:
+    return np.concatenate([np.asarray(part.mesh.vertices) for part in parts])
+
+
+def _guess(extent: np.ndarray, remarks: list[str]) -> str:
+    """Metres, unless another unit makes a building of it."""
+    largest = float(extent.max())
+    if _LIKELY[0] <= largest <= _LIKELY[1]:
+        return "m"
+    likely = [unit for unit in ("cm", "mm") if 2.5 <= largest * UNITS[unit] <= 100]
+    unit = likely[0] if largest > _LIKELY[1] and likely else "m"
+    size = f"{largest:.3g} long in its own units"
+    if unit == "m":
+        remarks.append(f"it is {size}, taken as m, which is odd for a building; --units says what they are")
+    else:
+        remarks.append(f"it is {size}, taken as {unit} ({largest * UNITS[unit]:.3g} m); --units says what they are")
+    return unit
+
+
+def _place(parts: list[Part], floor: bool, remarks: list[str]) -> None:
+    """Bring the floor to z = 0 and a scene from afar to the origin, in place."""
+    corners = _corners(parts)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    shift = np.zeros(3)
+    if max(np.abs(low[:2]).max(), np.abs(high[:2]).max()) > _FAR:
+        shift[:2] = -(low[:2] + high[:2]) / 2
+    if floor:
+        shift[2] = -_floor_level(parts)
+    if np.any(np.abs(shift) > 1e-6):
+        remarks.append("moved by {:.3f} {:.3f} {:.3f} m".format(*shift))
+        for part in parts:
+            part.mesh.vertices = np.asarray(part.mesh.vertices) + shift
+
+
+def _floor_level(parts: list[Part]) -> float:
+    """Height of the lowest large horizontal surface, or of the lowest corner if there is none, m."""
+    level, area = [], []
+    for part in parts:
+        flat = np.abs(part.mesh.face_normals[:, 2]) > 0.9
+        level.append(part.mesh.triangles_center[flat, 2])
+        area.append(part.mesh.area_faces[flat])
+    level, area = np.concatenate(level), np.concatenate(area)
+    lowest = float(_corners(parts)[:, 2].min())
+    if not len(level):
+        return lowest
+    bins = ((level - lowest) / 0.05).astype(int)
+    share = np.bincount(bins, area)
+    share = share + np.append(share[1:], 0)  # a level that two bins share
+    start = int(np.flatnonzero(share >= 0.25 * share.max())[0])
+    near = (bins >= start) & (bins <= start + 1)
+    middle = np.average(level[near], weights=area[near])
+    return float(round(middle, 6))
+
+
+def _write(path: Path, parts: list[Part], source: Path) -> None:
+    """The scene file and its folder of meshes, each renamed when whole."""
+    folder = path.with_name(f"{path.stem}.meshes")
+    if folder.exists() and any(item.suffix != ".ply" for item in folder.iterdir()):
+        raise InputError(f"{folder}: holds other files than meshes of an import, expected another output name")
+    path.parent.mkdir(parents=True, exist_ok=True)
+    fresh = folder.with_name(folder.name + ".part")
+    shutil.rmtree(fresh, ignore_errors=True)
+    fresh.mkdir()
+    objects, files, names = [], set(), set()
+    try:
+        for part in parts:
+            name = _unlike(part.name, names)
+            file = _unlike(re.sub(r"[^A-Za-z0-9._-]+", "_", part.name)[:60].strip("._") or "part", files)
+            mesh = trimesh.Trimesh(part.mesh.vertices, part.mesh.faces, process=False)
+            (fresh / f"{file}.ply").write_bytes(trimesh.exchange.ply.export_ply(mesh, vertex_normal=False))
+            item = {"name": name, "shape": "mesh", "file": f"{folder.name}/{file}.ply", "material": part.material}
+            objects.append(item | ({"solid": True} if part.solid else {}))
+        text = f"# imported from {source.name}\n" + yaml.safe_dump(
+            {"name": path.stem, "objects": objects}, sort_keys=False, width=120, default_flow_style=None
+        )
+        shutil.rmtree(folder, ignore_errors=True)
+        os.replace(fresh, folder)
+        half = path.with_name(path.name + ".part")
+        half.write_text(text, encoding="utf-8")
+        os.replace(half, path)
+    finally:
+        shutil.rmtree(fresh, ignore_errors=True)
+
+
+def _unlike(name: str, taken: set[str]) -> str:
+    """The name, numbered if something has it already, whatever the case of its letters."""
+    number, unique = 1, name
+    while unique.lower() in taken:
+        number += 1
+        unique = f"{name}-{number}"
+    taken.add(unique.lower())
+    return unique

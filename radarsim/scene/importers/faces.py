@@ -22,6 +22,8 @@ OFFSET = 1.5
 ASKEW = np.cos(np.deg2rad(25))
 #: Faces on one line are one if the gap is narrower, m: no door is.
 GAP = 0.4
+#: They are one across this gap if nothing free was seen in it, m: glass and dark things give no echo to a lidar.
+BLIND_GAP = 3.0
 #: Shorter pieces are no faces, m.
 SHORTEST = 0.25
 #: A face is turned to a main direction if its ends move by no more, cells.
@@ -102,7 +104,7 @@ def faces(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Face]:
     found = [
         Face.through(points[group], normals[group].mean(axis=0)) for group in _grown(points, normals, grid.resolution)
     ]
-    found = _joined(found, OFFSET * grid.resolution)
+    found = _joined(found, grid, inside)
     found = [face for face in found if face.length >= SHORTEST]
     _square(found, SNAP * grid.resolution)
     _meet(found)
@@ -156,14 +158,14 @@ def _grown(points, normals, cell: float) -> list[Int[np.ndarray, "n"]]:
     return groups
 
 
-def _joined(found: list[Face], offset: float) -> list[Face]:
+def _joined(found: list[Face], grid: OccupancyGrid, inside) -> list[Face]:
     """Faces on one line made one, longest first."""
     pending = sorted(found, key=lambda face: -face.length)
     done: list[Face] = []
     while pending:
         face = pending.pop(0)
         while True:
-            mates = [other for other in pending if _on_one_line(face, other, offset)]
+            mates = [other for other in pending if _on_one_line(face, other, grid, inside)]
             if not mates:
                 break
             pending = [other for other in pending if not any(other is mate for mate in mates)]
@@ -172,14 +174,21 @@ def _joined(found: list[Face], offset: float) -> list[Face]:
     return sorted(done, key=lambda face: -face.length)
 
 
-def _on_one_line(face: Face, other: Face, offset: float) -> bool:
+def _on_one_line(face: Face, other: Face, grid: OccupancyGrid, inside) -> bool:
     if face.normal @ other.normal < np.cos(np.deg2rad(30)):
         return False
     ends = other.ends - face.center
-    if np.abs(ends @ face.normal).max() > offset:
+    if np.abs(ends @ face.normal).max() > OFFSET * grid.resolution:
         return False
     along = ends @ face.direction
-    return max(along.min() - face.high, face.low - along.max()) < GAP
+    start, end = (face.high, along.min()) if along.min() > face.low else (along.max(), face.low)
+    if end - start < GAP:
+        return True
+    if end - start > min(BLIND_GAP, 2 * (face.length + other.length)):
+        return False
+    at = face.center + np.arange(start, end, grid.resolution)[:, None] * face.direction
+    behind = [inside[grid.cells(at - k * grid.resolution * face.normal)] for k in (1, 2, 3)]
+    return bool(np.mean(behind) < 0.1)
 
 
 def _square(found: list[Face], offset: float) -> None:

@@ -20,6 +20,10 @@ CLUTTER = 1.0
 _SPECK = 4
 #: Floor and ceiling are drawn in squares of this size, m: few rectangles rather than an exact edge, which walls hide.
 _TILE = 0.5
+#: Narrower gaps between walls are closed, m.
+_SLIT = 0.2
+#: Smaller holes are closed, in walls and floors, m^2.
+_COURT = 1.0
 
 
 def parts(grid: OccupancyGrid, height: float, thickness: float, source: str) -> list[Part]:
@@ -64,9 +68,15 @@ def walls(found: list[Face], thickness: float, grid: OccupancyGrid, inside: Bool
         corners = [(low, front), (high, front), (high, front - thickness), (low, front - thickness)]
         bodies.append(Polygon([face.center + a * along + b * across for a, b in corners]))
     union = shapely.union_all(shapely.set_precision(bodies, 1e-4))
-    # Slits and teeth of less than a few centimetres are where lines do not quite meet.
-    union = union.buffer(0.03, join_style="mitre").buffer(-0.06, join_style="mitre").buffer(0.03, join_style="mitre")
-    return shapely.simplify(union, 0.01)
+    # Slits are where lines do not quite meet, or between the two faces of a thick wall; so are small courts.
+    closed = union.buffer(_SLIT / 2, join_style="mitre", mitre_limit=2)
+    closed = closed.buffer(-_SLIT / 2 - 0.02, join_style="mitre", mitre_limit=2)
+    closed = shapely.simplify(closed.buffer(0.02, join_style="mitre", mitre_limit=2), 0.01)
+    return shapely.union_all([_without_courts(part) for part in shapely.get_parts(closed)])
+
+
+def _without_courts(part: Polygon) -> Polygon:
+    return Polygon(part.exterior, [ring for ring in part.interiors if Polygon(ring).area >= _COURT])
 
 
 def _depth(face: Face, thickness: float, grid: OccupancyGrid, inside) -> float:
@@ -74,8 +84,7 @@ def _depth(face: Face, thickness: float, grid: OccupancyGrid, inside) -> float:
     steps = np.arange(1.0, np.ceil(thickness / grid.resolution) + 2)
     along = np.linspace(face.low, face.high, max(3, int(face.length / grid.resolution)))
     at = face.center + along[:, None, None] * face.direction - steps[:, None] * grid.resolution * face.normal
-    i, j = np.clip((at / grid.resolution).astype(int), 0, np.array(inside.shape) - 1).transpose(2, 0, 1)
-    free = inside[i, j].mean(axis=0) > 0.5
+    free = inside[grid.cells(at)].mean(axis=0) > 0.5
     return min(thickness, float(steps[free.argmax()] - 0.5) * grid.resolution) if free.any() else thickness
 
 
@@ -95,16 +104,14 @@ def _overlap(face: Face, end: float, sign: int, found: list[Face], number: int, 
 def clutter(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"], solid) -> list[Polygon]:
     """Outlines of what stands on free ground apart from the walls."""
     cell = grid.resolution
-    near = ndimage.binary_dilation(inside, iterations=2)
-    labels, count = ndimage.label(grid.occupied & near, np.ones((3, 3)))
     taken = solid.buffer(1.5 * cell)
     shapely.prepare(taken)
     found = []
-    i, j = np.nonzero(labels)
+    i, j = np.nonzero(grid.occupied & ndimage.binary_dilation(inside, iterations=2))
     loose = ~shapely.contains_xy(taken, (i + 0.5) * cell, (j + 0.5) * cell)
-    mask = np.zeros(labels.shape, bool)
+    mask = np.zeros(inside.shape, bool)
     mask[i[loose], j[loose]] = True
-    labels, count = ndimage.label(mask, np.ones((3, 3)))
+    labels, _ = ndimage.label(mask, np.ones((3, 3)))
     for index, window in enumerate(ndimage.find_objects(labels), 1):
         i, j = np.nonzero(labels[window] == index)
         if len(i) < _SPECK:
@@ -143,9 +150,11 @@ def _tiles(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Polygon
     size = max(1, round(_TILE / grid.resolution))
     around = np.pad(inside, [(0, -n % size) for n in inside.shape])
     coarse = around.reshape(around.shape[0] // size, size, around.shape[1] // size, size).any(axis=(1, 3))
-    i, j = np.nonzero(ndimage.binary_fill_holes(coarse))
+    i, j = np.nonzero(coarse)
     step = size * grid.resolution
-    return [rectangle(*b) for b in strips(shapely.union_all(shapely.box(i * step, j * step, (i + 1) * step, (j + 1) * step)))]
+    area = shapely.union_all(shapely.box(i * step, j * step, (i + 1) * step, (j + 1) * step))
+    area = shapely.union_all([_without_courts(part) for part in shapely.get_parts(area)])
+    return [rectangle(*bounds) for bounds in strips(area)]
 
 
 def _lying(tile: Polygon, grid: OccupancyGrid, level: float, facing: int) -> trimesh.Trimesh:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 
 @dataclass(frozen=True)
@@ -26,3 +26,8 @@ class OccupancyGrid:
         x, y, yaw = self.origin
         turn = np.array([[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]])
         return np.asarray(points, float) @ turn.T + [x, y]
+
+    def cells(self, points: Float[np.ndarray, "*n 2"]) -> tuple[Int[np.ndarray, "*n"], Int[np.ndarray, "*n"]]:
+        """Indices of the cells nearest to points in metres along the grid's sides."""
+        index = np.clip(np.floor(points / self.resolution).astype(int), 0, np.array(self.occupied.shape) - 1)
+        return index[..., 0], index[..., 1]

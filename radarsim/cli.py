@@ -150,8 +150,13 @@ def import_(
 
     right = {"justify": "right"}
     table = Table("part", "material", "by", Column("triangles", **right), Column("area, m2", **right))
-    for row in done.rows:
+    shown = sorted(done.rows, key=lambda row: -row.area)
+    for row in shown[:40]:
         table.add_row(row.part, row.material, row.chosen_by, str(row.triangles), f"{row.area:.2f}")
+    for name in sorted({row.material for row in shown[40:]}):
+        rest = [row for row in shown[40:] if row.material == name]
+        triangles, area = sum(row.triangles for row in rest), sum(row.area for row in rest)
+        table.add_row(f"{len(rest)} more", name, "", str(triangles), f"{area:.2f}")
     Console().print(table)
     for remark in done.remarks:
         print(f"note: {remark}")

@@ -8,7 +8,7 @@ import os
 import re
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,8 @@ import yaml
 from radarize.errors import InputError
 from radarsim.scene.importers import carmen, floorplan, meshes, mitsuba, rosmap
 from radarsim.scene.importers.cleaning import clean, decimate, edges_of_many
-from radarsim.scene.importers.naming import Choice, MaterialMap
+from radarsim.scene.importers.flatten import flatten
+from radarsim.scene.importers.naming import MaterialMap
 from radarsim.scene.importers.part import Part
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
@@ -71,7 +72,7 @@ def import_scene(
         output: scene file (.yaml), or a folder for one with the source's name. Its meshes go to `NAME.meshes` beside.
         materials: YAML file of patterns, see `MaterialMap`.
         default: material of parts whose names say nothing.
-        units: of a mesh or XML scene, one of `UNITS`; default: m unless that is implausible for a building.
+        units: of a mesh or XML scene, one of `UNITS`; default: m, but of a mesh what makes a building of it.
         up: ``y`` or ``z``; default: y for glTF, z otherwise.
         floor: bring the floor of a mesh or XML scene to z = 0.
         budget: triangles; larger meshes are decimated.
@@ -109,6 +110,7 @@ def import_scene(
     else:
         parts = mitsuba.parts(source) if kind == "mitsuba" else meshes.parts(source)
         up = up or ("y" if source.suffix.lower() in (".glb", ".gltf") else "z")
+        units = units or ("m" if kind == "mitsuba" else _guess(parts, remarks))
         parts = _fit(parts, source, units, up, floor, budget, remarks, progress)
     rows = []
     for number, part in enumerate(parts, 1):
@@ -151,13 +153,10 @@ def _fit(parts, source, units, up, floor, budget, remarks, progress) -> list[Par
     if up == "y":
         for part in parts:
             part.mesh.vertices = np.asarray(part.mesh.vertices)[:, [0, 2, 1]] * [1, -1, 1]
-    extent = np.ptp(_corners(parts), axis=0)
-    extent = np.where(np.isfinite(extent), extent, 0)
-    if units is None:
-        units = _guess(extent, remarks)
-    elif not _LIKELY[0] <= extent.max() * UNITS[units] <= _LIKELY[1]:
-        remarks.append(f"in {units} it is {extent.max() * UNITS[units]:.3g} m long, which is odd for a building")
-    if extent[2] > 2 * extent[:2].max() and extent[2] * UNITS[units] > 2:
+    extent = _extent(parts) * UNITS[units]
+    if not _LIKELY[0] <= extent.max() <= _LIKELY[1]:
+        remarks.append(f"it is {extent.max():.3g} m long, which is odd for a building; --units says what its units are")
+    if extent[2] > max(2.0, 2 * extent[:2].max()):
         remarks.append(f"it is higher than long with {up} up; --up {'z' if up == 'y' else 'y'} may be meant")
     found = []
     for number, part in enumerate(parts, 1):
@@ -173,6 +172,7 @@ def _fit(parts, source, units, up, floor, budget, remarks, progress) -> list[Par
         remarks.append(f"{left} degenerate or repeated triangles removed")
     if many := sum(edges_of_many(part.mesh) for part in parts):
         remarks.append(f"{many} edges have more than two triangles; each is traced as a sheet")
+    parts = [_flat(part, source, number, len(parts), remarks, progress) for number, part in enumerate(parts, 1)]
     _place(parts, floor, remarks)
     total = sum(len(part.mesh.faces) for part in parts)
     if total > budget:
@@ -186,23 +186,38 @@ def _fit(parts, source, units, up, floor, budget, remarks, progress) -> list[Par
     return parts
 
 
+def _flat(part: Part, source, number: int, count: int, remarks: list[str], progress) -> Part:
+    """A scanned part with its planes flat."""
+    found = flatten(part.mesh)
+    if progress:
+        progress("finding planes", number, count)
+    if found is None:
+        return part
+    remarks.append(
+        f"{part.name}: {found.planes} planes ({found.share:.0%} of its area) made flat, {found.noise * 1e3:.1f} mm RMS "
+        "of noise taken away"
+    )
+    return clean(replace(part, mesh=found.mesh), str(source)) or part
+
+
 def _corners(parts: list[Part]) -> np.ndarray:
     return np.concatenate([np.asarray(part.mesh.vertices) for part in parts])
 
 
-def _guess(extent: np.ndarray, remarks: list[str]) -> str:
-    """Metres, unless another unit makes a building of it."""
-    largest = float(extent.max())
-    if _LIKELY[0] <= largest <= _LIKELY[1]:
-        return "m"
+def _extent(parts: list[Part]) -> np.ndarray:
+    corners = _corners(parts)
+    return np.ptp(corners[np.isfinite(corners).all(axis=1)], axis=0) if np.isfinite(corners).any() else np.zeros(3)
+
+
+def _guess(parts: list[Part], remarks: list[str]) -> str:
+    """Metres, unless that is too large and another unit makes a building of it."""
+    largest = float(_extent(parts).max())
     likely = [unit for unit in ("cm", "mm") if 2.5 <= largest * UNITS[unit] <= 100]
-    unit = likely[0] if largest > _LIKELY[1] and likely else "m"
-    size = f"{largest:.3g} long in its own units"
-    if unit == "m":
-        remarks.append(f"it is {size}, taken as m, which is odd for a building; --units says what they are")
-    else:
-        remarks.append(f"it is {size}, taken as {unit} ({largest * UNITS[unit]:.3g} m); --units says what they are")
-    return unit
+    if largest <= _LIKELY[1] or not likely:
+        return "m"
+    size = largest * UNITS[likely[0]]
+    remarks.append(f"it is {largest:.4g} long, taken as {likely[0]} ({size:.3g} m); --units says what its units are")
+    return likely[0]
 
 
 def _place(parts: list[Part], floor: bool, remarks: list[str]) -> None:
@@ -236,8 +251,9 @@ def _floor_level(parts: list[Part]) -> float:
     share = share + np.append(share[1:], 0)  # a level that two bins share
     start = int(np.flatnonzero(share >= 0.25 * share.max())[0])
     near = (bins >= start) & (bins <= start + 1)
-    middle = np.average(level[near], weights=area[near])
-    return float(round(middle, 6))
+    order = np.argsort(level[near])
+    half = np.searchsorted(np.cumsum(area[near][order]), area[near].sum() / 2)
+    return float(round(level[near][order][min(half, len(order) - 1)], 6))
 
 
 def _write(path: Path, parts: list[Part], source: Path) -> None:

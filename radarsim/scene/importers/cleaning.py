@@ -1,5 +1,7 @@
 """Meshes as files have them, made fit for tracing: merged, without waste, small enough."""
 
+from dataclasses import replace
+
 import numpy as np
 import trimesh
 from jaxtyping import Float
@@ -38,7 +40,7 @@ def clean(part: Part, source: str) -> Part | None:
         return None
     mesh = trimesh.Trimesh(mesh.vertices, faces, process=False)
     mesh.remove_unreferenced_vertices()
-    return Part(part.name, mesh, part.material, part.solid, part.labels)
+    return replace(part, mesh=mesh)
 
 
 def edges_of_many(mesh: trimesh.Trimesh) -> int:
@@ -73,7 +75,7 @@ def decimate(parts: list[Part], budget: int, source: str) -> tuple[list[Part], f
         mesh = trimesh.Trimesh(np.asarray(coarse.vertices), np.asarray(coarse.triangles), process=False)
         share = int(np.ceil(_SAMPLES * len(part.mesh.faces) / total))
         deviations.append(distances(part.mesh, mesh, share))
-        thin = clean(Part(part.name, mesh, part.material, part.solid, part.labels), source)
+        thin = clean(replace(part, mesh=mesh), source)
         if thin is not None:
             made.append(thin)
     left = sum(len(part.mesh.faces) for part in made)

@@ -218,9 +218,8 @@ def _meet(found: list[Face]) -> None:
     """Let faces that nearly meet end where their lines cross, in place."""
     ends = np.array([face.ends for face in found]).reshape(-1, 2)
     for number, face in enumerate(found):
-        near = np.unique(np.concatenate([
-            np.flatnonzero(np.linalg.norm(ends - end, axis=1) < 2 * _CORNER) // 2 for end in ends[2 * number : 2 * number + 2]
-        ]))  # fmt: skip
+        apart = np.linalg.norm(ends[:, None] - face.ends, axis=2).min(axis=1)
+        near = np.unique(np.flatnonzero(apart < 2 * _CORNER) // 2)
         best = {0: _CORNER, 1: _CORNER}
         low, high = face.low, face.high
         for other in near:

@@ -53,8 +53,8 @@ def test_help_is_instant(name):
 @pytest.mark.parametrize(
     "command",
     ["radarize import", "radarize info", "radarize run", "radarize evaluate", "radarize report", "radarsim simulate",
-     "radarsim calibrate", "radarsim scene", "radarsim scene info", "radarsim scene preview", "radarsim export",
-     "radarsim doctor"],
+     "radarsim calibrate", "radarsim scene", "radarsim scene info", "radarsim scene preview", "radarsim scene import",
+     "radarsim export", "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
     code, out, _ = call(capsys, command, "--help")
@@ -82,6 +82,8 @@ def test_every_command_explains_itself(capsys, command):
         ("radarsim calibrate", ["missing.h5", "-o", "board.yaml"], "missing.h5: no such file"),
         ("radarsim export", ["missing.h5", "--to", "tum", "-o", "x.tum"], "missing.h5: no such file"),
         ("radarsim scene info", ["castle"], "castle"),
+        ("radarsim scene import", ["castle.glb", "-o", "out"], "castle.glb: no such file"),
+        ("radarsim scene import", ["castle.glb"], "Missing option"),
     ],
 )
 def test_bad_input_is_one_sentence(capsys, tmp_path, monkeypatch, command, arguments, expected):

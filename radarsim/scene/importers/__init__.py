@@ -25,6 +25,7 @@ from radarsim.scene.importers.part import Part
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 #: Largest extent of a building, m; what seems larger or smaller is likely in other units.
 _LIKELY = (1.5, 300.0)
+_STOREY = 2.7  # m
 #: Scenes that lie further from the origin are moved to it, m.
 _FAR = 500.0
 
@@ -211,13 +212,15 @@ def _extent(parts: list[Part]) -> np.ndarray:
 
 def _guess(parts: list[Part], remarks: list[str]) -> str:
     """Metres, unless that is too large and another unit makes a building of it."""
-    largest = float(_extent(parts).max())
-    likely = [unit for unit in ("cm", "mm") if 2.5 <= largest * UNITS[unit] <= 100]
-    if largest <= _LIKELY[1] or not likely:
+    extent = _extent(parts)
+    likely = [unit for unit in ("cm", "mm") if 2.5 <= extent.max() * UNITS[unit] <= 100]
+    if extent.max() <= _LIKELY[1] or not likely:
         return "m"
-    size = largest * UNITS[likely[0]]
-    remarks.append(f"it is {largest:.4g} long, taken as {likely[0]} ({size:.3g} m); --units says what its units are")
-    return likely[0]
+    # A storey's height tells cm from mm.
+    unit = min(likely, key=lambda unit: abs(np.log(max(extent[2], 1e-9) * UNITS[unit] / _STOREY)))
+    size = extent.max() * UNITS[unit]
+    remarks.append(f"it is {extent.max():.4g} long, taken as {unit} ({size:.3g} m); --units says what its units are")
+    return unit
 
 
 def _place(parts: list[Part], floor: bool, remarks: list[str]) -> None:

@@ -10,7 +10,8 @@
     moving:
       - {kind: person, name: visitor, path: [[1, 0], [4, 0]], speed: 1.1}
 
-Lengths in m, angles in degrees (this is what people type), mesh files relative to the scene file.
+Lengths in m, angles in degrees (this is what people type), mesh files relative to the scene file. An open mesh that is
+the outside of a body says ``solid: true``; otherwise it is a sheet with two sides. `importers` writes such files.
 """
 
 from pathlib import Path

@@ -107,19 +107,17 @@ def import_scene(
     kind = _kind(source)
     if kind in ("map", "log"):
         grid = rosmap.grid(source) if kind == "map" else carmen.grid(source, resolution, progress)
-        parts = floorplan.parts(grid, height, thickness, str(source))
+        parts = floorplan.parts(grid, height, thickness, str(source), progress)
     else:
         parts = mitsuba.parts(source) if kind == "mitsuba" else meshes.parts(source)
         up = up or ("y" if source.suffix.lower() in (".glb", ".gltf") else "z")
         units = units or ("m" if kind == "mitsuba" else _guess(parts, remarks))
         parts = _fit(parts, source, units, up, floor, budget, remarks, progress)
     rows = []
-    for number, part in enumerate(parts, 1):
+    for part in parts:
         part.material, why = chosen.choose(part)
         name = part.material if isinstance(part.material, str) else "custom"
         rows.append(Row(part.name, name, why, len(part.mesh.faces), float(part.mesh.area)))
-        if progress and number == len(parts):
-            progress("materials", number, number)
     if unsure := sum(row.chosen_by == "default" for row in rows):
         remarks.append(f"{unsure} of {len(rows)} parts got the default material {default}; --materials can name theirs")
     _write(path, parts, source)
@@ -177,11 +175,7 @@ def _fit(parts, source, units, up, floor, budget, remarks, progress) -> list[Par
     _place(parts, floor, remarks)
     total = sum(len(part.mesh.faces) for part in parts)
     if total > budget:
-        if progress:
-            progress("decimating", 0, 1)
-        parts, moved = decimate(parts, budget, str(source))
-        if progress:
-            progress("decimating", 1, 1)
+        parts, moved = decimate(parts, budget, str(source), progress)
         left = sum(len(part.mesh.faces) for part in parts)
         remarks.append(f"decimated from {total} to {left} triangles; 99 % of the surface moved less than {moved:.4f} m")
     return parts

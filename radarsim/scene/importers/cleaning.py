@@ -1,5 +1,6 @@
 """Meshes as files have them, made fit for tracing: merged, without waste, small enough."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -49,7 +50,9 @@ def edges_of_many(mesh: trimesh.Trimesh) -> int:
     return int(np.sum(count > 2))
 
 
-def decimate(parts: list[Part], budget: int, source: str) -> tuple[list[Part], float]:
+def decimate(
+    parts: list[Part], budget: int, source: str, progress: Callable[..., None] | None = None
+) -> tuple[list[Part], float]:
     """Parts with no more than about `budget` triangles together, and the deviation of 99 % of the surface, m.
 
     Quadric error metrics (Garland and Heckbert 1997) collapse flat ground first, and so keep walls flat.
@@ -63,7 +66,9 @@ def decimate(parts: list[Part], budget: int, source: str) -> tuple[list[Part], f
     if total <= budget:
         return parts, 0.0
     made, deviations = [], []
-    for part in parts:
+    for number, part in enumerate(parts):
+        if progress:
+            progress("decimating", number, len(parts))
         target = max(12, int(budget * len(part.mesh.faces) / total))
         if len(part.mesh.faces) <= target:
             made.append(part)
@@ -78,6 +83,8 @@ def decimate(parts: list[Part], budget: int, source: str) -> tuple[list[Part], f
         thin = clean(replace(part, mesh=mesh), source)
         if thin is not None:
             made.append(thin)
+    if progress:
+        progress("decimating", len(parts), len(parts))
     left = sum(len(part.mesh.faces) for part in made)
     moved = float(np.quantile(np.concatenate(deviations), 0.99))
     if moved > DEVIATION or left > 1.2 * budget:

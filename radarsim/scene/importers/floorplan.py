@@ -1,5 +1,7 @@
 """From an occupancy grid to a building: walls, what stands about, floor and ceiling."""
 
+from collections.abc import Callable
+
 import numpy as np
 import shapely
 import trimesh
@@ -26,7 +28,9 @@ _SLIT = 0.2
 _COURT = 1.0
 
 
-def parts(grid: OccupancyGrid, height: float, thickness: float, source: str) -> list[Part]:
+def parts(
+    grid: OccupancyGrid, height: float, thickness: float, source: str, progress: Callable[..., None] | None = None
+) -> list[Part]:
     """The parts of a building with the plan of a grid: ``walls``, ``clutter``, ``floor`` and ``ceiling``.
 
     Args:
@@ -34,6 +38,7 @@ def parts(grid: OccupancyGrid, height: float, thickness: float, source: str) -> 
         height: floor to ceiling, m.
         thickness: of the thinnest wall, m.
         source: for messages.
+        progress: called with a stage's name, steps done, steps in all.
 
     Raises:
         InputError: no free ground, or nothing occupied around it.
@@ -41,11 +46,16 @@ def parts(grid: OccupancyGrid, height: float, thickness: float, source: str) -> 
     inside = rooms(grid)
     if not inside.any():
         raise InputError(f"{source}: has no square metre of free ground together, expected the map of a building")
+    step = progress or (lambda *_: None)
+    step("finding walls", 0, 3)
     found = faces(grid, inside)
+    step("finding walls", 1, 3)
     if not found:
         raise InputError(f"{source}: has no straight wall beside its free ground, expected the map of a building")
     solid = walls(found, thickness, grid, inside)
+    step("finding walls", 2, 3)
     rest = clutter(grid, inside, solid)
+    step("finding walls", 3, 3)
     built = [Part("walls", upright(_placed(solid, grid), height), "plasterboard", solid=True)]
     if rest:
         low = _placed(MultiPolygon(rest), grid)

@@ -40,11 +40,11 @@ def parts(path: Path) -> list[Part]:
         if not isinstance(mesh, trimesh.Trimesh) or not len(mesh.faces):
             continue
         material = getattr(getattr(mesh.visual, "material", None), "name", None)
-        labels = tuple(dict.fromkeys(str(name) for name in (material, key) if name and name != node))
         vertices = trimesh.transform_points(mesh.vertices, transform)
         # A mirrored node turns its faces inside out.
         faces = mesh.faces[:, ::-1] if np.linalg.det(transform[:3, :3]) < 0 else mesh.faces
         name = str(node) if len(scene.geometry) > 1 or path.suffix.lower() in (".glb", ".gltf") else path.stem
+        labels = tuple(dict.fromkeys(str(label) for label in (material, key, node) if label and label != name))
         placed = trimesh.Trimesh(vertices, faces, process=False)
         found += _by_category(path, mesh, placed) or [Part(name, placed, labels=labels)]
     if not found:

@@ -4,7 +4,8 @@ The map of each cause is that of `radarize.heatmaps.Heatmaps.range_azimuth` (Bar
 I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the window's
 transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; and of the burst's
 loops a few instants suffice, for the map sums over Doppler, which is the mean over loops. Without noise, converter and
-channel mismatch, which calibration removes.
+channel mismatch, which calibration removes; and without the smear over azimuth of echoes that close faster than
+`RadarConfig.max_velocity`, whose delays between transmitters the map takes out at the wrong speed.
 """
 
 import numpy as np
@@ -12,7 +13,6 @@ from jaxtyping import Complex, Float, UInt8
 from numba import njit, prange
 from scipy.signal import windows
 
-from radarize.heatmaps import Heatmaps
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.recording import Product, Stream
@@ -87,7 +87,8 @@ class CauseMaps:
 
     def __init__(self, config: RadarConfig):
         self.config, self.row = config, azimuth_row(config)
-        self.taper = Heatmaps._taper(len(self.row))
+        self.taper = windows.taylor(len(self.row), nbar=4, sll=25) if len(self.row) > 2 else np.ones(len(self.row))
+        self.taper /= self.taper.sum()
         y = virtual_positions(config).reshape(-1, 3)[self.row, 1]
         steering = np.exp(2j * np.pi / config.wavelength * y[:, None] * np.sin(AZIMUTHS))
         self._steering = (steering * self.taper[:, None]).astype(np.complex64)
@@ -125,9 +126,10 @@ class CauseMaps:
 
 @njit(parallel=True, fastmath=True, cache=True)
 def _spread(spectra, lengths, amplitudes, provenance, row, instants, kernel, per_metre, per_rate, wavenumber):
-    """spectra[instant, cause, bin, (re, im), antenna] += A exp(j phase) K(tone - bin); see `synthesis` for phase and tone.
+    """spectra[instant, cause, bin, (re, im), antenna] += A exp(j phase) K(tone - bin).
 
-    The tone is taken to be the same for all antennas: across the array it changes by less than a fifth of a bin.
+    Phase and tone are those of `synthesis`. The tone is taken to be the same for all antennas: across the array it
+    changes by less than a fifth of a bin.
     """
     antennas, n = len(row), spectra.shape[2]
     for i in prange(len(instants)):

@@ -81,7 +81,7 @@ class _Layout:
         while len(places) < count and at + piece.width < high - low - 0.03:
             middle = at + piece.width / 2
             place = room.wall_place(side, high - middle if downward else low + middle, off + piece.depth / 2)
-            tall = max(m.bounds[1, 2] for m in piece.parts.values()) > 1.0
+            tall = max(m.bounds[1, 2] for m in piece.parts.values()) > 1.25
             if not (lit and tall) and self.site.put_if_free(room, piece, *place, margin=-0.003):
                 places.append(place)
                 at += piece.width + gap
@@ -135,12 +135,12 @@ class _Layout:
 
 
 def _office(x: _Layout) -> None:
-    places = 1 + (min(x.room.size) > 3.6)
-    x.desks(x.left, places)
-    if x.room.size[0] * x.room.size[1] > 14:
-        x.desks(x.right, places)
-    if x.room.size[0] * x.room.size[1] > 30:
-        x.desks(x.back, 2)
+    area = x.room.size[0] * x.room.size[1]
+    x.desks(x.left, 2)
+    x.desks(x.right, 2 if area > 14 else 0)
+    x.desks(x.back, int(area / 15))
+    if area > 34:
+        x.tables(2, furniture.desk, (1,))
     x.line(x.front, x.cabinet, 2)
     x.line(x.right, x.shelf, 1, start=2.0)
     x.line(x.left, x.shelf if x.rng.random() < 0.5 else x.cabinet, 1, start=2.4)
@@ -209,7 +209,9 @@ def _storage(x: _Layout) -> None:
     x.line(x.left, x.shelf, 5, gap=0.02)
     x.line(x.right, x.cabinet, 3, gap=0.02)
     x.line(x.back, x.cabinet, 2, gap=0.02)
-    x.line(x.front, furniture.printer, 1)
+    x.line(x.front, x.shelf, 2, gap=0.02)
+    x.tables(1, x.shelf, ())
+    x.line(x.back, furniture.printer, 1)
 
 
 def _kitchen(x: _Layout) -> None:

@@ -165,16 +165,21 @@ def _lecture(x: _Layout) -> None:
     x.line(stage, partial(furniture.whiteboard), 2, start=0.6, gap=0.1)
     middle = room.center[1] if along_x else room.center[0]
     site.put_if_free(room, fittings.lectern(x.rng), *room.wall_place(stage, middle + 0.9, 1.1))
-    width = 1.6
+    width, rows = 1.6, 0
     columns = max(1, int((across - 0.4) / (width + 0.8)))
     for row in range(int((length - 3.4) / 1.25) + 1):
         for k in range(columns):
             along = middle + (k - (columns - 1) / 2) * (across - 0.2) / columns
             px, py, yaw = room.wall_place(stage, along, 2.2 + 1.25 * row)
             if site.put_if_free(room, furniture.table(x.rng, 0.5, width), px, py, yaw):
+                rows += 1
                 for side in (-0.4, 0.4):
                     sx, sy = px - side * np.sin(yaw), py + side * np.cos(yaw)
                     site.seat(room, float(sx), float(sy), yaw, away=0.62)
+    if not rows:  # the ways between its doors leave no room for rows
+        x.desks(x.left, 2)
+        x.desks(x.right, 2)
+        x.line(x.front, x.shelf, 3)
     x.line(x.front, furniture.bin, 1)
 
 

@@ -9,7 +9,7 @@ from radarsim.scene.rendering import render
 from radarsim.scene.scene import Scene
 
 
-def preview(scene: Scene, folder: str | Path, width: int = 1100, samples: int = 48) -> list[Path]:
+def preview(scene: Scene, folder: str | Path, width: int = 1100, samples: int = 40) -> list[Path]:
     """Write ``NAME.plan.png`` and ``NAME.view.png`` into `folder` and return their paths.
 
     Args:

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import numpy as np
-import shapely
 import trimesh
 from jaxtyping import Float
 
@@ -19,7 +18,7 @@ _SUN = np.array([0.55, 0.35, -0.85])
 _CAP = (0.16, 0.16, 0.17)  # of walls cut through
 
 
-def render(scene: Scene, width: int = 1100, samples: int = 48) -> Float[np.ndarray, "h w 3"]:
+def render(scene: Scene, width: int = 1100, samples: int = 40) -> Float[np.ndarray, "h w 3"]:
     """The scene from above, sRGB in 0...1.
 
     Args:

@@ -6,13 +6,15 @@ import shapely
 from scipy import ndimage
 
 from radarize.errors import InputError
+from radarsim.platforms import PLATFORMS
 from radarsim.scene.buildings import Building
 from radarsim.scene.clearance import RESOLUTION, Clearance
 from radarsim.scene.scene import Scene
-from radarsim.platforms import PLATFORMS
 
 SEEDS = np.random.default_rng(4).integers(0, 10_000, 20).tolist()
 FLOORS = [Building(kind="ABCD"[k % 4], seed=seed, floor=k // 4) for k, seed in enumerate(SEEDS)]
+#: Names of what is no furniture.
+FIXED = ("wall", "facade", "reveals", "column", "pipe", "window", "door", "way", "lamp", "riser", "stairs", "floor")
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +87,7 @@ def test_rooms_look_like_rooms():
         assert sum(a.area for a in floor) == pytest.approx(shapely.union_all(floor).area, abs=1e-6)
         # A door to every room, and at least two rooms that are joined by one.
         doored = {r.name for o in plan.openings if o.passage for r in (o.room, o.other)}
-        assert all(r.name in doored for r in plan.rooms)
+        assert all(r.name in doored for r in plan.rooms if r.kind != "corridor")
         between = [o for o in plan.openings if o.kind == "way" and "corridor" not in (o.room.kind, o.other.kind)]
         assert len(between) >= 2
         assert any(o.kind == "window" for o in plan.openings)
@@ -103,24 +105,23 @@ def test_nothing_stands_in_a_doorway(floors):
             ways.append((low + 0.08, y0 - across, high - 0.08, y1 + across) if o.side in "ns"
                         else (x0 - across, low + 0.08, x1 + across, high - 0.08))  # fmt: skip
         ways = shapely.box(*np.array(ways).T)
-        centers, tall = scene.triangles.mean(axis=1), scene.triangles[:, :, 2]
+        tall = scene.triangles[:, :, 2]
         body = (tall.max(axis=1) > 0.1) & (tall.min(axis=1) < 1.8) & (np.ptp(tall, axis=1) > 1e-6)
         tree = shapely.STRtree(ways)
         segments = shapely.linestrings(scene.triangles[body][:, :, :2])
         way, part = tree.query(segments, predicate="intersects")[::-1]
         names = {scene.objects[i].name for i in scene.triangle_object[np.flatnonzero(body)[part]]}
         names = {n for n in names if not n.endswith(("leaf", "handles"))}
-        assert not names, (building, sorted(names)[:5], centers[:0])
+        assert not names, (building, sorted(names)[:5])
 
 
-def test_pieces_do_not_overlap():
-    for building in FLOORS[:8]:
+def test_pieces_do_not_overlap(floors):
+    for building, scene in zip(FLOORS[:8], floors, strict=False):
         bodies = {}
-        for item in building.build():
+        for item in scene.objects:
             head = item.name.rsplit(" ", 1)[0]
             low, high = item.mesh.bounds
-            if item.is_floor_or_ceiling or any(w in item.name for w in ("wall", "facade", "reveals", "column", "pipe",
-                                               "window", "door", "way", "lamp", "riser", "stairs", "floor")):  # fmt: skip
+            if item.is_floor_or_ceiling or any(word in item.name for word in FIXED):
                 continue
             hull = shapely.MultiPoint(item.mesh.vertices[:, :2]).convex_hull
             bodies.setdefault(head, []).append(hull)

@@ -6,8 +6,8 @@ import trimesh
 from scipy import ndimage
 
 from radarsim.scene import walls
-from radarsim.scene.office import Office
 from radarsim.scene.clearance import Clearance
+from radarsim.scene.office import Office
 from radarsim.scene.scene import Scene
 
 

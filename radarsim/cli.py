@@ -38,6 +38,9 @@ def simulate(
             "makes every facet an infinite mirror, and draws speckle anew in every frame: do not train on it."
         ),
     ] = "radarsim",
+    sensors: Annotated[
+        str, typer.Option(help="Also record, comma-separated: depth, occupancy, tracking, imu, points, ghosts; or all.")
+    ] = "",
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth."""
     from radarsim.simulate import simulate
@@ -55,6 +58,7 @@ def simulate(
             frontend=frontend,
             provenance=provenance,
             engine=engine,
+            sensors=[name.strip() for name in sensors.split(",") if name.strip()],
             progress=report,
         )
     print(written)

@@ -99,6 +99,17 @@ class Motion:
 
         return Statistics.of(self, scene)
 
+    def acceleration(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
+        """Acceleration of the sensor in the world frame, m/s^2: a + R (alpha x l + omega x (omega x l))."""
+        inside = self._inside(t)
+        omega = self.attitude(inside, 1)
+        swing = np.cross(self.attitude(inside, 2), self.lever_arm) + np.cross(omega, np.cross(omega, self.lever_arm))
+        return (self.path(inside, 2) + self.attitude(inside).apply(swing)) * self._moving(t)
+
+    def mounted(self, offset: tuple[float, float, float]) -> "Motion":
+        """Motion of something fixed beside the sensor, its axes parallel: `offset` in the sensor frame, m."""
+        return replace(self, lever_arm=tuple(np.asarray(self.lever_arm) + self.mount.apply(offset)))
+
     def _inside(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
         return np.clip(np.asarray(t, float), self.path.x[0], self.path.x[-1])
 

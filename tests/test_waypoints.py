@@ -134,12 +134,11 @@ def test_the_recording_tells_its_motion(tmp_path):
     """Through way-points at the command line, cut short; and along poses through a wall."""
     from radarsim.cli import app
 
-    (tmp_path / "way.csv").write_text("\n".join(f"{x},{y}" for x, y in PLACES))
-    typed = ["simulate", "office", "-o", str(tmp_path / "a.h5"), "--waypoints", str(tmp_path / "way.csv")]
-    result = CliRunner().invoke(app, [*typed, "--duration", "0.2", "--mounting", "0.1 0 0 0 0 0"], prog_name="radarsim")
-    assert result.exit_code == 0 and "m in 0.2 s, mean" in result.stdout and "warning" not in result.stdout
-    poses = "".join(f"{t} {6 + 3 * t} {4.5 + 9 * t} 1 0 0 0 1\n" for t in np.arange(4) / 10)
-    (tmp_path / "wall.tum").write_text(poses)
-    path = simulate("office", tmp_path / "b.h5", trajectory=tmp_path / "wall.tum", duration=0.2)
+    (tmp_path / "way.csv").write_text("0 0\n1 0.5\n")
+    typed = ["simulate", "physics/room", "-o", str(tmp_path / "a.h5"), "--waypoints", str(tmp_path / "way.csv")]
+    result = CliRunner().invoke(app, [*typed, "--duration", "0.1", "--mounting", "0.1 0 0 0 0 0"], prog_name="radarsim")
+    assert result.exit_code == 0 and "m in 0.1 s, mean" in result.stdout and "warning" not in result.stdout
+    (tmp_path / "wall.tum").write_text("".join(f"{t} 0 {1 + 15 * t} 1 0 0 0 1\n" for t in (0.0, 0.05, 0.1, 0.15)))
+    path = simulate("physics/room", tmp_path / "b.h5", trajectory=tmp_path / "wall.tum", duration=0.1)
     with Recording(path) as recording:
-        assert "wall.tum: the sensor passes through '" in recording.attributes["warnings"]
+        assert "wall.tum: the sensor passes through 'north'" in recording.attributes["warnings"]

@@ -125,7 +125,7 @@ def preview(
     scene: SceneName,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the pictures.")] = Path("."),
 ):
-    """Draw SCENE as pictures: its floor plan and a view into it."""
+    """Draw SCENE as pictures: its floor plan and a rendering with the ceilings taken off."""
     from radarsim.scene.preview import preview
     from radarsim.scene.scene import Scene
 

@@ -41,9 +41,9 @@ def _on_one_blas_thread(method: Callable) -> Callable:
     """Numba's and Mitsuba's threads spin for work; a BLAS that wakes threads of its own beside them costs a third."""
 
     @wraps(method)
-    def limited(self, *arguments):
+    def limited(self, *arguments, **named):
         with self._threads.limit(limits=1, user_api="blas"):
-            return method(self, *arguments)
+            return method(self, *arguments, **named)
 
     return limited
 

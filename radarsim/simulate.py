@@ -14,7 +14,7 @@ from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.recording import RecordingWriter
-from radarsim.motion import Motion, motion_from_tum, plan_motion
+from radarsim.motion import Motion, Mounting, motion_from_tum, plan_motion
 from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
 from radarsim.physics.direct import DirectSum
@@ -30,8 +30,11 @@ from radarsim.scene.scene import Scene
 from radarsim.sensors.sensor import Frames, Rig
 from radarsim.sensors.sight import Sight
 from radarsim.sensors.suite import Suite, chosen
+from radarsim.statistics import crossings
+from radarsim.waypoints import read_waypoints
 
 _BATCH = 8
+_TOUR = 40.0  # s, unless asked for
 
 
 def _on_one_blas_thread(method: Callable) -> Callable:
@@ -130,7 +133,9 @@ def simulate(
     *,
     platform: str = "handheld",
     trajectory: Path | None = None,
-    duration: float = 40.0,
+    waypoints: Path | None = None,
+    mounting: Mounting | None = None,
+    duration: float | None = None,
     seed: int = 0,
     radar: str = "radarize",
     device: str = "cpu",
@@ -146,8 +151,11 @@ def simulate(
         scene: a scene, its YAML file, or the name of one that comes with the project.
         output: recording to write.
         platform: ``handheld``, ``cart`` or ``robot``: how a planned tour moves.
-        trajectory: TUM file of sensor poses to follow instead of a planned tour.
-        duration: s; a trajectory that is shorter ends the recording.
+        trajectory: TUM file of poses to follow instead of a planned tour; of the sensor, or if there is a mounting, of
+            the body that carries it.
+        waypoints: file of places to go through on the platform (see `waypoints.read_waypoints`) instead of a tour.
+        mounting: of the sensor on the platform; default: the platform's own.
+        duration: s; default: 40 s of a tour, or all of a trajectory or walk, which end the recording if shorter.
         seed: of the tour, the scatterers and the noise.
         radar: preset or configuration file.
         device: ``cpu`` or ``cuda``.
@@ -165,9 +173,9 @@ def simulate(
         the path written.
 
     Raises:
-        InputError: unusable scene, configuration, trajectory, sensor or output.
+        InputError: unusable scene, configuration, trajectory, way-points, sensor or output.
     """
-    if not (np.isfinite(duration) and duration > 0):
+    if duration is not None and not (np.isfinite(duration) and duration > 0):
         raise InputError(f"duration is {duration} s, expected a positive number of seconds")
     config, cfg_text = load_config(radar)
     check_limits(config)
@@ -184,14 +192,20 @@ def simulate(
     settings = FrontEndConfig.load(frontend) if frontend else FrontEndConfig()
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     route, physics = np.random.default_rng(seed).spawn(2)
+    if trajectory is not None and waypoints is not None:
+        raise InputError("both a trajectory and way-points are given, expected one of them")
     if trajectory is not None:
-        motion = motion_from_tum(trajectory)
+        motion = motion_from_tum(trajectory, mounting)
+    elif waypoints is not None:
+        motion = plan_motion(world, platform, duration, route, read_waypoints(waypoints), mounting)
     else:
-        motion = plan_motion(world, platform, duration, route)
+        motion = plan_motion(world, platform, _TOUR if duration is None else duration, route, mounting=mounting)
+    motion = motion if duration is None else motion.until(duration)
+    crossed = crossings(motion, world)
     simulator = Simulator(world, motion, config, physics, device, settings, engine)
-    frames = int(np.floor((min(duration, motion.duration) - config.burst_time) / config.frame_period)) + 1
+    frames = int(np.floor((motion.duration - config.burst_time) / config.frame_period)) + 1
     if frames < 1:
-        raise InputError(f"duration is {duration} s, expected at least one frame of {config.frame_period} s")
+        raise InputError(f"duration is {motion.duration:g} s, expected at least one frame of {config.frame_period} s")
     times = np.arange(frames) * config.frame_period
     attributes = {
         "source": "radarsim simulate",
@@ -201,6 +215,8 @@ def simulate(
         "radarsim_version": __version__,
         "engine": engine,
         "front_end": settings.model_dump_json(),
+        "motion": motion.statistics(world).json(),
+        "warnings": f"{trajectory or waypoints or 'tour'}: {crossed}" if crossed else "",
     }
     if engine == "radarsim":
         attributes |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}

@@ -2,20 +2,21 @@
 
 Layout (design: one chunk per frame, readable while it grows):
 
-    /radar/adc      int16 (frame, loop, tx, rx, sample, iq)   attributes: configuration as JSON, the .cfg text
+    /radar          attributes: configuration as JSON, the .cfg text
+    /radar/adc      int16 (frame, loop, tx, rx, sample, iq)   absent where only heat maps were kept
     /radar/time     float64 (frame,)                          s, start of the first chirp
     /radar/valid    bool (frame, loop, tx)                    False where samples of the chirp were lost
-    /truth/NAME, /imu/NAME, /points/NAME                      optional, attributes `unit` and `about`
+    /truth/NAME, /imu/NAME, /points/NAME, /maps/NAME          optional, attributes `unit` and `about`
 
-A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once a second in
-HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame flushed so far.
+A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once a second of
+recorded time in HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame
+flushed so far. No clock of the writing machine goes into the file or its layout: same content, same bytes.
 """
 
 import errno
 import json
 import os
 import shutil
-import time as clock
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,7 +31,6 @@ from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 
 FORMAT = 1
-_FLUSH_INTERVAL = 1.0
 #: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
 #: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.
 _RESERVE = 512 << 10
@@ -72,6 +72,7 @@ class RecordingWriter:
         attributes: scene, seed, command and the like, stored as attributes of the file.
         streams: growing data sets by path, e.g. ``"truth/pose"``.
         products: fixed data sets by path.
+        raw: False for a recording without samples (heat maps for training): `append` then takes None for them.
 
     Raises:
         InputError: the file cannot be created or a write failed (for instance, no space left).
@@ -86,15 +87,16 @@ class RecordingWriter:
         attributes: Mapping[str, object] | None = None,
         streams: Mapping[str, Stream] | None = None,
         products: Mapping[str, Product] | None = None,
+        raw: bool = True,
     ):
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + ".part")
         self.config = config
-        self.frames = 0
+        self.frames, self.raw = 0, raw
         self._file: h5py.File | None = None
         self._notes: dict[str, object] = {}
         self._pending: list[tuple] = []
-        self._flushed = clock.monotonic()
+        self._unflushed = 0
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._require_space(sum(product.data.nbytes for product in (products or {}).values()))
@@ -110,7 +112,8 @@ class RecordingWriter:
         radar.attrs["config"] = self.config.model_dump_json()
         radar.attrs["cfg"] = cfg_text
         loops, tx, rx, samples, _ = self.config.frame_shape
-        self._grow("radar/adc", Stream((loops, tx, rx, samples, 2), "i2", "ADC counts", "I/Q, TX1..3 x RX1..4"))
+        if self.raw:
+            self._grow("radar/adc", Stream((loops, tx, rx, samples, 2), "i2", "ADC counts", "I/Q, TX1..3 x RX1..4"))
         self._grow("radar/valid", Stream((loops, tx), "?", "", "False where samples of the chirp were lost"))
         self._grow("radar/time", Stream((), "f8", "s", "start of the frame's first chirp"))
         for name, product in products.items():
@@ -137,7 +140,7 @@ class RecordingWriter:
 
     def append(
         self,
-        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        adc: Int16[np.ndarray, "frame loop tx rx sample 2"] | None,
         time: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
         **rows: np.ndarray,
@@ -147,21 +150,23 @@ class RecordingWriter:
         Raises:
             InputError: the shapes do not fit the configuration, or the disk is full; frames flushed before stay.
         """
-        if adc.shape[1:] != self.config.frame_shape:
+        if self.raw and adc.shape[1:] != self.config.frame_shape:
             raise InputError(
                 f"{self.path}: frames have shape {adc.shape[1:]}, expected {self.config.frame_shape} "
                 "(loop, tx, rx, sample, iq) from the configuration"
             )
         if valid is None:
-            valid = np.ones(adc.shape[:3], bool)
+            valid = np.ones((len(time), *self.config.frame_shape[:2]), bool)
+        if self.raw:
+            rows["radar__adc"] = adc
         try:
-            self._require_space(adc.nbytes + sum(np.asarray(data).nbytes for data in rows.values()))
+            self._require_space(sum(np.asarray(data).nbytes for data in rows.values()))
             for name, data in rows.items():
                 self._extend(name.replace("__", "/"), data)
-            self._extend("radar/adc", adc)
             self._extend("radar/valid", valid)
             self._pending.append(np.asarray(time, float))
-            if clock.monotonic() - self._flushed > _FLUSH_INTERVAL:
+            self._unflushed += len(time)
+            if self._unflushed >= self.config.frame_rate:
                 self.flush()
         except (OSError, RuntimeError) as error:
             raise InputError(f"cannot write {self.part}: {_reason(error)}; {self._survivors()}") from error
@@ -203,7 +208,7 @@ class RecordingWriter:
         self._file["radar/time"].flush()
         if shutil.disk_usage(self.path.parent).free == 0:  # somebody else filled the disk; HDF5 would not say so
             raise OSError(errno.ENOSPC, "no space left on the device")
-        self._flushed = clock.monotonic()
+        self._unflushed = 0
 
     def _survivors(self) -> str:
         return f"{self.frames} whole frames are kept there"
@@ -290,11 +295,14 @@ class Recording:
         try:
             radar = self.file["radar"]
             self.config = RadarConfig.model_validate_json(radar.attrs["config"])
-            self._adc, self._valid, times = radar["adc"], radar["valid"], radar["time"][:]
+            self._adc, self._valid, times = radar.get("adc"), radar["valid"], radar["time"][:]
         except (KeyError, OSError, TypeError, ValidationError) as error:
             self.file.close()
             raise InputError(f"{self.path}: not a recording of this project ({_reason(error)})") from error
-        if self._adc.dtype != np.int16 or self._adc.shape[1:] != self.config.frame_shape:
+        if self._adc is None and "maps" not in self.file:
+            self.file.close()
+            raise InputError(f"{self.path}: not a recording of this project (neither /radar/adc nor /maps)")
+        if self._adc is not None and (self._adc.dtype != np.int16 or self._adc.shape[1:] != self.config.frame_shape):
             shape, kind = self._adc.shape[1:], self._adc.dtype
             self.file.close()
             raise InputError(
@@ -302,7 +310,7 @@ class Recording:
                 f"expected int16 of {self.config.frame_shape} from its configuration"
             )
         # A frame counts once its time is written, which happens after its samples are on disk.
-        whole = min(len(times), len(self._adc), len(self._valid))
+        whole = min(len(data) for data in (times, self._adc, self._valid) if data is not None)
         unwritten = np.flatnonzero(~np.isfinite(times[:whole]))
         self.times = times[: unwritten[0] if len(unwritten) else whole]
 
@@ -329,8 +337,10 @@ class Recording:
         """Raw samples of frames start...stop-1.
 
         Raises:
-            InputError: a chunk on disk is damaged.
+            InputError: a chunk on disk is damaged, or only heat maps were kept.
         """
+        if self._adc is None:
+            raise InputError(f"{self.path}: has no raw samples, only heat maps, expected a recording with /radar/adc")
         return self._read(self._adc, start, stop)
 
     def valid(self, start: int, stop: int) -> Bool[np.ndarray, "frame loop tx"]:

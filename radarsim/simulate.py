@@ -1,6 +1,6 @@
 """One recording from one scene and one motion: the simulator's main loop."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import wraps
 from pathlib import Path
 
@@ -126,7 +126,7 @@ class Simulator:
 
 
 def simulate(
-    scene: str,
+    scene: str | Scene,
     output: Path,
     *,
     platform: str = "handheld",
@@ -138,6 +138,7 @@ def simulate(
     frontend: Path | None = None,
     provenance: bool = False,
     engine: str = "radarsim",
+    attributes: Mapping[str, object] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Simulate a recording.
@@ -157,6 +158,7 @@ def simulate(
         engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver, for comparison. Its known defects
             stand at the head of `physics.pathsolver`: corners, small facets and half of the ghosts are wrong, and
             speckle is drawn anew for every frame.
+        attributes: more attributes of the file.
         progress: called with (frames done, frames in all).
 
     Returns:
@@ -179,19 +181,19 @@ def simulate(
     if engine not in ("radarsim", "sionna"):
         raise InputError(f"engine is {engine!r}, expected radarsim or sionna")
     settings = FrontEndConfig.load(frontend) if frontend else FrontEndConfig()
-    world = Scene.load(scene)
+    world = scene if isinstance(scene, Scene) else Scene.load(scene)
     route, physics = np.random.default_rng(seed).spawn(2)
     if trajectory is not None:
         motion = motion_from_tum(trajectory)
     else:
         motion = plan_motion(world, platform, duration, route)
     simulator = Simulator(world, motion, config, physics, device, settings, engine)
-    frames = int(np.floor((min(duration, motion.duration) - config.burst_time) / config.frame_period)) + 1
+    frames = config.frames_within(min(duration, motion.duration))
     if frames < 1:
         raise InputError(f"duration is {duration} s, expected at least one frame of {config.frame_period} s")
     times = np.arange(frames) * config.frame_period
     start = motion.position(np.array([config.burst_center]))[0]
-    attributes = {
+    facts = {
         "source": "radarsim simulate",
         "scene": world.name,
         "platform": "trajectory" if trajectory is not None else platform,
@@ -201,7 +203,7 @@ def simulate(
         "front_end": settings.model_dump_json(),
     }
     if engine == "radarsim":
-        attributes |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}
+        facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}
     products = {
         "truth/scan_azimuths": Product(SCAN_AZIMUTHS, "rad", "bearings of /truth/scan, positive to the left"),
         "truth/floor_plan": Product(
@@ -224,7 +226,7 @@ def simulate(
             "I/Q before noise and converter, by cause, which add up: " + ", ".join(CAUSES),
         )
     with RecordingWriter(
-        output, config, cfg_text=cfg_text, attributes=attributes, products=products, streams=streams
+        output, config, cfg_text=cfg_text, attributes=facts | dict(attributes or {}), products=products, streams=streams
     ) as writer:
         for first in range(0, frames, _BATCH):
             batch = times[first : first + _BATCH]

@@ -102,6 +102,13 @@ class Scene:
         file = find(path)
         return cls(*read(file))
 
+    @classmethod
+    def of(cls, description: dict, name: str) -> "Scene":
+        """A scene from what a scene file would hold, without a file."""
+        from radarsim.scene.description import Description
+
+        return cls(name, Description.model_validate(description).building.build(), [])
+
     @property
     def bounds(self) -> Float[np.ndarray, "2 3"]:
         """Lowest and highest corner, m."""

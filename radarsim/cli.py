@@ -38,6 +38,9 @@ def simulate(
             "makes every facet an infinite mirror, and draws speckle anew in every frame: do not train on it."
         ),
     ] = "radarsim",
+    sensors: Annotated[
+        str, typer.Option(help="Also record, comma-separated: depth, occupancy, tracking, imu, points, ghosts; or all.")
+    ] = "",
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth."""
     from radarsim.simulate import simulate
@@ -55,6 +58,7 @@ def simulate(
             frontend=frontend,
             provenance=provenance,
             engine=engine,
+            sensors=[name.strip() for name in sensors.split(",") if name.strip()],
             progress=report,
         )
     print(written)
@@ -62,10 +66,14 @@ def simulate(
 
 @app.command()
 def dataset(
-    specification: Annotated[Path, typer.Argument(metavar="SPEC.yaml", help="What to make: a file, small, radarize146.")],
+    specification: Annotated[
+        Path, typer.Argument(metavar="SPEC.yaml", help="What to make: a file, small, radarize146.")
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the recordings.")],
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
-    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Use this Ray cluster (auto: the local one).")] = None,
+    ray: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Use this Ray cluster (auto: the local one).")
+    ] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Make recordings of other parameters anew.")] = False,
 ):
     """Make the recordings of a data set. Started again, it goes on where it was stopped."""

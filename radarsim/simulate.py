@@ -1,11 +1,11 @@
 """One recording from one scene and one motion: the simulator's main loop."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Complex, Float, Int16
+from jaxtyping import Float, Int16
 from threadpoolctl import ThreadpoolController
 
 from radarize import __version__
@@ -13,7 +13,7 @@ from radarize.errors import InputError
 from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
-from radarize.recording import Product, RecordingWriter, Stream
+from radarize.recording import RecordingWriter
 from radarsim.motion import Motion, motion_from_tum, plan_motion
 from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
@@ -27,11 +27,10 @@ from radarsim.physics.pathsolver import PathSolverFinder
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
 from radarsim.scene.scene import Scene
+from radarsim.sensors.sensor import Frames, Rig
+from radarsim.sensors.sight import Sight
+from radarsim.sensors.suite import Suite, chosen
 
-#: Bearings of the true planar scan, rad: the radar's own 88 columns of one degree.
-SCAN_AZIMUTHS = np.deg2rad(np.arange(-44, 44))
-#: Parts of /truth/adc_by_cause, in this order.
-CAUSES = (*(p.name.lower() for p in Provenance), "leakage")
 _BATCH = 8
 
 
@@ -89,32 +88,32 @@ class Simulator:
         middle = np.asarray(times) + self.config.burst_center
         return self.finder.batch(self.motion.position(middle), self.motion.rotation(middle).as_matrix(), middle)
 
-    @_on_one_blas_thread
     def frames(
         self, times: Float[np.ndarray, "frame"]
     ) -> tuple[Int16[np.ndarray, "frame loop tx rx sample 2"], list[Echoes]]:
         """Samples of the frames that start at `times` (s), and the echoes in them."""
-        echoes = self.echoes(times)
-        signals = self.synthesize.batch(*self._received(times, echoes))
-        return np.stack([self.front_end.digitize(signal, self._noise) for signal in signals]), echoes
+        frames = self.observe(times)
+        return frames.samples, frames.echoes
 
     @_on_one_blas_thread
-    def frames_by_cause(
-        self, times: Float[np.ndarray, "frame"]
-    ) -> tuple[
-        Int16[np.ndarray, "frame loop tx rx sample 2"],
-        list[Echoes],
-        Complex[np.ndarray, "frame cause loop tx rx sample"],
-    ]:
-        """As `frames`, and the counts that each of `CAUSES` makes before noise and converter."""
+    def observe(self, times: Float[np.ndarray, "frame"], by_cause: bool = False) -> Frames:
+        """All there is to know of the frames that start at `times` (s), with the counts of each cause if asked for."""
         echoes = self.echoes(times)
-        samples, parts = [], []
-        for lengths, amplitudes, present in zip(*self._received(times, echoes), echoes, strict=True):
-            masks = [present.provenance == p for p in Provenance]
-            signals = self.synthesize.batch([lengths[m] for m in masks], [amplitudes[m] for m in masks])
-            parts.append(np.stack(self.front_end.by_cause(list(signals))))
-            samples.append(self.front_end.digitize(np.sum(signals, axis=0), self._noise))
-        return np.stack(samples), echoes, np.stack(parts)
+        lengths, amplitudes = self._received(times, echoes)
+        parts = None
+        if by_cause:
+            split = [self._split(*each) for each in zip(lengths, amplitudes, echoes, strict=True)]
+            signals = [np.sum(each, axis=0) for each in split]
+            parts = np.stack([np.stack(self.front_end.by_cause(each)) for each in split])
+        else:
+            signals = self.synthesize.batch(lengths, amplitudes)
+        samples = np.stack([self.front_end.digitize(signal, self._noise) for signal in signals])
+        return Frames(np.asarray(times), samples, echoes, lengths, amplitudes, parts)
+
+    def _split(self, lengths: np.ndarray, amplitudes: np.ndarray, echoes: Echoes) -> list[np.ndarray]:
+        """Beat signals of each cause."""
+        masks = [echoes.provenance == p for p in Provenance]
+        return list(self.synthesize.batch([lengths[m] for m in masks], [amplitudes[m] for m in masks]))
 
     def _received(self, times, echoes: list[Echoes]) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Path lengths and amplitudes behind the IF filters, by frame."""
@@ -126,7 +125,7 @@ class Simulator:
 
 
 def simulate(
-    scene: str | Scene,
+    scene: str | Path | Scene,
     output: Path,
     *,
     platform: str = "handheld",
@@ -138,13 +137,14 @@ def simulate(
     frontend: Path | None = None,
     provenance: bool = False,
     engine: str = "radarsim",
+    sensors: Sequence[str] = (),
     attributes: Mapping[str, object] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Simulate a recording.
 
     Args:
-        scene: YAML file, or the name of a scene that comes with the project.
+        scene: a scene, its YAML file, or the name of one that comes with the project.
         output: recording to write.
         platform: ``handheld``, ``cart`` or ``robot``: how a planned tour moves.
         trajectory: TUM file of sensor poses to follow instead of a planned tour.
@@ -158,6 +158,8 @@ def simulate(
         engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver, for comparison. Its known defects
             stand at the head of `physics.pathsolver`: corners, small facets and half of the ghosts are wrong, and
             speckle is drawn anew for every frame.
+        sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
+            are the same whatever is chosen.
         attributes: more attributes of the file.
         progress: called with (frames done, frames in all).
 
@@ -165,7 +167,7 @@ def simulate(
         the path written.
 
     Raises:
-        InputError: unusable scene, configuration, trajectory or output.
+        InputError: unusable scene, configuration, trajectory, sensor or output.
     """
     if not (np.isfinite(duration) and duration > 0):
         raise InputError(f"duration is {duration} s, expected a positive number of seconds")
@@ -180,6 +182,7 @@ def simulate(
             raise InputError("device is cuda, but this machine has no usable CUDA GPU, expected --device cpu")
     if engine not in ("radarsim", "sionna"):
         raise InputError(f"engine is {engine!r}, expected radarsim or sionna")
+    chosen(sensors)
     settings = FrontEndConfig.load(frontend) if frontend else FrontEndConfig()
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     route, physics = np.random.default_rng(seed).spawn(2)
@@ -192,7 +195,6 @@ def simulate(
     if frames < 1:
         raise InputError(f"duration is {duration} s, expected at least one frame of {config.frame_period} s")
     times = np.arange(frames) * config.frame_period
-    start = motion.position(np.array([config.burst_center]))[0]
     facts = {
         "source": "radarsim simulate",
         "scene": world.name,
@@ -204,60 +206,18 @@ def simulate(
     }
     if engine == "radarsim":
         facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}
-    products = {
-        "truth/scan_azimuths": Product(SCAN_AZIMUTHS, "rad", "bearings of /truth/scan, positive to the left"),
-        "truth/floor_plan": Product(
-            world.floor_plan(float(start[2])), "m", "x0 y0 x1 y1 of everything cut by the plane of the sensor at start"
-        ),
-    }
-    streams = {
-        "truth/time": Stream((), "f8", "s", "middle of the frame's burst: the instant of the other truth streams"),
-        "truth/pose": Stream((7,), "f8", "m, quaternion", "x y z qx qy qz qw of the sensor in the world"),
-        "truth/velocity": Stream((6,), "f8", "m/s, rad/s", "linear, then angular velocity of the sensor, sensor frame"),
-        "truth/scan": Stream((len(SCAN_AZIMUTHS),), "f4", "m", "range of the first surface in the horizontal plane"),
-        "truth/echoes": Stream((len(Provenance),), "i4", "", "echoes per cause: " + _causes()),
-        "truth/echo_power": Stream((len(Provenance),), "f4", "1", "received over transmitted power: " + _causes()),
-    }
-    if provenance:
-        streams["truth/adc_by_cause"] = Stream(
-            (len(CAUSES), *config.frame_shape),
-            "f2",
-            "ADC counts",
-            "I/Q before noise and converter, by cause, which add up: " + ", ".join(CAUSES),
-        )
+    suite = Suite(Rig(world, motion, config, simulator.front_end, Sight(world)), sensors, seed, provenance)
     with RecordingWriter(
-        output, config, cfg_text=cfg_text, attributes=facts | dict(attributes or {}), products=products, streams=streams
+        output,
+        config,
+        cfg_text=cfg_text,
+        attributes=facts | dict(attributes or {}),
+        products=suite.products,
+        streams=suite.streams,
     ) as writer:
         for first in range(0, frames, _BATCH):
-            batch = times[first : first + _BATCH]
-            rows = {}
-            if provenance:
-                samples, echoes, parts = simulator.frames_by_cause(batch)
-                rows["truth__adc_by_cause"] = np.stack([parts.real, parts.imag], axis=-1).astype(np.float16)
-            else:
-                samples, echoes = simulator.frames(batch)
-            rows |= _truth(world, motion, batch + config.burst_center, config.max_range)
-            writer.append(samples, batch, **rows, **_counts(echoes))
+            batch = simulator.observe(times[first : first + _BATCH], provenance)
+            writer.append(batch.samples, batch.times, rows=suite.observe(batch))
             if progress:
                 progress(first + len(batch), frames)
     return Path(output)
-
-
-def _causes() -> str:
-    return ", ".join(p.name.lower() for p in Provenance)
-
-
-def _truth(world: Scene, motion: Motion, times: np.ndarray, max_range: float) -> dict[str, np.ndarray]:
-    position, rotation = motion.position(times), motion.rotation(times)
-    pose = np.concatenate([position, rotation.as_quat()], axis=1)
-    velocity = np.concatenate([rotation.inv().apply(motion.velocity(times)), motion.angular_velocity(times)], axis=1)
-    forward = rotation.apply([1.0, 0.0, 0.0])
-    yaw = np.arctan2(forward[:, 1], forward[:, 0])
-    scan = world.planar_scan(position, yaw, SCAN_AZIMUTHS, max_range)
-    return {"truth__time": times, "truth__pose": pose, "truth__velocity": velocity, "truth__scan": scan}
-
-
-def _counts(frames: list[Echoes]) -> dict[str, np.ndarray]:
-    power = [[np.sum(np.abs(e.amplitude[e.provenance == p]) ** 2) for p in Provenance] for e in frames]
-    count = [[np.sum(e.provenance == p) for p in Provenance] for e in frames]
-    return {"truth__echoes": np.array(count), "truth__echo_power": np.array(power)}

@@ -36,12 +36,12 @@ def test_what_is_written_is_read(tmp_path):
         CONFIG,
         cfg_text="% text",
         attributes={"seed": 7, "scene": "office"},
-        streams={"truth/pose": pose, "imu/time": Stream((), "f8", "s", "")},
+        streams={"truth/pose": pose, "imu/time": Stream((), "f8", "s", "", "imu/time")},
         products={"truth/floor_plan": plan},
     ) as writer:
-        writer.append(frames(0, 3), np.arange(3.0), valid[:3], truth__pose=np.ones((3, 7)))
-        writer.append(frames(3, 5), np.arange(3.0, 5), valid[3:], truth__pose=np.zeros((2, 7)))
-        writer.extend("imu/time", np.arange(100.0))
+        writer.append(frames(0, 3), np.arange(3.0), valid[:3], rows={"truth/pose": np.ones((3, 7))})
+        writer.append(frames(3, 5), np.arange(3.0, 5), valid[3:], rows={"truth/pose": np.zeros((2, 7))})
+        writer.extend("imu/time", np.arange(100.0) / 20)
         assert not path.exists()
         writer.annotate(warnings="late")
     assert not writer.part.exists()
@@ -53,7 +53,9 @@ def test_what_is_written_is_read(tmp_path):
         assert np.array_equal(recording.adc(1, 5), frames(1, 5))
         assert np.array_equal(recording.valid(0, 5), valid)
         assert recording.read("truth/pose").sum() == 21
-        assert len(recording.read("imu/time")) == 100
+        imu = recording.read("imu/time")
+        assert len(imu) == 81 and imu[-1] == 4.0  # up to the end of the last frame, at 4.033 s
+        assert recording.rows("imu/time", 1, 3).tolist() == pytest.approx(np.arange(1, 3, 0.05))
         assert np.array_equal(recording.read("truth/floor_plan"), np.eye(4))
         assert recording.describe("truth/pose")["unit"] == "m"
         assert [(s.start, s.stop, len(adc)) for s, adc in recording.batches(2)] == [(0, 2, 2), (2, 4, 2), (4, 5, 1)]
@@ -146,11 +148,11 @@ def test_flushes_come_by_themselves(tmp_path):
 def test_same_content_same_bytes(tmp_path):
     """Whenever, and however slowly, it was written."""
     for name, pause in (("a.h5", 0.0), ("b.h5", 0.4)):
-        streams = {"imu/time": Stream((), "f8", "s", "")}
+        streams = {"imu/time": Stream((), "f8", "s", "", "imu/time")}
         with RecordingWriter(tmp_path / name, CONFIG, attributes={"seed": 7}, streams=streams) as writer:
             for i in range(3):
                 writer.append(frames(20 * i, 20 * i + 20), np.arange(20.0) + i)
-                writer.extend("imu/time", np.arange(100.0))
+                writer.extend("imu/time", np.arange(100.0) + 100 * i)
                 time.sleep(pause)
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
@@ -158,7 +160,7 @@ def test_same_content_same_bytes(tmp_path):
 def test_heat_maps_may_stand_without_samples(tmp_path):
     maps = {"maps/range_azimuth": Stream((96, 40), "f2", "dB", "")}
     with RecordingWriter(tmp_path / "a.h5", CONFIG, streams=maps, raw=False) as writer:
-        writer.append(None, np.arange(5.0), maps__range_azimuth=np.ones((5, 96, 40)))
+        writer.append(None, np.arange(5.0), rows={"maps/range_azimuth": np.ones((5, 96, 40))})
     with Recording(tmp_path / "a.h5") as recording:
         assert len(recording) == 5 and recording.valid(0, 5).all() and not recording.has("radar/adc")
         assert recording.read("maps/range_azimuth").sum() == 5 * 96 * 40

@@ -12,7 +12,8 @@ from radarsim.motion import plan_motion
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.scene.scene import Scene
-from radarsim.simulate import CAUSES, simulate
+from radarsim.sensors.causes import CAUSES
+from radarsim.simulate import simulate
 
 
 @pytest.fixture(scope="module")

@@ -101,13 +101,13 @@ class Frames(Dataset):
         for field in self.fields:
             if field in TRUTH:
                 path, columns = TRUTH[field]
-                item[field] = recording.file[path][frames][:, columns]
+                item[field] = recording.rows(path, first, frames.stop)[:: self.spacing][:, columns]
             elif field == "adc":
                 item[field] = recording.adc(first, frames.stop)[:: self.spacing]
             elif field == "time":
                 item[field] = recording.times[frames]
             elif field == "turn":
-                item[field] = _turns(recording.file["truth/pose"][frames])
+                item[field] = _turns(recording.rows("truth/pose", first, frames.stop)[:: self.spacing])
         return {name: _tensor(item[name]) for name in self.fields}
 
     def _maps(self, recording: Recording, frames: slice, names: tuple[str, ...], maker: MapMaker) -> dict:

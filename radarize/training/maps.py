@@ -15,7 +15,6 @@ compressible to 0.4 of its size.
 
 from pathlib import Path
 
-import h5py
 import numpy as np
 import torch
 from jaxtyping import Bool, Float16, Int16
@@ -110,8 +109,9 @@ def keep_maps(source: Path, output: Path) -> Path:
         others = [n for n in recording.names() if not n.startswith(("radar/", "maps/")) and n not in _LARGE]
         for name in others:
             data, about = recording.file[name], recording.describe(name)
-            if data.maxshape[:1] == (None,):
-                streams[name] = Stream(data.shape[1:], data.dtype.str, about["unit"], about["about"])
+            if "clock" in data.attrs:
+                clock = str(data.attrs["clock"])
+                streams[name] = Stream(data.shape[1:], data.dtype.str, about["unit"], about["about"], clock)
             else:
                 products[name] = Product(data[()], about["unit"], about["about"])
         own = ("format", "radarize_version")
@@ -120,19 +120,14 @@ def keep_maps(source: Path, output: Path) -> Path:
             output, recording.config, cfg_text=recording.cfg_text, attributes=attributes, products=products,
             streams=streams, raw=False,
         ) as writer:  # fmt: skip
-            for name in others:
-                if name in streams:
-                    _copy(recording.file[name], name, writer)
             for frames, adc in recording.batches(_BATCH):
                 valid = recording.valid(frames.start, frames.stop)
-                made = {f"maps__{name}": made for name, made in maker(adc, valid).items()}
-                writer.append(None, recording.times[frames], valid, **made)
+                for name in others:
+                    if name in streams:
+                        writer.extend(name, recording.rows(name, frames.start, frames.stop))
+                rows = {f"maps/{name}": made for name, made in maker(adc, valid).items()}
+                writer.append(None, recording.times[frames], valid, rows=rows)
     return output
-
-
-def _copy(data: h5py.Dataset, name: str, writer: RecordingWriter) -> None:
-    for start in range(0, len(data), 256):
-        writer.extend(name, data[start : start + 256])
 
 
 def maps_of(recording: Recording, start: int, stop: int, names: tuple[str, ...], maker: MapMaker) -> dict:
@@ -145,5 +140,5 @@ def maps_of(recording: Recording, start: int, stop: int, names: tuple[str, ...],
         if name not in maker.names:
             raise InputError(f"{recording.path}: has no map {name}; its array makes {', '.join(maker.names)}")
     if recording.has("maps"):
-        return {name: recording.file[f"maps/{name}"][start:stop] for name in names}
+        return {name: recording.rows(f"maps/{name}", start, stop) for name in names}
     return maker(recording.adc(start, stop), recording.valid(start, stop), names)

@@ -114,6 +114,7 @@ class Task:
                 seed=self.seed,
                 radar=self.radar,
                 frontend=None if self.frontend is None else Path(self.frontend),
+                sensors=self.sensors,
                 attributes={ATTRIBUTE: json.dumps(self.parameters, sort_keys=True)},
                 progress=progress,
             )

@@ -1,0 +1,214 @@
+"""Writing a recording frame by frame.
+
+A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once a second of
+recorded time in HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame
+flushed so far. No clock of the writing machine goes into the file or its layout: same content, same bytes.
+"""
+
+import errno
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+import h5py
+import numpy as np
+from jaxtyping import Bool, Float, Int16
+
+from radarize import __version__
+from radarize.errors import InputError
+from radarize.radar.config import RadarConfig
+from radarize.recording.streams import FORMAT, Product, Stream, reason
+
+#: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
+#: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.
+_RESERVE = 512 << 10
+
+
+class RecordingWriter:
+    """Writes a recording frame by frame; use as a context manager.
+
+    Args:
+        path: file to write; its ``.part`` neighbour holds the frames until the writer is closed.
+        config: radar configuration.
+        cfg_text: original configuration text, kept as it is.
+        attributes: scene, seed, command and the like, stored as attributes of the file.
+        streams: growing data sets by path, e.g. ``"truth/pose"``.
+        products: fixed data sets by path.
+        raw: False for a recording without samples (heat maps for training): `append` then takes None for them.
+
+    Raises:
+        InputError: the file cannot be created or a write failed (for instance, no space left).
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        config: RadarConfig,
+        *,
+        cfg_text: str = "",
+        attributes: Mapping[str, object] | None = None,
+        streams: Mapping[str, Stream] | None = None,
+        products: Mapping[str, Product] | None = None,
+        raw: bool = True,
+    ):
+        self.path = Path(path)
+        self.part = self.path.with_name(self.path.name + ".part")
+        self.config = config
+        self.frames, self.raw = 0, raw
+        self._file: h5py.File | None = None
+        self._notes: dict[str, object] = {}
+        self._pending: list[tuple] = []
+        self._unflushed = 0
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            self._require_space(sum(product.data.nbytes for product in (products or {}).values()))
+            self._file = h5py.File(self.part, "w", libver="latest")
+            self._create(cfg_text, attributes or {}, streams or {}, products or {})
+        except OSError as error:
+            raise InputError(f"cannot write {self.part}: {reason(error)}") from error
+
+    def _create(self, cfg_text, attributes, streams, products) -> None:
+        file = self._file
+        file.attrs.update({"format": FORMAT, "radarize_version": __version__, **attributes})
+        radar = file.create_group("radar")
+        radar.attrs["config"] = self.config.model_dump_json()
+        radar.attrs["cfg"] = cfg_text
+        loops, tx, rx, samples, _ = self.config.frame_shape
+        if self.raw:
+            self._grow("radar/adc", Stream((loops, tx, rx, samples, 2), "i2", "ADC counts", "I/Q, TX1..3 x RX1..4"))
+        self._grow("radar/valid", Stream((loops, tx), "?", "", "False where samples of the chirp were lost"))
+        self._grow("radar/time", Stream((), "f8", "s", "start of the frame's first chirp"))
+        for name, product in products.items():
+            data = file.create_dataset(name, data=product.data)
+            data.attrs.update({"unit": product.unit, "about": product.about})
+        for name, stream in streams.items():
+            self._grow(name, stream)
+        file.swmr_mode = True
+
+    def _grow(self, name: str, stream: Stream) -> None:
+        per_row = int(np.prod(stream.shape, dtype=int)) * np.dtype(stream.dtype).itemsize
+        rows = int(np.clip(16384 // max(per_row, 1), 1, 1024))
+        packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if per_row >= 1024 else {}
+        data = self._file.create_dataset(
+            name,
+            shape=(0, *stream.shape),
+            maxshape=(None, *stream.shape),
+            dtype=stream.dtype,
+            chunks=(rows, *stream.shape),
+            fillvalue=_unwritten(name, stream),
+            **packed,
+        )
+        data.attrs.update({"unit": stream.unit, "about": stream.about, "clock": stream.clock})
+
+    def append(
+        self,
+        adc: Int16[np.ndarray, "frame loop tx rx sample 2"] | None,
+        time: Float[np.ndarray, "frame"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+        *,
+        rows: Mapping[str, np.ndarray] | None = None,
+    ) -> None:
+        """Append frames, and rows of other streams by path, which count as soon as the frames do.
+
+        Raises:
+            InputError: the shapes do not fit the configuration, or the disk is full; frames flushed before stay.
+        """
+        if self.raw and adc.shape[1:] != self.config.frame_shape:
+            raise InputError(
+                f"{self.path}: frames have shape {adc.shape[1:]}, expected {self.config.frame_shape} "
+                "(loop, tx, rx, sample, iq) from the configuration"
+            )
+        if valid is None:
+            valid = np.ones((len(time), *self.config.frame_shape[:2]), bool)
+        rows = dict(rows or {})
+        if self.raw:
+            rows["radar/adc"] = adc
+        try:
+            self._require_space(sum(np.asarray(data).nbytes for data in rows.values()))
+            for name, data in rows.items():
+                self._extend(name, data)
+            self._extend("radar/valid", valid)
+            self._pending.append(np.asarray(time, float))
+            self._unflushed += len(time)
+            if self._unflushed >= self.config.frame_rate:
+                self.flush()
+        except (OSError, RuntimeError) as error:
+            raise InputError(f"cannot write {self.part}: {reason(error)}; {self._survivors()}") from error
+
+    def extend(self, name: str, data: np.ndarray) -> None:
+        """Append rows to a stream that runs at its own rate (an IMU)."""
+        try:
+            self._require_space(data.nbytes)
+            self._extend(name, data)
+        except (OSError, RuntimeError) as error:
+            raise InputError(f"cannot write {self.part}: {reason(error)}; {self._survivors()}") from error
+
+    def _require_space(self, size: int) -> None:
+        free = shutil.disk_usage(self.path.parent).free
+        if free < size + _RESERVE:
+            if self._file:
+                self.flush()
+            raise OSError(errno.ENOSPC, "no space left on the device")
+
+    def _extend(self, name: str, data: np.ndarray) -> None:
+        if not len(data):
+            return
+        target = self._file[name]
+        start = len(target)
+        target.resize(start + len(data), axis=0)
+        target[start:] = data
+
+    def annotate(self, **attributes: object) -> None:
+        """Attributes of the file that are known only at the end; stored when the writer is closed."""
+        self._notes.update(attributes)
+
+    def flush(self) -> None:
+        """Make every appended frame visible to readers. Times go last: a frame counts once its time is there."""
+        self._file.flush()
+        for times in self._pending:
+            self._extend("radar/time", times)
+            self.frames += len(times)
+        self._pending.clear()
+        self._file["radar/time"].flush()
+        if shutil.disk_usage(self.path.parent).free == 0:  # somebody else filled the disk; HDF5 would not say so
+            raise OSError(errno.ENOSPC, "no space left on the device")
+        self._unflushed = 0
+
+    def _survivors(self) -> str:
+        return f"{self.frames} whole frames are kept there"
+
+    def close(self, keep_part: bool = False) -> None:
+        """Flush, close and give the file its final name, unless `keep_part`."""
+        if self._file:
+            try:
+                self.flush()
+                self._file.close()
+                if self._notes:  # HDF5 takes no new attributes while readers may follow
+                    with h5py.File(self.part, "r+", libver="latest") as file:
+                        file.attrs.update(self._notes)
+            except (OSError, RuntimeError) as error:
+                raise InputError(f"cannot finish {self.part}: {reason(error)}; {self._survivors()}") from error
+            if not keep_part:
+                os.replace(self.part, self.path)
+
+    def __enter__(self) -> "RecordingWriter":
+        return self
+
+    def __exit__(self, kind, error, trace) -> None:
+        # An interrupt ends a recording, it does not spoil it: everything appended so far is kept under its name.
+        if kind is None or issubclass(kind, KeyboardInterrupt):
+            self.close()
+        else:
+            try:
+                self.close(keep_part=True)
+            except InputError:
+                pass  # the first error is the one to report
+
+
+def _unwritten(name: str, stream: Stream) -> float | int | None:
+    """What stands in rows that were never written: a clock must stay in order whatever was lost of its end."""
+    kind = np.dtype(stream.dtype)
+    if kind.kind == "f":
+        return np.nan
+    return np.iinfo(kind).max if name == stream.clock else None

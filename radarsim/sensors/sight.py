@@ -1,0 +1,123 @@
+"""The first surface along a ray, things that move included."""
+
+import numpy as np
+from jaxtyping import Float
+from numba import njit, prange
+
+from radarsim.physics.crowd import Crowd
+from radarsim.scene.scene import Scene
+
+#: Panes that light passes one after the other; after that it is taken to be lost in reflections.
+_PANES = 8
+_CLEAR = ("glass", "acrylic")
+
+
+class Sight:
+    """Casts rays into a scene as it is at given times.
+
+    Args:
+        scene: its objects stand still, its movers move.
+    """
+
+    def __init__(self, scene: Scene):
+        self._scene = scene
+        parts = [part for mover in scene.movers for part in mover.parts()]
+        self._half = np.array([part.half for part in parts]).reshape(-1, 3)
+        self._capsule = np.array([part.capsule for part in parts], bool)
+        self._crowd = Crowd(scene.movers, np.random.default_rng(0), density=0.0)  # for its poses
+        self._clear = np.array([o.material.name in _CLEAR for o in scene.objects])
+
+    def distance(
+        self,
+        origins: Float[np.ndarray, "frame 3"],
+        directions: Float[np.ndarray, "frame ray 3"],
+        times: Float[np.ndarray, "frame"],
+        through_glass: bool = False,
+    ) -> Float[np.ndarray, "frame ray"]:
+        """Distance along rays to the first surface.
+
+        Args:
+            origins: of each frame's rays, world, m.
+            directions: world, of unit length.
+            times: at which movers stand where they stand, s.
+            through_glass: see what is behind clear panes, not the panes.
+
+        Returns:
+            m, inf where there is nothing.
+        """
+        frames, rays, _ = directions.shape
+        starts = np.broadcast_to(origins[:, None], directions.shape).reshape(-1, 3)
+        ways = directions.reshape(-1, 3)
+        distance, item = self._scene.cast(starts, ways)
+        if through_glass and self._clear.any():
+            for _ in range(_PANES):
+                clear = np.flatnonzero((item >= 0) & self._clear[item])
+                if not len(clear):
+                    break
+                step = distance[clear] + 1e-4
+                beyond, item[clear] = self._scene.cast(starts[clear] + step[:, None] * ways[clear], ways[clear])
+                distance[clear] = step + beyond
+        distance = distance.reshape(frames, rays)
+        if len(self._half):
+            turn, center = self._crowd.poses(np.asarray(times, float))
+            _meet(np.asarray(origins, float), np.asarray(directions, float), turn, center, self._half, self._capsule,
+                  distance)  # fmt: skip
+        return distance
+
+
+@njit(parallel=True, cache=True)
+def _meet(origins, directions, turn, center, half, capsule, distance):
+    """Shortens distances to the moving parts that rays meet, in each part's own frame."""
+    for f in range(len(origins)):
+        for i in prange(directions.shape[1]):
+            way = directions[f, i]
+            for p in range(len(half)):
+                towards = center[f, p] - origins[f]
+                along = np.dot(towards, way)
+                reach = half[p, 2] + half[p, 0] if capsule[p] else np.sqrt(np.dot(half[p], half[p]))
+                if np.dot(towards, towards) - along * along > reach * reach or along < -reach:
+                    continue
+                a = np.zeros(3)
+                d = np.zeros(3)
+                for k in range(3):
+                    for j in range(3):
+                        a[k] -= turn[f, p, j, k] * towards[j]
+                        d[k] += turn[f, p, j, k] * way[j]
+                found = _capsule(a, d, half[p]) if capsule[p] else _box(a, d, half[p])
+                distance[f, i] = min(distance[f, i], found)
+
+
+@njit(inline="always")
+def _box(a, d, half):
+    low, high = -np.inf, np.inf
+    for k in range(3):
+        if abs(d[k]) < 1e-12:
+            if abs(a[k]) > half[k]:
+                return np.inf
+            continue
+        first, second = (-half[k] - a[k]) / d[k], (half[k] - a[k]) / d[k]
+        low, high = max(low, min(first, second)), min(high, max(first, second))
+    return low if 0 < low <= high else np.inf
+
+
+@njit(inline="always")
+def _capsule(a, d, half):
+    """A cylinder about z, and a ball at either end: the nearest of the three."""
+    radius, length = half[0], half[2]
+    best = np.inf
+    across = d[0] * d[0] + d[1] * d[1]
+    b = a[0] * d[0] + a[1] * d[1]
+    root = b * b - across * (a[0] * a[0] + a[1] * a[1] - radius * radius)
+    if across > 1e-12 and root >= 0:
+        s = (-b - np.sqrt(root)) / across
+        if s > 0 and abs(a[2] + s * d[2]) <= length:
+            best = s
+    for end in (-length, length):
+        z = a[2] - end
+        b = a[0] * d[0] + a[1] * d[1] + z * d[2]
+        root = b * b - (a[0] * a[0] + a[1] * a[1] + z * z - radius * radius)
+        if root >= 0:
+            s = -b - np.sqrt(root)
+            if 0 < s < best:
+                best = s
+    return best

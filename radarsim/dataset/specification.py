@@ -40,9 +40,6 @@ from radarsim.dataset.task import Task
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.scene.description import Description, find, shipped
 
-#: Truth sensors beyond pose, velocity, planar scan and floor plan, which are always there.
-SENSORS = ("depth", "occupancy", "tracking", "imu", "points", "ghosts")
-
 Platform = Literal["handheld", "cart", "robot"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 
@@ -82,7 +79,7 @@ class Specification(_Strict):
     recordings: tuple[Recordings, ...] = Field(min_length=1)
     radar: str = "radarize"
     frontend: str | None = None
-    sensors: tuple[Literal[SENSORS], ...] | Literal["all", "none"] = "none"
+    sensors: tuple[str, ...] | Literal["all", "none"] = "none"
     storage: Literal["raw", "heatmaps"] = "raw"
     splits: dict[Name, Split] = {}
     _folder: Path = Path()
@@ -121,7 +118,8 @@ class Specification(_Strict):
         try:
             found = cls.model_validate(data)
             found._folder = path.parent
-            found.tasks, found.members  # noqa: B018: so that their errors come now, with the file's name
+            for late in ("tasks", "members"):  # so that their errors come now, with the file's name
+                getattr(found, late)
         except ValidationError as error:
             raise InputError(f"{path}: {_first(error)}") from error
         except InputError as error:
@@ -143,7 +141,7 @@ class Specification(_Strict):
         fixed = {
             "radar": radar,
             "frontend": frontend,
-            "sensors": {"all": SENSORS, "none": ()}.get(self.sensors, self.sensors),
+            "sensors": self._sensors(),
             "storage": self.storage,
             "settings": hashlib.sha256((config.model_dump_json() + settings.model_dump_json()).encode()).hexdigest(),
         }
@@ -191,10 +189,21 @@ class Specification(_Strict):
             "splits": self.members,
         }
 
+    def _sensors(self) -> tuple[str, ...]:
+        names = {"all": ("all",), "none": ()}.get(self.sensors, self.sensors)
+        if not names:
+            return ()
+        from radarsim.sensors.suite import chosen
+
+        return tuple(chosen(names))
+
     def _scene(self, building: str, floor: int | None) -> dict | str:
         given = self.buildings[building]
         if isinstance(given, str):
-            return str(find(self._beside(given)).resolve())
+            try:
+                return str(find(self._beside(given)).resolve())
+            except InputError as error:
+                raise InputError(f"buildings.{building}: {error}") from error
         description = {"building": given if floor is None else given | {"floor": floor}}
         try:
             Description.model_validate(description)
@@ -223,6 +232,8 @@ def _first(error: ValidationError) -> str:
     """The first complaint as one sentence, with the field's place in the file."""
     problem = error.errors()[0]
     place = [part for part in problem["loc"] if not (isinstance(part, str) and ("[" in part or part in _TAGS))]
+    if place[:1] == ["splits"]:
+        del place[2:3]  # the kind, by which pydantic chose
     field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).lstrip(".")
     message = problem["msg"].removeprefix("Value error, ")
     if problem["type"] == "extra_forbidden":

@@ -64,7 +64,7 @@ class PlatformSplit(_Strict):
         for field, chosen in (("train", self.train), ("test", tested)):
             if unknown := [p for p in chosen if p not in present]:
                 raise InputError(
-                    f"{field} names {unknown[0]!r}, expected platforms of recordings: {', '.join(present)}"
+                    f"{field} names {unknown[0]!r}, expected some of: {', '.join(present)}"
                 )
         if both := set(self.train) & set(tested):
             raise InputError(f"{sorted(both)[0]!r} is in train and in test, expected it in one of them")
@@ -88,7 +88,7 @@ class BuildingSplit(_Strict):
         present = sorted({task.building for task in tasks})
         for building in self.held_out or ():
             if building not in present:
-                raise InputError(f"held_out names {building!r}, expected buildings of recordings: {', '.join(present)}")
+                raise InputError(f"held_out names {building!r}, expected some of: {', '.join(present)}")
         if len(present) < 2:
             raise InputError(f"there is only building {present[0]}, expected another one to train on")
         return {

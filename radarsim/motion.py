@@ -4,8 +4,10 @@ A body follows a C2 spline in position and attitude; the sensor sits on it with 
 velocity holds the lever arm's share, and Doppler follows from the same functions that give the path length.
 """
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -14,6 +16,38 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from radarize.errors import InputError
 from radarize.tum import read_tum
+
+if TYPE_CHECKING:
+    from radarsim.scene.scene import Scene
+    from radarsim.statistics import Statistics
+
+_FASTEST = 20.0  # m/s between two poses of a file: beyond it, they are no positions in m or no times in s
+_SHARPEST = np.deg2rad(120)  # between two poses: beyond it, nobody knows which way round
+
+
+@dataclass(frozen=True)
+class Mounting:
+    """Where a sensor sits on the body that carries it.
+
+    Attributes:
+        lever_arm: sensor in the body frame, m.
+        rotation: sensor to body.
+    """
+
+    lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    rotation: Rotation = Rotation.identity()
+
+    @classmethod
+    def of(cls, numbers: Sequence[float]) -> "Mounting":
+        """From x, y, z in m (forward, left, up) and roll, pitch, yaw in degrees (pitch positive: nose down).
+
+        Raises:
+            InputError: other than six finite numbers.
+        """
+        if len(numbers) != 6 or not np.isfinite(numbers).all():
+            raise InputError(f"mounting is {numbers}, expected six numbers: x y z in m, roll pitch yaw in degrees")
+        x, y, z, *angles = map(float, numbers)
+        return cls((x, y, z), Rotation.from_euler("ZYX", angles[::-1], degrees=True))
 
 
 @dataclass(frozen=True)
@@ -54,6 +88,27 @@ class Motion:
     def angular_velocity(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
         """Angular velocity in the sensor frame, rad/s."""
         return self.mount.inv().apply(self.attitude(self._inside(t), 1)) * self._moving(t)
+
+    def until(self, duration: float) -> "Motion":
+        """The same motion, ended after `duration` (s) at the latest."""
+        return replace(self, duration=min(self.duration, duration))
+
+    def statistics(self, scene: "Scene | None" = None) -> "Statistics":
+        """Distance, speeds, turn rates and shares of directions; with a scene, the least clearance too."""
+        from radarsim.statistics import Statistics
+
+        return Statistics.of(self, scene)
+
+    def acceleration(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
+        """Acceleration of the sensor in the world frame, m/s^2: a + R (alpha x l + omega x (omega x l))."""
+        inside = self._inside(t)
+        omega = self.attitude(inside, 1)
+        swing = np.cross(self.attitude(inside, 2), self.lever_arm) + np.cross(omega, np.cross(omega, self.lever_arm))
+        return (self.path(inside, 2) + self.attitude(inside).apply(swing)) * self._moving(t)
+
+    def mounted(self, offset: tuple[float, float, float]) -> "Motion":
+        """Motion of something fixed beside the sensor, its axes parallel: `offset` in the sensor frame, m."""
+        return replace(self, lever_arm=tuple(np.asarray(self.lever_arm) + self.mount.apply(offset)))
 
     def _inside(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
         return np.clip(np.asarray(t, float), self.path.x[0], self.path.x[-1])
@@ -98,34 +153,60 @@ class Motion:
         return cls(duration, CubicSpline(times, path), RotationSpline(times, turn), lever_arm)
 
 
-def motion_from_tum(path: str | Path) -> Motion:
+def motion_from_tum(path: str | Path, mounting: Mounting | None = None) -> Motion:
     """Motion through the poses of a TUM file (``time x y z qx qy qz qw``, ``#`` comments); its first pose is t = 0.
+
+    Args:
+        path: of poses of the sensor, or of a body that carries it.
+        mounting: of the sensor on that body; default: the poses are the sensor's own.
 
     Raises:
         InputError: missing file, wrong columns, something that is no finite number, stamps that do not ascend, a
-            quaternion that is not of unit length, or fewer than four poses; with the line.
+            quaternion that is not of unit length, fewer than four poses; poses too far from each other for a motion
+            between them, or a gap in which a smooth curve through them leaves them.
     """
     stamps, poses = read_tum(path)
     if len(stamps) < 4:
         raise InputError(f"{path}: {len(stamps)} poses, expected at least 4")
-    times = stamps - stamps[0]
-    return Motion(
-        float(times[-1]), CubicSpline(times, poses[:, :3]), RotationSpline(times, Rotation.from_quat(poses[:, 3:]))
+    times, steps, chords = stamps - stamps[0], np.diff(stamps), np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
+    attitude = Rotation.from_quat(poses[:, 3:])
+
+    def refuse(bad: np.ndarray, what: Callable[[int], str], expected: str) -> None:
+        if bad.any():
+            i = int(bad.argmax())
+            raise InputError(f"{path}: between times {stamps[i]:.3f} and {stamps[i + 1]:.3f} {what(i)}, {expected}")
+
+    speed, turn = chords / steps, (attitude[:-1].inv() * attitude[1:]).magnitude()
+    refuse(
+        speed > _FASTEST,
+        lambda i: f"the poses move {chords[i]:.3g} m at {speed[i]:.3g} m/s",
+        f"expected positions in m and times in s of something slower than {_FASTEST:g} m/s",
     )
+    refuse(
+        turn > _SHARPEST,
+        lambda i: f"the poses turn by {np.rad2deg(turn[i]):.0f} degrees",
+        f"expected poses so dense that none turns by more than {np.rad2deg(_SHARPEST):.0f}",
+    )
+    curve = CubicSpline(times, poses[:, :3])
+    astray = np.linalg.norm(curve(times[:-1] + steps / 2) - (poses[:-1, :3] + poses[1:, :3]) / 2, axis=1)
+    refuse(
+        astray > 0.5 + chords,
+        lambda i: f"a smooth curve through the poses leaves them by {astray[i]:.2g} m",
+        "expected poses without such a gap or jump",
+    )
+    carried = mounting or Mounting()
+    return Motion(float(times[-1]), curve, RotationSpline(times, attitude), carried.lever_arm, carried.rotation)
 
 
-def plan_motion(scene, platform: str, duration: float, rng: np.random.Generator) -> Motion:
-    """A tour through a scene on a platform: see `radarsim.platforms.plan`.
+def plan_motion(
+    scene: "Scene",
+    platform: str,
+    duration: float | None,
+    rng: np.random.Generator,
+    waypoints: Float[np.ndarray, "n 2"] | None = None,
+    mounting: Mounting | None = None,
+) -> Motion:
+    """A tour through a scene on a platform, or a walk through way-points: see `radarsim.planner.plan`."""
+    from radarsim.planner import plan
 
-    Args:
-        scene: the `Scene` to move in.
-        platform: ``handheld``, ``cart`` or ``robot``.
-        duration: s.
-        rng: source of every choice made.
-
-    Raises:
-        InputError: unknown platform, or no room to move.
-    """
-    from radarsim.platforms import plan
-
-    return plan(scene, platform, duration, rng)
+    return plan(scene, platform, duration, rng, waypoints, mounting)

@@ -1,46 +1,60 @@
-"""Tours on a clearance map: out from a home point, and back to it another way where there is one."""
+"""Ways over the ground: tours that come back to where they began, and routes through given way-points."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import cKDTree
 
 from radarize.errors import InputError
+from radarsim.band import SLACK, relax
 from radarsim.scene.clearance import RESOLUTION, Clearance
 
-STEP = 0.02  # m between points of a leg
 _STRIDE = 2  # cells of the clearance map per cell of the search grid
-_WAYPOINTS = 14
+_CELL = _STRIDE * RESOLUTION
 _USED_COST = 2.5  # times the length for ground walked before, so that a way back is a loop if there is one
-_SMOOTHING = 0.30  # m, Gaussian along the path
+_GOAL_AREA = 15.0  # m^2 of ground per goal to choose from
+_CHOICE = 3  # goals to choose from: the one with the best loop
+_REACH = 0.35  # of a tour's length, as far as the first goal lies
 
 
 @dataclass(frozen=True)
-class Grid:
-    """The largest connected part of the ground with enough clearance, as a graph for shortest paths."""
+class Ground:
+    """A connected part of the floor with enough clearance, as a graph for shortest paths.
 
-    points: Float[np.ndarray, "node 2"]  # m
-    clearance: Float[np.ndarray, "node"]  # m
-    edges: np.ndarray  # (edge, 2) node indices
-    lengths: Float[np.ndarray, "edge"]  # m
+    Attributes:
+        points: nodes, m.
+        clearance: of the nodes, m.
+        edges: pairs of nodes.
+        costs: lengths of the edges, m, times what tells the middle of free space from its edge.
+    """
+
+    points: Float[np.ndarray, "node 2"]
+    clearance: Float[np.ndarray, "node"]
+    edges: np.ndarray
+    costs: Float[np.ndarray, "edge"]
 
     @classmethod
-    def of(cls, clearance: Clearance, radius: float) -> "Grid":
-        """Nodes at least `radius` (m) from everything.
+    def of(cls, clearance: Clearance, radius: float, start: Float[np.ndarray, "2"] | None = None) -> "Ground":
+        """Nodes at least `radius` (m) from everything: the part around `start` (m), by default the largest.
 
         Raises:
-            InputError: there is less than a square metre of them.
+            InputError: the largest part has less than a square metre.
         """
         distance = clearance.distance[::_STRIDE, ::_STRIDE]
         labels, count = ndimage.label(distance >= radius)
         sizes = np.bincount(labels.ravel(), minlength=2)[1:]
-        cell = _STRIDE * RESOLUTION
-        if not count or sizes.max() * cell**2 < 1.0:
+        if not count or sizes.max() * _CELL**2 < 1.0:
             raise InputError(f"no room to move: less than 1 m2 of floor lies {radius:.2f} m away from everything")
-        inside = labels == 1 + sizes.argmax()
+        part = 1 + sizes.argmax()
+        if start is not None:
+            nodes = np.argwhere(labels)
+            part = labels[tuple(nodes[cKDTree(clearance.origin + nodes * _CELL).query(start)[1]])]
+        inside = labels == part
         number = np.full(inside.shape, -1)
         number[inside] = np.arange(inside.sum())
         edges, lengths = [], []
@@ -49,20 +63,103 @@ class Grid:
             b = number[dx:, max(0, dy) : number.shape[1] + min(0, dy)]
             both = (a >= 0) & (b >= 0)
             edges.append(np.stack([a[both], b[both]], axis=1))
-            lengths.append(np.full(both.sum(), cell * np.hypot(dx, dy)))
-        points = clearance.origin + np.argwhere(inside) * cell
-        return cls(points, distance[inside], np.concatenate(edges), np.concatenate(lengths))
+            lengths.append(np.full(both.sum(), _CELL * np.hypot(dx, dy)))
+        pairs, room = np.concatenate(edges), distance[inside]
+        dear = 1 + 3 * np.exp(-(room - radius) / 0.15)
+        costs = np.concatenate(lengths) * dear[pairs].mean(axis=1)
+        return cls(clearance.origin + np.argwhere(inside) * _CELL, room, pairs, costs)
 
-    def search(self, start: int, radius: float, used: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Cost to every node and its predecessor; the middle of free space is cheaper than its edge."""
-        node_cost = (1 + 3 * np.exp(-(self.clearance - radius) / 0.15)) * np.where(used, _USED_COST, 1.0)
-        a, b = self.edges.T
-        weight = self.lengths * (node_cost[a] + node_cost[b]) / 2
-        graph = coo_array((weight, (a, b)), shape=(len(self.points),) * 2).tocsr()
-        return dijkstra(graph, directed=False, indices=start, return_predecessors=True)
+    def search(
+        self, start: int, used: Bool[np.ndarray, "node"] | None = None, limit: float = np.inf
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Cost to every node (inf beyond `limit`) and its predecessor; ground `used` before costs more."""
+        costs = self.costs if used is None else self.costs * np.where(used, _USED_COST, 1.0)[self.edges].mean(axis=1)
+        graph = coo_array((costs, tuple(self.edges.T)), shape=(len(self.points),) * 2).tocsr()
+        return dijkstra(graph, directed=False, indices=start, return_predecessors=True, limit=limit)
+
+    def around(self, nodes: Sequence[int]) -> Bool[np.ndarray, "node"]:
+        """Nodes within half a metre of a path, apart from its ends."""
+        path = self.points[nodes[10:-10] or nodes]
+        return np.isfinite(cKDTree(path).query(self.points, distance_upper_bound=0.5)[0])
 
 
-def walk(predecessor: np.ndarray, goal: int) -> list[int]:
+def tour(
+    clearance: Clearance, radius: float, turning: float, length: float, rng: np.random.Generator
+) -> list[Float[np.ndarray, "n 2"]]:
+    """A tour of at least `length` metres, as smooth legs: out from a home, and back another way where there is one.
+
+    Args:
+        clearance: of the platform's body.
+        radius: clearance to keep, m.
+        turning: clearance of the places where it turns round, where there are any, m.
+        length: m.
+        rng: for the goals.
+
+    Returns:
+        Legs, each (points, 2) in m. One starts where the one before ends.
+
+    Raises:
+        InputError: no room to move.
+    """
+    ground = Ground.of(clearance, radius)
+    goals = _goals(ground, turning, rng)
+    apart = np.linalg.norm(ground.points[goals, None] - ground.points[goals], axis=2)
+    home = int(goals[np.sum(apart < _REACH * length, axis=1).argmax()])
+    cost, before = ground.search(home)
+    travelled, nodes, fresh = 0.0, [home], []
+    while travelled < length:
+        fresh = fresh or [int(g) for g in rng.permutation(goals) if g != home]
+        # The first way round is short enough that the walk comes back to where it has been.
+        near = [g for g in fresh if travelled or 3.0 < cost[g] < _REACH * length] or fresh
+        trips = [_round(ground, home, goal, float(cost[goal]), before) for goal in near[:_CHOICE]]
+        goal, (out, back), _ = min(trips, key=lambda trip: trip[-1])
+        fresh.remove(goal)
+        for part in (out, back):
+            travelled += np.linalg.norm(np.diff(ground.points[part], axis=0), axis=1).sum()
+            nodes += part[1:]
+    path = ground.points[nodes]
+    cuts = _reversals(path)
+    return [relax(path[a : b + 1], clearance, radius) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+
+
+def route(clearance: Clearance, radius: float, places: Float[np.ndarray, "n 2"]) -> list[Float[np.ndarray, "m 2"]]:
+    """Smooth legs through way-points, in their order, by the shortest ways.
+
+    Args:
+        clearance: of the platform's body.
+        radius: clearance to keep, m.
+        places: way-points with that clearance, m.
+
+    Raises:
+        InputError: naming the first way-point that cannot be reached.
+    """
+    ground = Ground.of(clearance, radius, places[0])
+    gaps, stations = cKDTree(ground.points).query(places)
+    for number, gap in enumerate(gaps, 1):
+        if gap > SLACK + 2 * _CELL:
+            raise InputError(
+                f"way-point {number} (x {places[number - 1, 0]:.2f}, y {places[number - 1, 1]:.2f} m) cannot be "
+                f"reached from the first one with {radius:.2f} m to each side of the carrier's middle"
+            )
+    path, pins = [places[:1]], [0]
+    for start, end, place in zip(stations[:-1], stations[1:], places[1:], strict=True):
+        # Near way-points need no search of the whole floor; nodes at both ends give way to the way-points themselves.
+        reach = 5 * float(np.linalg.norm(ground.points[start] - ground.points[end])) + 1
+        cost, before = ground.search(int(start), limit=reach)
+        if np.isinf(cost[end]):
+            before = ground.search(int(start))[1]
+        nodes = _walk(before, int(end))[1:-1]
+        path += [ground.points[nodes], place[None]]
+        pins.append(pins[-1] + len(nodes) + 1)
+    whole = np.concatenate(path)
+    cuts = _reversals(whole, pins)
+    return [
+        relax(whole[a : b + 1], clearance, radius, [p - a for p in pins if a < p < b])
+        for a, b in zip(cuts[:-1], cuts[1:], strict=True)
+    ]
+
+
+def _walk(predecessor: np.ndarray, goal: int) -> list[int]:
     """Nodes from the start of a search to `goal`."""
     nodes = [goal]
     while predecessor[nodes[-1]] >= 0:
@@ -70,95 +167,41 @@ def walk(predecessor: np.ndarray, goal: int) -> list[int]:
     return nodes[::-1]
 
 
-def tour(clearance: Clearance, radius: float, length: float, rng: np.random.Generator) -> list[np.ndarray]:
-    """A tour of at least `length` metres, as smooth legs between stops.
-
-    Args:
-        clearance: of the platform's body.
-        radius: clearance to keep, m.
-        length: m.
-        rng: for the waypoints.
-
-    Returns:
-        Legs, each (points, 2) in m about `STEP` apart. One starts where the one before ends.
-
-    Raises:
-        InputError: no room to move.
-    """
-    grid = Grid.of(clearance, radius)
-    nothing = np.zeros(len(grid.points), bool)
-    goals = _waypoints(grid, radius, rng)
-    costs = np.stack([grid.search(goal, radius, nothing)[0][goals] for goal in goals])
-    home = goals[costs.mean(axis=1).argmin()]
-    used, travelled, nodes, fresh = nothing.copy(), 0.0, [int(home)], []
-    while travelled < length:
-        cost, before = grid.search(home, radius, nothing)
-        fresh = fresh or [int(g) for g in rng.permutation(goals) if g != home]
-        # The first way round is short enough that the walk comes back to where it has been.
-        near = [g for g in fresh if travelled or 3.0 < cost[g] < 0.35 * length] or fresh
-        goal = near[0]
-        fresh.remove(goal)
-        out = walk(before, goal)
-        back = walk(grid.search(goal, radius, _near(grid, out))[1], home)
-        for part in (out, back):
-            used |= _near(grid, part)
-            travelled += _length(grid.points[part])
-            nodes += part[1:]
-    return _smooth_legs(grid.points[nodes], clearance, radius)
+def _round(
+    ground: Ground, home: int, goal: int, cost: float, before: np.ndarray
+) -> tuple[int, tuple[list[int], list[int]], float]:
+    """The goal, the ways there and back, and the share of the way back that is the way there."""
+    out = _walk(before, goal)
+    used = ground.around(out)
+    # The way there costs so much as a way back.
+    back = _walk(ground.search(goal, used, limit=1.01 * _USED_COST * cost)[1], home)
+    return goal, (out, back), float(used[back].mean())
 
 
-def _waypoints(grid: Grid, radius: float, rng: np.random.Generator) -> np.ndarray:
-    """Nodes far from each other and not too close to things."""
-    roomy = np.flatnonzero(grid.clearance >= min(radius + 0.1, np.quantile(grid.clearance, 0.7)))
-    pool = rng.choice(roomy, size=min(400, len(roomy)), replace=False)
-    chosen = [pool[0]]
-    while len(chosen) < min(_WAYPOINTS, len(pool)):
-        apart = np.linalg.norm(grid.points[pool, None] - grid.points[chosen][None], axis=2).min(axis=1)
+def _goals(ground: Ground, turning: float, rng: np.random.Generator) -> np.ndarray:
+    """Nodes far from each other, with room to turn round."""
+    roomy = np.flatnonzero(ground.clearance >= min(turning, np.quantile(ground.clearance, 0.8)))
+    pool = rng.choice(roomy, size=min(500, len(roomy)), replace=False)
+    wanted = int(np.clip(len(ground.points) * _CELL**2 / _GOAL_AREA, 12, 60))
+    chosen, apart = [pool[0]], np.full(len(pool), np.inf)
+    while len(chosen) < min(wanted, len(pool)):
+        apart = np.minimum(apart, np.linalg.norm(ground.points[pool] - ground.points[chosen[-1]], axis=1))
         chosen.append(pool[apart.argmax()])
     return np.array(chosen)
 
 
-def _near(grid: Grid, nodes: list[int]) -> np.ndarray:
-    """Nodes within half a metre of a path, apart from its ends."""
-    from scipy.spatial import cKDTree
-
-    return cKDTree(grid.points[nodes[10:-10] or nodes]).query(grid.points, distance_upper_bound=0.5)[0] < 0.5
-
-
-def _length(points: Float[np.ndarray, "n 2"]) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-
-
-def _smooth_legs(points: Float[np.ndarray, "n 2"], clearance: Clearance, radius: float) -> list[np.ndarray]:
-    """Split where the path doubles back, and round each leg off as far as the clearance allows."""
+def _reversals(path: Float[np.ndarray, "n 2"], pins: Sequence[int] | None = None) -> list[int]:
+    """Where a path doubles back (among `pins`, if given), and its two ends."""
     # The direction over 0.4 m to each side tells a corner from a turn-around.
-    reach = 8
-    ahead = points[np.minimum(np.arange(len(points)) + reach, len(points) - 1)] - points
-    behind = points - points[np.maximum(np.arange(len(points)) - reach, 0)]
-    turn = np.sum(ahead * behind, axis=1) / np.maximum(
-        np.linalg.norm(ahead, axis=1) * np.linalg.norm(behind, axis=1), 1e-9
-    )
-    cuts, last = [0], 0
-    for i in range(1, len(points) - 1):
-        window = turn[max(0, i - reach) : i + reach + 1]
-        if turn[i] < -0.2 and turn[i] == window.min() and i - last > 2 * reach:
-            cuts.append(i)
-            last = i
-    cuts.append(len(points) - 1)
-    legs = [points[a : b + 1] for a, b in zip(cuts[:-1], cuts[1:], strict=True) if b - a > 2]
-    return [_smooth(leg, clearance, radius) for leg in legs]
-
-
-def _smooth(leg: Float[np.ndarray, "n 2"], clearance: Clearance, radius: float) -> Float[np.ndarray, "m 2"]:
-    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(leg, axis=0), axis=1))])
-    count = max(8, int(np.ceil(along[-1] / STEP)))
-    dense = np.stack([np.interp(np.linspace(0, along[-1], count), along, leg[:, k]) for k in range(2)], axis=1)
-    sigma = _SMOOTHING
-    while True:
-        # Odd reflection at the ends keeps them where they are.
-        pad = min(int(4 * sigma / STEP), count - 1)
-        padded = np.pad(dense, ((pad, pad), (0, 0)), mode="reflect", reflect_type="odd")
-        result = ndimage.gaussian_filter1d(padded, sigma / STEP, axis=0)[pad : pad + count]
-        if sigma < 0.08 or clearance.at(result).min() >= radius - 0.03:
-            return result
-        sigma *= 0.8
+    reach = round(0.4 / _CELL)
+    index = np.arange(len(path))
+    ahead = path[np.minimum(index + reach, len(path) - 1)] - path
+    behind = path - path[np.maximum(index - reach, 0)]
+    size = np.linalg.norm(ahead, axis=1) * np.linalg.norm(behind, axis=1)
+    onward = np.sum(ahead * behind, axis=1) / np.maximum(size, 1e-9)
+    cuts = [0]
+    for i in range(1, len(path) - 1) if pins is None else pins[1:-1]:
+        sharpest = onward[max(0, i - reach) : i + reach + 1].min() if pins is None else onward[i]
+        if onward[i] < -0.2 and onward[i] == sharpest and i - cuts[-1] > reach and len(path) - 1 - i > reach:
+            cuts.append(int(i))
+    return [*cuts, len(path) - 1]

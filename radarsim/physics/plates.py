@@ -61,9 +61,7 @@ def parts(
     h = np.abs(h[near])
     center, u, v, half = facets.center[near], facets.u[near], facets.v[near], facets.half[near]
     normal = facets.normal[near] * side[:, None]
-    foot = np.stack(
-        [np.einsum("fd,fd->f", position - center, u), np.einsum("fd,fd->f", position - center, v)], axis=1
-    )
+    foot = np.stack([np.einsum("fd,fd->f", position - center, u), np.einsum("fd,fd->f", position - center, v)], axis=1)
     # distance from the foot to the part along u and along v, by (facet, part of that side: interior, edge -, edge +)
     across = np.stack([np.zeros_like(foot), -half - foot, half - foot], axis=-1)
     slant = np.hypot(h[:, None, None], across)
@@ -122,7 +120,5 @@ def _oblique(h, slant, distance) -> Float[np.ndarray, "facet part part"]:
 def gains(directions, azimuth_table, elevation_table):
     out = np.empty(len(directions))
     for i in range(len(directions)):
-        out[i] = amplitude_gain(
-            directions[i, 0], directions[i, 1], directions[i, 2], azimuth_table, elevation_table
-        )
+        out[i] = amplitude_gain(directions[i, 0], directions[i, 1], directions[i, 2], azimuth_table, elevation_table)
     return out

@@ -1,16 +1,19 @@
-"""Where there is floor to move on, and how far the nearest thing is."""
+"""Where there is floor to move on, how far the nearest thing is, and what it is."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import trimesh
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
 from radarsim.scene.scene import Scene
 
 RESOLUTION = 0.025  # m
+#: What rises less above the ground than this, m, is walked and rolled over: carpets, thresholds, unevenness.
+LOWEST = 0.03
+_LYING = 0.9  # cosine of the steepest floor's slope
 
 
 @dataclass(frozen=True)
@@ -27,22 +30,23 @@ class Clearance:
 
     @classmethod
     def of(cls, scene: Scene, low: float, high: float) -> "Clearance":
-        """Clearance for something that fills the heights `low` to `high` (m): all surfaces there, cast on the floor.
+        """Clearance for something that fills the heights `low` to `high` (m) above the ground: all surfaces there.
 
         Floor is what faces up below `low`; a scene without any is all floor.
         """
+        level = ground_level(scene)
+        low, high = level + low, level + high
         origin = scene.bounds[0, :2] - 0.1
         shape = np.ceil((scene.bounds[1, :2] + 0.1 - origin) / RESOLUTION).astype(int) + 1
 
         def raster(triangles: Float[np.ndarray, "t 3 3"]) -> np.ndarray:
             image = Image.new("1", (int(shape[1]), int(shape[0])))
             draw = ImageDraw.Draw(image)
-            for corners in (triangles[:, :, :2] - origin) / RESOLUTION:
-                draw.polygon([(float(y), float(x)) for x, y in corners], fill=1, outline=1)
+            for corners in ((triangles[:, :, 1::-1] - origin[::-1]) / RESOLUTION).reshape(-1, 6).tolist():
+                draw.polygon(corners, fill=1, outline=1)
             return np.array(image, bool)
 
-        lying = (scene.normals[:, 2] > 0.9) & (scene.triangles[:, :, 2].max(axis=1) < low)
-        floor = raster(scene.triangles[lying])
+        floor = raster(scene.triangles[_floor(scene, low)])
         free = floor if floor.any() else np.ones(shape, bool)
         free &= ~raster(_between(scene.triangles, low, high))
         free[[0, -1]] = free[:, [0, -1]] = False
@@ -54,6 +58,58 @@ class Clearance:
         """Clearance at points in the world, m; zero off the grid."""
         cells = (np.asarray(points) - self.origin) / RESOLUTION
         return ndimage.map_coordinates(self.distance, cells.T, order=1, mode="constant")
+
+    def uphill(self, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+        """Gradient of the clearance: the direction away from the nearest thing, of length 1 or less between things."""
+        step = 2 * RESOLUTION
+        offsets = step * np.array([[1, 0], [-1, 0], [0, 1], [0, -1]])
+        east, west, north, south = (self.at(points + offset) for offset in offsets)
+        return np.column_stack([east - west, north - south]) / (2 * step)
+
+
+def ground_level(scene: Scene) -> float:
+    """Height of the lowest wide floor, m; 0 in a scene without any."""
+    floor = _floor(scene, np.inf)
+    if not floor.any():
+        return 0.0
+    corners = scene.triangles[floor]
+    heights = corners[:, :, 2].mean(axis=1)
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    step = 0.05
+    bins = ((heights - heights.min()) / step).astype(int)
+    wide = np.bincount(bins, areas)
+    lowest = np.flatnonzero(wide >= 0.2 * wide.max())[0]
+    # A floor at the edge of a bin lies in two.
+    near = np.abs(bins - lowest) <= 1
+    order = np.argsort(heights[near])
+    share = np.cumsum(areas[near][order])
+    return float(heights[near][order][np.searchsorted(share, share[-1] / 2)])
+
+
+def nearest(scene: Scene, points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
+    """Distance from points to the nearest thing other than the ground, m, and its index into the scene's objects.
+
+    Triangles less than `LOWEST` above the ground do not count. Where there is nothing else: inf and -1.
+    """
+    import open3d
+
+    high = scene.triangles[:, :, 2].max(axis=1) > ground_level(scene) + LOWEST
+    if not high.any():
+        return np.full(len(points), np.inf), np.full(len(points), -1)
+    corners = np.ascontiguousarray(scene.triangles[high].reshape(-1, 3), np.float32)
+    world = open3d.t.geometry.RaycastingScene()
+    world.add_triangles(corners, np.arange(len(corners), dtype=np.uint32).reshape(-1, 3))
+    query = np.asarray(points, np.float32)
+    found = world.compute_closest_points(query)
+    distance = np.linalg.norm(found["points"].numpy() - query, axis=1).astype(float)
+    return distance, scene.triangle_object[high][found["primitive_ids"].numpy()]
+
+
+def _floor(scene: Scene, below: float) -> Bool[np.ndarray, "t"]:
+    """Triangles below a height that face up; of sheets, which have no inside, either way."""
+    sheet = np.array([item.two_sided for item in scene.objects])[scene.triangle_object]
+    up = np.where(sheet, np.abs(scene.normals[:, 2]), scene.normals[:, 2])
+    return (up > _LYING) & (scene.triangles[:, :, 2].max(axis=1) < below)
 
 
 def _between(triangles: Float[np.ndarray, "t 3 3"], low: float, high: float) -> Float[np.ndarray, "s 3 3"]:

@@ -23,9 +23,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from radarize.errors import InputError
 from radarsim.scene import shapes
-from radarsim.scene.buildings import Office
+from radarsim.scene.buildings import Building
 from radarsim.scene.materials import Material, constant, decibel, material
 from radarsim.scene.movers import Mover
+from radarsim.scene.office import Office
 from radarsim.scene.scene import SceneObject
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -135,7 +136,7 @@ class Description(_Strict):
 
     name: str = ""
     objects: list[Annotated[Box | Rectangle | Cylinder | Sphere | Mesh, Field(discriminator="shape")]] = []
-    building: Office | None = None
+    building: Annotated[Office | Building, Field(discriminator="kind")] | None = None
     moving: list[Mover] = []
 
 
@@ -177,20 +178,35 @@ def read(path: Path) -> tuple[str, list[SceneObject], list[Mover]]:
         raise InputError(f"{path}: cannot be read ({error})") from error
     except yaml.YAMLError as error:
         raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+    name, objects, moving = built(data, str(path), path.parent)
+    return name or path.stem, objects, moving
+
+
+def built(data: object, source: str, folder: Path) -> tuple[str, list[SceneObject], list[Mover]]:
+    """Name ("" where it has none), objects and movers of a description as read from YAML.
+
+    Args:
+        data: the description.
+        source: what to call it in errors.
+        folder: mesh files are relative to it.
+
+    Raises:
+        InputError: unknown key, value, material or mesh file.
+    """
     if not isinstance(data, dict):
-        raise InputError(f"{path}: holds {type(data).__name__}, expected keys such as objects and building")
+        raise InputError(f"{source}: holds {type(data).__name__}, expected keys such as objects and building")
     try:
         description = Description.model_validate(data)
-        objects = [SceneObject(o.name, o.mesh(path.parent), _material(o)) for o in description.objects]
+        objects = [SceneObject(o.name, o.mesh(folder), _material(o)) for o in description.objects]
         if description.building:
             objects += description.building.build()
     except ValidationError as error:
-        raise InputError(f"{path}: {_first(error, data)}") from error
+        raise InputError(f"{source}: {_first(error, data)}") from error
     except InputError as error:
-        raise InputError(f"{path}: {error}") from error
+        raise InputError(f"{source}: {error}") from error
     if not objects:
-        raise InputError(f"{path}: has neither objects nor a building, expected at least one")
-    return description.name or path.stem, objects, description.moving
+        raise InputError(f"{source}: has neither objects nor a building, expected at least one")
+    return description.name, objects, description.moving
 
 
 def _material(item: _Item) -> Material:
@@ -207,6 +223,7 @@ def _first(error: ValidationError, data: dict) -> str:
     problem = error.errors()[0]
     # Tags of unions are in pydantic's path but not in the file.
     tags = {"box", "rectangle", "cylinder", "sphere", "mesh", "str", "CustomMaterial", "person", "door", "fan"}
+    tags |= {"office", "A", "B", "C", "D"}
     place = [part for part in problem["loc"] if part not in tags]
     field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).lstrip(".")
     if len(place) > 1 and place[0] in ("objects", "moving"):

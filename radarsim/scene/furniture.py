@@ -56,16 +56,17 @@ def chair(rng: np.random.Generator) -> Piece:
     return Piece("chair", 0.56, 0.56, {"fabric": joined(seat, back), "metal": joined(column, foot)})
 
 
-def cabinet(rng: np.random.Generator) -> Piece:
-    """Closed steel cupboard or filing cabinet with two handles."""
+def cabinet(rng: np.random.Generator, material: str = "metal") -> Piece:
+    """Closed cupboard or filing cabinet with two steel handles."""
     width, depth, height = rng.choice([0.8, 1.0, 1.2]), rng.choice([0.42, 0.5]), rng.choice([1.1, 1.6, 1.95])
     body = span((-depth / 2, -width / 2, 0), (depth / 2, width / 2, height), ("-z",))
     handles = [box((depth / 2 + 0.012, y, 0.6 * height), (0.02, 0.015, 0.16)) for y in (-0.05, 0.05)]
-    return Piece("cabinet", depth, width, {"metal": joined(body, *handles)})
+    parts = {"metal": joined(body, *handles)} if material == "metal" else {material: body, "metal": joined(*handles)}
+    return Piece("cabinet", depth, width, parts)
 
 
-def shelf(rng: np.random.Generator) -> Piece:
-    """Open wooden bookcase, partly filled."""
+def shelf(rng: np.random.Generator, material: str = "wood") -> Piece:
+    """Open bookcase, partly filled."""
     width, depth, board = rng.choice([0.8, 1.0]), 0.34, 0.02
     levels = np.linspace(0.06, 1.78, 6)
     x0, x1, inner = -depth / 2, depth / 2, width / 2 - board
@@ -82,12 +83,12 @@ def shelf(rng: np.random.Generator) -> Piece:
                 ("-z",),
             )
         )
-    return Piece("shelf", depth, width, {"wood": joined(*sides, back, *boards), "chipboard": joined(*books)})
+    return Piece("shelf", depth, width, {material: joined(*sides, back, *boards), "chipboard": joined(*books)})
 
 
-def table(rng: np.random.Generator) -> Piece:
-    """Meeting table with metal legs."""
-    width, depth, height = rng.choice([1.6, 2.0]), 0.9, 0.74
+def table(rng: np.random.Generator, depth: float = 0.9, width: float | None = None) -> Piece:
+    """Table with metal legs."""
+    width, height = width or rng.choice([1.6, 2.0]), 0.74
     top = box((0, 0, height - 0.015), (depth, width, 0.03))
     corners = [(sx * (depth / 2 - 0.1), sy * (width / 2 - 0.1)) for sx in (-1, 1) for sy in (-1, 1)]
     legs = [cylinder((x, y, height / 2 - 0.015), 0.025, height - 0.03, 8, ("-z", "+z")) for x, y in corners]
@@ -137,7 +138,7 @@ def printer(rng: np.random.Generator) -> Piece:
     return Piece("printer", 0.62, 0.62, {"wood": stand, "acrylic": body})
 
 
-def lamp(height: float) -> Piece:
+def lamp(height: float, depth: float = 0.3, width: float = 1.2) -> Piece:
     """Surface-mounted metal ceiling lamp below a ceiling at `height`."""
-    housing = span((-0.15, -0.6, height - 0.07), (0.15, 0.6, height), ("+z",))
-    return Piece("lamp", 0.3, 1.2, {"metal": housing})
+    housing = span((-depth / 2, -width / 2, height - 0.07), (depth / 2, width / 2, height), ("+z",))
+    return Piece("lamp", depth, width, {"metal": housing})

@@ -104,10 +104,19 @@ class Scene:
 
     @classmethod
     def of(cls, description: dict, name: str) -> "Scene":
-        """A scene from what a scene file would hold, without a file."""
-        from radarsim.scene.description import Description
+        """The scene of a description without a file: ``Scene.of({"building": {"kind": "A", "seed": 3}}, "a3")``.
 
-        return cls(name, Description.model_validate(description).building.build(), [])
+        Args:
+            description: as in a scene file; mesh files are relative to the working directory.
+            name: of the scene.
+
+        Raises:
+            InputError: unknown key, value, material or mesh file; with the field.
+        """
+        from radarsim.scene.description import built
+
+        _, objects, moving = built(description, f"scene {name}", Path())
+        return cls(name, objects, moving)
 
     @property
     def bounds(self) -> Float[np.ndarray, "2 3"]:

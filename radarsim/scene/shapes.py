@@ -4,6 +4,8 @@ Faces of a box can be left out where they would touch another surface: a hidden 
 and two coplanar faces would reflect twice.
 """
 
+from functools import cache
+
 import numpy as np
 import shapely
 import trimesh
@@ -29,14 +31,26 @@ def mesh(vertices: Float[np.ndarray, "v 3"], faces: np.ndarray) -> trimesh.Trime
     return result
 
 
+def exact(vertices: Float[np.ndarray, "v 3"], faces: np.ndarray) -> trimesh.Trimesh:
+    """A mesh of vertices that are known to be different."""
+    return trimesh.Trimesh(np.asarray(vertices, float), np.array(faces), process=False)
+
+
 def box(
     center: tuple[float, float, float], size: tuple[float, float, float], without: tuple[str, ...] = ()
 ) -> trimesh.Trimesh:
     """Axis-aligned box, `without` some of its faces (``"-x"``, ``"+x"``, ... ``"+z"``)."""
-    corners = [c for face, signs in _FACES.items() if face not in without for c in signs]
-    vertices = np.asarray(center, float) + 0.5 * np.asarray(size, float) * np.array(corners, float)
-    quads = 4 * np.arange(len(corners) // 4)[:, None]
-    return mesh(vertices, np.concatenate([quads + [0, 1, 2], quads + [0, 2, 3]]))
+    corners, faces = _box_without(tuple(without))
+    return exact(np.asarray(center, float) + 0.5 * np.asarray(size, float) * corners, faces)
+
+
+@cache
+def _box_without(without: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Signs of the corners and triangles of a box without some faces."""
+    signs = np.array([c for face, signs in _FACES.items() if face not in without for c in signs], float)
+    corners, number = np.unique(signs, axis=0, return_inverse=True)
+    quads = number.reshape(-1, 4)
+    return corners, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
 def span(
@@ -62,7 +76,7 @@ def rectangle(
         up /= np.linalg.norm(up)
     across = np.cross(up, normal)
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * 0.5 * np.asarray(size, float)
-    return mesh(np.asarray(center, float) + corners @ np.stack([across, up]), [[0, 1, 2], [0, 2, 3]])
+    return exact(np.asarray(center, float) + corners @ np.stack([across, up]), [[0, 1, 2], [0, 2, 3]])
 
 
 def cylinder(
@@ -80,7 +94,7 @@ def cylinder(
         faces.append(fan + sides)
     if "-z" not in without:
         faces.append(fan[:, ::-1])
-    return mesh(vertices, np.concatenate(faces))
+    return exact(vertices, np.concatenate(faces))
 
 
 def sphere(center: tuple[float, float, float], radius: float, subdivisions: int = 3) -> trimesh.Trimesh:

@@ -5,6 +5,7 @@ solid or not, and a face lies between a solid and an open cell. No face is hidde
 rectangle with corners of its own, so that it stays one planar facet.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,15 +45,16 @@ class Face:
         # (y, z) is right-handed about x and (x, y) about z, but (x, z) is left-handed about y.
         if (self.sign > 0) == (self.axis == 1):
             loop.reverse()
-        return np.array([np.insert(point, self.axis, self.level) for point in loop])
+        return np.array([(*point[: self.axis], self.level, *point[self.axis :]) for point in loop])
 
 
-def faces(solids: list[Span], openings: list[Span]) -> list[Face]:
+def faces(solids: list[Span], openings: list[Span], pillars: Sequence[Span] = ()) -> list[Face]:
     """Boundary of the union of `solids` minus the union of `openings`, apart from its lowest and highest plane.
 
     Those two are floor and ceiling, which belong to the rooms. Upright faces run as high as they can, then as wide.
+    `pillars` are solid wherever they stand, in openings too.
     """
-    boxes = np.array([*solids, *openings], float).round(6)
+    boxes = np.array([*solids, *openings, *pillars], float).round(6)
     grid = [np.unique(boxes[:, [axis, axis + 3]]) for axis in range(3)]
     solid = np.zeros([len(g) + 1 for g in grid], bool)  # a rim of open cells around the grid
 
@@ -61,8 +63,10 @@ def faces(solids: list[Span], openings: list[Span]) -> list[Face]:
 
     for span in boxes[: len(solids)]:
         solid[cells(span)] = True
-    for span in boxes[len(solids) :]:
+    for span in boxes[len(solids) : len(solids) + len(openings)]:
         solid[cells(span)] = False
+    for span in boxes[len(solids) + len(openings) :]:
+        solid[cells(span)] = True
     found = []
     for axis in range(3):
         others = [k for k in range(3) if k != axis]
@@ -80,7 +84,8 @@ def faces(solids: list[Span], openings: list[Span]) -> list[Face]:
 def _rectangles(mask: Bool[np.ndarray, "a b"], a: np.ndarray, b: np.ndarray):
     """Disjoint rectangles that cover a mask on a grid: runs along b, then equal runs of neighbouring columns joined."""
     open_runs: dict[tuple[int, int], int] = {}
-    for i in range(len(mask) + 1):
+    filled = np.flatnonzero(mask.any(axis=1))
+    for i in np.union1d(filled, filled + 1):
         edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[i], [0]]))) if i < len(mask) else []
         runs = {(int(s), int(e)) for s, e in np.reshape(edges, (-1, 2))}
         for run in [run for run in open_runs if run not in runs]:

@@ -25,9 +25,7 @@ class CauseCounts(Sensor):
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Counts and powers."""
         count = [np.bincount(e.provenance, minlength=len(Provenance)) for e in frames.echoes]
-        power = [
-            np.bincount(e.provenance, np.abs(e.amplitude) ** 2, minlength=len(Provenance)) for e in frames.echoes
-        ]
+        power = [np.bincount(e.provenance, np.abs(e.amplitude) ** 2, minlength=len(Provenance)) for e in frames.echoes]
         return {"truth/echoes": np.array(count), "truth/echo_power": np.array(power)}
 
 

@@ -7,26 +7,44 @@ import numpy as np
 
 from radarize.errors import InputError
 from radarsim.sensors.causes import AdcByCause, CauseCounts
+from radarsim.sensors.depth import DepthCamera, DepthStrip
+from radarsim.sensors.ghosts import Ghosts
+from radarsim.sensors.imu import Imu
+from radarsim.sensors.points import ChipPoints
 from radarsim.sensors.pose import TruePose
 from radarsim.sensors.scan import Occupancy, PlanarScan
 from radarsim.sensors.sensor import Frames, Rig, Sensor
+from radarsim.sensors.tracking import TrackingCamera
 
 #: Sensors that cost next to nothing and are always there.
 ALWAYS = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}
 #: Sensors to choose from.
-SENSORS = {"occupancy": Occupancy}
+SENSORS = {
+    "depth": DepthCamera,
+    "depth-strip": DepthStrip,
+    "occupancy": Occupancy,
+    "tracking": TrackingCamera,
+    "imu": Imu,
+    "points": ChipPoints,
+    "ghosts": Ghosts,
+}
+#: What ``all`` stands for: either depth camera writes the same stream.
+_ALL = tuple(name for name in SENSORS if name != "depth-strip")
 
 
 def chosen(names: Sequence[str]) -> list[str]:
     """Names of sensors without repetition, in the order of `SENSORS`; ``all`` stands for all of them.
 
     Raises:
-        InputError: there is no such sensor.
+        InputError: there is no such sensor, or two exclude each other.
     """
     for name in names:
         if name not in SENSORS and name != "all":
             raise InputError(f"sensors: {name!r} is unknown, expected all or some of {', '.join(SENSORS)}")
-    return [name for name in SENSORS if name in names or "all" in names]
+    wanted = {*names, *(_ALL if "all" in names else ())}
+    if {"depth", "depth-strip"} <= wanted:
+        raise InputError("sensors: depth and depth-strip are both asked for, expected one depth camera")
+    return [name for name in SENSORS if name in wanted]
 
 
 class Suite:

@@ -1,0 +1,148 @@
+"""Which cause fills which cell of the range-azimuth map: direct echoes, ghosts, floor and ceiling, things that move.
+
+The map of each cause is that of `radarize.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its part of the
+I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the window's
+transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; and of the burst's
+loops a few instants suffice, for the map sums over Doppler, which is the mean over loops. Without noise, converter and
+channel mismatch, which calibration removes.
+"""
+
+import numpy as np
+from jaxtyping import Complex, Float, UInt8
+from numba import njit, prange
+from scipy.signal import windows
+
+from radarize.heatmaps import Heatmaps
+from radarize.radar.array import azimuth_row, virtual_positions
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+from radarize.recording import Product, Stream
+from radarsim.physics.echoes import Provenance
+from radarsim.physics.synthesis import BurstClock
+from radarsim.sensors.causes import CAUSES
+from radarsim.sensors.scan import AZIMUTHS
+from radarsim.sensors.sensor import Frames, Rig, Sensor
+
+_INSTANTS = 4
+#: Half width of the window's transform, bins, and its table's entries per bin.
+_WIDTH, _FINE = 4, 64
+#: Powers are kept in steps of so many dB, and not below so many dB under the noise: that is what lets them be packed.
+STEP, DEPTH = 0.25, 10.0
+#: Label of cells in which no cause reaches the noise.
+NOISE = 255
+
+
+class Ghosts(Sensor):
+    """Power by cause on the radar's range bins and the scan's bearings, and the strongest cause of every cell."""
+
+    def __init__(self, rig: Rig, rng: np.random.Generator):
+        config, front_end = rig.config, rig.front_end
+        self._front_end, self._maps = front_end, CauseMaps(config)
+        window = windows.hann(config.samples)
+        window /= window.sum()
+        taper = self._maps.taper
+        self._floor = 10 * np.log10(front_end.counts**2 * front_end.noise_power * np.sum(window**2) * np.sum(taper**2))
+        leakage = np.fft.fft(front_end.by_cause([])[0][0] * window, axis=-1).reshape(-1, config.samples)
+        self._leakage = self._maps.beams(leakage[self._maps.row].T[None])
+        shape = (config.samples, len(AZIMUTHS))
+        names = ", ".join(p.name.lower() for p in Provenance)
+        labels = ", ".join(f"{i} {name}" for i, name in enumerate(CAUSES))
+        self.streams = {
+            "truth/cause_power": Stream(
+                (len(Provenance), *shape), "f2", "dB of ADC counts^2",
+                f"range-azimuth power by cause ({names}), not below {DEPTH:g} dB under the noise",
+            ),
+            "truth/cause": Stream(shape, "u1", "", f"strongest cause of a range-azimuth cell: {labels}, {NOISE} noise"),
+        }  # fmt: skip
+        self.products = {
+            "truth/cause_ranges": Product(config.ranges - config.range_bias, "m", "range bins of /truth/cause"),
+            "truth/cause_azimuths": Product(AZIMUTHS, "rad", "bearings of /truth/cause, positive to the left"),
+        }
+
+    def observe(self, frames: Frames) -> dict[str, np.ndarray]:
+        """Maps and labels."""
+        power, cause = [], []
+        for lengths, amplitudes, echoes in zip(frames.lengths, frames.received, frames.echoes, strict=True):
+            maps = self._maps(lengths, self._front_end.scale * amplitudes, echoes.provenance)
+            power.append(maps)
+            cause.append(self.label(maps))
+        level = 10 * np.log10(np.maximum(np.stack(power), 10 ** ((self._floor - DEPTH) / 10)))
+        return {"truth/cause_power": STEP * np.rint(level / STEP), "truth/cause": np.stack(cause)}
+
+    def label(self, power: Float[np.ndarray, "cause range azimuth"]) -> UInt8[np.ndarray, "range azimuth"]:
+        """Index into `CAUSES` of the strongest one, leakage among them, or `NOISE`."""
+        every = np.concatenate([power, self._leakage[None]])
+        return np.where(every.sum(axis=0) > 10 ** (self._floor / 10), every.argmax(axis=0), NOISE).astype(np.uint8)
+
+
+class CauseMaps:
+    """Range-azimuth power of each cause straight from the echoes.
+
+    Args:
+        config: radar configuration.
+
+    Attributes:
+        row: the antennas that make the map.
+        taper: their weights.
+    """
+
+    def __init__(self, config: RadarConfig):
+        self.config, self.row = config, azimuth_row(config)
+        self.taper = Heatmaps._taper(len(self.row))
+        y = virtual_positions(config).reshape(-1, 3)[self.row, 1]
+        steering = np.exp(2j * np.pi / config.wavelength * y[:, None] * np.sin(AZIMUTHS))
+        self._steering = (steering * self.taper[:, None]).astype(np.complex64)
+        clock, n = BurstClock.of(config), config.samples
+        self._per_metre = 1 / (2 * config.range_resolution)
+        self._per_rate = config.center_frequency / SPEED_OF_LIGHT * n / config.sample_rate / clock.half
+        window = windows.hann(n)
+        offset = np.arange(-_WIDTH * _FINE, _WIDTH * _FINE + 1) / _FINE
+        turns = np.cos(2 * np.pi * offset[:, None] * (np.arange(n) - (n - 1) / 2) / n)
+        self._kernel = (turns @ window / window.sum()).astype(np.float32)
+        # Loops count by the square of their weight: instants that split it evenly stand for all of them.
+        share = np.cumsum(windows.hamming(max(config.loops, 2)) ** 2)
+        self._instants = np.interp(
+            (np.arange(_INSTANTS) + 0.5) / _INSTANTS, share / share[-1], np.linspace(-1, 1, len(share))
+        )
+
+    def __call__(
+        self,
+        lengths: Float[np.ndarray, "echo virtual 3"],
+        amplitudes: Complex[np.ndarray, "echo"],
+        provenance: UInt8[np.ndarray, "echo"],
+    ) -> Float[np.ndarray, "cause range azimuth"]:
+        """Power of each cause in the square of the amplitudes' unit."""
+        n = self.config.samples
+        spectra = np.zeros((_INSTANTS, len(Provenance), n, len(self.row)), np.complex64)
+        _spread(spectra, lengths, amplitudes, provenance, self.row, self._instants, self._kernel, self._per_metre,
+                self._per_rate, self.config.center_frequency / SPEED_OF_LIGHT)  # fmt: skip
+        return self.beams(spectra)
+
+    def beams(self, spectra: Complex[np.ndarray, "instant *cell antenna"]) -> Float[np.ndarray, "*cell azimuth"]:
+        """Mean power of the windowed sum over instants."""
+        beams = (spectra.reshape(-1, spectra.shape[-1]) @ self._steering).reshape(*spectra.shape[:-1], -1)
+        return np.mean(beams.real**2 + beams.imag**2, axis=0)
+
+
+@njit(parallel=True, fastmath=True, cache=True)
+def _spread(spectra, lengths, amplitudes, provenance, row, instants, kernel, per_metre, per_rate, wavenumber):
+    """spectra[instant, cause, bin, antenna] += A exp(j phase) K(tone - bin); see `synthesis` for phase and tone."""
+    n = spectra.shape[2]
+    fine, width = _FINE, _WIDTH
+    for task in prange(len(instants) * len(row)):
+        i, a = task // len(row), task % len(row)
+        s = instants[i]
+        for e in range(len(amplitudes)):
+            c0, c1, c2 = lengths[e, row[a]]
+            length, rate = c0 + s * (c1 + s * c2), c1 + 2 * s * c2
+            tone = length * per_metre + rate * per_rate
+            first = int(np.floor(tone)) - width + 1
+            # Tones beyond the sample rate come back, turned by the half sample between the middle and bin's phase.
+            turn = wavenumber * length - (int(np.floor(tone)) // n) * ((n - 1) / 2)
+            turn -= np.floor(turn)
+            value = np.complex64(amplitudes[e] * np.exp(2j * np.pi * turn))
+            for k in range(2 * width):
+                x = (first + k - tone + width) * fine
+                at = min(max(int(x), 0), 2 * width * fine - 1)
+                part = np.float32(x - at)
+                weight = kernel[at] + part * (kernel[at + 1] - kernel[at])
+                spectra[i, provenance[e], (first + k) % n, a] += weight * value

@@ -1,0 +1,153 @@
+"""An inertial sensor like the D435i's Bosch BMI055, at 200 Hz.
+
+It measures specific force (what a scale would feel: at rest +g upward) and angular velocity, exact derivatives of the
+motion's splines at the sensor's own place, plus
+
+- white noise of density N: Allan deviation N / sqrt(tau);
+- a bias that is constant, plus a first-order Gauss-Markov process whose Allan deviation peaks at the bias instability
+  (IEEE Std 952-1997, annex C), plus a random walk K: K sqrt(tau / 3);
+- quantisation, and saturation at the range's ends.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import lfilter
+
+from radarize.recording import Product, Stream
+from radarsim.sensors.depth import MOUNT
+from radarsim.sensors.sensor import Frames, Rig, Sensor, Ticker
+
+RATE = 200.0
+STANDARD_GRAVITY = 9.80665  # m/s^2
+_G = STANDARD_GRAVITY
+#: Peak of the Allan deviation of a Gauss-Markov process, in its standard deviations, at 1.89 correlation times; and
+#: the floor of flicker noise, by which bias instability is quoted: sqrt(2 ln 2 / pi).
+_PEAK, _FLOOR = 0.618, 0.664
+
+
+@dataclass(frozen=True)
+class Errors:
+    """What one triad (three accelerometers, or gyroscopes) does wrong, in its unit u: m/s^2 or rad/s.
+
+    Attributes:
+        noise: density of the white noise, u / sqrt(Hz).
+        instability: bias instability, u.
+        correlation_time: of the Gauss-Markov part of the bias, s.
+        walk: random walk of the bias, u sqrt(Hz) (u per second per sqrt(Hz)).
+        offset: constant part of the bias, u, standard deviation.
+        step: of the converter, u.
+        limit: largest magnitude, u.
+    """
+
+    noise: float
+    instability: float
+    correlation_time: float
+    walk: float
+    offset: float
+    step: float
+    limit: float
+
+    def allan_deviation(self, tau: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        """Allan deviation of noise and bias for averages over `tau`, s."""
+        t, ratio = self.correlation_time, np.asarray(tau, float) / self.correlation_time
+        wander = 2 * self._wander**2 / ratio * (1 - (3 - 4 * np.exp(-ratio) + np.exp(-2 * ratio)) / (2 * ratio))
+        return np.sqrt((self.noise**2 + self.step**2 / 12 / RATE) / (t * ratio) + wander + self.walk**2 * t * ratio / 3)
+
+    @property
+    def _wander(self) -> float:
+        """Standard deviation of the Gauss-Markov part."""
+        return self.instability * _FLOOR / _PEAK
+
+
+#: BMI055 data sheet (BST-BMI055-DS000): 150 ug/sqrt(Hz), 12 bit at +-4 g, zero-g offset +-70 mg; 0.014 deg/s/sqrt(Hz),
+#: 16 bit at +-1000 deg/s, zero-rate offset +-1 deg/s. A tenth of the offsets is taken to remain after the camera's
+#: factory calibration. Instability and random walk are not in the data sheet: assumed, usual for parts of this class.
+ACCELEROMETER = Errors(
+    noise=150e-6 * _G, instability=40e-6 * _G, correlation_time=100.0, walk=5e-6 * _G, offset=7e-3 * _G,
+    step=4 * _G / 2048, limit=4 * _G,
+)  # fmt: skip
+GYROSCOPE = Errors(
+    noise=np.deg2rad(0.014), instability=np.deg2rad(10 / 3600), correlation_time=100.0, walk=np.deg2rad(2e-4),
+    offset=np.deg2rad(0.1), step=np.deg2rad(1000) / 32768, limit=np.deg2rad(1000),
+)  # fmt: skip
+
+
+class Triad:
+    """Three sensors at right angles with errors that go on from one call to the next."""
+
+    def __init__(self, errors: Errors, rng: np.random.Generator):
+        self._errors, self._rng = errors, rng
+        self._offset = errors.offset * rng.standard_normal(3)
+        self._wander = errors._wander * rng.standard_normal(3)
+        self._walk = np.zeros(3)
+
+    def measure(
+        self, truth: Float[np.ndarray, "tick 3"]
+    ) -> tuple[Float[np.ndarray, "tick 3"], Float[np.ndarray, "tick 3"]]:
+        """What the sensors report for samples at `RATE`, and the bias in it."""
+        errors, drive = self._errors, self._rng.standard_normal((3, *truth.shape))
+        if not len(truth):
+            return truth, truth
+        keep = np.exp(-1 / (RATE * errors.correlation_time))
+        force = errors._wander * np.sqrt(1 - keep**2) * drive[0]
+        wander, _ = lfilter([1.0], [1.0, -keep], force, axis=0, zi=keep * self._wander[None])
+        walk = self._walk + np.cumsum(errors.walk / np.sqrt(RATE) * drive[1], axis=0)
+        self._wander, self._walk = wander[-1], walk[-1]
+        bias = self._offset + wander + walk
+        value = truth + bias + errors.noise * np.sqrt(RATE) * drive[2]
+        value = np.clip(np.rint(value / errors.step) * errors.step, -errors.limit, errors.limit)
+        return value, bias
+
+
+class Imu(Sensor):
+    """Accelerometers and gyroscopes in the depth camera's housing, axes parallel to the radar's.
+
+    Args:
+        rig: what it is mounted on.
+        rng: for its errors.
+    """
+
+    def __init__(self, rig: Rig, rng: np.random.Generator):
+        self._motion = rig.motion.mounted(MOUNT)
+        self._ticker = Ticker(rig.config, RATE)
+        self._accelerometer, self._gyroscope = (
+            Triad(errors, generator) for errors, generator in zip((ACCELEROMETER, GYROSCOPE), rng.spawn(2), strict=True)
+        )
+        clock = "imu/time"
+        self.streams = {
+            clock: Stream((), "f8", "s", "instants of the IMU's samples", clock),
+            "imu/accelerometer": Stream((3,), "f4", "m/s^2", "specific force x y z: +g upward at rest", clock),
+            "imu/gyroscope": Stream((3,), "f4", "rad/s", "angular velocity x y z", clock),
+            "imu/bias": Stream(
+                (6,), "f4", "m/s^2, rad/s", "true bias in it: accelerometer x y z, gyroscope x y z", clock
+            ),
+        }
+        specification = np.array([[e.noise, e.instability, e.walk] for e in (ACCELEROMETER, GYROSCOPE)])
+        about = "noise density (1/sqrt(Hz)), bias instability, random walk (sqrt(Hz)) of accelerometer, gyroscope"
+        place = np.array([*MOUNT, 0.0, 0.0, 0.0, 1.0])
+        self.products = {
+            "imu/mount": Product(place, "m, quaternion", "x y z qx qy qz qw of the IMU in the radar's frame"),
+            "imu/specification": Product(specification, "m/s^2, rad/s", about),
+        }
+
+    def truth(
+        self, times: Float[np.ndarray, "tick"]
+    ) -> tuple[Float[np.ndarray, "tick 3"], Float[np.ndarray, "tick 3"]]:
+        """Exact specific force and angular velocity."""
+        acceleration = self._motion.acceleration(times) + [0.0, 0.0, STANDARD_GRAVITY]
+        return self._motion.rotation(times).inv().apply(acceleration), self._motion.angular_velocity(times)
+
+    def observe(self, frames: Frames) -> dict[str, np.ndarray]:
+        """Samples until the next frame."""
+        times = self._ticker(frames)
+        force, turn = self.truth(times)
+        force, force_bias = self._accelerometer.measure(force)
+        turn, turn_bias = self._gyroscope.measure(turn)
+        return {
+            "imu/time": times,
+            "imu/accelerometer": force,
+            "imu/gyroscope": turn,
+            "imu/bias": np.hstack([force_bias, turn_bias]),
+        }

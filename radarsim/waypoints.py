@@ -1,0 +1,77 @@
+"""Way-points from a file: places x y that a walk goes through."""
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+from jaxtyping import Float
+
+from radarize.errors import InputError
+from radarize.tum import read_tum
+
+_APART = 0.5  # m between the way-points taken from a trajectory
+
+
+def read_waypoints(path: str | Path) -> Float[np.ndarray, "n 2"]:
+    """Places in m.
+
+    Args:
+        path: a YAML list of [x, y] (``.yaml``, alone or under the key ``waypoints``), a trajectory (``.tum``, of which
+            places half a metre apart are taken), or else lines of x and y, with commas or blanks between, which may
+            begin with a line of names.
+
+    Raises:
+        InputError: missing or malformed file, something that is no finite number, fewer than two places.
+    """
+    path = Path(path)
+    if path.suffix == ".tum":
+        rows = _thinned(read_tum(path)[1][:, :2])
+    else:
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"{path}: cannot be read ({error})") from error
+        rows = _yaml(path, text) if path.suffix in (".yaml", ".yml") else _lines(path, text)
+    if len(rows) < 2:
+        raise InputError(f"{path}: holds {len(rows)} way-points, expected at least 2")
+    return np.array(rows, float)
+
+
+def _yaml(path: Path, text: str) -> list[list[float]]:
+    try:
+        data = yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+    if isinstance(data, dict) and set(data) == {"waypoints"}:
+        data = data["waypoints"]
+    if not isinstance(data, list):
+        raise InputError(f"{path}: holds {type(data).__name__}, expected a list of [x, y], or one named waypoints")
+    return [_place(f"{path}, way-point {number}", item) for number, item in enumerate(data, 1)]
+
+
+def _lines(path: Path, text: str) -> list[list[float]]:
+    rows = []
+    for number, line in enumerate(text.splitlines(), 1):
+        words = line.split("#")[0].replace(",", " ").split()
+        if words and not (not rows and all(word[0].isalpha() for word in words) and number == 1):
+            rows.append(_place(f"{path}, line {number}", words))
+    return rows
+
+
+def _place(where: str, item: object) -> list[float]:
+    try:
+        x, y = (float(value) for value in item)
+        if np.isfinite([x, y]).all():
+            return [x, y]
+    except (TypeError, ValueError):
+        pass
+    found = " ".join(map(str, item)) if isinstance(item, list) else item
+    raise InputError(f"{where}: is {str(found)[:60]!r}, expected two finite numbers: x y in m")
+
+
+def _thinned(places: Float[np.ndarray, "n 2"]) -> list[Float[np.ndarray, "2"]]:
+    kept = [places[0]]
+    for place in places[1:]:
+        if np.linalg.norm(place - kept[-1]) >= _APART:
+            kept.append(place)
+    return kept

@@ -66,14 +66,10 @@ def simulate(
 
 @app.command()
 def dataset(
-    specification: Annotated[
-        Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, or radarize146.")
-    ],
+    specification: Annotated[Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, or radarize146.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the recordings.")],
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
-    ray: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")
-    ] = None,
+    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Make recordings of other parameters anew.")] = False,
 ):
     """Make the recordings of a data set. Started again, it goes on where it was stopped."""

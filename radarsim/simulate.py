@@ -203,6 +203,7 @@ def simulate(
         "radarsim_version": __version__,
         "engine": engine,
         "front_end": settings.model_dump_json(),
+        "motion": motion.statistics(world).json(),
     }
     if engine == "radarsim":
         facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}

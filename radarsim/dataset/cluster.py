@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from radarize.errors import InputError
-from radarsim.dataset.local import attempt, use_threads
+from radarsim.dataset.local import attempt
 from radarsim.dataset.run import Event
 from radarsim.dataset.task import Task
 
@@ -30,8 +30,7 @@ class _Board:
 
 
 def _make(task: Task, folder: Path, board) -> Event:
-    use_threads(1)
-    return attempt(task, folder, lambda done, _: board.put.remote(task.name, done))
+    return attempt(task, folder, 1, lambda done, _: board.put.remote(task.name, done))
 
 
 def work(tasks: list[Task], folder: Path, address: str) -> Iterator[Event]:

@@ -6,7 +6,7 @@ import signal
 import sys
 import threading
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
@@ -94,7 +94,7 @@ def _receive(worker: _Worker) -> Event | None:
         event = worker.connection.recv()
     except (EOFError, OSError):
         return None
-    if event.error is not None or event.statistics is not None:
+    if event.error is not None or event.motion is not None:
         worker.task = None
     return event
 
@@ -109,38 +109,23 @@ def _serve(connection: Connection, folder: Path, threads: int) -> None:
     """A worker's life."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; the parent ends its workers
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    use_threads(threads)
     while True:
         try:
             task = connection.recv()
         except EOFError:
             return
-        connection.send(attempt(task, folder, lambda done, _, task=task: connection.send(Event(task, done))))
+        connection.send(attempt(task, folder, threads, lambda done, _, task=task: connection.send(Event(task, done))))
 
 
-def attempt(task: Task, folder: Path, progress) -> Event:
+def attempt(task: Task, folder: Path, threads: int, progress: Callable[[int, int], None]) -> Event:
     """Make a task's recording; a failure is an event, too."""
     try:
-        return Event(task, task.frames, statistics=task.make(folder, progress))
+        return Event(task, task.frames, motion=task.make(folder, threads, progress))
     except InputError as error:
         return Event(task, error=str(error))
     except Exception as error:  # one broken task must not end the others
         line = (str(error).strip().splitlines() or [""])[0]
         return Event(task, error=f"{task.name}: internal error, {type(error).__name__}: {line}")
-
-
-def use_threads(count: int) -> None:
-    """Bound the threads of everything that simulates; call before those libraries load."""
-    for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = str(count)
-    from radarsim import llvm
-
-    llvm.require()
-    import drjit
-    import torch
-
-    drjit.set_thread_count(count)
-    torch.set_num_threads(count)
 
 
 def _end_with_parent() -> None:

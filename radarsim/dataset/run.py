@@ -24,13 +24,13 @@ class Event:
     Attributes:
         task: which it works on.
         frames: made so far.
-        statistics: of the motion, once the recording is finished.
+        motion: its statistics, one line, once the recording is finished.
         error: why it failed, one sentence.
     """
 
     task: Task
     frames: int = 0
-    statistics: dict[str, float] | None = None
+    motion: str | None = None
     error: str | None = None
 
 
@@ -96,10 +96,10 @@ def make(
                     if "no space left" in event.error:
                         raise InputError(f"no space left on the device; {_finished(outcome, tasks, folder)}")
                     say(f"failed: {event.error}")
-                elif event.statistics is not None:
+                elif event.motion is not None:
                     outcome.made.append(name)
                     done[name] = event.task.frames
-                    say(f"{name}: {_motion(event.statistics)}")
+                    say(f"{name}: {event.motion}")
                 else:
                     done[name] = event.frames
                 progress(sum(done.values()), total)
@@ -174,7 +174,3 @@ def _write_index(specification: Specification, folder: Path) -> None:
 def _finished(outcome: Outcome, tasks: tuple[Task, ...], folder: Path) -> str:
     count = len(outcome.made) + len(outcome.kept)
     return f"{count} of {len(tasks)} recordings are finished in {folder}; the same command goes on from there"
-
-
-def _motion(statistics: dict[str, float]) -> str:
-    return ", ".join(f"{name} {value:.3g}" for name, value in statistics.items())

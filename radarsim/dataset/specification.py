@@ -208,7 +208,8 @@ class Specification(_Strict):
         try:
             Description.model_validate(description)
         except ValidationError as error:
-            raise InputError(f"buildings.{building}: {_first(error).removeprefix('building.')}") from error
+            reason = _first(error).removeprefix(f"building.{given.get('kind')}.")
+            raise InputError(f"buildings.{building}: {reason}") from error
         return description
 
     def _beside(self, name: str) -> str:

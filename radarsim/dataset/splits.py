@@ -63,9 +63,7 @@ class PlatformSplit(_Strict):
         tested = tuple(p for p in present if p not in self.train) if self.test is None else self.test
         for field, chosen in (("train", self.train), ("test", tested)):
             if unknown := [p for p in chosen if p not in present]:
-                raise InputError(
-                    f"{field} names {unknown[0]!r}, expected some of: {', '.join(present)}"
-                )
+                raise InputError(f"{field} names {unknown[0]!r}, expected some of: {', '.join(present)}")
         if both := set(self.train) & set(tested):
             raise InputError(f"{sorted(both)[0]!r} is in train and in test, expected it in one of them")
         training = [task for task in tasks if task.platform in self.train]

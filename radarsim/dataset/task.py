@@ -1,6 +1,7 @@
 """One recording of a data set: what it must be, whether it is there already, and how it is made."""
 
 import json
+import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from hashlib import sha256
@@ -63,6 +64,11 @@ class Task:
             found["scene"] = {"file": Path(self.scene).name, "sha256": _digest(Path(self.scene))}
         return found
 
+    @property
+    def identity(self) -> str:
+        """`parameters` as the text that the recording keeps."""
+        return json.dumps(self.parameters, sort_keys=True)
+
     def path(self, folder: Path) -> Path:
         """Where the recording lies."""
         return folder / f"{self.name}.h5"
@@ -84,23 +90,31 @@ class Task:
         if made is None:
             raise Stale(f"{self.name} does not come from a data set")
         made = json.loads(str(made))
-        for field, wanted in json.loads(json.dumps(self.parameters)).items():
+        for field, wanted in json.loads(self.identity).items():
             if made.get(field) != wanted:
                 raise Stale(f"{self.name} has {field} {_short(made.get(field))}, now {_short(wanted)}")
         return frames == self.frames
 
-    def make(self, folder: Path, progress: Callable[[int, int], None] | None = None) -> dict[str, float]:
+    def make(self, folder: Path, threads: int | None = None, progress: Callable[[int, int], None] | None = None) -> str:
         """Simulate the recording; it appears under its name when it is whole.
 
+        Args:
+            folder: where.
+            threads: bound on those of the libraries that simulate; the first call of a process decides.
+            progress: called with (frames done, frames in all).
+
         Returns:
-            statistics of its motion.
+            statistics of its motion, one line.
 
         Raises:
             InputError: with the task's name.
         """
+        if threads:
+            _use_threads(threads)
         from radarize.training.maps import keep_maps
         from radarsim.scene.scene import Scene
         from radarsim.simulate import simulate
+        from radarsim.statistics import Statistics
 
         final = self.path(folder)
         path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
@@ -115,11 +129,11 @@ class Task:
                 radar=self.radar,
                 frontend=None if self.frontend is None else Path(self.frontend),
                 sensors=self.sensors,
-                attributes={ATTRIBUTE: json.dumps(self.parameters, sort_keys=True)},
+                attributes={ATTRIBUTE: self.identity},
                 progress=progress,
             )
             with Recording(path) as recording:
-                statistics = motion_statistics(recording)
+                moved = Statistics.from_json(str(recording.attributes["motion"]))
             if path != final:
                 keep_maps(path, final)
         except InputError as error:
@@ -127,7 +141,7 @@ class Task:
         finally:
             if path != final:
                 path.unlink(missing_ok=True)
-        return statistics
+        return str(moved)
 
     def clear(self, folder: Path) -> None:
         """Remove what a killed run left half-written."""
@@ -152,10 +166,12 @@ def _short(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def motion_statistics(recording: Recording) -> dict[str, float]:
-    """Distance (m), mean speed and top speed (m/s) of a recording's truth."""
-    import numpy as np
+def _use_threads(count: int) -> None:
+    for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = str(count)
+    from radarsim import llvm
 
-    steps = np.linalg.norm(np.diff(recording.read("truth/pose")[:, :3], axis=0), axis=1)
-    speed = np.linalg.norm(recording.read("truth/velocity")[:, :3], axis=1)
-    return {"distance": float(steps.sum()), "mean speed": float(speed.mean()), "top speed": float(speed.max())}
+    llvm.require()
+    import drjit
+
+    drjit.set_thread_count(count)

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from radarize.errors import InputError
 from radarsim.dataset.local import attempt
-from radarsim.dataset.run import Event
-from radarsim.dataset.task import Task
+from radarsim.dataset.task import Event, Task
 
 #: How often Ray begins a task again whose worker or node died.
 RETRIES = 3

@@ -13,8 +13,7 @@ from pathlib import Path
 import psutil
 
 from radarize.errors import InputError
-from radarsim.dataset.run import Event
-from radarsim.dataset.task import Task
+from radarsim.dataset.task import Event, Task
 
 #: A worker's memory at its peak, bytes (benchmarks/dataset_speed.py measures it).
 MEMORY = 1.5e9

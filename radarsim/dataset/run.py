@@ -11,27 +11,10 @@ from pathlib import Path
 from radarize import __version__
 from radarize.errors import InputError
 from radarsim.dataset.specification import Specification
-from radarsim.dataset.task import Stale, Task
+from radarsim.dataset.task import Event, Stale, Task
 
 #: The expanded specification beside the recordings: parameters of each, and the members of every split.
 INDEX = "dataset.json"
-
-
-@dataclass(frozen=True)
-class Event:
-    """What a worker reports.
-
-    Attributes:
-        task: which it works on.
-        frames: made so far.
-        motion: its statistics, one line, once the recording is finished.
-        error: why it failed, one sentence.
-    """
-
-    task: Task
-    frames: int = 0
-    motion: str | None = None
-    error: str | None = None
 
 
 @dataclass

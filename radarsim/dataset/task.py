@@ -154,6 +154,23 @@ class Task:
         return self.building if self.floor is None else f"{self.building}_{self.floor}"
 
 
+@dataclass(frozen=True)
+class Event:
+    """What a worker reports.
+
+    Attributes:
+        task: which it works on.
+        frames: made so far.
+        motion: its statistics, one line, once the recording is finished.
+        error: why it failed, one sentence.
+    """
+
+    task: Task
+    frames: int = 0
+    motion: str | None = None
+    error: str | None = None
+
+
 def _digest(path: Path) -> str:
     try:
         return sha256(path.read_bytes()).hexdigest()

@@ -13,6 +13,7 @@ from radarize.errors import InputError
 from radarize.recording import Recording
 from radarsim.dataset import run
 from radarsim.dataset.run import make
+from radarsim.dataset.task import Event
 
 
 def made(folder: Path) -> dict[str, bytes]:
@@ -87,7 +88,7 @@ def test_a_full_disk_ends_the_run(tmp_path):
 
 def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
     def interrupted(todo, folder, workers, ray):
-        yield run.Event(todo[0], 4, motion="1 m")
+        yield Event(todo[0], 4, motion="1 m")
         (folder / "b.h5.part").touch()
         raise KeyboardInterrupt
 

@@ -3,6 +3,7 @@
 The folder, and files that the specification names, must be visible on every node under the same path.
 """
 
+import socket
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -76,9 +77,21 @@ def _connect(address: str):
         import ray
     except ImportError:
         raise InputError("ray is not installed; type: pip install 'radarize[ray]'") from None
+    _knock(address)
     if not ray.is_initialized():
         try:
             ray.init(address=address, log_to_driver=False, logging_level="ERROR")
         except (ConnectionError, ValueError, RuntimeError) as error:
             raise InputError(f"--ray {address}: no cluster answers ({str(error).strip().splitlines()[0]})") from error
     return ray
+
+
+def _knock(address: str) -> None:
+    """Ray waits for minutes for an address where nobody is, and then ends the process."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host:
+        return  # auto
+    try:
+        socket.create_connection((host, int(port)), timeout=5).close()
+    except (OSError, ValueError) as error:
+        raise InputError(f"--ray {address}: no cluster answers ({error})") from error

@@ -79,9 +79,15 @@ def test_killed_and_resumed(specification, undisturbed, tmp_path):
 
 @pytest.fixture(scope="module")
 def cluster():
-    """Two nodes of one core each on this machine."""
-    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
-    ray = pytest.importorskip("ray")
+    """Two nodes of one core each on this machine, which can import what this process can."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        patch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *sys.path]))
+        yield from _two_nodes()
+
+
+def _two_nodes():
+    import ray
     from ray.cluster_utils import Cluster
 
     nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})

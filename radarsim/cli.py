@@ -82,6 +82,27 @@ def simulate(
 
 
 @app.command()
+def dataset(
+    specification: Annotated[Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, or radarize146.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the recordings.")],
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
+    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
+    replace: Annotated[bool, typer.Option("--replace", help="Make recordings of other parameters anew.")] = False,
+):
+    """Make the recordings of a data set. Started again, it goes on where it was stopped."""
+    from radarsim.dataset.run import make
+    from radarsim.dataset.specification import Specification
+
+    with progress("frames") as report:
+        outcome = make(
+            Specification.load(specification), output, workers=workers, ray=ray, replace=replace, progress=report
+        )
+    print(f"{len(outcome.made)} recordings made, {len(outcome.kept)} were there; {output}")
+    if outcome.failed:
+        raise InputError(f"{len(outcome.failed)} recordings failed: {'; '.join(outcome.failed.values())}")
+
+
+@app.command()
 def calibrate(
     recording: Annotated[Path, typer.Argument(metavar="REAL.h5", help="Recording of a real radar, best at rest.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Front-end file to write (.yaml).")],

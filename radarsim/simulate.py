@@ -1,6 +1,6 @@
 """One recording from one scene and one motion: the simulator's main loop."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
 from pathlib import Path
 
@@ -143,6 +143,7 @@ def simulate(
     provenance: bool = False,
     engine: str = "radarsim",
     sensors: Sequence[str] = (),
+    attributes: Mapping[str, object] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Simulate a recording.
@@ -167,6 +168,7 @@ def simulate(
             speckle is drawn anew for every frame.
         sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
             are the same whatever is chosen.
+        attributes: more attributes of the file.
         progress: called with (frames done, frames in all).
 
     Returns:
@@ -203,11 +205,11 @@ def simulate(
     motion = motion if duration is None else motion.until(duration)
     crossed = crossings(motion, world)
     simulator = Simulator(world, motion, config, physics, device, settings, engine)
-    frames = int(np.floor((motion.duration - config.burst_time) / config.frame_period)) + 1
+    frames = config.frames_within(motion.duration)
     if frames < 1:
         raise InputError(f"duration is {motion.duration:g} s, expected at least one frame of {config.frame_period} s")
     times = np.arange(frames) * config.frame_period
-    attributes = {
+    facts = {
         "source": "radarsim simulate",
         "scene": world.name,
         "platform": "trajectory" if trajectory is not None else platform,
@@ -219,10 +221,15 @@ def simulate(
         "warnings": f"{trajectory or waypoints or 'tour'}: {crossed}" if crossed else "",
     }
     if engine == "radarsim":
-        attributes |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}
+        facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}
     suite = Suite(Rig(world, motion, config, simulator.front_end, Sight(world)), sensors, seed, provenance)
     with RecordingWriter(
-        output, config, cfg_text=cfg_text, attributes=attributes, products=suite.products, streams=suite.streams
+        output,
+        config,
+        cfg_text=cfg_text,
+        attributes=facts | dict(attributes or {}),
+        products=suite.products,
+        streams=suite.streams,
     ) as writer:
         for first in range(0, frames, _BATCH):
             batch = simulator.observe(times[first : first + _BATCH], provenance)

@@ -135,14 +135,37 @@ def test_ctrl_c_keeps_every_frame(process, tmp_path):
         assert np.array_equal(recording.adc(0, 9), frames(0, 4))
 
 
-def test_flushes_come_by_themselves(tmp_path, monkeypatch):
-    monkeypatch.setattr("radarize.recording.writer._FLUSH_INTERVAL", 0.05)
-    with RecordingWriter(tmp_path / "a.h5", CONFIG) as writer:
-        for i in range(3):
-            writer.append(frames(i, i + 1), np.array([float(i)]))
-            time.sleep(0.06)
+def test_flushes_come_by_themselves(tmp_path):
+    """Once a second of recorded time."""
+    slow = CONFIG.model_copy(update={"frame_period": 0.4})
+    with RecordingWriter(tmp_path / "a.h5", slow) as writer:
+        for i in range(7):
+            writer.append(frames(i, i + 1), np.array([0.4 * i]))
         with Recording(writer.part) as recording:
-            assert len(recording) >= 2
+            assert len(recording) == 6
+
+
+def test_same_content_same_bytes(tmp_path):
+    """Whenever, and however slowly, it was written."""
+    for name, pause in (("a.h5", 0.0), ("b.h5", 0.4)):
+        streams = {"imu/time": Stream((), "f8", "s", "", "imu/time")}
+        with RecordingWriter(tmp_path / name, CONFIG, attributes={"seed": 7}, streams=streams) as writer:
+            for i in range(3):
+                writer.append(frames(20 * i, 20 * i + 20), np.arange(20.0) + i)
+                writer.extend("imu/time", np.arange(100.0) + 100 * i)
+                time.sleep(pause)
+    assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
+
+
+def test_heat_maps_may_stand_without_samples(tmp_path):
+    maps = {"maps/range_azimuth": Stream((96, 40), "f2", "dB", "")}
+    with RecordingWriter(tmp_path / "a.h5", CONFIG, streams=maps, raw=False) as writer:
+        writer.append(None, np.arange(5.0), rows={"maps/range_azimuth": np.ones((5, 96, 40))})
+    with Recording(tmp_path / "a.h5") as recording:
+        assert len(recording) == 5 and recording.valid(0, 5).all() and not recording.has("radar/adc")
+        assert recording.read("maps/range_azimuth").sum() == 5 * 96 * 40
+        with pytest.raises(InputError, match="has no raw samples"):
+            recording.adc(0, 1)
 
 
 @pytest.fixture

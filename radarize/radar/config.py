@@ -200,6 +200,10 @@ class RadarConfig(BaseModel):
         """Frames per second, Hz."""
         return 1 / self.frame_period
 
+    def frames_within(self, duration: float) -> int:
+        """Frames whose bursts end within `duration` (s)."""
+        return max(int(np.floor((duration - self.burst_time) / self.frame_period)) + 1, 0)
+
     @property
     def calibration(self) -> np.ndarray:
         """Complex factor per enabled (tx, rx), to be multiplied onto decoded samples."""

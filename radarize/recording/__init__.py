@@ -2,7 +2,8 @@
 
 Layout (one chunk per frame, readable while it grows):
 
-    /radar/adc      int16 (frame, loop, tx, rx, sample, iq)   attributes: configuration as JSON, the .cfg text
+    /radar          attributes: configuration as JSON, the .cfg text
+    /radar/adc      int16 (frame, loop, tx, rx, sample, iq)   absent where only heat maps were kept
     /radar/time     float64 (frame,)                          s, start of the first chirp
     /radar/valid    bool (frame, loop, tx)                    False where samples of the chirp were lost
     /truth/NAME, /imu/NAME, /tracking/NAME, /points/NAME      optional, attributes `unit`, `about` and `clock`

@@ -61,11 +61,14 @@ class Recording:
             self._clocks: dict[str, np.ndarray] = {}
             radar = self.file["radar"]
             self.config = RadarConfig.model_validate_json(radar.attrs["config"])
-            self._adc, self._valid, times = radar["adc"], radar["valid"], radar["time"][:]
+            self._adc, self._valid, times = radar.get("adc"), radar["valid"], radar["time"][:]
         except (KeyError, OSError, TypeError, ValidationError) as error:
             self.file.close()
             raise InputError(f"{self.path}: not a recording of this project ({reason(error)})") from error
-        if self._adc.dtype != np.int16 or self._adc.shape[1:] != self.config.frame_shape:
+        if self._adc is None and "maps" not in self.file:
+            self.file.close()
+            raise InputError(f"{self.path}: not a recording of this project (neither /radar/adc nor /maps)")
+        if self._adc is not None and (self._adc.dtype != np.int16 or self._adc.shape[1:] != self.config.frame_shape):
             shape, kind = self._adc.shape[1:], self._adc.dtype
             self.file.close()
             raise InputError(
@@ -73,7 +76,7 @@ class Recording:
                 f"expected int16 of {self.config.frame_shape} from its configuration"
             )
         # A frame counts once its time is written, which happens after its samples are on disk.
-        whole = min(len(times), len(self._adc), len(self._valid))
+        whole = min(len(data) for data in (times, self._adc, self._valid) if data is not None)
         unwritten = np.flatnonzero(~np.isfinite(times[:whole]))
         self.times = times[: unwritten[0] if len(unwritten) else whole]
 
@@ -100,8 +103,10 @@ class Recording:
         """Raw samples of frames start...stop-1.
 
         Raises:
-            InputError: a chunk on disk is damaged.
+            InputError: a chunk on disk is damaged, or only heat maps were kept.
         """
+        if self._adc is None:
+            raise InputError(f"{self.path}: has no raw samples, only heat maps, expected a recording with /radar/adc")
         return self._read(self._adc, start, stop)
 
     def valid(self, start: int, stop: int) -> Bool[np.ndarray, "frame loop tx"]:

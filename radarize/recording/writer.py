@@ -1,13 +1,13 @@
 """Writing a recording frame by frame.
 
-A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once a second in
-HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame flushed so far.
+A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once a second of
+recorded time in HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame
+flushed so far. No clock of the writing machine goes into the file or its layout: same content, same bytes.
 """
 
 import errno
 import os
 import shutil
-import time as clock
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -20,7 +20,6 @@ from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.recording.streams import FORMAT, Product, Stream, reason
 
-_FLUSH_INTERVAL = 1.0
 #: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
 #: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.
 _RESERVE = 512 << 10
@@ -36,6 +35,7 @@ class RecordingWriter:
         attributes: scene, seed, command and the like, stored as attributes of the file.
         streams: growing data sets by path, e.g. ``"truth/pose"``.
         products: fixed data sets by path.
+        raw: False for a recording without samples (heat maps for training): `append` then takes None for them.
 
     Raises:
         InputError: the file cannot be created or a write failed (for instance, no space left).
@@ -50,15 +50,16 @@ class RecordingWriter:
         attributes: Mapping[str, object] | None = None,
         streams: Mapping[str, Stream] | None = None,
         products: Mapping[str, Product] | None = None,
+        raw: bool = True,
     ):
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + ".part")
         self.config = config
-        self.frames = 0
+        self.frames, self.raw = 0, raw
         self._file: h5py.File | None = None
         self._notes: dict[str, object] = {}
         self._pending: list[tuple] = []
-        self._flushed = clock.monotonic()
+        self._unflushed = 0
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._require_space(sum(product.data.nbytes for product in (products or {}).values()))
@@ -74,7 +75,8 @@ class RecordingWriter:
         radar.attrs["config"] = self.config.model_dump_json()
         radar.attrs["cfg"] = cfg_text
         loops, tx, rx, samples, _ = self.config.frame_shape
-        self._grow("radar/adc", Stream((loops, tx, rx, samples, 2), "i2", "ADC counts", "I/Q, TX1..3 x RX1..4"))
+        if self.raw:
+            self._grow("radar/adc", Stream((loops, tx, rx, samples, 2), "i2", "ADC counts", "I/Q, TX1..3 x RX1..4"))
         self._grow("radar/valid", Stream((loops, tx), "?", "", "False where samples of the chirp were lost"))
         self._grow("radar/time", Stream((), "f8", "s", "start of the frame's first chirp"))
         for name, product in products.items():
@@ -101,7 +103,7 @@ class RecordingWriter:
 
     def append(
         self,
-        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        adc: Int16[np.ndarray, "frame loop tx rx sample 2"] | None,
         time: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
         *,
@@ -112,22 +114,24 @@ class RecordingWriter:
         Raises:
             InputError: the shapes do not fit the configuration, or the disk is full; frames flushed before stay.
         """
-        if adc.shape[1:] != self.config.frame_shape:
+        if self.raw and adc.shape[1:] != self.config.frame_shape:
             raise InputError(
                 f"{self.path}: frames have shape {adc.shape[1:]}, expected {self.config.frame_shape} "
                 "(loop, tx, rx, sample, iq) from the configuration"
             )
         if valid is None:
-            valid = np.ones(adc.shape[:3], bool)
+            valid = np.ones((len(time), *self.config.frame_shape[:2]), bool)
+        rows = dict(rows or {})
+        if self.raw:
+            rows["radar/adc"] = adc
         try:
-            rows = rows or {}
-            self._require_space(adc.nbytes + sum(np.asarray(data).nbytes for data in rows.values()))
+            self._require_space(sum(np.asarray(data).nbytes for data in rows.values()))
             for name, data in rows.items():
                 self._extend(name, data)
-            self._extend("radar/adc", adc)
             self._extend("radar/valid", valid)
             self._pending.append(np.asarray(time, float))
-            if clock.monotonic() - self._flushed > _FLUSH_INTERVAL:
+            self._unflushed += len(time)
+            if self._unflushed >= self.config.frame_rate:
                 self.flush()
         except (OSError, RuntimeError) as error:
             raise InputError(f"cannot write {self.part}: {reason(error)}; {self._survivors()}") from error
@@ -169,7 +173,7 @@ class RecordingWriter:
         self._file["radar/time"].flush()
         if shutil.disk_usage(self.path.parent).free == 0:  # somebody else filled the disk; HDF5 would not say so
             raise OSError(errno.ENOSPC, "no space left on the device")
-        self._flushed = clock.monotonic()
+        self._unflushed = 0
 
     def _survivors(self) -> str:
         return f"{self.frames} whole frames are kept there"

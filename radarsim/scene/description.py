@@ -157,7 +157,14 @@ def find(path: str | Path) -> Path:
     for folder in folders:
         if (candidate := folder / f"{given}.yaml").is_file():
             return candidate
-    known = sorted({str(f.relative_to(d).with_suffix("")) for d in folders for f in d.glob("**/*.yaml")})
+    known = sorted(
+        {
+            str(f.relative_to(d).with_suffix(""))
+            for d in folders
+            for f in d.glob("**/*.yaml")
+            if f.parent.name != "datasets"
+        }
+    )
     raise InputError(f"no scene {str(path)!r}, expected a .yaml file or one of: {', '.join(known) or 'none found'}")
 
 

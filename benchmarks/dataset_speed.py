@@ -1,0 +1,183 @@
+"""Data sets end to end: what sensors and writing cost beside the simulation, how workers share the cores, and what the
+paper's data set would take on this machine, from a sample of one in ten of its recordings."""
+
+import argparse
+import os
+import tempfile
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from benchmarks.results import publish
+from radarize.radar.presets import PRESETS
+from radarize.recording import RecordingWriter
+from radarsim.dataset.local import work
+from radarsim.dataset.specification import Specification
+from radarsim.dataset.task import Task
+from radarsim.motion import plan_motion
+from radarsim.scene.scene import Scene
+from radarsim.sensors.sensor import Rig
+from radarsim.sensors.sight import Sight
+from radarsim.sensors.suite import Suite
+from radarsim.simulate import Simulator
+
+CONFIG = PRESETS["radarize"]
+BATCH = 8
+BIG = "radarize146"
+
+
+def steps(frames: int, seed: int, folder: Path) -> dict[str, float]:
+    """Seconds per frame of simulation, truth and writing, in one loop; medians over batches."""
+    scene = Scene.of({"building": {"kind": "A", "seed": 1}}, "A")
+    route, physics = np.random.default_rng(seed).spawn(2)
+    motion = plan_motion(scene, "handheld", frames * CONFIG.frame_period + 1, route)
+    simulator = Simulator(scene, motion, CONFIG, physics)
+    rig = Rig(scene, motion, CONFIG, simulator.front_end, Sight(scene))
+    suites = {"truth always there": Suite(rig, (), seed), "all truth sensors": Suite(rig, ("all",), seed)}
+    spent: dict[str, list[float]] = {"simulation": [], **{name: [] for name in suites}, "writing all": []}
+    full = suites["all truth sensors"]
+    with RecordingWriter(folder / "steps.h5", CONFIG, streams=full.streams, products=full.products) as writer:
+        for first in range(0, frames, BATCH):
+            start = time.perf_counter()
+            batch = simulator.observe(np.arange(first, first + BATCH) * CONFIG.frame_period)
+            spent["simulation"].append(time.perf_counter() - start)
+            for name, suite in suites.items():
+                start = time.perf_counter()
+                rows = suite.observe(batch)
+                spent[name].append(time.perf_counter() - start)
+            start = time.perf_counter()
+            writer.append(batch.samples, batch.times, rows=rows)
+            spent["writing all"].append(time.perf_counter() - start)
+    return {name: float(np.median(seconds[1:])) / BATCH for name, seconds in spent.items()}
+
+
+@dataclass
+class Run:
+    """What a run of tasks took.
+
+    Attributes:
+        wall: s, processes starting included.
+        frame: s per frame of one worker.
+        overhead: s per recording of one worker: scene, tour, first frames, and its share of the start.
+        size: bytes per frame on disk.
+        memory: of the largest worker at its peak, MB.
+        frames: made.
+    """
+
+    wall: float
+    frame: float
+    overhead: float
+    size: float
+    memory: float
+    frames: int
+
+
+def run(tasks: list[Task], folder: Path, workers: int) -> Run:
+    """Make recordings on local processes."""
+    folder.mkdir()
+    begin, first, last, memory = time.perf_counter(), {}, {}, 0.0
+    for event in work(tasks, folder, workers):
+        if event.error:
+            raise SystemExit(event.error)
+        if event.motion is None:
+            last[event.task.name] = time.perf_counter(), event.frames
+            first.setdefault(event.task.name, last[event.task.name])
+        memory = max(memory, *(process.memory_info().rss / 1e6 for process in _workers()))
+    wall = time.perf_counter() - begin
+    span = sum(last[name][0] - first[name][0] for name in first)
+    frame = span / sum(last[name][1] - first[name][1] for name in first)
+    frames = sum(task.frames for task in tasks)
+    size = sum(task.path(folder).stat().st_size for task in tasks) / frames
+    return Run(wall, frame, (workers * wall - frames * frame) / len(tasks), size, memory, frames)
+
+
+def _workers() -> Iterable[psutil.Process]:
+    found = psutil.Process().children()
+    return found or [psutil.Process()]
+
+
+def shortened(tasks: Iterable[Task], seconds: float, storage: str) -> list[Task]:
+    """The same recordings, but shorter."""
+    return [
+        replace(task, duration=seconds, frames=CONFIG.frames_within(seconds), storage=storage)
+        if seconds < task.duration
+        else replace(task, storage=storage)
+        for task in tasks
+    ]
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--every", type=int, default=10, help=f"one in so many recordings of {BIG} is made")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of each at most")
+    parser.add_argument("--frames", type=int, default=240, help="of the comparison with the simulation alone")
+    parser.add_argument("--few", type=int, default=4, help="recordings by which workers and storage are compared")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    cores = len(os.sched_getaffinity(0))
+    tasks = Specification.load(BIG).tasks
+    sample = tasks[:: options.every]
+    rows = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        share = steps(options.frames, options.seed, folder)
+        for what, seconds in share.items():
+            rows.append(
+                {
+                    "what": f"one process: {what}",
+                    "ms per frame": 1e3 * seconds,
+                    "frames/s": 1 / seconds,
+                    "of simulation": seconds / share["simulation"],
+                    "kB per frame": "",
+                    "MB per worker": "",
+                }
+            )
+        runs = {}
+        few = sample[:: max(1, len(sample) // options.few)][: options.few]
+        short = min(options.seconds, 10.0)
+        for label, chosen, seconds, storage, workers in (
+            (f"1 worker x {cores} threads, raw", few, short, "raw", 1),
+            (f"{cores} workers x 1 thread, raw", few, short, "raw", cores),
+            (f"{cores} workers x 1 thread, heatmaps", few, short, "heatmaps", cores),
+            (f"{cores} workers: sample of {BIG}, raw", sample, options.seconds, "raw", cores),
+        ):
+            made = run(shortened(chosen, seconds, storage), folder / str(len(runs)), workers)
+            runs[label] = made
+            pace = made.frame / workers
+            rows.append(
+                {
+                    "what": label,
+                    "ms per frame": 1e3 * pace,
+                    "frames/s": 1 / pace,
+                    "of simulation": "",
+                    "kB per frame": made.size / 1e3,
+                    "MB per worker": made.memory,
+                }
+            )
+        heat, measured = list(runs.values())[-2:]
+    total = sum(task.frames for task in tasks)
+    hours = (total * measured.frame + len(tasks) * measured.overhead) / cores / 3600
+    extra = (share["all truth sensors"] + share["writing all"]) / share["simulation"]
+    publish(
+        "dataset_speed",
+        "Data sets: speed and size",
+        rows,
+        seed=options.seed,
+        notes=[
+            f"All truth sensors and writing cost {extra:.2f} of the simulation (target: at most 0.33).",
+            f"{BIG} on this machine, projected from {len(sample)} of its {len(tasks)} recordings, "
+            f"{measured.frames / len(sample) * CONFIG.frame_period:.0f} s each ({measured.frames} of {total} frames, "
+            f"made in {measured.wall / 60:.1f} minutes): {hours:.1f} hours, {total * measured.size / 1e9:.1f} GB raw "
+            f"with all sensors; heat maps with all sensors {total * heat.size / 1e9:.1f} GB.",
+            f"Beyond its frames a recording takes {measured.overhead:.1f} s: scene, tour, first frames.",
+            "Rates count from a recording's first batch to its last. Kilobytes are of whole files, truth included.",
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,159 @@
+"""Make a data set: look what is there, hand out the rest, report, and go on where an earlier run ended."""
+
+import fcntl
+import json
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from radarize import __version__
+from radarize.errors import InputError
+from radarsim.dataset.specification import Specification
+from radarsim.dataset.task import Event, Stale, Task
+
+#: The expanded specification beside the recordings: parameters of each, and the members of every split.
+INDEX = "dataset.json"
+
+
+@dataclass
+class Outcome:
+    """What a run made.
+
+    Attributes:
+        made: finished in this run.
+        kept: were finished before.
+        failed: name to the reason.
+    """
+
+    made: list[str] = field(default_factory=list)
+    kept: list[str] = field(default_factory=list)
+    failed: dict[str, str] = field(default_factory=dict)
+
+
+def make(
+    specification: Specification,
+    folder: Path,
+    *,
+    workers: int | None = None,
+    ray: str | None = None,
+    replace: bool = False,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    say: Callable[[str], None] = print,
+) -> Outcome:
+    """Make every recording of a data set that is not there yet.
+
+    A recording that is there is opened and compared with its task: whole and of the same parameters, it is kept. So a
+    run that was stopped, or killed, goes on by being started again, and ends in the same bytes.
+
+    Args:
+        specification: what to make.
+        folder: where; every worker must see it under this name.
+        workers: local processes; default: one per core, as far as memory goes.
+        ray: address of a Ray cluster (``auto``: the one of this machine) to use instead.
+        replace: make recordings of other parameters anew, instead of refusing.
+        progress: called with (frames done, frames in all), recordings found included.
+        say: takes a line for every finished recording.
+
+    Raises:
+        InputError: recordings of other parameters are in the folder, another run is at work there, the disk is full, or
+            the user interrupted; what is finished stays.
+    """
+    folder = Path(folder).resolve()
+    tasks = specification.tasks
+    with _alone(folder):
+        finished = _examine(tasks, folder, replace)
+        _write_index(specification, folder)
+        outcome = Outcome(kept=[task.name for task in finished])
+        todo = [task for task in tasks if task not in finished]
+        total = sum(task.frames for task in tasks)
+        done = {task.name: task.frames for task in finished}
+        progress(sum(done.values()), total)
+        try:
+            for event in _crew(todo, folder, workers, ray):
+                name = event.task.name
+                if event.error is not None:
+                    outcome.failed[name] = event.error
+                    done.pop(name, None)
+                    if "no space left" in event.error:
+                        raise InputError(f"no space left on the device; {_finished(outcome, tasks, folder)}")
+                    say(f"failed: {event.error}")
+                elif event.motion is not None:
+                    outcome.made.append(name)
+                    done[name] = event.task.frames
+                    say(f"{name}: {event.motion}")
+                else:
+                    done[name] = event.frames
+                progress(sum(done.values()), total)
+        except KeyboardInterrupt:
+            raise InputError(f"stopped; {_finished(outcome, tasks, folder)}") from None
+        finally:
+            for task in todo:
+                task.clear(folder)
+    return outcome
+
+
+def _crew(todo: list[Task], folder: Path, workers: int | None, ray: str | None) -> Iterator[Event]:
+    if not todo:
+        return iter(())
+    if ray is not None:
+        from radarsim.dataset.cluster import work
+
+        return work(todo, folder, ray)
+    from radarsim.dataset.local import work
+
+    return work(todo, folder, workers)
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Hold a folder for one run; the lock goes with the process, however that ends."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror})") from error
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    except BlockingIOError:
+        raise InputError(f"{folder}: another run is making a data set here, expected to be alone") from None
+    finally:
+        os.close(handle)
+
+
+def _examine(tasks: tuple[Task, ...], folder: Path, replace: bool) -> list[Task]:
+    """Tasks whose recordings are there.
+
+    Raises:
+        InputError: some are of other parameters, and `replace` is not set.
+    """
+    finished, stale = [], []
+    for task in tasks:
+        try:
+            if task.is_finished(folder):
+                finished.append(task)
+        except Stale as error:
+            stale.append(str(error))
+    if stale and not replace:
+        others = f" (and {len(stale) - 1} more)" if len(stale) > 1 else ""
+        raise InputError(
+            f"{folder}: {stale[0]}{others}; --replace makes such recordings anew, another folder leaves them alone"
+        )
+    return finished
+
+
+def _write_index(specification: Specification, folder: Path) -> None:
+    part = folder / f"{INDEX}.part"
+    try:
+        part.write_text(json.dumps({"version": __version__, **specification.as_data()}, indent=1) + "\n")
+        os.replace(part, folder / INDEX)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise InputError(f"{folder / INDEX}: cannot be written ({error.strerror})") from error
+
+
+def _finished(outcome: Outcome, tasks: tuple[Task, ...], folder: Path) -> str:
+    count = len(outcome.made) + len(outcome.kept)
+    return f"{count} of {len(tasks)} recordings are finished in {folder}; the same command goes on from there"

@@ -1,0 +1,251 @@
+"""What a data set holds: a YAML file, and the list of recordings it stands for.
+
+    name: two-floors
+    seed: 1
+    buildings:
+      A: {kind: A, seed: 3}            # as `building` in a scene file; `floors` below picks a floor
+      shop: shop.yaml                  # a scene of the project, or a scene file beside this one
+    recordings:
+      - {building: A, floors: [0, 1], platform: handheld, count: 15, duration: 60}
+      - {building: shop, platform: [cart, robot], count: 2, duration: 20}
+    radar: radarize                    # preset or .cfg file
+    frontend: board.yaml               # as `radarsim calibrate` writes it; an IWR1843BOOST's by default
+    sensors: [depth, imu]              # or all, or none
+    storage: raw                       # or heatmaps: no samples, about a tenth of the size, for training
+    splits:
+      random: {kind: random, folds: 5}                                  # random-0 ... random-4
+      platform: {kind: platform, train: [handheld]}                     # tested on all others
+      building: {kind: building, held_out: [A, shop]}                   # building-A, building-shop
+
+A recording is called BUILDING_FLOOR_PLATFORM_NUMBER. Its seed comes from the data set's seed and this name alone, so a
+recording stays the same whatever else the data set holds and in whatever order it is made.
+"""
+
+import hashlib
+import json
+from collections import Counter
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from radarize.errors import InputError
+from radarize.radar.cfg import load_config
+from radarize.radar.limits import check_limits
+from radarsim.dataset.splits import Split
+from radarsim.dataset.task import Task
+from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.scene.description import Description, find, shipped
+
+Platform = Literal["handheld", "cart", "robot"]
+Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Recordings(_Strict):
+    """Some recordings of one building.
+
+    Attributes:
+        building: a name of `Specification.buildings`.
+        floors: used in turn; none for buildings without floors.
+        platform: one, or several with `count` recordings each.
+        count: recordings per platform.
+        duration: s, each.
+    """
+
+    building: Name
+    floors: tuple[Annotated[int, Field(ge=0)], ...] = ()
+    platform: Platform | tuple[Platform, ...]
+    count: int = Field(gt=0)
+    duration: float = Field(gt=0)
+
+    @property
+    def platforms(self) -> tuple[str, ...]:
+        return (self.platform,) if isinstance(self.platform, str) else self.platform
+
+
+class Specification(_Strict):
+    """A data set's specification; see the head of this file."""
+
+    name: Name
+    seed: int = Field(0, ge=0)
+    buildings: dict[Name, dict | str] = Field(min_length=1)
+    recordings: tuple[Recordings, ...] = Field(min_length=1)
+    radar: str = "radarize"
+    frontend: str | None = None
+    sensors: tuple[str, ...] | Literal["all", "none"] = "none"
+    storage: Literal["raw", "heatmaps"] = "raw"
+    splits: dict[Name, Split] = {}
+    _folder: Path = Path()
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Specification":
+        for number, group in enumerate(self.recordings):
+            if group.building not in self.buildings:
+                raise ValueError(
+                    f"recordings[{number}].building is {group.building!r}, expected one of buildings: "
+                    f"{', '.join(self.buildings)}"
+                )
+            if group.floors and isinstance(self.buildings[group.building], str):
+                raise ValueError(
+                    f"recordings[{number}].floors is {list(group.floors)}, but building {group.building} is a scene "
+                    "file, expected no floors"
+                )
+        return self
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Specification":
+        """Read a specification: a YAML file, or the name of one that comes with the project (``small``).
+
+        Raises:
+            InputError: missing file, malformed YAML, an unknown key or a wrong value, with file and field.
+        """
+        path = _find(path)
+        try:
+            data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise InputError(f"{path}: cannot be read ({error})") from error
+        except yaml.YAMLError as error:
+            raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+        if not isinstance(data, dict):
+            raise InputError(f"{path}: holds {type(data).__name__}, expected keys such as buildings and recordings")
+        try:
+            found = cls.model_validate(data)
+            found._folder = path.parent
+            for late in ("tasks", "members"):  # so that their errors come now, with the file's name
+                getattr(found, late)
+        except ValidationError as error:
+            raise InputError(f"{path}: {_first(error)}") from error
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+        return found
+
+    @cached_property
+    def tasks(self) -> tuple[Task, ...]:
+        """One task for each recording, in the order of the file.
+
+        Raises:
+            InputError: a scene, radar or front-end file is missing or wrong.
+        """
+        radar = self._beside(self.radar)
+        config, _ = load_config(radar)
+        check_limits(config)
+        frontend = None if self.frontend is None else self._beside(self.frontend)
+        settings = FrontEndConfig.load(frontend) if frontend else FrontEndConfig()
+        fixed = {
+            "radar": radar,
+            "frontend": frontend,
+            "sensors": self._sensors(),
+            "storage": self.storage,
+            "settings": hashlib.sha256((config.model_dump_json() + settings.model_dump_json()).encode()).hexdigest(),
+        }
+        tasks, count = [], Counter()
+        for number, group in enumerate(self.recordings):
+            frames = config.frames_within(group.duration)
+            if not frames:
+                raise InputError(
+                    f"recordings[{number}].duration is {group.duration} s, expected at least one frame "
+                    f"({config.burst_time:.4f} s)"
+                )
+            for platform in group.platforms:
+                for k in range(group.count):
+                    floor = group.floors[k % len(group.floors)] if group.floors else None
+                    place = group.building if floor is None else f"{group.building}_{floor}"
+                    name = f"{place}_{platform}_{count[place, platform]:02d}"
+                    count[place, platform] += 1
+                    seed = np.random.SeedSequence([self.seed, *name.encode()]).generate_state(1, np.uint64)[0]
+                    tasks.append(
+                        Task(
+                            name=name, building=group.building, floor=floor, platform=platform,
+                            scene=self._scene(group.building, floor), duration=group.duration, frames=frames,
+                            seed=int(seed >> np.uint64(1)), **fixed,
+                        )
+                    )  # fmt: skip
+        return tuple(tasks)
+
+    @cached_property
+    def members(self) -> dict[str, dict[str, list[str]]]:
+        """Split name to train, validation and test to names of recordings."""
+        found = {}
+        for name, split in self.splits.items():
+            rng = np.random.default_rng([self.seed, *name.encode()])
+            try:
+                found |= split.members(name, self.tasks, rng)
+            except InputError as error:
+                raise InputError(f"splits.{name}: {error}") from error
+        return found
+
+    def as_data(self) -> dict[str, object]:
+        """The expanded specification as JSON-ready data."""
+        return {
+            "specification": self.model_dump(mode="json"),
+            "recordings": {task.name: task.parameters for task in self.tasks},
+            "splits": self.members,
+        }
+
+    def _sensors(self) -> tuple[str, ...]:
+        names = {"all": ("all",), "none": ()}.get(self.sensors, self.sensors)
+        if not names:
+            return ()
+        from radarsim.sensors.suite import chosen
+
+        return tuple(chosen(names))
+
+    def _scene(self, building: str, floor: int | None) -> dict | str:
+        given = self.buildings[building]
+        if isinstance(given, str):
+            try:
+                return str(find(self._beside(given)).resolve())
+            except InputError as error:
+                raise InputError(f"buildings.{building}: {error}") from error
+        description = {"building": given if floor is None else given | {"floor": floor}}
+        try:
+            Description.model_validate(description)
+        except ValidationError as error:
+            reason = _first(error).removeprefix(f"building.{given.get('kind')}.")
+            raise InputError(f"buildings.{building}: {reason}") from error
+        return description
+
+    def _beside(self, name: str) -> str:
+        """A file that the specification names: beside it where there is one, else left to those who look further."""
+        beside = self._folder / name
+        return str(beside.resolve()) if beside.is_file() else name
+
+
+def _find(path: str | Path) -> Path:
+    given = Path(path)
+    if given.is_file():
+        return given
+    folder = shipped() / "datasets"
+    if given.suffix not in (".yaml", ".yml") and (named := folder / f"{given.name}.yaml").is_file():
+        return named
+    known = ", ".join(sorted(file.stem for file in folder.glob("*.yaml")))
+    raise InputError(f"no specification {str(path)!r}, expected a .yaml file or one of: {known or 'none found'}")
+
+
+def _first(error: ValidationError) -> str:
+    """The first complaint as one sentence, with the field's place in the file."""
+    problem = error.errors()[0]
+    place = [part for part in problem["loc"] if not (isinstance(part, str) and ("[" in part or part in _TAGS))]
+    if place[:1] == ["splits"]:
+        del place[2:3]  # the kind, by which pydantic chose
+    field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).lstrip(".")
+    message = problem["msg"].removeprefix("Value error, ")
+    if problem["type"] == "extra_forbidden":
+        return f"{field}: unknown key"
+    if problem["type"] == "missing":
+        return f"has no {field}"
+    if not field:
+        return message
+    value = "" if isinstance(problem["input"], dict) else f" is {json.dumps(problem['input'], default=str)}"
+    return f"{field}{value}: {message[0].lower()}{message[1:]}"
+
+
+#: Names that pydantic puts into an error's path for the branches of a union.
+_TAGS = {"str", "dict", "dict[any,any]"}

@@ -1,0 +1,194 @@
+"""One recording of a data set: what it must be, whether it is there already, and how it is made."""
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from hashlib import sha256
+from pathlib import Path
+
+from radarize import __version__
+from radarize.errors import InputError
+from radarize.recording import Recording
+
+#: Attribute of a recording that holds its task's parameters.
+ATTRIBUTE = "task"
+#: What a killed run may leave beside a recording: samples of it, or those that its heat maps are made from.
+_LEFTOVERS = (".part", ".raw.part", ".raw.part.part")
+
+
+class Stale(InputError):
+    """A recording that was made with other parameters."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """One recording to make.
+
+    Attributes:
+        name: of the recording, without suffix.
+        building, floor: as in the specification.
+        platform: how the sensor moves.
+        scene: a scene's description, or the path of its file.
+        duration: s.
+        frames: that the recording will have.
+        seed: of tour, scatterers and noise.
+        radar: preset or configuration file.
+        frontend: front-end file; None for the default.
+        settings: digest of what these two hold.
+        sensors: truth sensors.
+        storage: ``raw`` or ``heatmaps``.
+    """
+
+    name: str
+    building: str
+    floor: int | None
+    platform: str
+    scene: dict | str
+    duration: float
+    frames: int
+    seed: int
+    radar: str
+    frontend: str | None
+    settings: str
+    sensors: tuple[str, ...]
+    storage: str
+
+    @property
+    def parameters(self) -> dict[str, object]:
+        """Everything that decides the recording's bytes; files by their content, so that they may move."""
+        found = asdict(self) | {"sensors": list(self.sensors), "version": __version__}
+        for field in ("radar", "frontend"):
+            found[field] = found[field] and Path(found[field]).name
+        if isinstance(self.scene, str):
+            found["scene"] = {"file": Path(self.scene).name, "sha256": _digest(Path(self.scene))}
+        return found
+
+    @property
+    def identity(self) -> str:
+        """`parameters` as the text that the recording keeps."""
+        return json.dumps(self.parameters, sort_keys=True)
+
+    def path(self, folder: Path) -> Path:
+        """Where the recording lies."""
+        return folder / f"{self.name}.h5"
+
+    def is_finished(self, folder: Path) -> bool:
+        """Whether the recording is there and whole.
+
+        Raises:
+            Stale: it is, but was made with other parameters, or is no recording of a data set.
+        """
+        path = self.path(folder)
+        if not path.is_file():
+            return False
+        try:
+            with Recording(path) as recording:
+                frames, made = len(recording), recording.attributes.get(ATTRIBUTE)
+        except InputError:
+            return False  # cut short or damaged
+        if made is None:
+            raise Stale(f"{self.name} does not come from a data set")
+        made = json.loads(str(made))
+        for field, wanted in json.loads(self.identity).items():
+            if made.get(field) != wanted:
+                raise Stale(f"{self.name} has {field} {_short(made.get(field))}, now {_short(wanted)}")
+        return frames == self.frames
+
+    def make(self, folder: Path, threads: int | None = None, progress: Callable[[int, int], None] | None = None) -> str:
+        """Simulate the recording; it appears under its name when it is whole.
+
+        Args:
+            folder: where.
+            threads: bound on those of the libraries that simulate; the first call of a process decides.
+            progress: called with (frames done, frames in all).
+
+        Returns:
+            statistics of its motion, one line.
+
+        Raises:
+            InputError: with the task's name.
+        """
+        if threads:
+            _use_threads(threads)
+        from radarize.training.maps import keep_maps
+        from radarsim.scene.scene import Scene
+        from radarsim.simulate import simulate
+        from radarsim.statistics import Statistics
+
+        final = self.path(folder)
+        path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
+        try:
+            scene = Scene.load(self.scene) if isinstance(self.scene, str) else Scene.of(self.scene, self._place)
+            simulate(
+                scene,
+                path,
+                platform=self.platform,
+                duration=self.duration,
+                seed=self.seed,
+                radar=self.radar,
+                frontend=None if self.frontend is None else Path(self.frontend),
+                sensors=self.sensors,
+                attributes={ATTRIBUTE: self.identity},
+                progress=progress,
+            )
+            with Recording(path) as recording:
+                moved = Statistics.from_json(str(recording.attributes["motion"]))
+            if path != final:
+                keep_maps(path, final)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from error
+        finally:
+            if path != final:
+                path.unlink(missing_ok=True)
+        return str(moved)
+
+    def clear(self, folder: Path) -> None:
+        """Remove what a killed run left half-written."""
+        for suffix in _LEFTOVERS:
+            path = self.path(folder)
+            path.with_name(path.name + suffix).unlink(missing_ok=True)
+
+    @property
+    def _place(self) -> str:
+        return self.building if self.floor is None else f"{self.building}_{self.floor}"
+
+
+@dataclass(frozen=True)
+class Event:
+    """What a worker reports.
+
+    Attributes:
+        task: which it works on.
+        frames: made so far.
+        motion: its statistics, one line, once the recording is finished.
+        error: why it failed, one sentence.
+    """
+
+    task: Task
+    frames: int = 0
+    motion: str | None = None
+    error: str | None = None
+
+
+def _digest(path: Path) -> str:
+    try:
+        return sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+
+
+def _short(value: object) -> str:
+    text = json.dumps(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _use_threads(count: int) -> None:
+    for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = str(count)
+    from radarsim import llvm
+
+    llvm.require()
+    import drjit
+
+    drjit.set_thread_count(count)

@@ -1,0 +1,133 @@
+"""The run of a data set, whatever makes its recordings: progress, failures, killed workers, resuming, refusals."""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from fakes import FakeSpecification, fake
+
+from radarize.errors import InputError
+from radarize.recording import Recording
+from radarsim.dataset import run
+from radarsim.dataset.run import make
+from radarsim.dataset.task import Event
+
+
+def made(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.h5*")}
+
+
+@pytest.fixture(scope="module")
+def undisturbed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("undisturbed")
+    make(FakeSpecification(*(fake(name) for name in "abcd")), folder, workers=2, say=lambda line: None)
+    return made(folder)
+
+
+def test_every_recording_is_made_once(undisturbed, tmp_path):
+    seen, lines = [], []
+    specification = FakeSpecification(*(fake(name) for name in "abcd"))
+    arguments = {"workers": 2, "progress": lambda *p: seen.append(p), "say": lines.append}
+    outcome = make(specification, tmp_path, **arguments)
+    assert sorted(outcome.made) == ["a", "b", "c", "d"] and not outcome.kept and not outcome.failed
+    assert seen[0] == (0, 16) and seen[-1] == (16, 16) and seen == sorted(seen)
+    assert sorted(lines) == [f"{name}: 1 m" for name in "abcd"]
+    assert made(tmp_path) == undisturbed and len(undisturbed) == 4
+    again = make(specification, tmp_path, **arguments)
+    assert sorted(again.kept) == ["a", "b", "c", "d"] and not again.made and seen[-1] == (16, 16)
+
+
+def test_failures_do_not_stop_the_others(undisturbed, tmp_path):
+    """A bad tour, a bug, and a process that is killed each time: named, and nothing half-written stays."""
+    tasks = fake("a", "fails"), fake("b", "breaks"), fake("x", "killed"), fake("c"), fake("d")
+    lines = []
+    outcome = make(FakeSpecification(*tasks), tmp_path, workers=2, say=lines.append)
+    assert sorted(outcome.made) == ["c", "d"]
+    assert outcome.failed["a"] == "a: no room to move"
+    assert outcome.failed["b"] == "b: internal error, ZeroDivisionError: odd"
+    assert outcome.failed["x"].startswith("x: its process was killed, twice")
+    assert "failed: a: no room to move" in lines
+    assert made(tmp_path) == {name: undisturbed[name] for name in ("c.h5", "d.h5")}
+
+
+def test_a_killed_worker_is_replaced_and_its_task_begun_again(tmp_path):
+    outcome = make(FakeSpecification(fake("a", "killed once"), fake("b")), tmp_path, workers=1, say=lambda line: None)
+    assert sorted(outcome.made) == ["a", "b"] and not outcome.failed
+    with Recording(tmp_path / "a.h5") as recording:
+        assert len(recording) == 4
+
+
+def test_half_written_recordings_are_redone(undisturbed, tmp_path):
+    specification = FakeSpecification(*(fake(name) for name in "abcd"))
+    for name, cut in (("a.h5.part", 5000), ("b.h5", 5000), ("c.h5", None)):  # half-written, cut short, whole
+        (tmp_path / name).write_bytes(undisturbed[name[:4]][:cut])
+    outcome = make(specification, tmp_path, workers=2, say=lambda line: None)
+    assert outcome.kept == ["c"] and sorted(outcome.made) == ["a", "b", "d"]
+    assert made(tmp_path) == undisturbed
+
+
+def test_recordings_of_other_parameters_are_named_and_kept(tmp_path):
+    make(FakeSpecification(fake("a"), fake("b")), tmp_path, workers=1, say=lambda line: None)
+    before = made(tmp_path)
+    longer = FakeSpecification(fake("a"), fake("b", frames=5))
+    with pytest.raises(InputError, match=r"b has frames 4, now 5; --replace makes such recordings anew"):
+        make(longer, tmp_path)
+    assert made(tmp_path) == before
+    outcome = make(longer, tmp_path, workers=1, replace=True, say=lambda line: None)
+    assert outcome.kept == ["a"] and outcome.made == ["b"]
+
+
+def test_a_full_disk_ends_the_run(tmp_path):
+    tasks = fake("a", "full disk"), fake("b"), fake("c")
+    with pytest.raises(InputError, match="no space left on the device; 0 of 3 recordings are finished"):
+        make(FakeSpecification(*tasks), tmp_path, workers=1, say=lambda line: None)
+
+
+def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
+    def interrupted(todo, folder, workers, ray):
+        yield Event(todo[0], 4, motion="1 m")
+        (folder / "b.h5.part").touch()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run, "_crew", interrupted)
+    with pytest.raises(InputError, match="stopped; 1 of 2 recordings are finished in .*; the same command goes on"):
+        make(FakeSpecification(fake("a"), fake("b")), tmp_path, say=lambda line: None)
+    assert not made(tmp_path)
+
+
+ORPHANS = """
+import sys
+from pathlib import Path
+from fakes import FakeSpecification, fake
+from radarsim.dataset.run import make
+
+if __name__ == "__main__":
+    make(FakeSpecification(fake("a"), fake("b", "slow", 40)), Path(sys.argv[1]), workers=2)
+"""
+
+
+def test_workers_end_with_a_killed_parent_and_runs_exclude_each_other(tmp_path):
+    script, folder = tmp_path / "script.py", tmp_path / "out"
+    script.write_text(ORPHANS)
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    parent = subprocess.Popen([sys.executable, script, folder], env=environment)
+    part = folder / "b.h5.part"
+    waited = time.monotonic() + 60
+    while not ((folder / "a.h5").exists() and part.exists()):
+        assert time.monotonic() < waited and parent.poll() is None
+        time.sleep(0.02)
+    tasks = FakeSpecification(fake("a"), fake("b", "slow", 40))
+    with pytest.raises(InputError, match="another run is making a data set here"):
+        make(tasks, folder)
+    children = subprocess.run(["ps", "--ppid", str(parent.pid), "-o", "pid="], capture_output=True, text=True)
+    parent.kill()
+    parent.wait()
+    waited = time.monotonic() + 5
+    while any(Path(f"/proc/{pid}").exists() for pid in children.stdout.split()):
+        assert time.monotonic() < waited, "a worker outlives its parent"
+        time.sleep(0.02)
+    outcome = make(FakeSpecification(fake("a")), folder, workers=1, say=lambda line: None)
+    assert outcome.kept == ["a"]

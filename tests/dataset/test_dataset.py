@@ -1,0 +1,139 @@
+"""Real recordings of a data set: killed and resumed, on local processes and on a Ray cluster, the same bytes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+from fakes import FakeSpecification, fake
+
+from radarize.errors import InputError
+from radarize.recording import Recording
+from radarize.training.maps import MAPS
+from radarsim.dataset.run import make
+from radarsim.dataset.specification import Specification
+
+PLAIN = {
+    "name": "tiny",
+    "seed": 1,
+    "buildings": {"office": {"kind": "office", "seed": 3}},
+    "recordings": [{"building": "office", "platform": ["cart", "robot"], "count": 1, "duration": 0.5}],
+    "sensors": ["occupancy", "imu"],
+    "storage": "heatmaps",
+}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def specification(tmp_path_factory):
+    path = tmp_path_factory.mktemp("spec") / "tiny.yaml"
+    path.write_text(yaml.safe_dump(PLAIN))
+    return path
+
+
+@pytest.fixture(scope="module")
+def undisturbed(specification, tmp_path_factory):
+    """Made in this process, with all its threads; all others must give the same bytes."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    for task in Specification.load(specification).tasks:
+        task.make(folder)
+    return contents(folder)
+
+
+def test_a_recording_holds_what_was_asked_for(undisturbed, tmp_path):
+    assert sorted(undisturbed) == ["office_cart_00.h5", "office_robot_00.h5"]
+    path = tmp_path / "a.h5"
+    path.write_bytes(undisturbed["office_cart_00.h5"])
+    with Recording(path) as recording:
+        assert len(recording) == 15 and recording.attributes["platform"] == "cart"
+        for name in ("truth/pose", "truth/scan", "truth/occupancy", "imu/gyroscope", *(f"maps/{m}" for m in MAPS)):
+            assert recording.has(name)
+        assert not recording.has("radar/adc") and not recording.has("truth/depth")
+
+
+def test_killed_and_resumed(specification, undisturbed, tmp_path):
+    command = [Path(sys.executable).parent / "radarsim", "dataset", specification, "-o", tmp_path, "--workers", "1"]
+    run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    waited = time.monotonic() + 120
+    while not list(tmp_path.glob("office_robot_00.h5.*part")):
+        assert time.monotonic() < waited and run.poll() is None
+        time.sleep(0.005)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    assert (tmp_path / "office_cart_00.h5").exists() and not (tmp_path / "office_robot_00.h5").exists()
+    stamp = (tmp_path / "office_cart_00.h5").stat().st_mtime_ns
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "1 recordings made, 1 were there" in done.stdout and "office_robot_00: 0." in done.stdout
+    assert (tmp_path / "office_cart_00.h5").stat().st_mtime_ns == stamp
+    found = contents(tmp_path)
+    assert found.pop("dataset.json") and found == undisturbed
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """Two nodes of one core each on this machine, which can import what this process can."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        patch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *sys.path]))
+        yield from _two_nodes()
+
+
+def _two_nodes():
+    import ray
+    from ray.cluster_utils import Cluster
+
+    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    nodes.add_node(num_cpus=1)
+    yield nodes.address
+    ray.shutdown()
+    nodes.shutdown()
+
+
+def test_a_ray_cluster_makes_the_same_bytes(cluster, specification, undisturbed, tmp_path):
+    seen = []
+    outcome = make(
+        Specification.load(specification), tmp_path, ray=cluster, progress=lambda *p: seen.append(p), say=lambda _: None
+    )
+    assert sorted(outcome.made) == ["office_cart_00", "office_robot_00"] and seen[-1] == (30, 30)
+    found = contents(tmp_path)
+    assert found.pop("dataset.json") and found == undisturbed
+
+
+def test_ray_begins_the_task_of_a_killed_worker_again(cluster, tmp_path):
+    """And names the one that no worker survives."""
+    tasks = fake("a", "killed once"), fake("b"), fake("x", "fails")
+    outcome = make(FakeSpecification(*tasks), tmp_path, ray=cluster, say=lambda _: None)
+    assert sorted(outcome.made) == ["a", "b"] and outcome.failed == {"x": "x: no room to move"}
+    assert (tmp_path / "a.tried").exists()
+    with Recording(tmp_path / "a.h5") as recording:
+        assert len(recording) == 4
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_a_cluster_that_is_not_there(tmp_path, specification):
+    code = (
+        "import sys\nfrom radarsim.cli import main\n"
+        f"sys.argv = ['radarsim', 'dataset', {str(specification)!r}, '-o', {str(tmp_path)!r}, '--ray', '127.0.0.1:9']\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 2 and "--ray 127.0.0.1:9: no cluster answers" in done.stderr
+    assert "Traceback" not in done.stderr and "stopped" not in done.stdout
+
+
+def test_a_building_without_room_is_named(tmp_path):
+    scene = tmp_path / "cell.yaml"
+    scene.write_text("objects:\n  - {name: floor, shape: box, size: [1, 1, 0.1], material: concrete}\n")
+    path = tmp_path / "spec.yaml"
+    path.write_text(yaml.safe_dump(PLAIN | {"buildings": {"office": "cell.yaml"}}))
+    task = Specification.load(path).tasks[0]
+    with pytest.raises(InputError, match="office_cart_00: scene cell, platform cart: no room to move"):
+        task.make(tmp_path)

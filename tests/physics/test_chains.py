@@ -10,23 +10,15 @@ from scipy.spatial.transform import Rotation
 from radarize.radar.presets import PRESETS
 from radarsim.physics import chains
 from radarsim.physics.echoes import Provenance
-from radarsim.physics.facets import TABLE, Facets
+from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene.scene import Scene
+from tests.physics.rigs import conductors, isotropic_view
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
-ISOTROPIC = (np.ones(181), np.ones(181))
-
-
-def conductors(*plates):
-    """Conducting rectangles: (centre, side directions u and v, half sides); the normal is u x v."""
-    center, u, v, half = (np.array(column, float) for column in zip(*plates, strict=True))
-    none, n = np.zeros(len(plates), bool), len(plates)
-    gamma = np.broadcast_to(np.array([-1.0, 1.0])[:, None], (n, 2, TABLE)).astype(complex)
-    return Facets(center, np.cross(u, v), u, v, half, none, none, none, gamma)
 
 
 def corner(count, a, b, triangles=False):
@@ -54,7 +46,7 @@ def cross_section(mirrors, direction, distance=6.0, roll=0.0):
     """RCS of all chains, as |a|^2 (4 pi)^3 R^4 / lambda^2, seen from a unit direction."""
     position = distance * np.asarray(direction)
     chain, isometry, amplitude, _ = chains.images(
-        mirrors, np.arange(len(mirrors)), position, looking(-position / distance, roll), 100.0, LAMBDA, 0.0, ISOTROPIC
+        mirrors, np.arange(len(mirrors)), isotropic_view(position, LAMBDA, looking(-position / distance, roll))
     )
     both = chain[:, 0] != chain[:, 2]
     isometry = np.concatenate([isometry, chains.reverse(isometry[both])])
@@ -123,9 +115,8 @@ def test_no_step_as_the_image_leaves_the_corner():
     values = []
     for z in 0.5 + np.arange(-100, 100) * 1e-3:
         position = np.array([1.4, 1.4, z])
-        _, _, amplitude, _ = chains.images(
-            mirrors, np.arange(2), position, looking(np.array([-1, -1, 0]) / np.sqrt(2)), 50.0, LAMBDA, 0.0, ISOTROPIC
-        )
+        pose = looking(np.array([-1, -1, 0]) / np.sqrt(2))
+        _, _, amplitude, _ = chains.images(mirrors, np.arange(2), isotropic_view(position, LAMBDA, pose))
         values.append(np.sum(amplitude))
     assert np.max(np.abs(np.diff(values))) < 0.03 * np.max(np.abs(values))
     assert abs(values[0]) > 10 * abs(values[-1])
@@ -160,7 +151,7 @@ def test_box_room_has_all_its_images(monkeypatch):
     low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
     p, pose = np.array([0.37, -0.21, 1.23]), Rotation.from_euler("ZYX", [0.3, 0.4, 0.5]).as_matrix()
     mirrors = Mirrors.of(Facets.of(scene, CONFIG), scene, 50.0)
-    chain, isometry, amplitude, _ = chains.images(mirrors, np.arange(6), p, pose, 50.0, LAMBDA, 0.0, ISOTROPIC)
+    chain, isometry, amplitude, _ = chains.images(mirrors, np.arange(6), isotropic_view(p, LAMBDA, pose))
     both = chain[:, 0] != chain[:, 2]
     isometry = np.concatenate([isometry, chains.reverse(isometry[both])])
     amplitude = np.concatenate([amplitude, amplitude[both]])

@@ -213,7 +213,8 @@ class EchoFinder:
             shown = self._shown[frame, index] * np.sqrt(s.sigma[index] * s.lobe[index, :3].sum(axis=1))
             weakest = self.weakest / np.maximum(scale * shown * best, 1e-300)
             longest = np.where(free, 2 * self.reach - distance, self.reach)
-            double = free & (self._weights[index, 2] > 0)
+            # How a virtual point moves is known of one mirror (`Legs.turn`): movers have no legs over two.
+            double = free & (self._weights[index, 2] > 0) & (index < self._still)
             pose = position, rotation, self.config.wavelength, self._tables
             single = np.stack([mirrors, np.full(len(mirrors), -1)], axis=1)
             bounds = longest[double], weakest[double]

@@ -32,8 +32,8 @@ from radarsim.physics.view import View
 
 #: The foot moves this far inwards, m: on a seam it is inside both plates, which adds up.
 NUDGE = 1e-8
-#: Nodes and weights of the quadrature along an edge, on 0 ... 1.
-_NODES, _WEIGHTS = (np.polynomial.legendre.leggauss(28) + np.array([[1.0], [0.0]])) / 2
+#: Nodes and weights of the quadrature along an edge, on 0 ... 1: for most, and for where the pole is near.
+_FEW, _MANY = ((np.polynomial.legendre.leggauss(n) + np.array([[1.0], [0.0]])) / 2 for n in (8, 28))
 
 
 def parts(
@@ -164,14 +164,15 @@ def _beyond(h, s, slant, x, wavelength):
     end = np.arcsinh(min(3.0, 5.5 / (begin + 1e-3)) / around)
     turn = np.exp(0.25j * np.pi)
     total = 0j
-    for i in range(len(_NODES)):
-        u = end * _NODES[i]
+    nodes, weights = _FEW if end < 1.5 else _MANY
+    for i in range(len(nodes)):
+        u = end * nodes[i]
         y = around * np.sinh(u) * turn
         rise = wavelength / 8 * (begin + y) ** 2  # rho - L
         rho = slant + rise
         below = s * s / (slant + h) + rise  # rho - h
         phase = np.exp(0.5j * np.pi * y * (2 * begin + y))
-        total += _WEIGHTS[i] * np.cosh(u) * phase / (rho * below * (rho + h) * np.sqrt(rho + slant))
+        total += weights[i] * np.cosh(u) * phase / (rho * below * (rho + h) * np.sqrt(rho + slant))
     return total * turn * around * end * h * h * s * np.sqrt(wavelength / 2) / (2 * np.pi)
 
 

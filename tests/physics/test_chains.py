@@ -211,7 +211,7 @@ def test_images_fade_out_before_their_paths_get_too_long():
     reach = front.settings.band.high * CONFIG.max_range
     mirrors, ahead = Mirrors.of(Facets.of(scene, CONFIG), scene, 50.0), looking(direction(0.4, 0.1))
     frames = []
-    for x in np.arange(-1.0, 0.0, 0.01):
+    for x in np.arange(-1.5, 1.5, 0.01):
         position = np.array([x, 0.1, 1.4])
         chain, isometry, _, _ = chains.images(mirrors, np.arange(6), isotropic_view(position, LAMBDA, ahead, reach))
         path = np.linalg.norm(position - isometry[:, :, :3] @ position - isometry[:, :, 3], axis=1)
@@ -220,5 +220,5 @@ def test_images_fade_out_before_their_paths_get_too_long():
     for before, after in zip(frames, frames[1:], strict=False):
         for some, other in ((before, after), (after, before)):
             pops += [p for c, p in some.items() if c not in other and p > 2 * reach - 0.05]
-    assert len(pops) > 3
+    assert len(pops) > 2
     assert np.abs(front.if_response(np.array(pops))).max() < 0.05

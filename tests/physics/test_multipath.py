@@ -20,6 +20,7 @@ from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
 from radarsim.scene.shapes import box, rectangle
+from tests.physics.brute_force import transfer_matrix
 from tests.physics.rigs import Rig, burst
 
 CONFIG = PRESETS["radarize"]
@@ -105,27 +106,6 @@ def test_the_hidden_are_seen_over_mirrors():
     assert not len(points_of(echoes, Provenance.DIRECT)[0]) and not len(points_of(echoes, Provenance.GHOST_1)[0])
     points, _ = points_of(echoes, Provenance.GHOST_2)
     assert points == pytest.approx(np.array([[[2.4, 2.4, 0], [2.4, 2.4, 0]]]))
-
-
-def transfer_matrix(layers, cosine, frequency, tm):
-    """Transmission and reflection of layers (permittivity, thickness) in air by 2 x 2 matrices, e^{+jwt}.
-
-    Born and Wolf, 1.6; ratios of the fields along the layers.
-    """
-    k = 2 * np.pi * frequency / SPEED_OF_LIGHT
-    sine = 1 - cosine**2
-    total = np.eye(2, dtype=complex)
-    for permittivity, thickness in layers:
-        root = np.sqrt(permittivity - sine)
-        admittance = permittivity / root if tm else root
-        delta = k * thickness * root
-        total = total @ [
-            [np.cos(delta), 1j * np.sin(delta) / admittance],
-            [1j * admittance * np.sin(delta), np.cos(delta)],
-        ]
-    air = 1 / cosine if tm else cosine
-    electric, magnetic = total[0] @ [1, air] * air, total[1] @ [1, air]
-    return 2 * air / (electric + magnetic), (electric - magnetic) / (electric + magnetic)
 
 
 @pytest.mark.parametrize("angle", [0.0, 30.0, 55.0])

@@ -79,8 +79,10 @@ class Simulator:
         if engine == "sionna":
             self.finder = PathSolverFinder(scene, config, weakest, antenna, int(world.integers(2**31)))
         else:
+            band = self.front_end.settings.band
+            reach = None if band is None else band.high * config.max_range  # where the IF filter closes
             self.finder = EchoFinder(
-                scene, Surface(scene, world), Facets.of(scene, config), config, weakest, antenna=antenna,
+                scene, Surface(scene, world), Facets.of(scene, config), config, weakest, reach, antenna,
                 curved=Curved.of(scene, config), crowd=Crowd(scene.movers, crowd),
             )  # fmt: skip
         self.synthesize = Synthesizer(config) if device == "cpu" else DirectSum(config, device)

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from radarsim.physics.antenna import amplitude_gain
-from radarsim.physics.facets import TABLE
+from radarsim.physics.coefficients import TABLE
 
 
 @njit(inline="always")

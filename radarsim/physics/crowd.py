@@ -76,7 +76,7 @@ class Crowd:
             two_sided=np.zeros(n, bool),
             horizontal=np.zeros(n, bool),
             bounces=np.where(every % BOUNCE_STRIDE == 0, float(BOUNCE_STRIDE), 0.0),
-            bounces_twice=np.zeros(n),  # ghosts of movers are of first order only
+            bounces_twice=np.where(every % BOUNCE_STRIDE**2 == 0, float(BOUNCE_STRIDE**2), 0.0),
             lobe=np.tile(LAMBERT, (n, 1)),
             rank=np.full(n, -1.0),
         )

@@ -6,7 +6,13 @@ sensor to the nearest point, times sqrt(a / (a + h)) for each curved direction:
     sphere    lambda / (8 pi h) a / (a + h), far away sigma = pi a^2;
     cylinder  lambda / (8 pi h) sqrt(a / (a + h)) (interior - ends), far away at broadside sigma = k a l^2.
 
-Along a cylinder the Fresnel integral and its end terms are those of a plate's side. Paths are isometries of the
+Along a cylinder the Fresnel integral splits into the interior (if the foot of the perpendicular lies between the ends)
+and one term per end that decays away from it:
+
+    F = [G(u)] from u_1 to u_2,  G(u) = (C(u) + j S(u)) / (1 + j) = sign(u) (1/2 - E(|u|)),
+    u = +-2 sqrt((L_end - L_line) / lambda), L the round trip.
+
+ Paths are isometries of the
 receiver as for plates: a half turn about the nearest line of the cylinder, inversions in its ends and in the sphere's
 nearest point. The body's point or line wanders over it as the sensor moves, but is held during one burst: the path is
 then wrong by delta^2 (1 / h - 1 / (a + h)) for a step delta across, below 0.01 mm for a table leg or a lamp at walking
@@ -17,12 +23,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Complex, Float
+from numba import njit
+from scipy.special import fresnel
 
 from radarize.radar.config import RadarConfig
-from radarsim.physics import plates
+from radarsim.physics.antenna import amplitude_gain
 from radarsim.physics.bodies import recognise
-from radarsim.physics.facets import reflection_table
+from radarsim.physics.coefficients import as_slab, reflection
+from radarsim.physics.view import View
 from radarsim.scene.scene import Scene
+
+#: Above the antenna's gain both ways, as an amplitude: for a first sieve.
+PEAK_GAIN = 12.0
 
 
 @dataclass(frozen=True)
@@ -53,25 +65,18 @@ class Curved:
         for item in scene.objects:
             bodies, _ = recognise(item.mesh)
             if bodies:
-                reflection = reflection_table(item.material, config)[0, -1]
-                rows += [(b.center, b.axis, b.radius, b.half, reflection) for b in bodies]
+                head_on = reflection(as_slab(item)[0], config)[0, -1]
+                rows += [(b.center, b.axis, b.radius, b.half, head_on) for b in bodies]
         if not rows:
             return cls(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, complex))
         return cls(*(np.array(column) for column in zip(*rows, strict=True)))
 
     def parts(
         self,
-        position: Float[np.ndarray, "3"],
-        rotation: Float[np.ndarray, "3 3"],
-        reach: float,
-        wavelength: float,
-        weakest: float,
-        tables: tuple[np.ndarray, np.ndarray],
+        view: View,
     ) -> tuple[Float[np.ndarray, "part 3"], Float[np.ndarray, "part 3 4"], Complex[np.ndarray, "part"]]:
-        """Flashes and ends for a sensor pose: point that each comes from (m), isometry of the receiver, amplitude.
-
-        Args: as of `plates.parts`.
-        """
+        """Flashes and ends as the radar sees them: point to aim a ray at (m), isometry of the receiver, amplitude."""
+        position, reach, wavelength, weakest = view.position, view.reach, view.wavelength, view.weakest
         offset = position - self.center
         z = np.einsum("bd,bd->b", offset, self.axis)
         radial = offset - z[:, None] * self.axis
@@ -83,16 +88,16 @@ class Curved:
         sphere = half == 0
         across = np.stack([np.zeros_like(z), -half - z, half - z], axis=1)
         slant = np.hypot(h[:, None], across)
-        size = plates.side_terms(across[:, None], slant[:, None], h, wavelength)[:, 0]
+        size = _side_terms(across[:, None], slant[:, None], h, wavelength)[:, 0]
         size[:, 1:] *= np.sqrt(2) * h[:, None] ** 2 / (slant[:, 1:] ** 1.5 * np.sqrt(slant[:, 1:] + h[:, None]))
         size[sphere] = [1.0, 0.0, 0.0]
         spread = radius / (radius + h)
         size *= (wavelength / (8 * np.pi * h) * np.where(sphere, spread, np.sqrt(spread)))[:, None]
         size *= self.reflection[near, None]
-        b, part = np.nonzero((np.abs(size) * plates.PEAK_GAIN > weakest) & (slant < reach))
+        b, part = np.nonzero((np.abs(size) * PEAK_GAIN > weakest) & (slant < reach))
         along = np.stack([np.where(sphere, 0, z), -half, half], axis=1)[b, part]
         point = line[b] + along[:, None] * axis[b]
-        amplitude = size[b, part] * plates.gains((point - position) @ rotation, *tables) ** 2
+        amplitude = size[b, part] * _gains((point - position) @ view.rotation, *view.tables) ** 2
         keep = np.abs(amplitude) > weakest
         b, part, point, amplitude = b[keep], part[keep], point[keep], amplitude[keep]
         turned = axis[b] * (part == 0)[:, None]
@@ -100,3 +105,25 @@ class Curved:
         shift = point - np.einsum("pde,pe->pd", matrix, point)
         inward = np.array([0.0, 1.0, -1.0])[part] * np.minimum(0.01, half[b])
         return point + inward[:, None] * axis[b], np.concatenate([matrix, shift[:, :, None]], axis=2), amplitude
+
+
+def _side_terms(across, slant, h, wavelength) -> Complex[np.ndarray, "facet side part"]:
+    """Interior and edge terms of the Fresnel integral along each side, phases referred to the part's own path."""
+    u = 2 * np.sqrt(2 * np.maximum(slant - h[:, None, None], 0) / wavelength)
+    sine, cosine = fresnel(u)
+    edge = 0.5 - (cosine + 1j * sine) / (1 + 1j)
+    edge = edge * np.exp(-0.5j * np.pi * u**2)
+    terms = np.empty(across.shape, complex)
+    sign = np.where(across >= 0, 1, -1)  # +1 on the edge itself, for both of two abutting plates
+    terms[..., 0] = (sign[..., 2] - sign[..., 1]) / 2
+    terms[..., 1] = sign[..., 1] * edge[..., 1]
+    terms[..., 2] = -sign[..., 2] * edge[..., 2]
+    return terms
+
+
+@njit(cache=True)
+def _gains(directions, azimuth_table, elevation_table):
+    out = np.empty(len(directions))
+    for i in range(len(directions)):
+        out[i] = amplitude_gain(directions[i, 0], directions[i, 1], directions[i, 2], azimuth_table, elevation_table)
+    return out

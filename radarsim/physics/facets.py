@@ -1,4 +1,4 @@
-"""Flat rectangles of the scene: mirrors for ghosts, and plates that flash where they face the radar."""
+"""Flat parts of the scene: mirrors for ghosts, and plates that flash where they face the radar."""
 
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -8,8 +8,9 @@ from jaxtyping import Complex, Float
 
 from radarize.radar.config import RadarConfig
 from radarsim.physics.bodies import recognise
+from radarsim.physics.coefficients import TABLE, as_slab, reflection
 from radarsim.physics.grid import Grid
-from radarsim.physics.planes import rectangles
+from radarsim.physics.planes import plates
 from radarsim.scene.materials import Material
 from radarsim.scene.scene import Scene
 
@@ -18,17 +19,16 @@ from radarsim.scene.scene import Scene
 SMALLEST_PLATE, SMALLEST_METAL_PLATE = 0.01, 4e-4
 #: Facets below this area (m^2) are no mirrors: at 77 GHz and 2 m the first Fresnel zone is about 0.03 m^2 wide.
 SMALLEST_MIRROR = 0.25
-#: Entries of the reflection tables, over the cosine of the angle of incidence.
-TABLE = 65
 
 
 @dataclass(frozen=True)
 class Facets:
-    """Flat rectangles.
+    """Flat convex quadrilaterals, and in each a rectangle that stands for it where it is a mirror for scatterers.
 
     Attributes:
-        center, normal, u, v: m and unit vectors; u, v lie along the sides.
-        half: half side lengths along u and v, m.
+        corners: in order around, m; of a triangle two fall together.
+        center, normal, u, v: m and unit vectors; u, v lie along the rectangle's sides.
+        half: half the rectangle's side lengths along u and v, m.
         two_sided: sheets without a volume show both sides.
         mirror: large enough to be a mirror.
         horizontal: part of a floor or ceiling.
@@ -36,6 +36,7 @@ class Facets:
             included, as it appears in the beat signal (conjugate of the field's).
     """
 
+    corners: Float[np.ndarray, "facet 4 3"]
     center: Float[np.ndarray, "facet 3"]
     normal: Float[np.ndarray, "facet 3"]
     u: Float[np.ndarray, "facet 3"]
@@ -51,8 +52,7 @@ class Facets:
 
     @cached_property
     def _grid(self) -> Grid:
-        span = np.abs(self.half[:, :1] * self.u) + np.abs(self.half[:, 1:] * self.v)
-        return Grid(self.center - span, self.center + span)
+        return Grid(self.corners.min(axis=1), self.corners.max(axis=1))
 
     def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> "Facets":
         """Those within `reach` (m) of any of the positions, in the same order."""
@@ -61,28 +61,23 @@ class Facets:
 
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig) -> "Facets":
-        """The rectangles that cover the flat regions of a scene."""
+        """The quadrilaterals that cover the flat regions of a scene."""
         rows = []
-        tables: dict[str, np.ndarray] = {}
+        tables: dict[Material, np.ndarray] = {}
         for item in scene.objects:
-            mesh = item.mesh
-            name = item.material.name
-            if name not in tables:
-                tables[name] = reflection_table(item.material, config)
+            slab, _ = as_slab(item)
+            if slab not in tables:
+                tables[slab] = reflection(slab, config)
             smallest = SMALLEST_METAL_PLATE if item.material.conductor else SMALLEST_PLATE
-            _, is_round = recognise(mesh)
-            for r in rectangles(mesh, ~is_round, smallest):
-                mirror = 4 * r.half.prod() >= SMALLEST_MIRROR
+            _, is_round = recognise(item.mesh)
+            for p in plates(item.mesh, ~is_round, smallest):
+                mirror = 4 * p.half.prod() >= SMALLEST_MIRROR
                 sides = (item.two_sided, mirror, item.is_floor_or_ceiling)
-                rows.append((r.center, r.normal, r.u, r.v, r.half, *sides, tables[name]))
-        if not rows:
-            empty = np.zeros((0, 3))
-            none = np.zeros(0, bool)
-            return cls(empty, empty, empty, empty, np.zeros((0, 2)), none, none, none, np.zeros((0, 2, TABLE), complex))
-        return cls(*(np.array(column) for column in zip(*rows, strict=True)))
-
-
-def reflection_table(material: Material, config: RadarConfig) -> Complex[np.ndarray, "2 cosine"]:
-    """Fresnel coefficients with the factor that roughness leaves (`Material.coherent_factor`), ITU-R P.2040."""
-    cosine, frequency = np.linspace(0, 1, TABLE), config.center_frequency
-    return np.conj(np.stack(material.fresnel(cosine, frequency))) * material.coherent_factor(cosine, frequency)
+                rows.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *sides, tables[slab]))
+        if rows:
+            return cls(*(np.array(column) for column in zip(*rows, strict=True)))
+        none, empty = np.zeros(0, bool), np.zeros((0, 3))
+        return cls(
+            np.zeros((0, 4, 3)), empty, empty, empty, empty, np.zeros((0, 2)), none, none, none,
+            np.zeros((0, 2, TABLE), complex),
+        )  # fmt: skip

@@ -18,6 +18,7 @@ from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.slabs import Slabs
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import NODES, BurstClock
+from radarsim.physics.view import View
 from radarsim.scene.scene import Scene
 
 #: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
@@ -56,7 +57,7 @@ class EchoFinder:
         self.scene, self.surface, self.facets, self.config = scene, surface, facets, config
         self.weakest, self.curved, self.crowd = weakest, curved, crowd
         self.reach = 1.05 * config.max_range if reach is None else reach
-        self.mirrors = None if facets is None or not len(facets) else Mirrors.of(facets, scene, self.reach)
+        self.mirrors = None if facets is None else Mirrors.of(facets, scene, self.reach)
         self.slabs = None if scene is None else Slabs(scene, config, CLEARANCE)
         self._tables = gain_tables(antenna)
 
@@ -212,7 +213,8 @@ class EchoFinder:
             shown = self._shown[frame, index] * np.sqrt(s.sigma[index] * s.lobe[index, :3].sum(axis=1))
             weakest = self.weakest / np.maximum(scale * shown * best, 1e-300)
             longest = np.where(free, 2 * self.reach - distance, self.reach)
-            double = free & (self._weights[index, 2] > 0)
+            # How a virtual point moves is known of one mirror (`Legs.turn`): movers have no legs over two.
+            double = free & (self._weights[index, 2] > 0) & (index < self._still)
             pose = position, rotation, self.config.wavelength, self._tables
             single = np.stack([mirrors, np.full(len(mirrors), -1)], axis=1)
             bounds = longest[double], weakest[double]
@@ -254,16 +256,19 @@ class EchoFinder:
         frame, *columns = (np.concatenate(pair) for pair in zip(plate, chain, strict=True))
         return [tuple(column[frame == k] for column in columns) for k in range(len(positions))]
 
+    def _views(self, positions, rotations) -> list[View]:
+        limits = self.reach, self.config.wavelength, self.weakest, self._tables
+        return [View(p, r, *limits) for p, r in zip(positions, rotations, strict=True)]
+
     def _plates(self, positions, rotations) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Flashes: frame, isometry, amplitude, cause."""
-        limits = self.reach, self.config.wavelength, self.weakest, self._tables
         facets, found = self.facets.near(positions, self.reach), []
-        for pose in zip(positions, rotations, strict=True):
-            facet, *flat = plates.parts(facets, *pose, *limits)
+        for view in self._views(positions, rotations):
+            facet, *flat = plates.parts(facets, view)
             cause = np.where(facets.horizontal[facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
             found.append((*flat, cause))
             if self.curved is not None:
-                round_ = self.curved.parts(*pose, *limits)
+                round_ = self.curved.parts(view)
                 bent = (*round_, np.full(len(round_[0]), Provenance.DIRECT))
                 found[-1] = tuple(np.concatenate(pair) for pair in zip(found[-1], bent, strict=True))
         frame = np.repeat(np.arange(len(found)), [len(f[0]) for f in found])
@@ -281,10 +286,8 @@ class EchoFinder:
 
     def _chains(self, positions, rotations, near) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Chains of mirrors, either way round: frame, isometry, amplitude, cause."""
-        limits = self.reach, self.config.wavelength, self.weakest, self._tables
-        found = [
-            chains.images(self.mirrors, n, p, r, *limits) for n, p, r in zip(near, positions, rotations, strict=True)
-        ]
+        views = self._views(positions, rotations)
+        found = [chains.images(self.mirrors, n, view) for n, view in zip(near, views, strict=True)]
         frame = np.repeat(np.arange(len(found)), [len(f[0]) for f in found])
         chain, isometry, amplitude, stops = (np.concatenate(column) for column in zip(*found, strict=True))
         place = [positions[frame], *stops.transpose(1, 0, 2), positions[frame]]

@@ -103,12 +103,13 @@ class Band(_Strict):
     """The decimation filter's amplitude response over the beat frequency, as fractions of the sample rate.
 
     0 at `low`, 1 from 0 to `flat`, 0 from `high` on, straight in between. Noise of real captures falls by 2 to 9 dB in
-    the last sixteenth of the band, and images of echoes beyond 5 % of the sample rate are 50 to 70 dB down.
+    the last sixteenth of the band, and images of echoes beyond 5 % of the sample rate are 50 to 70 dB down. Where it
+    closes is as far as the simulator looks for echoes: they fade out there, and none pops.
     """
 
     low: float = Field(-0.06, lt=0)
     flat: float = Field(0.9, gt=0)
-    high: float = Field(1.1, gt=0)
+    high: float = Field(1.05, gt=0)
 
     @model_validator(mode="after")
     def _consistent(self) -> "Band":

@@ -17,16 +17,16 @@ SEAM = 0.01
 
 @dataclass(frozen=True)
 class Mirrors:
-    """Mirrors, and the smaller plates that form corners, as rectangles.
+    """Mirrors, and the smaller plates that form corners.
 
     Attributes:
-        center, normal, u, v, half, two_sided, horizontal, reflection: as in `Facets`.
+        corners, center, normal, u, v, half, two_sided, horizontal, reflection: as in `Facets`.
         large: a mirror for scatterers as well, not only part of a corner.
-        corners: of each, in order around it, m.
         first, following: what can be the next mirror after mirror m on a ray's way:
             following[first[m] : first[m + 1]].
     """
 
+    corners: Float[np.ndarray, "mirror 4 3"]
     center: Float[np.ndarray, "mirror 3"]
     normal: Float[np.ndarray, "mirror 3"]
     u: Float[np.ndarray, "mirror 3"]
@@ -36,7 +36,6 @@ class Mirrors:
     horizontal: Bool[np.ndarray, "mirror"]
     reflection: Complex[np.ndarray, "mirror 2 cosine"]
     large: Bool[np.ndarray, "mirror"]
-    corners: Float[np.ndarray, "mirror 4 3"]
     first: Int[np.ndarray, "mirror+1"]
     following: Int[np.ndarray, "pair"]
 
@@ -52,12 +51,10 @@ class Mirrors:
         member[pairs] = True
         index = np.flatnonzero(member)
         number = np.cumsum(member) - 1
-        columns = (getattr(facets, name)[index] for name in
-                   ("center", "normal", "u", "v", "half", "two_sided", "horizontal", "reflection"))  # fmt: skip
+        names = "corners", "center", "normal", "u", "v", "half", "two_sided", "horizontal", "reflection"
         return cls(
-            *columns,
+            *(getattr(facets, name)[index] for name in names),
             facets.mirror[index],
-            np.stack([_at(facets, index, a, b) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))], axis=1),
             np.searchsorted(number[pairs[:, 0]], np.arange(len(index) + 1)),
             number[pairs[:, 1]],
         )
@@ -67,7 +64,7 @@ class Mirrors:
     ) -> Int[np.ndarray, "n"]:
         """Mirrors with a part within reach and in front that turn their face to a position."""
         height = np.einsum("md,md->m", position - self.center, self.normal)
-        away = np.linalg.norm(_beyond(self, position), axis=1)
+        away = np.linalg.norm(self._beyond(position), axis=1)
         faced = (np.abs(height) > 0.01) & (self.two_sided | (height > 0))
         ahead = (self.corners @ forward).max(axis=1) > position @ forward
         return np.flatnonzero(faced & ahead & (np.hypot(height, away) < reach))
@@ -92,16 +89,15 @@ class Mirrors:
         ok |= level.min(axis=1) < -1e-3  # partly behind the first mirror: not bounded by its corners
         return np.stack([one[ok], two[ok]], axis=1)
 
+    def _beyond(self, position: np.ndarray) -> Float[np.ndarray, "mirror 2"]:
+        """How far the foot of a position lies outside each, along u and v; 0 inside of what they span."""
+        axes = np.stack([self.u, self.v], axis=1)
+        at = np.einsum("mkd,mad->mka", self.corners - position, axes)
+        return np.maximum(np.maximum(at.min(axis=1), -at.max(axis=1)), 0)
+
     def spread(self, mirrors: Int[np.ndarray, "n"], around: Float[np.ndarray, "3"], reach: float) -> np.ndarray:
         """`SAMPLES` points on each of some mirrors, on the part within a square of +-`reach` around a position, m."""
         return _spread(self, mirrors, np.broadcast_to(around, (len(mirrors), 3)), reach)
-
-
-def _beyond(rectangles, position: np.ndarray) -> Float[np.ndarray, "n 2"]:
-    """How far the foot of a position lies outside each rectangle, along its sides; 0 inside."""
-    offset = position - rectangles.center
-    foot = np.stack([np.einsum("md,md->m", offset, rectangles.u), np.einsum("md,md->m", offset, rectangles.v)], axis=1)
-    return np.maximum(np.abs(foot) - rectangles.half, 0)
 
 
 def _spread(rectangles, index, around, reach) -> Float[np.ndarray, "n samples 3"]:
@@ -115,16 +111,9 @@ def _spread(rectangles, index, around, reach) -> Float[np.ndarray, "n samples 3"
     return center[:, None] + at[..., :1] * u[:, None] + at[..., 1:] * v[:, None]
 
 
-def _at(facets: Facets, index: np.ndarray, a: float, b: float) -> Float[np.ndarray, "n 3"]:
-    """Points at shares -1...1 of the half sides."""
-    half = facets.half[index]
-    return facets.center[index] + a * half[:, :1] * facets.u[index] + b * half[:, 1:] * facets.v[index]
-
-
 def _touching(facets: Facets, index: np.ndarray, distance: float) -> Int[np.ndarray, "pair 2"]:
     """Ordered pairs of facets whose bounding boxes come within a distance, m."""
-    extent = facets.half[index, :1] * np.abs(facets.u[index]) + facets.half[index, 1:] * np.abs(facets.v[index])
-    low, high = facets.center[index] - extent, facets.center[index] + extent
+    low, high = facets.corners[index].min(axis=1), facets.corners[index].max(axis=1)
     tree = shapely.STRtree(shapely.box(low[:, 0], low[:, 1], high[:, 0], high[:, 1]))
     grown = shapely.box(*(low[:, :2] - distance).T, *(high[:, :2] + distance).T)
     a, b = tree.query(grown)
@@ -136,11 +125,8 @@ def _facing(facets: Facets, pairs: np.ndarray) -> np.ndarray:
     """Those pairs of which either has a part in front of the other."""
     ok = np.ones(len(pairs), bool)
     for a, b in (pairs.T, pairs.T[::-1]):
-        n = facets.normal[a]
-        height = np.einsum("pd,pd->p", facets.center[b] - facets.center[a], n)
-        span = (facets.half[b, 0] * np.abs(np.einsum("pd,pd->p", facets.u[b], n))
-                + facets.half[b, 1] * np.abs(np.einsum("pd,pd->p", facets.v[b], n)))  # fmt: skip
-        ok &= (height + span > SEAM) | (facets.two_sided[a] & (height - span < -SEAM))
+        height = np.einsum("pkd,pd->pk", facets.corners[b] - facets.corners[a, :1], facets.normal[a])
+        ok &= (height.max(axis=1) > SEAM) | (facets.two_sided[a] & (height.min(axis=1) < -SEAM))
     return pairs[ok]
 
 

@@ -1,4 +1,4 @@
-"""Flat regions of a mesh, scanned and noisy ones included, and the rectangles that cover them.
+"""Flat regions of a mesh, scanned and noisy ones included, and the quadrilaterals that cover them.
 
 A scanned wall is thousands of triangles that lie a millimetre off and a few degrees askew. Each by itself would be a
 mirror that points somewhere else, and the wall would sparkle. So triangles join their neighbours as long as they stay
@@ -24,14 +24,19 @@ ASKEW = np.cos(np.deg2rad(12))
 STRAIGHT = 2.0
 #: A rectangle fills this share of the bounding rectangle of its region; other regions are cut into strips.
 SMALLEST_FILL = 0.97
-#: Thickness of strips along slanted edges, m: below a Fresnel zone's width.
-STRIP = 0.05
 
 
 @dataclass(frozen=True)
-class Rectangle:
-    """A flat rectangle: center, unit normal, unit directions of its sides, half lengths along them (m)."""
+class Plate:
+    """A flat convex quadrilateral, of which two corners may fall together, and a large rectangle in it.
 
+    Attributes:
+        corners: in order around it, m.
+        center, half: of the rectangle, half its side lengths, m; `half` is zero where there is none.
+        normal, u, v: unit vectors, u and v along the rectangle's sides.
+    """
+
+    corners: Float[np.ndarray, "4 3"]
     center: Float[np.ndarray, "3"]
     normal: Float[np.ndarray, "3"]
     u: Float[np.ndarray, "3"]
@@ -39,8 +44,8 @@ class Rectangle:
     half: Float[np.ndarray, "2"]
 
 
-def rectangles(mesh: trimesh.Trimesh, among: Bool[np.ndarray, "face"], smallest: float) -> list[Rectangle]:
-    """Rectangles that cover the flat regions of a mesh.
+def plates(mesh: trimesh.Trimesh, among: Bool[np.ndarray, "face"], smallest: float) -> list[Plate]:
+    """Quadrilaterals that cover the flat regions of a mesh.
 
     Args:
         mesh: triangles that share corners where they join.
@@ -146,8 +151,8 @@ def _flat_parts(mesh, faces) -> list[Int[np.ndarray, "face"]]:
     return groups + [np.array([face]) for face in sorted(inside.difference(*(g.tolist() for g in groups)))]
 
 
-def _cover(mesh, faces) -> list[Rectangle]:
-    """The rectangle that a region is, or strips that add up to its area."""
+def _cover(mesh, faces) -> list[Plate]:
+    """The quadrilateral that a region is, or trapezoids that add up to it."""
     normal, center = _plane(mesh, faces)
     axes = _frame(normal)
     flat = (mesh.triangles[faces] - center) @ axes.T
@@ -159,59 +164,61 @@ def _cover(mesh, faces) -> list[Rectangle]:
         return []
     turn = sides[0] / lengths[0]
     turn = np.array([turn, [-turn[1], turn[0]]])
-    area = mesh.area_faces[faces].sum()
-    if area >= SMALLEST_FILL * lengths.prod():
-        boxes = [(*(corners @ turn.T).min(axis=0), *(corners @ turn.T).max(axis=0))]
+    if mesh.area_faces[faces].sum() >= SMALLEST_FILL * lengths.prod():
+        quads = [shapely.get_coordinates(shapely.transform(outline, lambda xy: xy @ turn.T).envelope)[:4]]
     else:
         region = shapely.union_all(shapely.polygons(flat @ turn.T), grid_size=1e-6)
-        boxes = strips(shapely.simplify(region, OFFSET))
+        quads = trapezoids(shapely.simplify(region, OFFSET))
     u, v = turn @ axes
-    return [
-        Rectangle(
-            center + (x0 + x1) / 2 * u + (y0 + y1) / 2 * v, normal, u, v, np.array([x1 - x0, y1 - y0]) / 2
-        )
-        for x0, y0, x1, y1 in boxes
-    ]  # fmt: skip
+    found = []
+    for quad in quads:
+        x0, y0, x1, y1 = inner_rectangle(quad)
+        middle = center + (x0 + x1) / 2 * u + (y0 + y1) / 2 * v
+        half = np.array([x1 - x0, y1 - y0]) / 2
+        found.append(Plate(center + quad @ np.stack([u, v]), middle, normal, u, v, half))
+    return found
 
 
-def strips(region: shapely.Geometry) -> list[tuple[float, float, float, float]]:
-    """Disjoint rectangles x0 y0 x1 y1 of the area of a region, holes respected, along x or y, whichever takes fewer.
+def trapezoids(region: shapely.Geometry) -> list[Float[np.ndarray, "4 2"]]:
+    """Disjoint trapezoids of the area of a region, holes respected, parallel to x or to y, whichever takes fewer.
 
-    Cuts run through all corners, so a region with right angles only is covered exactly; along slanted or round edges
-    the rectangles are stairs of `STRIP` high through the middles of the steps.
+    Cuts run through all corners, so straight edges are covered exactly.
     """
-    along_x = _strips(region)
-    along_y = [(x0, y0, x1, y1) for y0, x0, y1, x1 in _strips(shapely.transform(region, lambda xy: xy[:, ::-1]))]
+    along_x = _trapezoids(region)
+    along_y = [quad[:, ::-1] for quad in _trapezoids(shapely.transform(region, lambda xy: xy[:, ::-1]))]
     return min(along_x, along_y, key=len)
 
 
-def _strips(region) -> list[tuple[float, float, float, float]]:
+def _trapezoids(region) -> list[Float[np.ndarray, "4 2"]]:
     levels = np.sort(shapely.get_coordinates(region)[:, 1])
     levels = levels[np.diff(levels, prepend=-np.inf) > 1e-6]
     found = []
     for low, high in zip(levels[:-1], levels[1:], strict=True):
         margin = min(1e-6, (high - low) / 10)
         below, above = _crossings(region, low + margin), _crossings(region, high - margin)
-        if high - low <= STRIP or below.shape != above.shape:  # they differ where a part is thinner than the margin
-            found += [(x0, low, x1, high) for x0, x1 in _crossings(region, (low + high) / 2)]
-            continue
-        for (left, right), (left_above, right_above) in zip(below, above, strict=True):
-            found += _trapezoid(low, high, (left, right), (left_above, right_above))
+        if below.shape != above.shape:  # they differ where a part is thinner than the margin
+            below = above = _crossings(region, (low + high) / 2)
+        for (x0, x1), (x3, x2) in zip(below, above, strict=True):
+            if x1 - x0 + x2 - x3 > OFFSET / 2:
+                found.append(np.array([[x0, low], [x1, low], [x2, high], [x3, high]]))
     return found
 
 
-def _trapezoid(low: float, high: float, below: tuple[float, float], above: tuple[float, float]):
-    """The widest upright rectangle in a trapezoid between two levels, and stairs on its slanted sides."""
-    inner = max(below[0], above[0]), min(below[1], above[1])
-    upright = inner[1] - inner[0] > OFFSET
-    found = [(inner[0], low, inner[1], high)] if upright else []
-    edges = np.linspace(low, high, int(np.ceil((high - low) / STRIP)) + 1)
-    for y0, y1 in zip(edges[:-1], edges[1:], strict=True):
-        part = ((y0 + y1) / 2 - low) / (high - low)
-        left, right = (b + part * (a - b) for b, a in zip(below, above, strict=True))
-        sides = ((left, inner[0]), (inner[1], right)) if upright else ((left, right),)
-        found += [(x0, y0, x1, y1) for x0, x1 in sides if x1 - x0 > OFFSET / 3]
-    return found
+def inner_rectangle(quad: Float[np.ndarray, "4 2"]) -> tuple[float, float, float, float]:
+    """x0 y0 x1 y1 of a large upright rectangle in a trapezoid: as high as it is, or half as high at either end.
+
+    Half a triangle's area is the most that one can hold.
+    """
+    flip = abs(quad[1, 1] - quad[0, 1]) > 1e-9  # its parallel sides run along y
+    (x0, low), (x1, _), (x2, high), (x3, _) = quad[:, ::-1] if flip else quad
+    best = (0.0, 0.0, 0.0, 0.0)
+    for begin, end in ((0.0, 1.0), (0.0, 0.5), (0.5, 1.0)):
+        left = max(x0 + begin * (x3 - x0), x0 + end * (x3 - x0))
+        right = min(x1 + begin * (x2 - x1), x1 + end * (x2 - x1))
+        y0, y1 = low + begin * (high - low), low + end * (high - low)
+        if (right - left) * (y1 - y0) > (best[2] - best[0]) * (best[3] - best[1]):
+            best = left, y0, right, y1
+    return (best[1], best[0], best[3], best[2]) if flip else best
 
 
 def _crossings(region, y: float) -> Float[np.ndarray, "interval 2"]:

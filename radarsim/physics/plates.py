@@ -1,124 +1,195 @@
-"""The coherent echo of flat rectangles: physical optics, from near field to far field, on and off the normal.
+"""The coherent echo of flat convex polygons: physical optics, from near field to far field, on and off the normal.
 
-The physical-optics integral of a rectangle under a point source is, near the normal, a product of two Fresnel
-integrals, one per side. Each splits into the interior (the wall's flash, if the foot of the perpendicular lies between
-the edges) and one term per edge that decays away from it:
+The physical-optics integral of a plate under a point source at height h over its plane,
 
-    F = [G(u)] from u_1 to u_2,  G(u) = (C(u) + j S(u)) / (1 + j) = sign(u) (1/2 - E(|u|)),
-    u = +-2 sqrt((L_edge - L_plane) / lambda), L the round trip.
+    I = int cos exp(2jk rho) / rho^2 dA = h int dphi int exp(2jk rho) / rho^2 drho,
 
-The product of (interior, edge, edge) x (interior, edge, edge) gives nine parts: the mirror image of the radar in the
-plane, four half turns about edges, four inversions in corners. Every part has its own exact path length |tx - M rx|, so
-Doppler, angle and range of edges and corners come out right, and the parts of adjoining coplanar plates cancel along
-their seam. Away from the normal the end-point contributions of the exact integral (1/lambda) I = (1/lambda) int cos
-exp(j 2 k rho) / rho^2 dA replace the paraxial ones.
+polar about the foot of the perpendicular, has an end at the foot, the wall's flash, and one along the outline. Over the
+echo of the endless plane, lambda / (8 pi h), it is to the leading order in 1 / (k rho)
+
+    F = inside - h^2 / (2 pi) closed int exp(2jk (rho - h)) / rho^2 dphi,
+
+inside: whether the foot is. (The contour form of Kirchhoff's integral after Maggi and Rubinowicz; for far polygons it
+is Gordon's, IEEE TAP 23(4), 1975.) Along an edge whose line passes the foot at s and the radar at L = |(h, s)|, with
+X = sqrt(8 (rho - L) / lambda), it is exactly
+
+    h^2 s sqrt(lambda / 2) / (2 pi) int exp(j pi X^2 / 2) / (rho (rho^2 - h^2) sqrt(rho + L)) dX,
+
+which splits into the edge's own echo, from the point of its line nearest the radar, where that lies on the edge, and
+one from either end. Every part has its own exact path length |tx - M rx|: the mirror image in the plane, half turns
+about edges, inversions in corners. So Doppler, angle and range of edges and corners come out right, and parts of
+adjoining coplanar plates cancel along their seam.
 """
 
 import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
-from scipy.special import fresnel
 
-from radarsim.physics.antenna import amplitude_gain
+from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length, minus
+from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.facets import Facets
+from radarsim.physics.view import View
 
-#: Above the antenna's gain both ways, as an amplitude: for a first sieve.
-PEAK_GAIN = 12.0
+#: The foot moves this far inwards, m: on a seam it is inside both plates, which adds up.
+NUDGE = 1e-8
+#: Nodes and weights of the quadrature along an edge, on 0 ... 1: for most, and for where the pole is near.
+_FEW, _MANY = ((np.polynomial.legendre.leggauss(n) + np.array([[1.0], [0.0]])) / 2 for n in (8, 28))
 
 
 def parts(
-    facets: Facets,
-    position: Float[np.ndarray, "3"],
-    rotation: Float[np.ndarray, "3 3"],
-    reach: float,
-    wavelength: float,
-    weakest: float,
-    tables: tuple[np.ndarray, np.ndarray],
+    facets: Facets, view: View
 ) -> tuple[
     Int[np.ndarray, "part"],
     Float[np.ndarray, "part 3"],
     Float[np.ndarray, "part 3 4"],
     Complex[np.ndarray, "part"],
 ]:
-    """Flashes, edges and corners of all facets for a sensor pose.
-
-    Args:
-        facets: rectangles.
-        position, rotation: sensor pose, rotation from sensor to world.
-        reach: largest one-way range, m.
-        wavelength: m.
-        weakest: parts below this amplitude are left out.
-        tables: the antenna's gain tables.
+    """Flashes, edges and corners of all facets as the radar sees them.
 
     Returns:
-        facet of each part, point that it comes from (m), isometry of the receiver, amplitude.
+        facet of each part, a point for a ray to it to aim at (m), isometry of the receiver, amplitude.
     """
-    h = np.einsum("fd,fd->f", position - facets.center, facets.normal)
-    near = np.flatnonzero((np.abs(h) > 0.01) & (np.abs(h) < reach) & (facets.two_sided | (h > 0)))
-    if not len(near):
-        return near, np.zeros((0, 3)), np.zeros((0, 3, 4)), np.zeros(0, complex)
-    side = np.sign(h[near])
-    h = np.abs(h[near])
-    center, u, v, half = facets.center[near], facets.u[near], facets.v[near], facets.half[near]
-    normal = facets.normal[near] * side[:, None]
-    foot = np.stack([np.einsum("fd,fd->f", position - center, u), np.einsum("fd,fd->f", position - center, v)], axis=1)
-    # distance from the foot to the part along u and along v, by (facet, part of that side: interior, edge -, edge +)
-    across = np.stack([np.zeros_like(foot), -half - foot, half - foot], axis=-1)
-    slant = np.hypot(h[:, None, None], across)
-    size = side_terms(across, slant, h, wavelength)
-    amplitude = size[:, 0, :, None] * size[:, 1, None, :]
-    distance = np.sqrt(h[:, None, None] ** 2 + across[:, 0, :, None] ** 2 + across[:, 1, None, :] ** 2)
-    amplitude = amplitude * wavelength / (8 * np.pi * h[:, None, None]) * _oblique(h, slant, distance)
-    amplitude = amplitude * facets.reflection[near, 0, -1][:, None, None]
-    f, i, j = np.nonzero((distance < reach) & (np.abs(amplitude) * PEAK_GAIN > weakest))
-    amplitude = amplitude[f, i, j]
-    along_u, along_v = (foot[f, 0] + across[f, 0, i])[:, None], (foot[f, 1] + across[f, 1, j])[:, None]
-    point = center[f] + along_u * u[f] + along_v * v[f]
-    towards = (point - position) @ rotation
-    amplitude = amplitude * gains(towards, *tables) ** 2
-    keep = np.abs(amplitude) > weakest
-    f, i, j, point, amplitude = f[keep], i[keep], j[keep], point[keep], amplitude[keep]
-    # The part's isometry flips the normal and each side direction on whose edge it lies.
-    flips = np.stack([normal[f], u[f] * (i > 0)[:, None], v[f] * (j > 0)[:, None]], axis=1)
-    matrix = np.eye(3) - 2 * np.einsum("pkd,pke->pde", flips, flips)
-    offset = point - np.einsum("pde,pe->pd", matrix, point)
-    # Rays aim a little inside the facet, where its neighbours do not hide it.
-    edge_u = np.array([0, 1, -1])[i][:, None] * u[f]
-    edge_v = np.array([0, 1, -1])[j][:, None] * v[f]
-    aim = point + 0.01 * (edge_u + edge_v) + 0.002 * normal[f]
-    return near[f], aim, np.concatenate([matrix, offset[:, :, None]], axis=2), amplitude
-
-
-def side_terms(across, slant, h, wavelength) -> Complex[np.ndarray, "facet side part"]:
-    """Interior and edge terms of the Fresnel integral along each side, phases referred to the part's own path."""
-    u = 2 * np.sqrt(2 * np.maximum(slant - h[:, None, None], 0) / wavelength)
-    sine, cosine = fresnel(u)
-    edge = 0.5 - (cosine + 1j * sine) / (1 + 1j)
-    edge = edge * np.exp(-0.5j * np.pi * u**2)
-    terms = np.empty(across.shape, complex)
-    sign = np.where(across >= 0, 1, -1)  # +1 on the edge itself, for both of two abutting plates
-    terms[..., 0] = (sign[..., 2] - sign[..., 1]) / 2
-    terms[..., 1] = sign[..., 1] * edge[..., 1]
-    terms[..., 2] = -sign[..., 2] * edge[..., 2]
-    return terms
-
-
-def _oblique(h, slant, distance) -> Float[np.ndarray, "facet part part"]:
-    """End-point contributions of the exact integral over those of the paraxial one; 1 near the normal."""
-    h = h[:, None, None]
-    factor = np.ones(distance.shape)
-    du, dv = slant[:, 0, :, None], slant[:, 1, None, :]
-    edge = np.sqrt(2) * h**2 / (distance**1.5 * np.sqrt(distance + h))
-    corner = 2 * h**2 / (distance * np.sqrt((du + h) * (dv + h)))
-    factor[:, 1:, 0] = edge[:, 1:, 0]
-    factor[:, 0, 1:] = edge[:, 0, 1:]
-    factor[:, 1:, 1:] = corner[:, 1:, 1:]
-    return factor
+    size = 1024
+    while True:
+        facet, aim, isometry = np.empty(size, np.int64), np.empty((size, 3)), np.empty((size, 3, 4))
+        amplitude = np.empty(size, complex)
+        count = _parts(
+            facets.corners, facets.normal, facets.two_sided, facets.reflection[:, 0, -1], view.position, view.rotation,
+            view.reach, view.wavelength, view.weakest, *view.tables, facet, aim, isometry, amplitude,
+        )  # fmt: skip
+        if count <= size:
+            return facet[:count], aim[:count], isometry[:count], amplitude[:count]
+        size = count
 
 
 @njit(cache=True)
-def gains(directions, azimuth_table, elevation_table):
-    out = np.empty(len(directions))
-    for i in range(len(directions)):
-        out[i] = amplitude_gain(directions[i, 0], directions[i, 1], directions[i, 2], azimuth_table, elevation_table)
-    return out
+def _parts(
+    corners, normals, two_sided, reflection, position, rotation, reach, wavelength, weakest, azimuth_table,
+    elevation_table, facet, aim, isometry, amplitude,
+):  # fmt: skip
+    """Returns how many parts there are, of which as many as fit are written."""
+    p, sides, count = vec(position), corners.shape[1], 0
+    outward, value = np.empty((sides, 3)), np.empty(sides, np.complex128)
+    for f in range(len(corners)):
+        n = vec(normals[f])
+        h = dot(minus(p, vec(corners[f, 0])), n)
+        if abs(h) < 0.01 or abs(h) > reach or (h < 0 and not two_sided[f]):
+            continue
+        if h < 0:
+            n, h = (-n[0], -n[1], -n[2]), -h
+        middle = (0.0, 0.0, 0.0)
+        for k in range(sides):
+            middle = along(middle, 1 / sides, vec(corners[f, k]))
+        foot = along(p, -h, n)
+        inwards = minus(middle, foot)
+        foot = along(foot, NUDGE / (length(inwards) + NUDGE), inwards)
+        mirror = wavelength / (8 * np.pi * h) * abs(reflection[f])
+        inside = True
+        value[:] = 0
+        for k in range(sides):
+            one, two = vec(corners[f, k]), vec(corners[f, (k + 1) % sides])
+            side = minus(two, one)
+            size = length(side)
+            if size < 1e-6:
+                outward[k] = 0.0
+                continue
+            side = (side[0] / size, side[1] / size, side[2] / size)
+            out = cross(side, n)
+            if dot(minus(middle, one), out) > 0:
+                out = (-out[0], -out[1], -out[2])
+            outward[k, 0], outward[k, 1], outward[k, 2] = out
+            s = dot(minus(one, foot), out)
+            inside = inside and s > 0
+            low = dot(minus(one, foot), side)
+            high = low + size
+            slant = np.hypot(h, s)
+            # Ends of the edge: worth a thought if the leading term, far from the flash, is.
+            for end, x, sign in ((k, low, 1.0), ((k + 1) % sides, high, -1.0)):
+                rho = np.hypot(slant, x)
+                if rho >= reach:
+                    continue
+                towards = minus(vec(corners[f, end]), p)
+                scale = mirror * gain_towards(towards, rotation, azimuth_table, elevation_table) ** 2
+                least = h * h * abs(s) / (rho * (s * s + x * x) * abs(x) + 1e-12) * wavelength / (8 * np.pi**2)
+                if min(least, 0.25) * scale > 0.1 * weakest:
+                    value[end] -= sign * np.sign(x) * _beyond(h, s, slant, abs(x), wavelength)
+            if low < 0 < high and slant < reach:
+                point = along(foot, s, out)
+                scale = mirror * gain_towards(minus(point, p), rotation, azimuth_table, elevation_table) ** 2
+                least = h * h * np.sqrt(wavelength * slant / 2) / (slant * slant * abs(s)) / (2 * np.pi)
+                if min(least, 0.5) * scale > weakest:
+                    own = -2 * _beyond(h, s, slant, 0.0, wavelength)
+                    if abs(own) * scale > weakest:
+                        if count < len(facet):
+                            facet[count], amplitude[count] = f, own * scale
+                            _turn(n, out, False, point, isometry[count])
+                            _write(along(along(point, -0.01, out), 0.002, n), aim[count])
+                        count += 1
+        for k in range(sides):
+            if value[k] == 0:
+                continue
+            point = vec(corners[f, k])
+            scale = mirror * gain_towards(minus(point, p), rotation, azimuth_table, elevation_table) ** 2
+            if abs(value[k]) * scale > weakest:
+                if count < len(facet):
+                    facet[count], amplitude[count] = f, value[k] * scale
+                    _turn(n, n, True, point, isometry[count])
+                    before, after = vec(outward[(k - 1) % sides]), vec(outward[k])
+                    _write(along(along(along(point, -0.01, before), -0.01, after), 0.002, n), aim[count])
+                count += 1
+        if inside:
+            scale = mirror * gain_towards(minus(foot, p), rotation, azimuth_table, elevation_table) ** 2
+            if scale > weakest:
+                if count < len(facet):
+                    facet[count], amplitude[count] = f, scale
+                    _turn(n, (0.0, 0.0, 0.0), False, foot, isometry[count])
+                    _write(along(foot, 0.002, n), aim[count])
+                count += 1
+    for i in range(min(count, len(facet))):
+        amplitude[i] *= reflection[facet[i]] / abs(reflection[facet[i]])
+    return count
+
+
+@njit(cache=True)
+def _beyond(h, s, slant, x, wavelength):
+    """The integral along an edge's line from x >= 0 on, phase referred to the path by its begin.
+
+    From X the way turns by 45 deg into the complex plane, where exp(j pi X^2 / 2) decays; steps grow with the distance
+    from the pole X = +-j S at rho = h.
+    """
+    near = np.sqrt(slant * slant + x * x)
+    begin = x * np.sqrt(8 / (wavelength * (near + slant)))
+    pole = abs(s) * np.sqrt(8 / (wavelength * (slant + h)))
+    around = np.sqrt(begin * begin + pole * pole) + 1e-12
+    end = np.arcsinh(min(3.0, 5.5 / (begin + 1e-3)) / around)
+    turn = np.exp(0.25j * np.pi)
+    total = 0j
+    nodes, weights = _FEW if end < 1.5 else _MANY
+    for i in range(len(nodes)):
+        u = end * nodes[i]
+        y = around * np.sinh(u) * turn
+        rise = wavelength / 8 * (begin + y) ** 2  # rho - L
+        rho = slant + rise
+        below = s * s / (slant + h) + rise  # rho - h
+        phase = np.exp(0.5j * np.pi * y * (2 * begin + y))
+        total += weights[i] * np.cosh(u) * phase / (rho * below * (rho + h) * np.sqrt(rho + slant))
+    return total * turn * around * end * h * h * s * np.sqrt(wavelength / 2) / (2 * np.pi)
+
+
+@njit(inline="always")
+def _turn(n, out, all_axes, point, isometry):
+    """Reflection in a plane (out zero), half turn about an edge, or inversion in a corner."""
+    for i in range(3):
+        shift = point[i]
+        for j in range(3):
+            m = (1.0 if i == j else 0.0) - 2 * n[i] * n[j] - 2 * out[i] * out[j]
+            if all_axes:
+                m = -1.0 if i == j else 0.0
+            isometry[i, j] = m
+            shift -= m * point[j]
+        isometry[i, 3] = shift
+
+
+@njit(inline="always")
+def _write(a, out):
+    out[0], out[1], out[2] = a

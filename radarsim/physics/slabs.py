@@ -1,26 +1,18 @@
 """What passes through walls, panes and doors: loss, phase and delay of thin slabs on a ray's way."""
 
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Complex, Float
 
 from radarize.radar.config import RadarConfig
-from radarsim.physics.facets import TABLE
-from radarsim.scene.materials import SPEED_OF_LIGHT
+from radarsim.physics.coefficients import TABLE, as_slab, transmission
 from radarsim.scene.scene import Scene
 
 #: A ray is given up behind this many slabs: one stud wall with a board on either side, or two panes.
 MOST_SLABS = 2
-#: Closed bodies up to this mean thickness (m) are one homogeneous slab: door leaves, table tops.
-THICKEST_BODY = 0.05
 
 
 class Slabs:
-    """The thin objects of a scene.
-
-    A sheet is a slab of its material's thickness, and so is each face of a thick closed body of such a material
-    (hollow: a cabinet of boards). A thin closed body is one slab as thick as itself. All else is opaque.
+    """The thin objects of a scene (`coefficients`).
 
     Args:
         scene: ray tests run on its geometry.
@@ -32,12 +24,11 @@ class Slabs:
         self.scene, self.margin, self._wavelength = scene, margin, config.wavelength
         tables, self._table, self._body = {}, [], []
         for item in scene.objects:
-            thickness, thin = _thickness(item)
-            key = (item.material.name, thickness)
-            if thickness is not None and key not in tables:
-                tables[key] = (len(tables), _transmission(item.material, thickness, config))
-            self._table.append(-1 if thickness is None else tables[key][0])
-            self._body.append(thin)
+            slab, whole = as_slab(item)
+            if slab.thickness is not None and slab not in tables:
+                tables[slab] = (len(tables), transmission(slab, config))
+            self._table.append(-1 if slab.thickness is None else tables[slab][0])
+            self._body.append(whole)
         self._table, self._body = np.array(self._table), np.array(self._body)
         self._factor = np.array([t for _, (t, _) in tables.values()]).reshape(-1, 2, TABLE)
         self._delay = np.array([d for _, (_, d) in tables.values()]).reshape(-1, TABLE)
@@ -92,35 +83,3 @@ class Slabs:
         field /= np.linalg.norm(field, axis=1, keepdims=True) + 1e-9
         share = np.einsum("nd,nd->n", field, across) ** 2
         return te * share + tm * (1 - share), (1 - t) * self._delay[table, j] + t * self._delay[table, j + 1]
-
-
-def _thickness(item) -> tuple[float | None, bool]:
-    """How thick a slab an object is (m; None: opaque), and whether the slab is the whole of a closed body."""
-    if item.material.conductor:
-        return None, False
-    if item.mesh.is_watertight:
-        normals = np.unique(item.mesh.face_normals.round(6), axis=0)
-        width = float(np.ptp(item.mesh.vertices @ normals.T, axis=0).min())
-        if width <= THICKEST_BODY:
-            return round(width, 4), True
-    return item.material.thickness, False
-
-
-def _transmission(material, thickness: float, config: RadarConfig):
-    """Factor by (TE / TM, cosine), relative to free space and as in the beat signal (conjugate), and delay (m).
-
-    tau counts from face to face, in which a plane wave in air turns by k d cos(theta). The delay is that of the group,
-    -d arg(tau) / dk over the sweep.
-    """
-    cosine = np.linspace(0, 1, TABLE)
-    slab = replace(material, thickness=thickness)
-
-    def excess(frequency):
-        wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT
-        return slab.slab(cosine, frequency)[1] * np.exp(1j * wavenumber * thickness * cosine)
-
-    step = 0.25e9
-    low, high = (excess(config.center_frequency + s * step) for s in (-1, 1))
-    turn = np.angle(np.mean(high * low.conj(), axis=0) + 1e-300)
-    delay = -turn / (2 * np.pi * 2 * step / SPEED_OF_LIGHT)
-    return np.conj(excess(config.center_frequency)), np.maximum(delay, 0)

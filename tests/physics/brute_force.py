@@ -1,4 +1,7 @@
-"""Independent float64 reference: the beat signal of world points sample by sample, from the motion itself."""
+"""Independent float64 references. `beat`: the beat signal of world points sample by sample, from the motion itself.
+
+`transfer_matrix`: layers.
+"""
 
 import numpy as np
 
@@ -27,3 +30,24 @@ def beat(config: RadarConfig, motion, time: float, points, amplitude) -> np.ndar
                 phase = frequency * (there + back) / SPEED_OF_LIGHT
                 out[loop, k, r] = (amplitude[:, None] * np.exp(2j * np.pi * phase)).sum(axis=0)
     return out
+
+
+def transfer_matrix(layers, cosine, frequency, tm):
+    """Transmission and reflection of layers (permittivity, thickness) in air by 2 x 2 matrices, e^{+jwt}.
+
+    Born and Wolf, 1.6; ratios of the fields along the layers.
+    """
+    k = 2 * np.pi * frequency / SPEED_OF_LIGHT
+    sine = 1 - cosine**2
+    total = np.eye(2, dtype=complex)
+    for permittivity, thickness in layers:
+        root = np.sqrt(permittivity - sine)
+        admittance = permittivity / root if tm else root
+        delta = k * thickness * root
+        total = total @ [
+            [np.cos(delta), 1j * np.sin(delta) / admittance],
+            [1j * admittance * np.sin(delta), np.cos(delta)],
+        ]
+    air = 1 / cosine if tm else cosine
+    electric, magnetic = total[0] @ [1, air] * air, total[1] @ [1, air]
+    return 2 * air / (electric + magnetic), (electric - magnetic) / (electric + magnetic)

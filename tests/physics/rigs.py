@@ -8,7 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import RadarConfig
+from radarsim.physics.coefficients import TABLE
+from radarsim.physics.facets import Facets
 from radarsim.physics.synthesis import Synthesizer
+from radarsim.physics.view import View
+
+ISOTROPIC = (np.ones(181), np.ones(181))
 
 
 @dataclass
@@ -27,10 +32,27 @@ class Rig:
         return np.outer(t, self.velocity) + self.rotation(t).apply(self.lever)
 
 
+def conductors(*plates, reflection=(-1.0, 1.0)):
+    """Conducting rectangles: (centre, side directions u and v, half sides); the normal is u x v."""
+    center, u, v, half = (np.array(column, float) for column in zip(*plates, strict=True))
+    none, n = np.zeros(len(plates), bool), len(plates)
+    u_, v_ = half[:, :1] * u, half[:, 1:] * v
+    corners = center[:, None] + np.stack([-u_ - v_, u_ - v_, u_ + v_, v_ - u_], axis=1)
+    gamma = np.broadcast_to(np.array(reflection)[:, None], (n, 2, TABLE)).astype(complex)
+    return Facets(corners, center, np.cross(u, v), u, v, half, none, none, none, gamma)
+
+
 def polar(range_, azimuth_deg=0.0, elevation_deg=0.0):
     """Point at a range and direction from the origin."""
     a, e = np.deg2rad([azimuth_deg, elevation_deg])
     return range_ * np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
+
+
+def isotropic_view(position, wavelength, rotation=None, reach=100.0):
+    """All that an isotropic antenna receives at a place."""
+    return View(
+        np.asarray(position, float), np.eye(3) if rotation is None else rotation, reach, wavelength, 0.0, ISOTROPIC
+    )
 
 
 def burst(config, echoes, motion, time=0.0):
@@ -41,10 +63,14 @@ def burst(config, echoes, motion, time=0.0):
 def locate(config: RadarConfig, signal, guess):
     """Range, azimuth, elevation (rad), closing speed and amplitude of the strongest echo, by the matched filter.
 
+    Fails on silence, in which everything would be at its place.
+
     A far-field, constant-velocity signal model written from the definitions, not from the synthesis: phase
     -2 pi / lambda (antenna . u) over antennas, closing echoes at exp(-j 4 pi v t / lambda), beat frequency from range
     and the Doppler shift within the ramp.
     """
+    power = np.mean(np.abs(signal) ** 2)
+    assert power > 0
     t = config.chirp_times - config.burst_center
     n = (np.arange(config.samples) - (config.samples - 1) / 2) / config.sample_rate
     k = 2 * np.pi / config.wavelength
@@ -61,7 +87,7 @@ def locate(config: RadarConfig, signal, guess):
 
     scale = np.array([0.01, 0.02, 0.02, 0.02])
     found = minimize(
-        lambda x: -abs(response(np.asarray(guess) + x * scale)) ** 2 / np.mean(abs(signal) ** 2),
+        lambda x: -(abs(response(np.asarray(guess) + x * scale)) ** 2) / power,
         np.zeros(4),
         method="Nelder-Mead",
         options={"xatol": 1e-5, "fatol": 1e-14, "maxiter": 4000, "maxfev": 4000},

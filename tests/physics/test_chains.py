@@ -8,25 +8,18 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
-from radarsim.physics import chains
+from radarsim.physics import chains, plates
 from radarsim.physics.echoes import Provenance
-from radarsim.physics.facets import TABLE, Facets
+from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
+from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene.scene import Scene
+from tests.physics.rigs import conductors, isotropic_view
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
-ISOTROPIC = (np.ones(181), np.ones(181))
-
-
-def conductors(*plates):
-    """Conducting rectangles: (centre, side directions u and v, half sides); the normal is u x v."""
-    center, u, v, half = (np.array(column, float) for column in zip(*plates, strict=True))
-    none, n = np.zeros(len(plates), bool), len(plates)
-    gamma = np.broadcast_to(np.array([-1.0, 1.0])[:, None], (n, 2, TABLE)).astype(complex)
-    return Facets(center, np.cross(u, v), u, v, half, none, none, none, gamma)
 
 
 def corner(count, a, b, triangles=False):
@@ -54,7 +47,7 @@ def cross_section(mirrors, direction, distance=6.0, roll=0.0):
     """RCS of all chains, as |a|^2 (4 pi)^3 R^4 / lambda^2, seen from a unit direction."""
     position = distance * np.asarray(direction)
     chain, isometry, amplitude, _ = chains.images(
-        mirrors, np.arange(len(mirrors)), position, looking(-position / distance, roll), 100.0, LAMBDA, 0.0, ISOTROPIC
+        mirrors, np.arange(len(mirrors)), isotropic_view(position, LAMBDA, looking(-position / distance, roll))
     )
     both = chain[:, 0] != chain[:, 2]
     isometry = np.concatenate([isometry, chains.reverse(isometry[both])])
@@ -123,9 +116,8 @@ def test_no_step_as_the_image_leaves_the_corner():
     values = []
     for z in 0.5 + np.arange(-100, 100) * 1e-3:
         position = np.array([1.4, 1.4, z])
-        _, _, amplitude, _ = chains.images(
-            mirrors, np.arange(2), position, looking(np.array([-1, -1, 0]) / np.sqrt(2)), 50.0, LAMBDA, 0.0, ISOTROPIC
-        )
+        pose = looking(np.array([-1, -1, 0]) / np.sqrt(2))
+        _, _, amplitude, _ = chains.images(mirrors, np.arange(2), isotropic_view(position, LAMBDA, pose))
         values.append(np.sum(amplitude))
     assert np.max(np.abs(np.diff(values))) < 0.03 * np.max(np.abs(values))
     assert abs(values[0]) > 10 * abs(values[-1])
@@ -148,28 +140,36 @@ def test_kirchhoff_integral(seed):
 
 
 def test_box_room_has_all_its_images(monkeypatch):
-    """18 images of second and 38 of third order, edges and corners included, with delay, sign and strength.
+    """6 images of first, 18 of second and 38 of third order and no others, with delay, sign and strength.
 
     The reference is the lattice of images, and each one's path followed through the walls as a straight line in the
     lattice: a conductor turns the field E into 2 (E n) n - E. The antenna is made isotropic, and tilted, because two
     opposite walls send the wave out in front and take it in from behind.
     """
-    monkeypatch.setattr(chains, "gain_towards", lambda *_: 1.0)
-    monkeypatch.setattr(chains, "_search", chains._search.py_func)
+    for module, kernel in ((chains, "_search"), (plates, "_parts")):
+        monkeypatch.setattr(module, "gain_towards", lambda *_: 1.0)
+        monkeypatch.setattr(module, kernel, getattr(module, kernel).py_func)
     scene = Scene.load("physics/room")
     low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
     p, pose = np.array([0.37, -0.21, 1.23]), Rotation.from_euler("ZYX", [0.3, 0.4, 0.5]).as_matrix()
-    mirrors = Mirrors.of(Facets.of(scene, CONFIG), scene, 50.0)
-    chain, isometry, amplitude, _ = chains.images(mirrors, np.arange(6), p, pose, 50.0, LAMBDA, 0.0, ISOTROPIC)
+    facets, view = Facets.of(scene, CONFIG), isotropic_view(p, LAMBDA, pose)
+    _, _, single, flash = plates.parts(facets, view)
+    walls = (
+        np.abs(np.linalg.det(single[:, :, :3]) + 1 + np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1)) < 1e-6
+    )
+    chain, isometry, amplitude, _ = chains.images(Mirrors.of(facets, scene, 50.0), np.arange(6), view)
     both = chain[:, 0] != chain[:, 2]
-    isometry = np.concatenate([isometry, chains.reverse(isometry[both])])
-    amplitude = np.concatenate([amplitude, amplitude[both]])
+    order = np.concatenate(
+        [np.ones(walls.sum(), int), *(2 + (chain[some, 1] != chain[some, 2]) for some in (both | True, both))]
+    )
+    isometry = np.concatenate([single[walls], isometry, chains.reverse(isometry[both])])
+    amplitude = np.concatenate([flash[walls], amplitude, amplitude[both]])
     found = isometry[:, :, :3] @ p + isometry[:, :, 3]
 
-    counted = {2: 0, 3: 0}
+    counted, known = {1: 0, 2: 0, 3: 0}, np.zeros(len(found), bool)
     for cell in product(range(-3, 4), repeat=3):
-        order = int(np.abs(cell).sum())
-        if order not in counted:
+        length = int(np.abs(cell).sum())
+        if length not in counted:
             continue
         even = np.array(cell) % 2 == 0
         image = low + cell * (high - low) + np.where(even, p - low, high - p)
@@ -179,13 +179,15 @@ def test_box_room_has_all_its_images(monkeypatch):
         sent = pose[:, 2] - pose[:, 2] @ out * out
         arriving = turns * out
         taken = pose[:, 2] - pose[:, 2] @ arriving * arriving
-        turned = (-1) ** order * turns * sent / np.linalg.norm(sent)
+        turned = (-1) ** length * turns * sent / np.linalg.norm(sent)
         expected = LAMBDA / (4 * np.pi * path) * turned @ taken / np.linalg.norm(taken)
-        here = np.linalg.norm(found - image, axis=1) < 1e-6
+        here = (np.linalg.norm(found - image, axis=1) < 1e-6) & (order == length)
         assert here.any(), cell
-        counted[order] += 1
+        counted[length] += 1
+        known |= here
         assert np.sum(amplitude[here]) == pytest.approx(expected, abs=0.023 * LAMBDA / (4 * np.pi * path)), cell
-    assert counted == {2: 18, 3: 38}
+    assert counted == {1: 6, 2: 18, 3: 38}
+    assert known.all()
 
 
 def test_causes_in_a_box_room():
@@ -201,3 +203,22 @@ def test_causes_in_a_box_room():
     real = echoes.provenance <= Provenance.FLOOR_CEILING
     assert np.array_equal(inside, real)
     assert len(echoes.of(Provenance.GHOST_3)) and real.sum() > 10
+
+
+def test_images_fade_out_before_their_paths_get_too_long():
+    """Through the room in steps of 1 cm, images come and go at the longest path only where the IF filter has closed."""
+    scene, front = Scene.load("physics/room"), FrontEnd(CONFIG)
+    reach = front.settings.band.high * CONFIG.max_range
+    mirrors, ahead = Mirrors.of(Facets.of(scene, CONFIG), scene, 50.0), looking(direction(0.4, 0.1))
+    frames = []
+    for x in np.arange(-1.5, 1.5, 0.01):
+        position = np.array([x, 0.1, 1.4])
+        chain, isometry, _, _ = chains.images(mirrors, np.arange(6), isotropic_view(position, LAMBDA, ahead, reach))
+        path = np.linalg.norm(position - isometry[:, :, :3] @ position - isometry[:, :, 3], axis=1)
+        frames.append({tuple(c): p for c, p in zip(chain.tolist(), path, strict=True)})
+    pops = []
+    for before, after in zip(frames, frames[1:], strict=False):
+        for some, other in ((before, after), (after, before)):
+            pops += [p for c, p in some.items() if c not in other and p > 2 * reach - 0.05]
+    assert len(pops) > 2
+    assert np.abs(front.if_response(np.array(pops))).max() < 0.05

@@ -12,11 +12,10 @@ from radarsim.physics.scatterers import Scatterers
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
-from tests.physics.rigs import Rig, burst, locate
+from tests.physics.rigs import Rig, burst, isotropic_view, locate
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
-ISOTROPIC = (np.ones(181), np.ones(181))
 
 
 def scene_of(mesh):
@@ -26,7 +25,7 @@ def scene_of(mesh):
 def field(mesh, position):
     """Echo of the round bodies of a mesh, all parts together, isotropic antenna."""
     position = np.asarray(position, float)
-    _, images, amplitude = Curved.of(scene_of(mesh), CONFIG).parts(position, np.eye(3), 100.0, LAMBDA, 0.0, ISOTROPIC)
+    _, images, amplitude = Curved.of(scene_of(mesh), CONFIG).parts(isotropic_view(position, LAMBDA))
     mirrored = np.einsum("pij,j->pi", images[:, :, :3], position) + images[:, :, 3]
     return np.sum(amplitude * np.exp(2j * np.pi * np.linalg.norm(position - mirrored, axis=1) / LAMBDA))
 

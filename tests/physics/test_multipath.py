@@ -9,7 +9,9 @@ from scipy.spatial.transform import Rotation
 from radarize.heatmaps import Heatmaps
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
+from radarsim.physics.antenna import ISOTROPIC as ISOTROPIC_ANTENNA
 from radarsim.physics.antenna import amplitude_gain, gain_tables
+from radarsim.physics.coefficients import TABLE, reflection, transmission
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
@@ -18,11 +20,13 @@ from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
 from radarsim.scene.shapes import box, rectangle
+from tests.physics.brute_force import transfer_matrix
 from tests.physics.rigs import Rig, burst
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
 HERE, AHEAD = np.zeros(3), np.eye(3)
+NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
 
 
 def sheet(name, material, position, size, facing):
@@ -104,23 +108,6 @@ def test_the_hidden_are_seen_over_mirrors():
     assert points == pytest.approx(np.array([[[2.4, 2.4, 0], [2.4, 2.4, 0]]]))
 
 
-def transfer_matrix(layers, cosine, frequency, tm):
-    """Transmission of layers (permittivity, thickness) in air by 2 x 2 matrices (Born and Wolf, 1.6), e^{+jwt}."""
-    k = 2 * np.pi * frequency / SPEED_OF_LIGHT
-    sine = 1 - cosine**2
-    total = np.eye(2, dtype=complex)
-    for permittivity, thickness in layers:
-        root = np.sqrt(permittivity - sine)
-        admittance = permittivity / root if tm else root
-        delta = k * thickness * root
-        total = total @ [
-            [np.cos(delta), 1j * np.sin(delta) / admittance],
-            [1j * admittance * np.sin(delta), np.cos(delta)],
-        ]
-    air = 1 / cosine if tm else cosine
-    return 2 * air / (total[0] @ [1, air] * air + total[1] @ [1, air])
-
-
 @pytest.mark.parametrize("angle", [0.0, 30.0, 55.0])
 @pytest.mark.parametrize("tm", [False, True])
 @pytest.mark.parametrize("material", ["glass", "plasterboard"])
@@ -139,13 +126,46 @@ def test_pane_in_front_of_a_target(material, tm, angle):
     def truth(frequency):
         """tau relative to the air that the pane takes the place of, twice; conjugated as in the beat signal."""
         layer = [(m.permittivity_at(frequency), m.thickness)]
-        tau = transfer_matrix(layer, np.cos(tilt), frequency, tm)
+        tau, _ = transfer_matrix(layer, np.cos(tilt), frequency, tm)
         air = np.exp(2j * np.pi * frequency / SPEED_OF_LIGHT * m.thickness * np.cos(tilt))
         return np.conj(tau * air) ** 2
 
     assert 20 * np.log10(abs(found / truth(f))) == pytest.approx(0, abs=0.1)
     assert np.rad2deg(np.angle(found / truth(f))) == pytest.approx(0, abs=2.0)
     assert 0 < path - 6.0 < 0.06  # two passages of a slab slow the wave down by millimetres each
+
+
+@pytest.mark.parametrize("tm", [False, True])
+@pytest.mark.parametrize("material", [name for name, m in MATERIALS.items() if m.thickness])
+def test_slabs_reflect_as_they_transmit(material, tm):
+    """Mirrors and ways through have the coefficients of one slab: the transfer matrix, and no energy is made."""
+    m, f = MATERIALS[material], CONFIG.center_frequency
+    cosine = np.linspace(0, 1, TABLE)[8:]
+    smooth = replace(m, roughness=0.0)
+    back, (through, _) = (reflection(smooth, CONFIG)[int(tm), 8:], transmission(smooth, CONFIG))
+    through = through[int(tm), 8:]
+    truth = [transfer_matrix([(m.permittivity_at(f), m.thickness)], c, f, tm) for c in cosine]
+    sign = -1 if tm else 1  # P.2040 counts TM by the magnetic field
+    assert np.abs(through) == pytest.approx(np.abs([t for t, _ in truth]), abs=1e-6)
+    assert back == pytest.approx(sign * np.conj([r for _, r in truth]), abs=1e-6)
+    assert np.max(np.abs(back) ** 2 + np.abs(through) ** 2) <= 1 + 1e-9
+
+
+@pytest.mark.parametrize("closed", [False, True], ids=["sheet", "closed body"])
+def test_a_pane_flashes_once(closed):
+    """Face on, a pane echoes lambda |r| / (8 pi R) with r of the slab, be it a sheet or a body with two faces."""
+    pane = sheet("pane", "glass", (1.5, 0, 0), (4.0, 4.0), (-1, 0, 0))
+    if closed:
+        pane = SceneObject("pane", box((1.503, 0, 0), (0.006, 4.0, 4.0)), MATERIALS["glass"])
+    scene = Scene("pane", [pane])
+    echoes = EchoFinder(scene, NOTHING, Facets.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC_ANTENNA)(HERE, AHEAD)
+    m, f = MATERIALS["glass"], CONFIG.center_frequency
+    _, r = transfer_matrix([(m.permittivity_at(f), m.thickness)], 1.0, f, False)
+    apparent = np.linalg.norm(echoes.images[:, :, 3], axis=1)
+    near = np.abs(apparent / 2 - 1.5) < 0.02
+    assert 20 * np.log10(np.abs(echoes.amplitude[near]) / (LAMBDA * abs(r) / (12 * np.pi))) == pytest.approx(
+        [0], abs=0.05
+    )
 
 
 def test_delay_of_a_slab():
@@ -170,11 +190,11 @@ def test_walls_and_doors():
     free = EchoFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)(HERE, AHEAD).amplitude[0].real
     boards = [sheet(f"board {x}", "plasterboard", (x, 0, 0), (2.0, 2.0), (-1, 0, 0)) for x in (1.5, 1.6, 1.7)]
     board = MATERIALS["plasterboard"]
-    one = abs(transfer_matrix([(board.permittivity_at(f), board.thickness)], 1.0, f, False))
+    one = abs(transfer_matrix([(board.permittivity_at(f), board.thickness)], 1.0, f, False)[0])
     assert level(*boards[:2]) / free == pytest.approx(one**4, rel=0.01)
     assert level(*boards) == 0  # given up: three boards
     door = SceneObject("door", box((1.5, 0, 0), (0.04, 2.0, 2.0)), MATERIALS["chipboard"])
-    leaf = abs(transfer_matrix([(MATERIALS["chipboard"].permittivity_at(f), 0.04)], 1.0, f, False))
+    leaf = abs(transfer_matrix([(MATERIALS["chipboard"].permittivity_at(f), 0.04)], 1.0, f, False)[0])
     assert level(door) / free == pytest.approx(leaf**2, rel=0.01)
     assert level(SceneObject("wall", box((1.5, 0, 0), (0.2, 2.0, 2.0)), MATERIALS["concrete"])) == 0
 

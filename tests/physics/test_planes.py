@@ -65,8 +65,11 @@ def test_curved_surfaces_are_no_planes():
         assert max(len(r) for r in on_side) <= side
 
 
-def covered(boxes):
-    return sum((x1 - x0) * (y1 - y0) for x0, y0, x1, y1 in boxes)
+def tiled(quads, region):
+    """Quadrilaterals that do not overlap and together are a region."""
+    shapes_ = [shapely.Polygon(q) for q in quads]
+    assert sum(s.area for s in shapes_) == pytest.approx(region.area)
+    assert shapely.union_all(shapes_).symmetric_difference(region).area < 1e-5
 
 
 def test_right_angles_are_covered_exactly():
@@ -75,28 +78,30 @@ def test_right_angles_are_covered_exactly():
     doorway = shapely.box(0, 0, 5, 3) - shapely.box(1, 0, 2, 2)
     ell = shapely.Polygon([(0, 0), (4, 0), (4, 1), (1, 1), (1, 3), (0, 3)])
     for region, count in ((ell, 2), (window, 4), (doorway, 3)):
-        boxes = planes.strips(region)
-        assert len(boxes) == count
-        assert covered(boxes) == pytest.approx(region.area)
-        assert shapely.union_all([shapely.box(*b) for b in boxes]).symmetric_difference(region).area < 1e-6
+        quads = planes.trapezoids(region)
+        assert len(quads) == count
+        tiled(quads, region)
 
 
 @pytest.mark.parametrize(
-    "region",
+    ("region", "count"),
     [
-        shapely.Polygon([(0, 0), (1, 0), (0.7, 0.6), (0.2, 0.6)]),
-        shapely.Polygon([(0, 0), (1, 0), (0, 0.8)]),
-        shapely.Point(0, 0).buffer(0.5),
+        (shapely.Polygon([(0, 0), (1, 0), (0.7, 0.6), (0.2, 0.6)]), 1),
+        (shapely.Polygon([(0, 0), (1, 0), (0, 0.8)]), 1),
+        (shapely.Polygon([(0, 0), (1, 0.2), (0.3, 0.8)]), 2),
+        (shapely.Point(0, 0).buffer(0.5, quad_segs=3), 6),
+        (shapely.Point(0, 0).buffer(0.5, quad_segs=3) - shapely.box(0, -0.1, 1, 0.1), 8),
     ],
-    ids=["trapezoid", "triangle", "disc"],
+    ids=["trapezoid", "right triangle", "triangle", "disc", "notched disc"],
 )
-def test_slanted_edges_become_stairs(region):
-    """Area is kept, and no step is further than a strip's height from the edge."""
-    boxes = planes.strips(region)
-    assert covered(boxes) == pytest.approx(region.area, rel=0.01)
-    union = shapely.union_all([shapely.box(*b) for b in boxes])
-    assert union.difference(region.buffer(planes.STRIP)).area < 1e-9
-    assert region.difference(union.buffer(planes.STRIP)).area < 1e-9
+def test_slanted_edges_are_covered_exactly(region, count):
+    quads = planes.trapezoids(region)
+    assert len(quads) <= count
+    tiled(quads, region)
+    for quad in quads:
+        inner = shapely.box(*planes.inner_rectangle(quad))
+        assert inner.difference(shapely.Polygon(quad)).area < 1e-9
+        assert inner.area > 0.3 * shapely.Polygon(quad).area
 
 
 def test_an_ell_shaped_wall_flashes_where_it_is():

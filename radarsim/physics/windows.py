@@ -1,0 +1,93 @@
+"""What windows on a path leave of a wave: polygons in Fresnel units, and Kirchhoff's integral over them."""
+
+import numpy as np
+from numba import njit
+
+#: Edges this far off the path, in units of the Fresnel integral, begin to fade from the sum, and those are left out:
+#: what they diffract comes on a path of its own, longer by s^2 lambda / 4.
+FADE, FAR = 5.0, 8.0
+#: Most corners that the overlap of three quadrilaterals and a square can have, and one to close it.
+CORNERS = 20
+
+
+@njit(inline="always")
+def depth(planes, count, x, y):
+    """Distance of a point inside the nearest of some edges."""
+    least = 1e9
+    for k in range(count):
+        least = min(least, planes[k, 2] - planes[k, 0] * x - planes[k, 1] * y)
+    return least
+
+
+@njit(cache=True)
+def overlap(planes, count, polygon, spare):
+    """Corners, counter-clockwise, of what half planes n . x <= s leave of a wide square; returns their number."""
+    wide = 50.0
+    polygon[0, 0], polygon[0, 1] = -wide, -wide
+    polygon[1, 0], polygon[1, 1] = wide, -wide
+    polygon[2, 0], polygon[2, 1] = wide, wide
+    polygon[3, 0], polygon[3, 1] = -wide, wide
+    corner = 4
+    for k in range(count):
+        nx, ny, s = planes[k]
+        kept = 0
+        for i in range(corner):
+            x0, y0 = polygon[i]
+            x1, y1 = polygon[(i + 1) % corner]
+            d0, d1 = nx * x0 + ny * y0 - s, nx * x1 + ny * y1 - s
+            if d0 <= 0:
+                spare[kept, 0], spare[kept, 1] = x0, y0
+                kept += 1
+            if (d0 <= 0) != (d1 <= 0):
+                t = d0 / (d0 - d1)
+                spare[kept, 0], spare[kept, 1] = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+                kept += 1
+        corner = kept
+        polygon[:corner] = spare[:corner]
+        if corner < 3:
+            return 0
+    return corner
+
+
+@njit(cache=True)
+def kirchhoff(polygon, corners):
+    """(1 / 2j) int exp(j pi r^2 / 2) dA over a convex polygon (counter-clockwise, its first `corners` rows)."""
+    total = 0j
+    for k in range(corners):
+        x0, y0 = polygon[k]
+        x1, y1 = polygon[(k + 1) % corners]
+        size = np.hypot(x1 - x0, y1 - y0)
+        if size < 1e-12:
+            continue
+        dx, dy = (x1 - x0) / size, (y1 - y0) / size
+        s = x0 * dy - y0 * dx  # the origin's distance inside the edge
+        low, high = x0 * dx + y0 * dy, x1 * dx + y1 * dy
+        if s != 0:
+            total += np.arctan(high / s) - np.arctan(low / s)
+        weight = min(max((FAR - abs(s)) / (FAR - FADE), 0.0), 1.0)
+        if weight > 0:
+            total -= weight * weight * (3 - 2 * weight) * _edge(s, max(low, -FAR), min(high, FAR))
+    return total / (2 * np.pi)
+
+
+@njit(cache=True)
+def _edge(s, low, high):
+    """int exp(j pi (s^2 + x^2) / 2) s / (s^2 + x^2) dx, the part that is sharp for small s in closed form."""
+    if high <= low or s == 0:
+        return 0j
+    total = 0j
+    # Gauss-Legendre with four points on stretches over which the phase turns by a radian or less.
+    x = low
+    while x < high:
+        nearest = 0.0 if x < 0 < x + 0.5 else min(abs(x), abs(x + 0.5))
+        step = min(0.5, 1.2 / (nearest + 0.5), high - x)
+        for node, weight in ((-0.8611363116, 0.3478548451), (-0.3399810436, 0.6521451549),
+                             (0.3399810436, 0.6521451549), (0.8611363116, 0.3478548451)):  # fmt: skip
+            at = x + 0.5 * step * (1 + node)
+            angle = 0.5 * np.pi * at * at
+            # exp(j angle) - 1, without loss of digits
+            half = np.sin(angle / 2)
+            total += 0.5 * step * weight * (-2 * half * half + 1j * np.sin(angle)) * s / (s * s + at * at)
+        x += step
+    total += np.arctan(high / s) - np.arctan(low / s)
+    return total * np.exp(0.5j * np.pi * s * s)

@@ -38,18 +38,17 @@ class Pyramid:
     def of(cls, grid: OccupancyGrid, levels: int, distance: float) -> "Pyramid":
         """Pyramid with `levels` halvings for windows of half-width up to `distance` (m)."""
         half = int(np.ceil(distance / grid.resolution))
-        base = np.pad(np.rint(255 * grid.probability).astype(np.uint8), 2 * half)
-        planes = [base] + [_maxima(base, 1 << h) for h in range(1, levels + 1)]
-        sizes = np.array([p.size for p in planes])
-        return cls(
-            grid.resolution,
-            grid.origin - 2 * half * grid.resolution,
-            half,
-            np.concatenate([p.ravel() for p in planes]),
-            np.concatenate([[0], np.cumsum(sizes)[:-1]]),
-            np.array([p.shape[0] for p in planes]),
-            np.array([p.shape[1] for p in planes]),
-        )
+        rows, columns = np.array(grid.probability.shape)[:, None] + 4 * half
+        size = 1 << np.arange(levels + 1)
+        rim = np.minimum(np.arange(levels + 1), 1)
+        rows, columns = (rows + size - 1) // size + rim, (columns + size - 1) // size + rim
+        sizes = rows * columns
+        starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+        buffer = np.zeros(sizes.sum(), np.uint8)
+        base = buffer[: sizes[0]].reshape(rows[0], columns[0])
+        base[2 * half : rows[0] - 2 * half, 2 * half : columns[0] - 2 * half] = grid.quantised().probability
+        _fill(buffer, starts, rows, columns)
+        return cls(grid.resolution, grid.origin - 2 * half * grid.resolution, half, buffer, starts, rows, columns)
 
     @property
     def levels(self) -> int:
@@ -83,7 +82,7 @@ def search(
     """
     if not len(points):
         return None
-    reach = max(float(np.percentile(np.hypot(points[:, 0], points[:, 1]), 90)), 1.0)
+    reach = max(float(np.sort(np.hypot(points[:, 0], points[:, 1]))[int(0.9 * (len(points) - 1))]), 1.0)
     step = pyramid.resolution / reach
     turns = int(np.ceil(angle / step))
     angles = np.arange(-turns, turns + 1) * step
@@ -108,38 +107,57 @@ def search(
     return np.array([guess[0] + shift[0], guess[1] + shift[1], guess[2] + angles[a]]), score
 
 
-@numba.njit(cache=True)
-def _maxima(base, size):
-    # Cell (i, j) of the result bounds base cells (i - 1) * size ... (i + 1) * size - 1 along each axis.
-    rows, columns = base.shape
-    out = np.zeros(((rows + size - 1) // size + 1, (columns + size - 1) // size + 1), np.uint8)
-    for row in range(rows):
-        r = row // size
-        for column in range(columns):
-            c, value = column // size, base[row, column]
-            if value > 0:
-                for i in range(r, r + 2):
-                    for j in range(c, c + 2):
-                        if out[i, j] < value:
-                            out[i, j] = value
-    return out
+@numba.njit(cache=True, nogil=True)
+def _fill(buffer, starts, rows, columns):
+    # Cell (i, j) of level h bounds base cells (i - 1) * size ... (i + 1) * size - 1 along each axis: the maximum of 2 x 2
+    # blocks of `size`, which in turn are the maxima of four blocks half as large.
+    blocks = buffer[: rows[0] * columns[0]].reshape((rows[0], columns[0]))
+    for h in range(1, len(starts)):
+        coarse = np.zeros((rows[h] - 1, columns[h] - 1), np.uint8)
+        for row in range(blocks.shape[0]):
+            for column in range(blocks.shape[1]):
+                value = blocks[row, column]
+                if value > coarse[row >> 1, column >> 1]:
+                    coarse[row >> 1, column >> 1] = value
+        blocks = coarse
+        plane = buffer[starts[h] : starts[h] + rows[h] * columns[h]].reshape((rows[h], columns[h]))
+        for row in range(blocks.shape[0]):
+            for column in range(blocks.shape[1]):
+                value = blocks[row, column]
+                if value > 0:
+                    plane[row, column] = max(plane[row, column], value)
+                    plane[row, column + 1] = max(plane[row, column + 1], value)
+                    plane[row + 1, column] = max(plane[row + 1, column], value)
+                    plane[row + 1, column + 1] = max(plane[row + 1, column + 1], value)
 
 
-@numba.njit(cache=True)
-def _bound(buffer, cells, shift):
-    total = np.int64(0)
-    for k in range(len(cells)):
-        total += buffer[cells[k] + shift]
+@numba.njit(cache=True, nogil=True)
+def _bound(buffer, cells, shift, needed):
+    # Sum at the cells, or an upper bound of it as soon as that is below what is needed.
+    total, count = np.int64(0), len(cells)
+    for start in range(0, count, 16):
+        end = min(start + 16, count)
+        for k in range(start, end):
+            total += buffer[cells[k] + shift]
+        if total + 255 * (count - end) < needed:
+            return total + 255 * (count - end)
     return total
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
+def _cells(corner, h, starts, columns, out):
+    rim = 1 if h > 0 else 0
+    for k in range(len(corner)):
+        out[k] = starts[h] + ((corner[k, 0] >> h) + rim) * columns[h] + (corner[k, 1] >> h) + rim
+
+
+@numba.njit(cache=True, nogil=True)
 def _nearest(low, size):
     # Smallest distance to 0 of the integers low ... low + size - 1.
     return max(low, -(low + size - 1), 0)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
 def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty, scale, half, min_score, penalty):
     # Shifts (dx, dy) count from the window's corner, so a block's shift at its level is one number for all points.
     top = len(starts) - 1
@@ -147,7 +165,10 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
     across = (2 * half + size) // size
     count = len(angles) * across * across
     unit = 1 / (255.0 * len(points))
-    cells, inside = np.empty((len(angles), top + 1, len(points)), np.int64), np.zeros(len(angles), np.int64)
+    least = min_score / unit
+    # Cells of the points, by angle; those below the top level only of angles that are looked at closer.
+    corner, inside = np.empty((len(angles), len(points), 2), np.int32), np.zeros(len(angles), np.int64)
+    cells, known = np.empty((len(angles), top + 1, len(points)), np.int32), np.zeros(len(angles), np.bool_)
     bounds, where = np.empty(count), np.empty((count, 3), np.int64)
     n = 0
     for a in range(len(angles)):
@@ -157,15 +178,14 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
             column = int(np.floor(cos * x - sin * y + guess[0])) - half
             row = int(np.floor(sin * x + cos * y + guess[1])) - half
             if column >= 0 and row >= 0 and column + 2 * half < columns[0] and row + 2 * half < rows[0]:
-                for h in range(top + 1):
-                    rim = 1 if h > 0 else 0
-                    cells[a, h, inside[a]] = starts[h] + ((row >> h) + rim) * columns[h] + (column >> h) + rim
+                corner[a, inside[a], 0], corner[a, inside[a], 1] = row, column
                 inside[a] += 1
+        _cells(corner[a, : inside[a]], top, starts, columns, cells[a, top])
         for i in range(across):
             for j in range(across):
                 dx, dy = i * size, j * size
                 away = _nearest(dx - half, size) ** 2 + _nearest(dy - half, size) ** 2
-                total = _bound(buffer, cells[a, top, : inside[a]], i + j * columns[top])
+                total = _bound(buffer, cells[a, top, : inside[a]], i + j * columns[top], least)
                 bounds[n] = total * unit - angle_penalty[a] - penalty * away
                 where[n, 0], where[n, 1], where[n, 2] = a, dx, dy
                 n += 1
@@ -176,6 +196,10 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
         if bounds[index] <= best:
             break
         a = where[index, 0]
+        if not known[a]:
+            known[a] = True
+            for h in range(top):
+                _cells(corner[a, : inside[a]], h, starts, columns, cells[a, h])
         stack_bound[0], stack[0, 0], stack[0, 1], stack[0, 2] = bounds[index], where[index, 1], where[index, 2], top
         depth = 1
         while depth > 0:
@@ -194,7 +218,8 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
                 child_bound[c] = -1.0
                 if cx <= 2 * half and cy <= 2 * half:
                     away = _nearest(cx - half, size) ** 2 + _nearest(cy - half, size) ** 2
-                    total = _bound(buffer, cells[a, level, : inside[a]], (cx >> level) + (cy >> level) * columns[level])
+                    shift = (cx >> level) + (cy >> level) * columns[level]
+                    total = _bound(buffer, cells[a, level, : inside[a]], shift, best / unit)
                     child_bound[c] = total * unit - angle_penalty[a] - penalty * away
             for c in np.argsort(child_bound):  # the best child is looked at first
                 if child_bound[c] > best:

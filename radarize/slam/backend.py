@@ -234,6 +234,7 @@ class Slam:
 
     def _questions(self, number: int, count: int, distance: float, angle: float) -> list[Question]:
         """Searches of a node and those before it in the finished submaps near it, nearest first."""
+        spacing = self.config.matcher.spacing
         first = max(number - self.config.loop.nodes + 1, 0)
         poses, ready = self.graph.poses, len(self._centers)
         if len(self.nodes[number].points) < self.config.node.min_points or not ready:
@@ -245,13 +246,17 @@ class Slam:
         near = np.flatnonzero((away <= self.config.loop.radius) & ((last < first) | (anchors > number)))
         if not len(near):
             return []
-        points = [transform(between(poses[number], poses[k]), self.nodes[k].points) for k in range(first, number + 1)]
-        points = points[0] if len(points) == 1 else thin(np.concatenate(points), self.config.matcher.spacing)
+        members = range(first, number + 1)
+        points, fronts = (
+            thin(np.concatenate([transform(between(poses[number], poses[k]), part[k]) for k in members]), spacing)
+            for part in ({k: self.nodes[k].points for k in members}, {k: self.nodes[k].fronts for k in members})
+        )
         return [
             Question(
                 self.submaps[k],
                 number,
                 points,
+                fronts,
                 between(poses[anchors[k]], poses[number]),
                 self._drift.between(anchors[k], number),
                 distance,

@@ -3,6 +3,9 @@
 Branch and bound over a pyramid (Hess et al., ICRA 2016, section V.C). Level h holds, on cells of 2^h, the maximum over
 2 x 2 such cells, so that all poses whose shift lies in a block of 2^h x 2^h cells are bounded by one look-up per point:
 the best pose of the window is found as if all had been tried. A pyramid takes 4/3 of the bytes of its grid.
+
+Echoes should lie where the map is occupied. Places in front of them, as seen by the sensor, should lie where it is
+free: a wall seen from its other side, which is what a corridor's two walls are to each other, is another wall.
 """
 
 from dataclasses import dataclass
@@ -22,7 +25,7 @@ class Pyramid:
         resolution, origin: of level 0, as in `OccupancyGrid`.
         half: half-width of the largest window that can be searched, cells; twice this much empty space is added around
             the grid, so that the search need not look where the grid ends.
-        buffer: levels one after the other, row by row.
+        buffer: levels one after the other, row by row: first of being occupied, then, if asked for, of being free.
         starts, rows, columns: of each level; from level 1 on, cell (-1, -1) is stored at (0, 0).
     """
 
@@ -35,7 +38,7 @@ class Pyramid:
     columns: np.ndarray
 
     @classmethod
-    def of(cls, grid: OccupancyGrid, levels: int, distance: float) -> "Pyramid":
+    def of(cls, grid: OccupancyGrid, levels: int, distance: float, free: bool = False) -> "Pyramid":
         """Pyramid with `levels` halvings for windows of half-width up to `distance` (m)."""
         half = int(np.ceil(distance / grid.resolution))
         rows, columns = np.array(grid.probability.shape)[:, None] + 4 * half
@@ -44,10 +47,14 @@ class Pyramid:
         rows, columns = (rows + size - 1) // size + rim, (columns + size - 1) // size + rim
         sizes = rows * columns
         starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
-        buffer = np.zeros(sizes.sum(), np.uint8)
-        base = buffer[: sizes[0]].reshape(rows[0], columns[0])
-        base[2 * half : rows[0] - 2 * half, 2 * half : columns[0] - 2 * half] = grid.quantised().probability
-        _fill(buffer, starts, rows, columns)
+        probability = grid.quantised().probability
+        layers = [probability, np.where((probability > 0) & (probability < 128), np.uint8(255), np.uint8(0))]
+        buffer = np.zeros((1 + free, sizes.sum()), np.uint8)
+        for layer, values in zip(buffer, layers, strict=False):
+            base = layer[: sizes[0]].reshape(rows[0], columns[0])
+            base[2 * half : rows[0] - 2 * half, 2 * half : columns[0] - 2 * half] = values
+            _fill(layer, starts, rows, columns)
+        buffer = buffer.ravel()
         return cls(grid.resolution, grid.origin - 2 * half * grid.resolution, half, buffer, starts, rows, columns)
 
     @property
@@ -65,6 +72,7 @@ def search(
     angle: float,
     min_score: float,
     penalty: tuple[float, float] = (0.0, 0.0),
+    fronts: Float[np.ndarray, "m 2"] | None = None,
 ) -> tuple[Float[np.ndarray, "3"], float] | None:
     """Best pose of a window around a guess, or None if none scores above `min_score`.
 
@@ -74,8 +82,9 @@ def search(
         guess: middle of the window, in the submap's frame.
         distance, angle: half-widths of the window, m and rad. The angle steps by one cell at the 90th percentile of
             the points' ranges.
-        min_score: mean probability at the points, 0...1.
+        min_score: mean probability at the points, and of being free at the fronts, 0...1.
         penalty: subtracted from the score per square metre and per square radian away from the guess.
+        fronts: places in front of the points, m, for a pyramid that knows what is free.
 
     Returns:
         Pose in the submap's frame and its score, penalty subtracted.
@@ -87,12 +96,14 @@ def search(
     turns = int(np.ceil(angle / step))
     angles = np.arange(-turns, turns + 1) * step
     half = min(int(np.ceil(distance / pyramid.resolution)), pyramid.half)
+    everything = points if fronts is None else np.concatenate([points, fronts])
     found, score, a, dx, dy = _search(
         pyramid.buffer,
         pyramid.starts,
         pyramid.rows,
         pyramid.columns,
-        np.ascontiguousarray(points, float),
+        np.ascontiguousarray(everything, float),
+        len(points),
         (np.asarray(guess, float)[:2] - pyramid.origin) / pyramid.resolution,
         guess[2] + angles,
         angles**2 * penalty[1],
@@ -148,7 +159,7 @@ def _bound(buffer, cells, shift, needed):
 def _cells(corner, h, starts, columns, out):
     rim = 1 if h > 0 else 0
     for k in range(len(corner)):
-        out[k] = starts[h] + ((corner[k, 0] >> h) + rim) * columns[h] + (corner[k, 1] >> h) + rim
+        out[k] = corner[k, 2] + starts[h] + ((corner[k, 0] >> h) + rim) * columns[h] + (corner[k, 1] >> h) + rim
 
 
 @numba.njit(cache=True, nogil=True)
@@ -158,7 +169,7 @@ def _nearest(low, size):
 
 
 @numba.njit(cache=True, nogil=True)
-def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty, scale, half, min_score, penalty):
+def _search(buffer, starts, rows, columns, points, echoes, guess, angles, angle_penalty, scale, half, min_score, penalty):
     # Shifts (dx, dy) count from the window's corner, so a block's shift at its level is one number for all points.
     top = len(starts) - 1
     size = 1 << top
@@ -167,7 +178,7 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
     unit = 1 / (255.0 * len(points))
     least = min_score / unit
     # Cells of the points, by angle; those below the top level only of angles that are looked at closer.
-    corner, inside = np.empty((len(angles), len(points), 2), np.int32), np.zeros(len(angles), np.int64)
+    corner, inside = np.empty((len(angles), len(points), 3), np.int32), np.zeros(len(angles), np.int64)
     cells, known = np.empty((len(angles), top + 1, len(points)), np.int32), np.zeros(len(angles), np.bool_)
     bounds, where = np.empty(count), np.empty((count, 3), np.int64)
     n = 0
@@ -179,6 +190,7 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
             row = int(np.floor(sin * x + cos * y + guess[1])) - half
             if column >= 0 and row >= 0 and column + 2 * half < columns[0] and row + 2 * half < rows[0]:
                 corner[a, inside[a], 0], corner[a, inside[a], 1] = row, column
+                corner[a, inside[a], 2] = 0 if k < echoes else len(buffer) // 2
                 inside[a] += 1
         _cells(corner[a, : inside[a]], top, starts, columns, cells[a, top])
         for i in range(across):

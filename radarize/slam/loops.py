@@ -32,7 +32,7 @@ class Question:
 
     Attributes:
         submap, node: number of the node.
-        points: seen from the node, m.
+        points, fronts: seen from the node, as in `Node`, m.
         guess: pose of the node in the submap's frame.
         spread: covariance of the guess, in the frame of the node.
         distance, angle: half-widths of the window to search at most, m and rad.
@@ -41,6 +41,7 @@ class Question:
     submap: Submap
     node: int
     points: Float[np.ndarray, "point 2"]
+    fronts: Float[np.ndarray, "front 2"]
     guess: Float[np.ndarray, "3"]
     spread: Float[np.ndarray, "3 3"]
     distance: float
@@ -76,7 +77,7 @@ class LoopSearch:
         self.config = config
         self._pool = ThreadPoolExecutor(_WORKERS, thread_name_prefix="loops")
         self._asked: deque[tuple[int, Future]] = deque()
-        self._pyramid = lru_cache(_PYRAMIDS)(lambda submap: Pyramid.of(submap.grid, config.levels, config.distance))
+        self._pyramid = lru_cache(_PYRAMIDS)(lambda submap: Pyramid.of(submap.grid, config.levels, config.distance, free=True))
 
     def ask(self, questions: Sequence[Question]) -> None:
         """Begin to search."""
@@ -105,6 +106,7 @@ class LoopSearch:
             angle=min(question.angle, max(3 * turn, 0.05)),
             min_score=c.min_score,
             penalty=(price / place**2, price / turn**2),
+            fronts=question.fronts,
         )
         if found is None:
             return None

@@ -49,6 +49,7 @@ class Pipeline:
         self.poses: list[np.ndarray] = []
         self.velocities: list[np.ndarray] = []
         self.velocity_covariances: list[np.ndarray] = []
+        self.step_covariances: list[np.ndarray] = []
         self.ranges: list[np.ndarray] = []
         self.stage_seconds: dict[str, float] = defaultdict(float)
 
@@ -88,6 +89,7 @@ class Pipeline:
         self.poses.append(track.pose)
         self.velocities.append(track.velocity)
         self.velocity_covariances.append(track.velocity_covariance)
+        self.step_covariances.append(track.covariance)
         self.ranges.append(ranges.astype(np.float32))
 
     def finish(self) -> None:
@@ -189,6 +191,7 @@ def _write_scans(pipeline: Pipeline, source: Recording, path: Path, times: np.nd
         put("azimuths", BEARINGS, "rad")
         put("velocity", np.concatenate(pipeline.velocities), "m/s, sensor frame")
         put("velocity_covariance", np.concatenate(pipeline.velocity_covariances), "m^2/s^2")
+        put("step_covariance", np.concatenate(pipeline.step_covariances), "m^2, m rad, rad^2: of odometry since before")
         for name in ("velocity", "scan", "scan_azimuths", "floor_plan", "pose", "time"):
             if source.has(f"truth/{name}"):
                 put(f"truth/{name}", source.read(f"truth/{name}"), str(source.describe(f"truth/{name}")["unit"]))

@@ -14,10 +14,10 @@ from radarize.pose import between, compose, interpolate, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.grid import OccupancyGrid
-from radarize.slam.loops import candidates, close, uncertainty
-from radarize.slam.matcher import match
+from radarize.slam.loops import Jury, LoopSearch, Question, uncertainty
+from radarize.slam.matcher import match, thin
 from radarize.slam.node import Node, Scan
-from radarize.slam.odometry import Odometry, Stillness
+from radarize.slam.odometry import Drift, Odometry, Stillness
 from radarize.slam.posegraph import PoseGraph
 from radarize.slam.submap import Submap
 
@@ -50,7 +50,11 @@ class Slam:
         self._scan_times: list[float] = []
         self._open: list[Scan] = []
         self._local: list[np.ndarray] = []  # of every node in the local frame
-        self._closures_at_last_optimisation = 0
+        self._drift = Drift(self.config.odometry.scale)
+        self._search = LoopSearch(self.config.loop)
+        self._jury = Jury(self.graph, self._drift, self.config.loop)
+        self._building: list[Submap] = []
+        self._centers: list[np.ndarray] = []  # of finished submaps, as seen from their anchors
 
     def add_odometry(
         self, time: float, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"] | None = None
@@ -102,6 +106,8 @@ class Slam:
         if self._open:
             self._add_node()
         if self.config.loop.enabled:
+            for closure in self._search.answers():
+                self._jury.hear(closure)
             self.graph.optimise()
             self._close_again()
         self.graph.optimise()
@@ -113,7 +119,7 @@ class Slam:
         """
         if not self.nodes:
             return np.zeros(0), np.zeros((0, 3))
-        knots, poses = np.array([node.time for node in self.nodes]), np.stack(self.graph.poses)
+        knots, poses = np.array([node.time for node in self.nodes]), self.graph.poses
         times = np.array(self._scan_times[: len(self._scan_times) - len(self._waiting) - len(self._open)])
         odometry = np.stack([self.odometry.pose(t) for t in times])
         anchors = np.stack([self.odometry.pose(t) for t in knots])
@@ -152,6 +158,7 @@ class Slam:
         if not self.nodes:
             start = self.odometry.pose(node.time)
             self._local.append(start)
+            self._drift.add(start, np.zeros((3, 3)), 0.0)
             self.graph.add_node(start)
         else:
             motion, covariance = self.odometry.motion(self.nodes[-1].time, node.time)
@@ -160,11 +167,12 @@ class Slam:
             self.graph.add_node(compose(self.graph.poses[-1], moved))
             self.graph.add_motion(len(self.nodes) - 1, len(self.nodes), motion, covariance)
             self._local.append(local)
+            self._drift.add(local, covariance, float(np.hypot(motion[0], motion[1])))
             if isinstance(self.odometry, Stillness):
                 self.odometry.last = moved
         self.nodes.append(node)
         self._insert(len(self.nodes) - 1, node)
-        if self.config.loop.enabled and (len(self.nodes) - 1) % self.config.loop.every == 0:
+        if self.config.loop.enabled:
             self._close(len(self.nodes) - 1)
 
     def _match(self, node: Node, predicted: np.ndarray, covariance: np.ndarray) -> np.ndarray:
@@ -172,7 +180,7 @@ class Slam:
         c = self.config.matcher
         if not c.enabled or len(node.points) < self.config.node.min_points:
             return predicted
-        submap = next(s for s in self.submaps if not s.finished)
+        submap = self._building[0]
         prior = between(self._local[submap.anchor], predicted)
         guess = prior
         if c.presearch_distance > 0:
@@ -196,36 +204,63 @@ class Slam:
 
     def _insert(self, number: int, node: Node) -> None:
         """Add a node to the two submaps being built; a new one starts when the older is half full."""
-        building = [s for s in self.submaps if not s.finished]
-        if len(building) < 2 and (not building or len(building[0].nodes) >= self.config.grid.nodes // 2):
+        if len(self._building) < 2 and (
+            not self._building or len(self._building[0].nodes) >= self.config.grid.nodes // 2
+        ):
             self.submaps.append(Submap(self.config, number))
-            building.append(self.submaps[-1])
-        for submap in building:
+            self._building.append(self.submaps[-1])
+        for submap in self._building:
             submap.insert(number, node, between(self._local[submap.anchor], self._local[number]))
+        if self._building[0].finished:
+            self._centers.append(self._building.pop(0).center)
 
     def _close(self, number: int) -> None:
-        """Search a node in the submaps near it, and optimise when it is time and there is news."""
+        """Begin to search a node in the submaps near it, and take in what was found for earlier ones."""
         c = self.config.loop
-        if len(self.nodes[number].points) >= self.config.node.min_points:
-            for submap in candidates(number, self.submaps, self.graph.poses, c)[: c.candidates]:
-                self._try(number, submap, c.distance, c.angle)
-        if number % c.optimise_every == 0 and len(self.graph.closures) > self._closures_at_last_optimisation:
-            self._closures_at_last_optimisation = len(self.graph.closures)
-            self.graph.optimise()
+        if number % c.every == 0:
+            self._search.ask(self._questions(number, c.candidates, c.distance, c.angle))
+        jumps = [self._jury.hear(closure) for closure in self._search.answers(number - c.lag)]
+        if any(jumps) or number % c.update_every == 0:
+            self.graph.update()
 
     def _close_again(self) -> None:
         """With loops closed, nodes and submaps lie where they overlap: match what was not matched, closely."""
-        c, grid = self.config.loop, self.config.grid
-        done = set(self.graph.closures)
-        for number, node in enumerate(self.nodes):
-            if len(node.points) >= self.config.node.min_points:
-                near = [s for s in candidates(number, self.submaps, self.graph.poses, c)]
-                for submap in near[: 2 * c.candidates]:
-                    if (submap.anchor, number) not in done:
-                        self._try(number, submap, 8 * grid.resolution, 0.1)
+        c, done = self.config.loop, set(self.graph.closures)
+        for number in range(len(self.nodes)):
+            questions = self._questions(number, 2 * c.candidates, 8 * self.config.grid.resolution, 0.1)
+            self._search.ask([q for q in questions if (q.submap.anchor, number) not in done])
+        for closure in self._search.answers():
+            self._jury.hear(closure)
 
-    def _try(self, number: int, submap: Submap, distance: float, angle: float) -> None:
-        guess = between(self.graph.poses[submap.anchor], self.graph.poses[number])
-        found = close(number, self.nodes[number], submap, guess, self.config.loop, distance=distance, angle=angle)
-        if found is not None:
-            self.graph.add_closure(found.anchor, found.node, found.pose, found.covariance)
+    def _questions(self, number: int, count: int, distance: float, angle: float) -> list[Question]:
+        """Searches of a node and those before it in the finished submaps near it, nearest first."""
+        spacing = self.config.matcher.spacing
+        first = max(number - self.config.loop.nodes + 1, 0)
+        poses, ready = self.graph.poses, len(self._centers)
+        if len(self.nodes[number].points) < self.config.node.min_points or not ready:
+            return []
+        last = np.array([submap.nodes[-1] for submap in self.submaps[:ready]])
+        anchors = np.array([submap.anchor for submap in self.submaps[:ready]])
+        centers = compose(poses[anchors], np.pad(np.array(self._centers), ((0, 0), (0, 1))))[:, :2]
+        away = np.hypot(*(centers - poses[number, :2]).T)
+        near = np.flatnonzero((away <= self.config.loop.radius) & ((last < first) | (anchors > number)))
+        if not len(near):
+            return []
+        members = range(first, number + 1)
+        points, fronts = (
+            thin(np.concatenate([transform(between(poses[number], poses[k]), part[k]) for k in members]), spacing)
+            for part in ({k: self.nodes[k].points for k in members}, {k: self.nodes[k].fronts for k in members})
+        )
+        return [
+            Question(
+                self.submaps[k],
+                number,
+                points,
+                fronts,
+                between(poses[anchors[k]], poses[number]),
+                self._drift.between(anchors[k], number),
+                distance,
+                angle,
+            )
+            for k in near[np.argsort(away[near], kind="stable")][:count]
+        ]

@@ -16,6 +16,8 @@ class OdometryConfig(_Section):
         translation, rotation: floor of a step, m and rad.
         translation_per_metre, rotation_per_metre: m/m and rad/m.
         rotation_per_radian: rad/rad.
+        scale: error of length that all steps share, m/m; added to covariances that come with the odometry, which know
+            of each step alone.
         missing_translation, missing_rotation: of a step without any odometry (constant velocity is assumed), m and rad.
     """
 
@@ -24,6 +26,7 @@ class OdometryConfig(_Section):
     translation_per_metre: float = Field(0.05, ge=0)
     rotation_per_metre: float = Field(0.02, ge=0)
     rotation_per_radian: float = Field(0.03, ge=0)
+    scale: float = Field(0.01, ge=0)
     missing_translation: float = Field(0.3, gt=0)
     missing_rotation: float = Field(0.2, gt=0)
 
@@ -105,12 +108,15 @@ class LoopConfig(_Section):
         distance, angle: half-widths of the search window, m and rad.
         candidates: at most so many submaps are searched per node, nearest first.
         every: only every so-many-th node is searched for.
-        min_score: mean probability at the node's points that a closure needs.
+        nodes: points of so many nodes, the latest ones, are searched for together: one view may be too poor.
+        min_score: mean probability at the points that a closure needs.
         levels: halvings of the resolution in the branch-and-bound search.
         sigma: as `MatcherConfig.sigma`, for closures.
         translation_floor, rotation_floor: no closure is believed better than this, m and rad.
+        lag: searches run in the background; what they find is taken in so many nodes later.
+        support: closures that contradict the present estimate are believed when so many of them agree.
+        update_every: nodes between two updates of the graph where no loop has just closed.
         inlier_probability: closures whose error is less likely than one minus this are rejected.
-        optimise_every: nodes between two optimisations on the way.
     """
 
     enabled: bool = True
@@ -119,13 +125,16 @@ class LoopConfig(_Section):
     angle: float = Field(0.5, gt=0)
     candidates: int = Field(2, gt=0)
     every: int = Field(2, gt=0)
+    nodes: int = Field(1, gt=0)
     min_score: float = Field(0.6, gt=0, lt=1)
     levels: int = Field(5, ge=0, le=8)
     sigma: float = Field(1.0, gt=0)
     translation_floor: float = Field(0.03, gt=0)
     rotation_floor: float = Field(0.006, gt=0)
+    lag: int = Field(4, ge=0)
+    support: int = Field(3, gt=0)
+    update_every: int = Field(10, gt=0)
     inlier_probability: float = Field(0.99, gt=0, lt=1)
-    optimise_every: int = Field(50, gt=0)
 
 
 class SlamConfig(_Section):
@@ -171,12 +180,13 @@ PRESETS: dict[str, SlamConfig] = {
             distance=2.0,
             angle=0.5,
             candidates=3,
-            every=1,
-            min_score=0.65,
+            every=2,
+            nodes=8,
+            min_score=0.5,
             levels=4,
-            sigma=3.0,
-            translation_floor=0.1,
-            rotation_floor=0.03,
+            sigma=1.0,
+            translation_floor=0.05,
+            rotation_floor=0.02,
         ),
     ),
 }

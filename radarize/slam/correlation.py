@@ -3,6 +3,9 @@
 Branch and bound over a pyramid (Hess et al., ICRA 2016, section V.C). Level h holds, on cells of 2^h, the maximum over
 2 x 2 such cells, so that all poses whose shift lies in a block of 2^h x 2^h cells are bounded by one look-up per point:
 the best pose of the window is found as if all had been tried. A pyramid takes 4/3 of the bytes of its grid.
+
+Echoes should lie where the map is occupied. Places in front of them, as seen by the sensor, should lie where it is
+free: a wall seen from its other side, which is what a corridor's two walls are to each other, is another wall.
 """
 
 from dataclasses import dataclass
@@ -22,7 +25,7 @@ class Pyramid:
         resolution, origin: of level 0, as in `OccupancyGrid`.
         half: half-width of the largest window that can be searched, cells; twice this much empty space is added around
             the grid, so that the search need not look where the grid ends.
-        buffer: levels one after the other, row by row.
+        buffer: levels one after the other, row by row: first of being occupied, then, if asked for, of being free.
         starts, rows, columns: of each level; from level 1 on, cell (-1, -1) is stored at (0, 0).
     """
 
@@ -35,21 +38,24 @@ class Pyramid:
     columns: np.ndarray
 
     @classmethod
-    def of(cls, grid: OccupancyGrid, levels: int, distance: float) -> "Pyramid":
+    def of(cls, grid: OccupancyGrid, levels: int, distance: float, free: bool = False) -> "Pyramid":
         """Pyramid with `levels` halvings for windows of half-width up to `distance` (m)."""
         half = int(np.ceil(distance / grid.resolution))
-        base = np.pad(np.rint(255 * grid.probability).astype(np.uint8), 2 * half)
-        planes = [base] + [_maxima(base, 1 << h) for h in range(1, levels + 1)]
-        sizes = np.array([p.size for p in planes])
-        return cls(
-            grid.resolution,
-            grid.origin - 2 * half * grid.resolution,
-            half,
-            np.concatenate([p.ravel() for p in planes]),
-            np.concatenate([[0], np.cumsum(sizes)[:-1]]),
-            np.array([p.shape[0] for p in planes]),
-            np.array([p.shape[1] for p in planes]),
-        )
+        rows, columns = np.array(grid.probability.shape)[:, None] + 4 * half
+        size = 1 << np.arange(levels + 1)
+        rim = np.minimum(np.arange(levels + 1), 1)
+        rows, columns = (rows + size - 1) // size + rim, (columns + size - 1) // size + rim
+        sizes = rows * columns
+        starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
+        probability = grid.quantised().probability
+        layers = [probability, np.where((probability > 0) & (probability < 128), np.uint8(255), np.uint8(0))]
+        buffer = np.zeros((1 + free, sizes.sum()), np.uint8)
+        for layer, values in zip(buffer, layers, strict=False):
+            base = layer[: sizes[0]].reshape(rows[0], columns[0])
+            base[2 * half : rows[0] - 2 * half, 2 * half : columns[0] - 2 * half] = values
+            _fill(layer, starts, rows, columns)
+        buffer = buffer.ravel()
+        return cls(grid.resolution, grid.origin - 2 * half * grid.resolution, half, buffer, starts, rows, columns)
 
     @property
     def levels(self) -> int:
@@ -66,6 +72,7 @@ def search(
     angle: float,
     min_score: float,
     penalty: tuple[float, float] = (0.0, 0.0),
+    fronts: Float[np.ndarray, "m 2"] | None = None,
 ) -> tuple[Float[np.ndarray, "3"], float] | None:
     """Best pose of a window around a guess, or None if none scores above `min_score`.
 
@@ -75,25 +82,28 @@ def search(
         guess: middle of the window, in the submap's frame.
         distance, angle: half-widths of the window, m and rad. The angle steps by one cell at the 90th percentile of
             the points' ranges.
-        min_score: mean probability at the points, 0...1.
+        min_score: mean probability at the points, and of being free at the fronts, 0...1.
         penalty: subtracted from the score per square metre and per square radian away from the guess.
+        fronts: places in front of the points, m, for a pyramid that knows what is free.
 
     Returns:
         Pose in the submap's frame and its score, penalty subtracted.
     """
     if not len(points):
         return None
-    reach = max(float(np.percentile(np.hypot(points[:, 0], points[:, 1]), 90)), 1.0)
+    reach = max(float(np.sort(np.hypot(points[:, 0], points[:, 1]))[int(0.9 * (len(points) - 1))]), 1.0)
     step = pyramid.resolution / reach
     turns = int(np.ceil(angle / step))
     angles = np.arange(-turns, turns + 1) * step
     half = min(int(np.ceil(distance / pyramid.resolution)), pyramid.half)
+    everything = points if fronts is None else np.concatenate([points, fronts])
     found, score, a, dx, dy = _search(
         pyramid.buffer,
         pyramid.starts,
         pyramid.rows,
         pyramid.columns,
-        np.ascontiguousarray(points, float),
+        np.ascontiguousarray(everything, float),
+        len(points),
         (np.asarray(guess, float)[:2] - pyramid.origin) / pyramid.resolution,
         guess[2] + angles,
         angles**2 * penalty[1],
@@ -108,46 +118,68 @@ def search(
     return np.array([guess[0] + shift[0], guess[1] + shift[1], guess[2] + angles[a]]), score
 
 
-@numba.njit(cache=True)
-def _maxima(base, size):
-    # Cell (i, j) of the result bounds base cells (i - 1) * size ... (i + 1) * size - 1 along each axis.
-    rows, columns = base.shape
-    out = np.zeros(((rows + size - 1) // size + 1, (columns + size - 1) // size + 1), np.uint8)
-    for row in range(rows):
-        r = row // size
-        for column in range(columns):
-            c, value = column // size, base[row, column]
-            if value > 0:
-                for i in range(r, r + 2):
-                    for j in range(c, c + 2):
-                        if out[i, j] < value:
-                            out[i, j] = value
-    return out
+@numba.njit(cache=True, nogil=True)
+def _fill(buffer, starts, rows, columns):
+    # Cell (i, j) of level h bounds base cells (i - 1) * size ... (i + 1) * size - 1 along each axis: the maximum of 2 x 2
+    # blocks of `size`, which in turn are the maxima of four blocks half as large.
+    blocks = buffer[: rows[0] * columns[0]].reshape((rows[0], columns[0]))
+    for h in range(1, len(starts)):
+        coarse = np.zeros((rows[h] - 1, columns[h] - 1), np.uint8)
+        for row in range(blocks.shape[0]):
+            for column in range(blocks.shape[1]):
+                value = blocks[row, column]
+                if value > coarse[row >> 1, column >> 1]:
+                    coarse[row >> 1, column >> 1] = value
+        blocks = coarse
+        plane = buffer[starts[h] : starts[h] + rows[h] * columns[h]].reshape((rows[h], columns[h]))
+        for row in range(blocks.shape[0]):
+            for column in range(blocks.shape[1]):
+                value = blocks[row, column]
+                if value > 0:
+                    plane[row, column] = max(plane[row, column], value)
+                    plane[row, column + 1] = max(plane[row, column + 1], value)
+                    plane[row + 1, column] = max(plane[row + 1, column], value)
+                    plane[row + 1, column + 1] = max(plane[row + 1, column + 1], value)
 
 
-@numba.njit(cache=True)
-def _bound(buffer, cells, shift):
-    total = np.int64(0)
-    for k in range(len(cells)):
-        total += buffer[cells[k] + shift]
+@numba.njit(cache=True, nogil=True)
+def _bound(buffer, cells, shift, needed):
+    # Sum at the cells, or an upper bound of it as soon as that is below what is needed.
+    total, count = np.int64(0), len(cells)
+    for start in range(0, count, 16):
+        end = min(start + 16, count)
+        for k in range(start, end):
+            total += buffer[cells[k] + shift]
+        if total + 255 * (count - end) < needed:
+            return total + 255 * (count - end)
     return total
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, nogil=True)
+def _cells(corner, h, starts, columns, out):
+    rim = 1 if h > 0 else 0
+    for k in range(len(corner)):
+        out[k] = corner[k, 2] + starts[h] + ((corner[k, 0] >> h) + rim) * columns[h] + (corner[k, 1] >> h) + rim
+
+
+@numba.njit(cache=True, nogil=True)
 def _nearest(low, size):
     # Smallest distance to 0 of the integers low ... low + size - 1.
     return max(low, -(low + size - 1), 0)
 
 
-@numba.njit(cache=True)
-def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty, scale, half, min_score, penalty):
+@numba.njit(cache=True, nogil=True)
+def _search(buffer, starts, rows, columns, points, echoes, guess, angles, angle_penalty, scale, half, min_score, penalty):
     # Shifts (dx, dy) count from the window's corner, so a block's shift at its level is one number for all points.
     top = len(starts) - 1
     size = 1 << top
     across = (2 * half + size) // size
     count = len(angles) * across * across
     unit = 1 / (255.0 * len(points))
-    cells, inside = np.empty((len(angles), top + 1, len(points)), np.int64), np.zeros(len(angles), np.int64)
+    least = min_score / unit
+    # Cells of the points, by angle; those below the top level only of angles that are looked at closer.
+    corner, inside = np.empty((len(angles), len(points), 3), np.int32), np.zeros(len(angles), np.int64)
+    cells, known = np.empty((len(angles), top + 1, len(points)), np.int32), np.zeros(len(angles), np.bool_)
     bounds, where = np.empty(count), np.empty((count, 3), np.int64)
     n = 0
     for a in range(len(angles)):
@@ -157,15 +189,15 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
             column = int(np.floor(cos * x - sin * y + guess[0])) - half
             row = int(np.floor(sin * x + cos * y + guess[1])) - half
             if column >= 0 and row >= 0 and column + 2 * half < columns[0] and row + 2 * half < rows[0]:
-                for h in range(top + 1):
-                    rim = 1 if h > 0 else 0
-                    cells[a, h, inside[a]] = starts[h] + ((row >> h) + rim) * columns[h] + (column >> h) + rim
+                corner[a, inside[a], 0], corner[a, inside[a], 1] = row, column
+                corner[a, inside[a], 2] = 0 if k < echoes else len(buffer) // 2
                 inside[a] += 1
+        _cells(corner[a, : inside[a]], top, starts, columns, cells[a, top])
         for i in range(across):
             for j in range(across):
                 dx, dy = i * size, j * size
                 away = _nearest(dx - half, size) ** 2 + _nearest(dy - half, size) ** 2
-                total = _bound(buffer, cells[a, top, : inside[a]], i + j * columns[top])
+                total = _bound(buffer, cells[a, top, : inside[a]], i + j * columns[top], least)
                 bounds[n] = total * unit - angle_penalty[a] - penalty * away
                 where[n, 0], where[n, 1], where[n, 2] = a, dx, dy
                 n += 1
@@ -176,6 +208,10 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
         if bounds[index] <= best:
             break
         a = where[index, 0]
+        if not known[a]:
+            known[a] = True
+            for h in range(top):
+                _cells(corner[a, : inside[a]], h, starts, columns, cells[a, h])
         stack_bound[0], stack[0, 0], stack[0, 1], stack[0, 2] = bounds[index], where[index, 1], where[index, 2], top
         depth = 1
         while depth > 0:
@@ -194,7 +230,8 @@ def _search(buffer, starts, rows, columns, points, guess, angles, angle_penalty,
                 child_bound[c] = -1.0
                 if cx <= 2 * half and cy <= 2 * half:
                     away = _nearest(cx - half, size) ** 2 + _nearest(cy - half, size) ** 2
-                    total = _bound(buffer, cells[a, level, : inside[a]], (cx >> level) + (cy >> level) * columns[level])
+                    shift = (cx >> level) + (cy >> level) * columns[level]
+                    total = _bound(buffer, cells[a, level, : inside[a]], shift, best / unit)
                     child_bound[c] = total * unit - angle_penalty[a] - penalty * away
             for c in np.argsort(child_bound):  # the best child is looked at first
                 if child_bound[c] > best:

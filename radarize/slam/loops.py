@@ -1,16 +1,51 @@
-"""Loop closure: where has this node been seen before?"""
+"""Loop closure: where has this place been seen before?
 
+Searches run beside the caller in threads (the kernels release Python's lock). Each result is taken in a fixed number
+of nodes after its search began, waited for if it is late: so threads change when work is done and never what comes out.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
+from scipy.stats import chi2
 
-from radarize.pose import between, transform
+from radarize.pose import between, compose
 from radarize.slam.config import LoopConfig
-from radarize.slam.correlation import search
+from radarize.slam.correlation import Pyramid, search
 from radarize.slam.matcher import Match, match
-from radarize.slam.node import Node
+from radarize.slam.odometry import Drift
+from radarize.slam.posegraph import PoseGraph
 from radarize.slam.submap import Submap
+
+_PYRAMIDS = 12  # kept of the submaps searched last
+_WORKERS = 2
+
+
+@dataclass(frozen=True)
+class Question:
+    """Where in a submap is a node?
+
+    Attributes:
+        submap, node: number of the node.
+        points, fronts: seen from the node, as in `Node`, m.
+        guess: pose of the node in the submap's frame.
+        spread: covariance of the guess, in the frame of the node.
+        distance, angle: half-widths of the window to search at most, m and rad.
+    """
+
+    submap: Submap
+    node: int
+    points: Float[np.ndarray, "point 2"]
+    fronts: Float[np.ndarray, "front 2"]
+    guess: Float[np.ndarray, "3"]
+    spread: Float[np.ndarray, "3 3"]
+    distance: float
+    angle: float
 
 
 @dataclass(frozen=True)
@@ -31,39 +66,104 @@ class Closure:
     score: float
 
 
-def candidates(number: int, submaps: list[Submap], poses: list[np.ndarray], config: LoopConfig) -> list[Submap]:
-    """Finished submaps near to a node that it is not part of, nearest first."""
-    found = []
-    for submap in submaps:
-        if submap.finished and not submap.nodes[0] <= number <= submap.nodes[-1]:
-            center = transform(poses[submap.anchor], submap.center[None])[0]
-            distance = float(np.hypot(*(center - poses[number][:2])))
-            if distance <= config.radius:
-                found.append((distance, submap.anchor, submap))
-    return [submap for *_, submap in sorted(found, key=lambda f: f[:2])]
+class LoopSearch:
+    """Answers questions in the background, in the order in which they were asked.
+
+    Args:
+        config: of the search.
+    """
+
+    def __init__(self, config: LoopConfig):
+        self.config = config
+        self._pool = ThreadPoolExecutor(_WORKERS, thread_name_prefix="loops")
+        self._asked: deque[tuple[int, Future]] = deque()
+        self._pyramid = lru_cache(_PYRAMIDS)(lambda submap: Pyramid.of(submap.grid, config.levels, config.distance, free=True))
+
+    def ask(self, questions: Sequence[Question]) -> None:
+        """Begin to search."""
+        for question in questions:
+            self._asked.append((question.node, self._pool.submit(self.answer, question)))
+
+    def answers(self, before: int | None = None) -> list[Closure]:
+        """What was found for nodes up to `before`, or for all; waits for it."""
+        found = []
+        while self._asked and (before is None or self._asked[0][0] <= before):
+            found.append(self._asked.popleft()[1].result())
+        return [closure for closure in found if closure is not None]
+
+    def answer(self, question: Question) -> Closure | None:
+        """Search around the guess, refine, and check the result again."""
+        c, submap, points = self.config, question.submap, question.points
+        place = float(np.sqrt(np.linalg.eigvalsh(question.spread[:2, :2])[1]))
+        turn = float(np.sqrt(question.spread[2, 2]))
+        # The mean residual that moves as much as the guess's covariance does.
+        price = c.sigma**2 / max(len(points), 1)
+        found = search(
+            self._pyramid(submap),
+            points,
+            question.guess,
+            distance=min(question.distance, max(3 * place, 4 * submap.grid.resolution)),
+            angle=min(question.angle, max(3 * turn, 0.05)),
+            min_score=c.min_score,
+            penalty=(price / place**2, price / turn**2),
+            fronts=question.fronts,
+        )
+        if found is None:
+            return None
+        pose, score = found
+        refined = match(submap.grid, points, pose, sigma=c.sigma)
+        moved = np.abs(between(pose, refined.pose))
+        if max(moved[0], moved[1]) > 4 * submap.grid.resolution or moved[2] > 0.1:
+            return None  # the peak of the search is no minimum of the refinement: not a place that fits
+        covariance = uncertainty(refined, c.translation_floor, c.rotation_floor)
+        return Closure(submap.anchor, question.node, refined.pose, covariance, score)
 
 
-def close(
-    number: int,
-    node: Node,
-    submap: Submap,
-    guess: Float[np.ndarray, "3"],
-    config: LoopConfig,
-    *,
-    distance: float,
-    angle: float,
-) -> Closure | None:
-    """Search a node in a submap around a guess (in the anchor's frame), refine, and check the result again."""
-    found = search(submap.pyramid, node.points, guess, distance=distance, angle=angle, min_score=config.min_score)
-    if found is None:
-        return None
-    pose, score = found
-    refined = match(submap.grid, node.points, pose, sigma=config.sigma)
-    moved = np.abs(between(pose, refined.pose))
-    if max(moved[0], moved[1]) > 4 * submap.grid.resolution or moved[2] > 0.1:
-        return None  # the peak of the search is no minimum of the refinement: not a place that fits
-    covariance = uncertainty(refined, config.translation_floor, config.rotation_floor)
-    return Closure(submap.anchor, number, refined.pose, covariance, score)
+class Jury:
+    """Decides which closures move poses at once; the graph's final optimisation decides over all of them again.
+
+    A closure that agrees with the present estimate is believed. One that contradicts it must be possible given how
+    far odometry may have drifted since, and is believed when others, of nodes near by, contradict it the same way:
+    a place that only looks the same seldom looks the same from several.
+    """
+
+    def __init__(self, graph: PoseGraph, drift: Drift, config: LoopConfig):
+        self.graph, self.drift, self.config = graph, drift, config
+        self._limit = float(chi2.ppf(config.inlier_probability, 3))
+        self._doubtful: deque[tuple[int, Closure]] = deque(maxlen=4 * config.support)
+
+    def hear(self, closure: Closure) -> bool:
+        """Enter a closure into the graph; True if poses should move for it now."""
+        number = len(self.graph.closures)
+        self.graph.add_closure(closure.anchor, closure.node, closure.pose, closure.covariance)
+        poses = self.graph.poses
+        error = between(between(poses[closure.anchor], poses[closure.node]), closure.pose)
+        if self._fits(error, closure.covariance):
+            self.graph.believe(number)
+            return False
+        if not self._fits(error, closure.covariance + self.drift.between(closure.anchor, closure.node)):
+            return False
+        agreeing = [n for n, other in self._doubtful if self._agree(other, closure)]
+        self._doubtful.append((number, closure))
+        if len(agreeing) + 1 < self.config.support:
+            return False
+        for n in (*agreeing, number):
+            self.graph.believe(n)
+        return True
+
+    def _agree(self, first: Closure, second: Closure) -> bool:
+        if first.node == second.node and first.anchor == second.anchor:
+            return False
+        poses = self.graph.poses
+        carried = compose(
+            compose(poses[first.anchor], first.pose), between(poses[first.node], poses[second.node])
+        )
+        error = between(carried, compose(poses[second.anchor], second.pose))
+        drift = self.drift.between(first.node, second.node) + self.drift.between(first.anchor, second.anchor)
+        return self._fits(error, first.covariance + second.covariance + drift)
+
+    def _fits(self, error: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]) -> bool:
+        return float(error @ np.linalg.solve(covariance, error)) <= self._limit
 
 
 def uncertainty(result: Match, translation: float, rotation: float) -> Float[np.ndarray, "3 3"]:

@@ -57,6 +57,7 @@ def match(
     weight = np.zeros((3, 3)) if covariance is None else np.linalg.inv(covariance)
     pose, score, information = _refine(
         grid.probability,
+        grid.unit,
         grid.origin[0],
         grid.origin[1],
         grid.resolution,
@@ -79,8 +80,8 @@ def thin(points: Float[np.ndarray, "n 2"], spacing: float) -> Float[np.ndarray, 
     return np.stack([np.bincount(index, points[:, axis]) / count for axis in (0, 1)], axis=-1)
 
 
-@numba.njit(cache=True)
-def interpolate(probability: np.ndarray, x: float, y: float) -> tuple[float, float, float]:
+@numba.njit(cache=True, nogil=True)
+def interpolate(probability: np.ndarray, x: float, y: float, unit: float = 1.0) -> tuple[float, float, float]:
     """Quadratic B-spline over max(2 p - 1, 0) and its gradient; x, y in cells from the grid's corner; 0 outside."""
     rows, columns = probability.shape
     column, row = int(np.floor(x)), int(np.floor(y))
@@ -94,15 +95,15 @@ def interpolate(probability: np.ndarray, x: float, y: float) -> tuple[float, flo
     value = slope_x = slope_y = 0.0
     for j in range(3):
         for i in range(3):
-            p = max(2 * probability[row + j - 1, column + i - 1] - 1, 0)
+            p = max(2 * unit * probability[row + j - 1, column + i - 1] - 1, 0)
             value += wy[j] * wx[i] * p
             slope_x += wy[j] * gx[i] * p
             slope_y += gy[j] * wx[i] * p
     return value, slope_x, slope_y
 
 
-@numba.njit(cache=True)
-def _cost(probability, ox, oy, resolution, points, pose, prior, prior_weight, weight, hessian, gradient):
+@numba.njit(cache=True, nogil=True)
+def _cost(probability, unit, ox, oy, resolution, points, pose, prior, prior_weight, weight, hessian, gradient):
     # Fills the Gauss-Newton system at the pose; returns the cost and the mean occupancy.
     hessian[:] = 0
     gradient[:] = 0
@@ -111,7 +112,7 @@ def _cost(probability, ox, oy, resolution, points, pose, prior, prior_weight, we
     for k in range(len(points)):
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
-        m, gx, gy = interpolate(probability, (rx + pose[0] - ox) / resolution, (ry + pose[1] - oy) / resolution)
+        m, gx, gy = interpolate(probability, (rx + pose[0] - ox) / resolution, (ry + pose[1] - oy) / resolution, unit)
         total += m
         residual = 1 - m
         cost += weight * residual * residual
@@ -136,14 +137,14 @@ def _cost(probability, ox, oy, resolution, points, pose, prior, prior_weight, we
     return cost + error @ prior_weight @ error, score, turn.T @ (prior_weight @ error), turn.T @ prior_weight @ turn
 
 
-@numba.njit(cache=True)
-def _refine(probability, ox, oy, resolution, points, guess, prior, prior_weight, weight, iterations):
+@numba.njit(cache=True, nogil=True)
+def _refine(probability, unit, ox, oy, resolution, points, guess, prior, prior_weight, weight, iterations):
     # Levenberg's damping: steps that raise the cost are taken back and shortened.
     pose = guess.copy()
     hessian, gradient = np.empty((3, 3)), np.empty(3)
     trial_hessian, trial_gradient = np.empty((3, 3)), np.empty(3)
     cost, score, prior_gradient, prior_hessian = _cost(
-        probability, ox, oy, resolution, points, pose, prior, prior_weight, weight, hessian, gradient
+        probability, unit, ox, oy, resolution, points, pose, prior, prior_weight, weight, hessian, gradient
     )
     damping = 1e-3
     for _ in range(iterations):
@@ -153,7 +154,7 @@ def _refine(probability, ox, oy, resolution, points, guess, prior, prior_weight,
         step = -np.linalg.solve(full, gradient + prior_gradient)
         trial = pose + step
         new_cost, new_score, new_prior_gradient, new_prior_hessian = _cost(
-            probability, ox, oy, resolution, points, trial, prior, prior_weight, weight, trial_hessian, trial_gradient
+            probability, unit, ox, oy, resolution, points, trial, prior, prior_weight, weight, trial_hessian, trial_gradient
         )
         if new_cost < cost:
             small = np.abs(step[0]) + np.abs(step[1]) < 1e-4 and np.abs(step[2]) < 1e-5

@@ -9,6 +9,8 @@ from radarize.pose import between, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.matcher import thin
 
+FRONT = 0.25  # m
+
 
 @dataclass(frozen=True)
 class Scan:
@@ -36,6 +38,7 @@ class Node:
         origins, ends: of the rays, m.
         hits: False for rays that saw nothing as far as their end.
         points: ends of hits, thinned for matching.
+        fronts: places a quarter of a metre before the ends of hits, thinned.
     """
 
     time: float
@@ -43,6 +46,7 @@ class Node:
     ends: Float[np.ndarray, "ray 2"]
     hits: Bool[np.ndarray, "ray"]
     points: Float[np.ndarray, "point 2"]
+    fronts: Float[np.ndarray, "front 2"]
 
     @classmethod
     def gather(cls, scans: list[Scan], config: SlamConfig) -> "Node":
@@ -52,13 +56,16 @@ class Node:
         reference = used[len(used) // 2]
         rays = [_rays(scan, between(reference.odometry, scan.odometry), config) for scan in used]
         origins, ends, hits = (np.concatenate(parts) for parts in zip(*rays, strict=True))
+        echo, way = ends[hits], ends[hits] - origins[hits]
+        before = echo - way * (FRONT / np.maximum(np.linalg.norm(way, axis=1), FRONT))[:, None]
         # Rays are half of what a session keeps in memory: single precision is 1 um at 10 m.
         return cls(
             reference.time,
             origins.astype(np.float32),
             ends.astype(np.float32),
             hits,
-            thin(ends[hits], config.matcher.spacing),
+            thin(echo, config.matcher.spacing).astype(np.float32),
+            thin(before, config.matcher.spacing).astype(np.float32),
         )
 
 

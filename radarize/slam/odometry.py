@@ -86,7 +86,8 @@ class Odometry:
             carry = adjoint(inverse(step))
             total = carry @ total @ carry.T + fraction * covariance
         # A floor keeps the graph solvable where the source claims to be perfect (a sensor at rest).
-        return whole, total + np.diag([1e-4, 1e-4, 1e-4]) ** 2
+        shared = 1e-4 + self.config.scale * np.hypot(whole[0], whole[1])
+        return whole, total + np.diag([shared, shared, 1e-4]) ** 2
 
     def model(self, step: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
         """Covariance of a step from the configured standard deviations."""
@@ -94,6 +95,30 @@ class Odometry:
         translation = np.hypot(c.translation, c.translation_per_metre * distance)
         rotation = np.linalg.norm([c.rotation, c.rotation_per_metre * distance, c.rotation_per_radian * angle])
         return np.diag([translation, translation, rotation]) ** 2
+
+
+class Drift:
+    """How far odometry may have drifted between any two nodes: sums of what it may have in each step."""
+
+    def __init__(self, scale: float):
+        self.scale = scale
+        self._inverse: list[np.ndarray] = []
+        self._sums: list[np.ndarray] = []
+        self._lengths: list[float] = []
+
+    def add(self, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"], length: float) -> None:
+        """Append a node: its pose in a frame without jumps, covariance (in its own frame) and length of the last step."""
+        carry = adjoint(pose)
+        self._inverse.append(np.linalg.inv(carry))
+        self._sums.append((self._sums[-1] if self._sums else 0) + carry @ covariance @ carry.T)
+        self._lengths.append((self._lengths[-1] if self._lengths else 0.0) + length)
+
+    def between(self, first: int, second: int) -> Float[np.ndarray, "3 3"]:
+        """Covariance of the motion between two nodes, in the frame of the later one."""
+        low, high = min(first, second), max(first, second)
+        home = self._inverse[high]
+        shared = self.scale * (self._lengths[high] - self._lengths[low])
+        return home @ (self._sums[high] - self._sums[low]) @ home.T + np.diag([shared, shared, 0.0]) ** 2
 
 
 class Stillness(Odometry):

@@ -1,78 +1,106 @@
 """The pose graph: what nodes know of each other, and the poses that agree best with it.
 
-Motions and matches are Gaussian. Closures may be false; graduated non-convexity (Yang et al., RA-L 2020) with motions
-and matches as known inliers decides which of them to believe (`gtsam.GncLMOptimizer`, truncated least squares). Robust
-kernels do worse: they keep some false closures and weaken true ones.
+While a session runs, closures that are believed go into iSAM2 (Kaess et al., IJRR 2012), which solves anew only what
+they touch. At its end graduated non-convexity (Yang et al., RA-L 2020) with motions and matches as known inliers
+decides over all closures afresh (`gtsam.GncLMOptimizer`, truncated least squares). Robust kernels do worse: they keep
+some false closures and weaken true ones.
 """
-
-from dataclasses import dataclass, field
 
 import gtsam
 import numpy as np
 from jaxtyping import Bool, Float
 
 
-@dataclass
 class PoseGraph:
     """Poses of nodes and relative poses between them.
 
     Every relative pose is that of node `to` in the frame of node `of`, its covariance is for (x, y, yaw) in the frame
-    of `to`, the convention of gtsam.
+    of `to`, the convention of gtsam. Node 0 stays where it is.
+
+    Args:
+        inlier_probability: a closure is rejected when its error is less likely than one minus this.
 
     Attributes:
-        inlier_probability: a closure is rejected when its error is less likely than one minus this.
-        poses: current estimate, one per node; node 0 stays where it is.
         closures: (of, to) of all closures.
-        accepted: of each closure, whether the last optimisation believed it.
+        accepted: of each closure, whether it is believed.
     """
 
-    inlier_probability: float = 0.99
-    poses: list[np.ndarray] = field(default_factory=list)
-    closures: list[tuple[int, int]] = field(default_factory=list)
-    accepted: Bool[np.ndarray, "closure"] = field(default_factory=lambda: np.zeros(0, bool))
-
-    def __post_init__(self):
+    def __init__(self, inlier_probability: float = 0.99):
+        self.inlier_probability = inlier_probability
+        self.closures: list[tuple[int, int]] = []
+        self.accepted: Bool[np.ndarray, "closure"] = np.zeros(0, bool)
+        self._poses, self._count = np.zeros((64, 3)), 0
         self._certain: list[gtsam.BetweenFactorPose2] = []
         self._uncertain: list[gtsam.BetweenFactorPose2] = []
+        self._isam: gtsam.ISAM2 | None = None
+        self._news = gtsam.NonlinearFactorGraph()  # not in iSAM2 yet
+        self._known = 0  # nodes in iSAM2
+
+    @property
+    def poses(self) -> Float[np.ndarray, "node 3"]:
+        """Current estimate."""
+        return self._poses[: self._count]
 
     def add_node(self, pose: Float[np.ndarray, "3"]) -> int:
         """Add a node with a first estimate; returns its number."""
-        self.poses.append(np.asarray(pose, float))
-        return len(self.poses) - 1
+        if self._count == len(self._poses):
+            self._poses = np.concatenate([self._poses, np.zeros_like(self._poses)])
+        self._poses[self._count] = pose
+        self._count += 1
+        return self._count - 1
 
     def add_motion(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
         """A relative pose that is known not to be an outlier: odometry, or a match to the submap being built."""
         self._certain.append(_factor(of, to, relative, covariance))
+        self._news.add(self._certain[-1])
 
     def add_closure(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
-        """A relative pose from a loop search, which may be false."""
+        """A relative pose from a loop search, which may be false; it is not believed yet."""
         self._uncertain.append(_factor(of, to, relative, covariance))
         self.closures.append((of, to))
+        self.accepted = np.append(self.accepted, False)
 
-    def optimise(self, reject: bool = True) -> None:
-        """Move `poses` to the optimum, and set `accepted`.
+    def believe(self, closure: int) -> None:
+        """Let a closure move poses from the next `update` on."""
+        if not self.accepted[closure]:
+            self.accepted[closure] = True
+            self._news.add(self._uncertain[closure])
 
-        Args:
-            reject: decide anew which closures to believe; otherwise keep what was believed, and believe new ones.
-        """
-        if len(self.poses) < 2:
+    def update(self) -> None:
+        """Move poses to where everything believed agrees, solving anew only what changed."""
+        if self._count < 2:
             return
-        if reject and self._uncertain:
+        if self._isam is None:
+            self._isam, self._known = gtsam.ISAM2(_incremental()), 0
+            self._news = self._graph(self._believed())
+        values = gtsam.Values()
+        for k in range(self._known, self._count):
+            values.insert(k, gtsam.Pose2(*self._poses[k]))
+        self._isam.update(self._news, values)
+        self._isam.update()  # a second step: closing a loop is far from linear
+        self._news, self._known = gtsam.NonlinearFactorGraph(), self._count
+        self._poses[: self._count] = gtsam.utilities.extractPose2(self._isam.calculateBestEstimate())
+
+    def optimise(self) -> None:
+        """Decide over all closures afresh, and move poses to the optimum."""
+        if self._count < 2:
+            return
+        if self._uncertain:
             self.accepted = self._judge()
-        else:
-            new = len(self._uncertain) - len(self.accepted)
-            self.accepted = np.concatenate([self.accepted, np.ones(new, bool)])
-        believed = [f for f, keep in zip(self._uncertain, self.accepted, strict=True) if keep]
-        graph = self._graph(believed)
-        self._set(gtsam.LevenbergMarquardtOptimizer(graph, self._values(), _levenberg()).optimize())
+        graph = self._graph(self._believed())
+        values = gtsam.LevenbergMarquardtOptimizer(graph, self._values(), _levenberg()).optimize()
+        self._poses[: self._count] = gtsam.utilities.extractPose2(values)
+        self._isam = None
 
     def covariances(self) -> Float[np.ndarray, "node 3 3"]:
         """Marginal covariance of every node for (x, y, yaw) in its own frame, given that node 0 is exact."""
-        if not self.poses:
+        if not self._count:
             return np.zeros((0, 3, 3))
-        believed = [f for f, keep in zip(self._uncertain, self.accepted, strict=False) if keep]
-        marginals = gtsam.Marginals(self._graph(believed), self._values())
-        return np.stack([marginals.marginalCovariance(k) for k in range(len(self.poses))])
+        marginals = gtsam.Marginals(self._graph(self._believed()), self._values())
+        return np.stack([marginals.marginalCovariance(k) for k in range(self._count)])
+
+    def _believed(self) -> list:
+        return [factor for factor, keep in zip(self._uncertain, self.accepted, strict=True) if keep]
 
     def _judge(self) -> Bool[np.ndarray, "closure"]:
         graph = self._graph(self._uncertain)
@@ -88,7 +116,7 @@ class PoseGraph:
     def _graph(self, closures: list) -> gtsam.NonlinearFactorGraph:
         graph = gtsam.NonlinearFactorGraph()
         anchor = gtsam.noiseModel.Isotropic.Sigma(3, 1e-6)
-        graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*self.poses[0]), anchor))
+        graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*self._poses[0]), anchor))
         for factor in self._certain:
             graph.add(factor)
         for factor in closures:
@@ -101,11 +129,6 @@ class PoseGraph:
             values.insert(k, gtsam.Pose2(*pose))
         return values
 
-    def _set(self, values: gtsam.Values) -> None:
-        for k in range(len(self.poses)):
-            pose = values.atPose2(k)
-            self.poses[k] = np.array([pose.x(), pose.y(), pose.theta()])
-
 
 def _factor(of, to, relative, covariance) -> gtsam.BetweenFactorPose2:
     noise = gtsam.noiseModel.Gaussian.Covariance(covariance)
@@ -115,4 +138,11 @@ def _factor(of, to, relative, covariance) -> gtsam.BetweenFactorPose2:
 def _levenberg() -> gtsam.LevenbergMarquardtParams:
     parameters = gtsam.LevenbergMarquardtParams()
     parameters.setRelativeErrorTol(1e-4)
+    return parameters
+
+
+def _incremental() -> gtsam.ISAM2Params:
+    parameters = gtsam.ISAM2Params()
+    parameters.setRelinearizeThreshold(0.02)
+    parameters.relinearizeSkip = 1
     return parameters

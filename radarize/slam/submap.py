@@ -8,14 +8,15 @@ from jaxtyping import Float
 
 from radarize.pose import transform
 from radarize.slam.config import SlamConfig
-from radarize.slam.correlation import Pyramid
 from radarize.slam.grid import OccupancyGrid
 from radarize.slam.node import Node
 
 
-@dataclass
+@dataclass(eq=False)
 class Submap:
     """Nodes are added until it holds as many as configured; then it is finished and never changes.
+
+    A finished grid takes a byte a cell. What a search needs besides is made when it searches, and dropped again.
 
     Attributes:
         config: of the back end.
@@ -36,7 +37,7 @@ class Submap:
         self.grid.insert(origins, ends, node.hits, self.config.grid, spread=True)
         self.nodes.append(number)
         if self.finished:
-            self.grid = self.grid.crop(margin=2)
+            self.grid = self.grid.crop(margin=2).quantised()
 
     @property
     def finished(self) -> bool:
@@ -44,14 +45,9 @@ class Submap:
         return len(self.nodes) >= self.config.grid.nodes
 
     @cached_property
-    def pyramid(self) -> Pyramid:
-        """For the loop search; of a finished submap."""
-        return Pyramid.of(self.grid, self.config.loop.levels, self.config.loop.distance)
-
-    @cached_property
     def center(self) -> Float[np.ndarray, "2"]:
         """Middle of the occupied cells, m."""
-        occupied = np.argwhere(self.grid.probability > 0.5)
+        occupied = np.argwhere(self.grid.probability * self.grid.unit > 0.5)
         if not len(occupied):
             return np.zeros(2)
         return (occupied.mean(axis=0)[::-1] + 0.5) * self.grid.resolution + self.grid.origin

@@ -86,7 +86,7 @@ def test_search_finds_what_trying_everything_finds():
     for guess in (truth + [0.31, -0.24, 0.1], truth + [-0.42, 0.13, -0.08]):
         for penalty in ((0.0, 0.0), (0.4, 0.6)):
             found = search(pyramid, points, guess, distance=0.6, angle=0.15, min_score=0.2, penalty=penalty)
-            step = GRID.resolution / max(np.percentile(np.hypot(*points.T), 90), 1.0)
+            step = GRID.resolution / max(np.sort(np.hypot(*points.T))[int(0.9 * (len(points) - 1))], 1.0)
             turns = int(np.ceil(0.15 / step))
             best = 0.0
             for turn, dx, dy in itertools.product(range(-turns, turns + 1), range(-12, 13), range(-12, 13)):

@@ -26,6 +26,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 #: Largest extent of a building, m; what seems larger or smaller is likely in other units.
 _LIKELY = (1.5, 300.0)
 _STOREY = 2.7  # m
+_LARGEST = 2000.0  # m; ray tests compute in single precision
 #: Scenes that lie further from the origin are moved to it, m.
 _FAR = 500.0
 
@@ -153,6 +154,8 @@ def _fit(parts, source, units, up, floor, budget, remarks, progress) -> list[Par
         for part in parts:
             part.mesh.vertices = np.asarray(part.mesh.vertices)[:, [0, 2, 1]] * [1, -1, 1]
     extent = _extent(parts) * UNITS[units]
+    if extent.max() > _LARGEST:
+        raise InputError(f"{source}: is {extent.max():.3g} m long in {units}, expected at most {_LARGEST:g} m")
     if not _LIKELY[0] <= extent.max() <= _LIKELY[1]:
         remarks.append(f"it is {extent.max():.3g} m long, which is odd for a building; --units says what its units are")
     if extent[2] > max(2.0, 2 * extent[:2].max()):

@@ -23,8 +23,6 @@ from radarsim.sensors.scan import AZIMUTHS
 from radarsim.sensors.sensor import Frames, Rig, Sensor
 
 _INSTANTS = 3
-#: Echoes so far below the noise of a map (dB) add nothing to it: a quarter of those that the simulator sums.
-_SILENT = 20.0
 #: Half width of the window's transform, bins, and its table's entries per bin.
 _WIDTH, _FINE = 4, 64
 #: Powers are kept in steps of so many dB, and not below so many dB under the noise: that is what lets them be packed.
@@ -64,9 +62,7 @@ class Ghosts(Sensor):
         """Maps and labels."""
         power, cause = [], []
         for lengths, amplitudes, echoes in zip(frames.lengths, frames.received, frames.echoes, strict=True):
-            amplitudes = self._front_end.scale * amplitudes
-            heard = np.abs(amplitudes) > 10 ** ((self._floor - _SILENT) / 20)
-            maps = self._maps(lengths[heard], amplitudes[heard], echoes.provenance[heard])
+            maps = self._maps(lengths, self._front_end.scale * amplitudes, echoes.provenance)
             power.append(maps)
             cause.append(self.label(maps))
         level = 10 * np.log10(np.maximum(np.stack(power), 10 ** ((self._floor - DEPTH) / 10)))

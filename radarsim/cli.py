@@ -21,7 +21,15 @@ def simulate(
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
     platform: Annotated[Literal["handheld", "cart", "robot"], typer.Option(help="How the sensor moves.")] = "handheld",
     trajectory: Annotated[Path | None, typer.Option(help="Poses (TUM) to follow instead of a platform's.")] = None,
-    duration: Annotated[float, typer.Option(min=0.0, help="Length of the walk, s.")] = 40.0,
+    waypoints: Annotated[
+        Path | None, typer.Option(help="Places x y (YAML, CSV or TUM) to go through instead of a tour.")
+    ] = None,
+    mounting: Annotated[
+        str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="Sensor on its carrier, m and degrees.")
+    ] = "",
+    duration: Annotated[
+        float | None, typer.Option(min=0.0, help="Length, s; else 40 of a tour, all of a trajectory or way-points.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
     device: Annotated[Literal["cpu", "cuda"], typer.Option(help="Where echoes are summed; cuda is untried.")] = "cpu",
@@ -43,7 +51,10 @@ def simulate(
     ] = "",
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth."""
+    from radarize.recording import Recording
+    from radarsim.motion import Mounting
     from radarsim.simulate import simulate
+    from radarsim.statistics import Statistics
 
     with keeping(output), progress(f"simulate {Path(scene).stem}") as report:
         written = simulate(
@@ -51,6 +62,8 @@ def simulate(
             output,
             platform=platform,
             trajectory=trajectory,
+            waypoints=waypoints,
+            mounting=Mounting.parse(mounting) if mounting else None,
             duration=duration,
             seed=seed,
             radar=radar,
@@ -61,6 +74,10 @@ def simulate(
             sensors=[name.strip() for name in sensors.split(",") if name.strip()],
             progress=report,
         )
+    with Recording(written) as recording:
+        print(Statistics.from_json(recording.attributes["motion"]))
+        if recording.attributes["warnings"]:
+            print(f"warning: {recording.attributes['warnings']}")
     print(written)
 
 
@@ -129,7 +146,7 @@ def preview(
     scene: SceneName,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the pictures.")] = Path("."),
 ):
-    """Draw SCENE as pictures: its floor plan and a view into it."""
+    """Draw SCENE as pictures: its floor plan and a rendering with the ceilings taken off."""
     from radarsim.scene.preview import preview
     from radarsim.scene.scene import Scene
 

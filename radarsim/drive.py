@@ -16,7 +16,7 @@ from radarsim.platforms import Platform
 STANDSTILL = 0.5  # at the start, s
 _RATE = 100.0  # Hz
 _MARGIN = 1.0  # s of motion before 0 (still) and after the end
-_BACKED = 12.0  # m, longest leg that is done backward instead of turning round
+_BACKED = 22.0  # s, longest leg that is done backward instead of turning round
 
 
 def drive(
@@ -84,8 +84,8 @@ def _timeline(
         else:
             start = courses[-1][-1]
             change = _wrapped(course[0] - start)
-            backward = np.linalg.norm(np.diff(leg, axis=0), axis=1).sum() < _BACKED
-            if backward and abs(change) > 2.0 and rng.random() < carrier.reversing:
+            short = np.linalg.norm(np.diff(leg, axis=0), axis=1).sum() < _BACKED * carrier.speed
+            if short and abs(change) > 2.0 and rng.random() < carrier.reversing:
                 course = course + np.pi
                 change = _wrapped(course[0] - start)
             course = course + start + change - course[0]

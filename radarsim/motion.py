@@ -38,16 +38,25 @@ class Mounting:
     rotation: Rotation = Rotation.identity()
 
     @classmethod
-    def of(cls, numbers: Sequence[float]) -> "Mounting":
-        """From x, y, z in m (forward, left, up) and roll, pitch, yaw in degrees (pitch positive: nose down).
+    def of(cls, lever_arm: Sequence[float], tilt: Sequence[float]) -> "Mounting":
+        """From x, y, z in m (forward, left, up) and roll, pitch, yaw in degrees (pitch positive: nose down)."""
+        x, y, z = map(float, lever_arm)
+        return cls((x, y, z), Rotation.from_euler("ZYX", tuple(tilt)[::-1], degrees=True))
+
+    @classmethod
+    def parse(cls, text: str) -> "Mounting":
+        """From six numbers in a line: x y z in m, roll pitch yaw in degrees.
 
         Raises:
-            InputError: other than six finite numbers.
+            InputError: anything else.
         """
+        try:
+            numbers = [float(word) for word in text.replace(",", " ").split()]
+        except ValueError:
+            numbers = []
         if len(numbers) != 6 or not np.isfinite(numbers).all():
-            raise InputError(f"mounting is {numbers}, expected six numbers: x y z in m, roll pitch yaw in degrees")
-        x, y, z, *angles = map(float, numbers)
-        return cls((x, y, z), Rotation.from_euler("ZYX", angles[::-1], degrees=True))
+            raise InputError(f"mounting is {text!r}, expected six numbers: x y z in m, roll pitch yaw in degrees")
+        return cls.of(numbers[:3], numbers[3:])
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ class Platform:
         acceleration: m/s^2, along and across.
         turn_rate: rad/s.
         smoothing: of accelerations, s.
-        reversing: share of the reversals of direction that are done without turning round.
+        reversing: share of the shorter ways back that are done without turning round.
         lever_arm: of the sensor from the carrier's axis, forward, m.
         tilt: of the sensor's mount in pitch and roll, standard deviation, rad.
         bob: amplitude of the gait at 1 m/s, m; zero on wheels.
@@ -61,13 +61,13 @@ PLATFORMS: dict[str, Platform] = {
         free_heading=True,
     ),
     "cart": Platform(
-        height=0.95, top=1.2, radius=0.38, footprint=0.25, speed=1.25, unsteadiness=0.07, top_speed=1.6,
-        acceleration=0.7, turn_rate=np.deg2rad(45), smoothing=0.25, reversing=0.2, lever_arm=0.20,
+        height=0.95, top=1.2, radius=0.38, footprint=0.25, speed=1.4, unsteadiness=0.07, top_speed=1.6,
+        acceleration=0.8, turn_rate=np.deg2rad(45), smoothing=0.25, reversing=0.35, lever_arm=0.20,
         tilt=np.deg2rad(0.5), tremor=np.deg2rad(0.15),
     ),
     "robot": Platform(
         height=0.20, top=0.45, radius=0.36, footprint=0.17, speed=0.46, unsteadiness=0.05, top_speed=0.5,
-        acceleration=0.4, turn_rate=np.deg2rad(45), smoothing=0.15, reversing=0.2, lever_arm=0.10,
+        acceleration=0.4, turn_rate=np.deg2rad(45), smoothing=0.15, reversing=0.35, lever_arm=0.10,
         tilt=np.deg2rad(0.5), tremor=np.deg2rad(0.1),
     ),
 }  # fmt: skip

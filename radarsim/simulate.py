@@ -14,7 +14,7 @@ from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.recording import RecordingWriter
-from radarsim.motion import Motion, motion_from_tum, plan_motion
+from radarsim.motion import Motion, Mounting, motion_from_tum, plan_motion
 from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
 from radarsim.physics.direct import DirectSum
@@ -30,17 +30,20 @@ from radarsim.scene.scene import Scene
 from radarsim.sensors.sensor import Frames, Rig
 from radarsim.sensors.sight import Sight
 from radarsim.sensors.suite import Suite, chosen
+from radarsim.statistics import crossings
+from radarsim.waypoints import read_waypoints
 
 _BATCH = 8
+_TOUR = 40.0  # s, unless asked for
 
 
 def _on_one_blas_thread(method: Callable) -> Callable:
     """Numba's and Mitsuba's threads spin for work; a BLAS that wakes threads of its own beside them costs a third."""
 
     @wraps(method)
-    def limited(self, *arguments):
+    def limited(self, *arguments, **named):
         with self._threads.limit(limits=1, user_api="blas"):
-            return method(self, *arguments)
+            return method(self, *arguments, **named)
 
     return limited
 
@@ -130,7 +133,9 @@ def simulate(
     *,
     platform: str = "handheld",
     trajectory: Path | None = None,
-    duration: float = 40.0,
+    waypoints: Path | None = None,
+    mounting: Mounting | None = None,
+    duration: float | None = None,
     seed: int = 0,
     radar: str = "radarize",
     device: str = "cpu",
@@ -147,8 +152,11 @@ def simulate(
         scene: a scene, its YAML file, or the name of one that comes with the project.
         output: recording to write.
         platform: ``handheld``, ``cart`` or ``robot``: how a planned tour moves.
-        trajectory: TUM file of sensor poses to follow instead of a planned tour.
-        duration: s; a trajectory that is shorter ends the recording.
+        trajectory: TUM file of poses to follow instead of a planned tour; of the sensor, or if there is a mounting, of
+            the body that carries it.
+        waypoints: file of places to go through on the platform (see `waypoints.read_waypoints`) instead of a tour.
+        mounting: of the sensor on the platform; default: the platform's own.
+        duration: s; default: 40 s of a tour, or all of a trajectory or walk, which end the recording if shorter.
         seed: of the tour, the scatterers and the noise.
         radar: preset or configuration file.
         device: ``cpu`` or ``cuda``.
@@ -167,9 +175,9 @@ def simulate(
         the path written.
 
     Raises:
-        InputError: unusable scene, configuration, trajectory, sensor or output.
+        InputError: unusable scene, configuration, trajectory, way-points, sensor or output.
     """
-    if not (np.isfinite(duration) and duration > 0):
+    if duration is not None and not (np.isfinite(duration) and duration > 0):
         raise InputError(f"duration is {duration} s, expected a positive number of seconds")
     config, cfg_text = load_config(radar)
     check_limits(config)
@@ -186,14 +194,20 @@ def simulate(
     settings = FrontEndConfig.load(frontend) if frontend else FrontEndConfig()
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     route, physics = np.random.default_rng(seed).spawn(2)
+    if trajectory is not None and waypoints is not None:
+        raise InputError("both a trajectory and way-points are given, expected one of them")
     if trajectory is not None:
-        motion = motion_from_tum(trajectory)
+        motion = motion_from_tum(trajectory, mounting)
+    elif waypoints is not None:
+        motion = plan_motion(world, platform, duration, route, read_waypoints(waypoints), mounting)
     else:
-        motion = plan_motion(world, platform, duration, route)
+        motion = plan_motion(world, platform, _TOUR if duration is None else duration, route, mounting=mounting)
+    motion = motion if duration is None else motion.until(duration)
+    crossed = crossings(motion, world)
     simulator = Simulator(world, motion, config, physics, device, settings, engine)
-    frames = config.frames_within(min(duration, motion.duration))
+    frames = config.frames_within(motion.duration)
     if frames < 1:
-        raise InputError(f"duration is {duration} s, expected at least one frame of {config.frame_period} s")
+        raise InputError(f"duration is {motion.duration:g} s, expected at least one frame of {config.frame_period} s")
     times = np.arange(frames) * config.frame_period
     facts = {
         "source": "radarsim simulate",
@@ -204,6 +218,7 @@ def simulate(
         "engine": engine,
         "front_end": settings.model_dump_json(),
         "motion": motion.statistics(world).json(),
+        "warnings": f"{trajectory or waypoints or 'tour'}: {crossed}" if crossed else "",
     }
     if engine == "radarsim":
         facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}

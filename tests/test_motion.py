@@ -1,12 +1,14 @@
 """Motion: derivatives against differences, clearance against the mesh itself, limits, bad files."""
 
+import time
+
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
-from radarsim.motion import Motion, motion_from_tum, plan_motion
+from radarsim.motion import Motion, Mounting, motion_from_tum, plan_motion
 from radarsim.platforms import PLATFORMS
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
@@ -101,7 +103,7 @@ def test_limits(tours, platform):
         assert np.abs(height - carrier.height).max() < 0.05
 
 
-def test_hand_faces_other_ways_and_wheels_do_not(tours):
+def test_hand_faces_other_ways_and_wheels_follow_their_line(tours):
     t = np.arange(1, DURATION, 0.05)
 
     def angles(motion):
@@ -112,7 +114,20 @@ def test_hand_faces_other_ways_and_wheels_do_not(tours):
     hand = np.concatenate([angles(tours["handheld", s]) for s in SEEDS])
     assert 0.3 < (hand < 30).mean() < 0.9 and (hand > 60).mean() > 0.05
     for platform in ("cart", "robot"):
-        assert np.concatenate([angles(tours[platform, s]) for s in SEEDS]).max() < 35
+        wheels = np.concatenate([angles(tours[platform, s]) for s in SEEDS])
+        # Ahead or straight back, and ahead for most of the time.
+        assert np.minimum(wheels, 180 - wheels).max() < 35
+        assert (wheels < 35).mean() > 0.7
+
+
+@pytest.mark.parametrize("platform", list(PLATFORMS))
+def test_no_jerk(tours, platform):
+    """Muscles and motors take time: acceleration never jumps, though gait makes it swing."""
+    t = np.arange(0, DURATION, 0.01)
+    most = {"handheld": 60.0, "cart": 6.0, "robot": 6.0}[platform]
+    for seed in SEEDS:
+        jerk = np.diff(tours[platform, seed].velocity(t)[:, :2], n=2, axis=0) / 0.01**2
+        assert np.linalg.norm(jerk, axis=1).max() < most
 
 
 def test_hand_comes_back(tours):
@@ -131,6 +146,24 @@ def test_same_generator_same_tour(office, tours):
     again = plan_motion(office, "robot", DURATION, np.random.default_rng(0))
     t = np.linspace(0, DURATION, 50)
     assert np.array_equal(again.position(t), tours["robot", 0].position(t))
+
+
+def test_mounting_is_the_users(office):
+    mounting = Mounting.parse("0.3, 0.05, 0.1, 0 10 90")
+    motion = plan_motion(office, "robot", 5.0, np.random.default_rng(0), mounting=mounting)
+    t = np.array([0.0, 3.0])
+    offset = motion.attitude(t).inv().apply(motion.position(t) - motion.path(t))
+    assert offset == pytest.approx(np.tile([0.3, 0.05, 0.1], (2, 1)))
+    # Looking to the left of the body's axis; rolled against the body's x axis is then nose down.
+    forward = motion.attitude(t).inv().apply(motion.rotation(t).apply([1.0, 0, 0]))
+    turned = [0.0, np.cos(np.deg2rad(10)), -np.sin(np.deg2rad(10))]
+    assert forward == pytest.approx(np.tile(turned, (2, 1)), abs=1e-9)
+
+
+@pytest.mark.parametrize("text", ["1 2 3", "a b c d e f", "0 0 0 0 0 nan"])
+def test_bad_mounting(text):
+    with pytest.raises(InputError, match="mounting is .* expected six numbers"):
+        Mounting.parse(text)
 
 
 def test_nowhere_to_go():
@@ -163,6 +196,9 @@ def test_tum(tmp_path):
     assert not motion.velocity(np.array([5.0])).any()
 
 
+BENT = ["0 0 0 0 0 0 0 1", "0.5 5 0 0 0 0 0 1", "1 9 0 0 0 0 0 1"]
+
+
 @pytest.mark.parametrize(
     ("rows", "complaint"),
     [
@@ -173,6 +209,12 @@ def test_tum(tmp_path):
         ([*GOOD[:3], "100.3 0 0 1 0 0 0 0"], "line 5: has a quaternion of length 0"),
         (GOOD[:3], "3 poses, expected at least 4"),
         ([], "holds no poses"),
+        (
+            ["0 0 0 0 0 0 0 1", "1 0 0 0 0 0 0 1", "1.01 9 0 0 0 0 0 1", "2 9 0 0 0 0 0 1"],
+            "times 1.000 and 1.010.* 9 m",
+        ),
+        ([*GOOD[:9], "100.9 9 0 1 0 0 1 0"], "times 100.800 and 100.900 the poses turn by 134 degrees"),
+        ([*BENT, "109 9 0 0 0 0 0 1", "109.01 9.1 0 0 0 0 0 1"], "between times 1.000 and 109.000 a smooth curve"),
     ],
 )
 def test_bad_tum(tmp_path, rows, complaint):
@@ -183,3 +225,36 @@ def test_bad_tum(tmp_path, rows, complaint):
 def test_missing_tum(tmp_path):
     with pytest.raises(InputError, match="gone.tum"):
         motion_from_tum(tmp_path / "gone.tum")
+
+
+def test_tum_with_uneven_stamps_passes_every_pose(tmp_path):
+    rng = np.random.default_rng(0)
+    t = 5.0 + np.cumsum(rng.uniform(0.002, 0.3, 60))
+    place = np.column_stack([np.sin(t), t / 5, 1 + 0.1 * np.cos(t)])
+    turn = Rotation.from_euler("ZYX", np.column_stack([np.cos(t), 0.1 * np.sin(t), 0 * t])).as_quat()
+    path = tmp_path / "uneven.tum"
+    np.savetxt(path, np.column_stack([t, place, turn]), fmt="%.12f")
+    motion = motion_from_tum(path)
+    assert motion.position(t - t[0]) == pytest.approx(place, abs=1e-9)
+    assert np.max((motion.rotation(t - t[0]).inv() * Rotation.from_quat(turn)).magnitude()) < 1e-6
+    between = (t[1:] + t[:-1]) / 2
+    truth = np.column_stack([np.cos(between), 0 * between + 0.2, -0.1 * np.sin(between)])
+    assert np.abs(motion.velocity(between - t[0]) - truth)[3:-3].max() < 0.02
+
+
+def test_tum_of_a_body_carries_the_sensor(tmp_path):
+    motion = motion_from_tum(tum(tmp_path, GOOD), Mounting.of((0.2, 0, 0), (0, 0, 90)))
+    assert motion.position(np.array([0.0])) == pytest.approx(np.array([[0.2, 0, 1]]))
+    assert motion.rotation(np.array([0.0])).apply([1.0, 0, 0]) == pytest.approx(np.array([[0, 1, 0]]))
+
+
+def test_long_tum_is_read_in_a_moment(tmp_path):
+    """Eight minutes at 200 Hz."""
+    t = np.arange(100_000) / 200
+    zero = 0 * t
+    path = tmp_path / "long.tum"
+    np.savetxt(path, np.column_stack([t, np.sin(t), np.cos(t), zero, zero, zero, zero, zero + 1]), fmt="%.6f")
+    start = time.process_time()
+    motion = motion_from_tum(path)
+    assert time.process_time() - start < 5
+    assert motion.duration == pytest.approx(t[-1])

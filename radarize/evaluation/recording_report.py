@@ -10,6 +10,7 @@ from radarize.contents import contents
 from radarize.errors import InputError
 from radarize.evaluation.drawings import LEAKAGE, canvas, draw_doppler, draw_fan, draw_profiles
 from radarize.evaluation.page import COLORS, INK, Page
+from radarize.evaluation.sensors import show_sensors
 from radarize.heatmaps import Heatmaps
 from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
@@ -52,6 +53,7 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
         _profiles(page, recording, maps)
         _maps(page, recording, maps)
         _samples(page, recording)
+        show_sensors(page, recording, [index for index, *_ in _batches(recording, _FRAMES)])
         if recording.has("truth/pose"):
             _trajectory(page, recording)
     _contents(page, found)

@@ -13,6 +13,7 @@ from radarsim.scene.scene import Scene
 RESOLUTION = 0.025  # m
 #: What rises less above the ground than this, m, is walked and rolled over: carpets, thresholds, unevenness.
 LOWEST = 0.03
+_DEEPEST = 0.5  # m from the lowest surface (a slab's underside, a pit) up to the floor, at most
 _LYING = 0.9  # cosine of the steepest floor's slope
 
 
@@ -69,21 +70,25 @@ class Clearance:
 
 def ground_level(scene: Scene) -> float:
     """Height of the lowest wide floor, m; 0 in a scene without any."""
-    floor = _floor(scene, np.inf)
+    corners = scene.triangles
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    # A floor is among the lowest things, but for what lies astray in scans; what else faces up is tops of furniture.
+    lowest = _quantile(corners[:, :, 2].min(axis=1), areas, 0.01)
+    floor = _floor(scene, lowest + _DEEPEST)
     if not floor.any():
         return 0.0
-    corners = scene.triangles[floor]
-    heights = corners[:, :, 2].mean(axis=1)
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-    step = 0.05
-    bins = ((heights - heights.min()) / step).astype(int)
+    heights, areas = corners[floor, :, 2].mean(axis=1), areas[floor]
+    bins = ((heights - heights.min()) / 0.05).astype(int)
     wide = np.bincount(bins, areas)
-    lowest = np.flatnonzero(wide >= 0.2 * wide.max())[0]
     # A floor at the edge of a bin lies in two.
-    near = np.abs(bins - lowest) <= 1
-    order = np.argsort(heights[near])
-    share = np.cumsum(areas[near][order])
-    return float(heights[near][order][np.searchsorted(share, share[-1] / 2)])
+    near = np.abs(bins - np.flatnonzero(wide >= 0.2 * wide.max())[0]) <= 1
+    return _quantile(heights[near], areas[near], 0.5)
+
+
+def _quantile(values: Float[np.ndarray, "n"], weights: Float[np.ndarray, "n"], share: float) -> float:
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, share * total[-1])])
 
 
 def nearest(scene: Scene, points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:

@@ -238,5 +238,8 @@ def _first(error: ValidationError, data: dict) -> str:
         field += f" (object {item['name']!r})" if isinstance(item, dict) and "name" in item else ""
     if problem["type"] == "extra_forbidden":
         return f"{field}: unknown key"
+    if problem["type"] == "union_tag_invalid":
+        tag, expected = problem["ctx"]["tag"], problem["ctx"]["expected_tags"].replace("'", "")
+        return f"{field}.{problem['ctx']['discriminator'].strip(chr(39))} is {tag!r}, expected one of: {expected}"
     value = "" if isinstance(problem["input"], dict) else f" is {problem['input']!r}"
     return f"{field or 'file'}{value}: {problem['msg'][0].lower()}{problem['msg'][1:]}"

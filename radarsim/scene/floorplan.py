@@ -151,14 +151,26 @@ class FloorPlan:
                 widths.append(last - excess)
         edges = start + pitch * np.cumsum([0, *widths])
         cuts = [(float(a), float(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
-        # A room in a corner of the building may touch no corridor: its neighbour takes it.
-        for k in (0, -1):
-            while len(cuts) > 1 and not self._reaches_corridor(block, *cuts[k]):
-                a, b = (cuts[k], cuts[k + 1]) if k == 0 else (cuts[k - 1], cuts[k])
-                cuts[slice(0, 2) if k == 0 else slice(-2, None)] = [(a[0], b[1])]
+        cuts = self._joined_at_corners(block, cuts, start + pitch * np.arange(modules + 1))
         for a, b in cuts:
             half = style.inner / 2
             self._room(block, a + (half if a > start + 0.01 else 0), b - (half if b < end - 0.01 else 0), "")
+
+    def _joined_at_corners(self, block: Block, cuts: list[tuple[float, float]], axes) -> list[tuple[float, float]]:
+        """A room in a corner of the building may touch no corridor: it takes from its neighbour what it needs."""
+        for last in (False, True):
+            cuts = cuts[::-1] if last else cuts
+            while len(cuts) > 1 and not self._reaches_corridor(block, *cuts[0]):
+                low, high = min(cuts[0][0], cuts[1][0]), max(cuts[0][1], cuts[1][1])
+                ends = (
+                    [((low, e), (e, high)) for e in axes] if not last else [((e, high), (low, e)) for e in axes[::-1]]
+                )
+                enough = [(a, b) for a, b in ends if b[1] - b[0] >= NARROWEST + self.style.inner
+                          and a[1] > a[0] and self._reaches_corridor(block, *a)]  # fmt: skip
+                wide = high - low > WIDEST and enough
+                cuts[:2] = [*map(lambda c: (float(c[0]), float(c[1])), enough[0])] if wide else [(low, high)]
+            cuts = cuts[::-1] if last else cuts
+        return cuts
 
     def _box(self, block: Block, a: float, b: float) -> tuple[float, float, float, float]:
         x0, y0, x1, y1 = block.box
@@ -189,7 +201,7 @@ class FloorPlan:
     # Openings
 
     def _doors(self) -> None:
-        rng, style = self._rng, self.style
+        rng = self._rng
         entered = [room for room in self.rooms if room.kind != "corridor"]
         ways = {room.name: [b for b in self.borders[room.name] if b.other in self.corridors
                             and b.length > DOOR + 2 * JAMB] for room in entered}  # fmt: skip
@@ -309,7 +321,7 @@ class FloorPlan:
                 if room is None:
                     continue
                 low, high = o.passage
-                margin = 0.1 if high - low < 1.5 else -0.1
+                margin = 0.1 if high - low < 1.5 else 0.0
                 depth = min(APPROACH, min(room.size) - 0.05)
                 room.kept.append(area(*_strip(room, side, low - margin, high + margin, -depth, 0.0)))
                 x0, y0, x1, y1 = _strip(room, side, low, high, -0.6, -0.6)

@@ -81,7 +81,7 @@ class _Layout:
         while len(places) < count and at + piece.width < high - low - 0.03:
             middle = at + piece.width / 2
             place = room.wall_place(side, high - middle if downward else low + middle, off + piece.depth / 2)
-            tall = max(m.bounds[1, 2] for m in piece.parts.values()) > 1.0
+            tall = max(m.bounds[1, 2] for m in piece.parts.values()) > 1.25
             if not (lit and tall) and self.site.put_if_free(room, piece, *place, margin=-0.003):
                 places.append(place)
                 at += piece.width + gap
@@ -135,12 +135,12 @@ class _Layout:
 
 
 def _office(x: _Layout) -> None:
-    places = 1 + (min(x.room.size) > 3.6)
-    x.desks(x.left, places)
-    if x.room.size[0] * x.room.size[1] > 14:
-        x.desks(x.right, places)
-    if x.room.size[0] * x.room.size[1] > 30:
-        x.desks(x.back, 2)
+    area = x.room.size[0] * x.room.size[1]
+    x.desks(x.left, 2)
+    x.desks(x.right, 2 if area > 14 else 0)
+    x.desks(x.back, int(area / 15))
+    if area > 34:
+        x.tables(2, furniture.desk, (1,))
     x.line(x.front, x.cabinet, 2)
     x.line(x.right, x.shelf, 1, start=2.0)
     x.line(x.left, x.shelf if x.rng.random() < 0.5 else x.cabinet, 1, start=2.4)
@@ -165,16 +165,21 @@ def _lecture(x: _Layout) -> None:
     x.line(stage, partial(furniture.whiteboard), 2, start=0.6, gap=0.1)
     middle = room.center[1] if along_x else room.center[0]
     site.put_if_free(room, fittings.lectern(x.rng), *room.wall_place(stage, middle + 0.9, 1.1))
-    width = 1.6
+    width, rows = 1.6, 0
     columns = max(1, int((across - 0.4) / (width + 0.8)))
     for row in range(int((length - 3.4) / 1.25) + 1):
         for k in range(columns):
             along = middle + (k - (columns - 1) / 2) * (across - 0.2) / columns
             px, py, yaw = room.wall_place(stage, along, 2.2 + 1.25 * row)
             if site.put_if_free(room, furniture.table(x.rng, 0.5, width), px, py, yaw):
+                rows += 1
                 for side in (-0.4, 0.4):
                     sx, sy = px - side * np.sin(yaw), py + side * np.cos(yaw)
                     site.seat(room, float(sx), float(sy), yaw, away=0.62)
+    if not rows:  # the ways between its doors leave no room for rows
+        x.desks(x.left, 2)
+        x.desks(x.right, 2)
+        x.line(x.front, x.shelf, 3)
     x.line(x.front, furniture.bin, 1)
 
 
@@ -209,7 +214,9 @@ def _storage(x: _Layout) -> None:
     x.line(x.left, x.shelf, 5, gap=0.02)
     x.line(x.right, x.cabinet, 3, gap=0.02)
     x.line(x.back, x.cabinet, 2, gap=0.02)
-    x.line(x.front, furniture.printer, 1)
+    x.line(x.front, x.shelf, 2, gap=0.02)
+    x.tables(1, x.shelf, ())
+    x.line(x.back, furniture.printer, 1)
 
 
 def _kitchen(x: _Layout) -> None:

@@ -146,7 +146,7 @@ def skeleton(style: Style, rng: np.random.Generator) -> Skeleton:
                 a_row, toilets_left = a_row + TOILET + wall, toilets_left - 1
             if stubs_left and b_row - a_row > 9:
                 stubs_left -= 1
-                at = a_row + rng.uniform(0.35, 0.65) * (b_row - a_row)
+                at = rng.uniform(a_row + 3.3, b_row - STUB - 3.3)
                 _stub(plan, at, low, high, southward=row == 0 and (rows == 2 or rng.random() < 0.5), wall=wall)
                 plan.blocks.append(Block(_cm(a_row, low, at - wall, high), 0, "core", pitch))
                 a_row = at + STUB + wall

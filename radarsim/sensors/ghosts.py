@@ -4,7 +4,8 @@ The map of each cause is that of `radarize.heatmaps.Heatmaps.range_azimuth` (Bar
 I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the window's
 transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; and of the burst's
 loops a few instants suffice, for the map sums over Doppler, which is the mean over loops. Without noise, converter and
-channel mismatch, which calibration removes.
+channel mismatch, which calibration removes; and without the smear over azimuth of echoes that close faster than
+`RadarConfig.max_velocity`, whose delays between transmitters the map takes out at the wrong speed.
 """
 
 import numpy as np
@@ -12,12 +13,11 @@ from jaxtyping import Complex, Float, UInt8
 from numba import njit, prange
 from scipy.signal import windows
 
-from radarize.heatmaps import Heatmaps
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.recording import Product, Stream
 from radarsim.physics.echoes import Provenance
-from radarsim.physics.synthesis import BurstClock
+from radarsim.physics.synthesis import BurstClock, _sincos_cycles
 from radarsim.sensors.causes import CAUSES
 from radarsim.sensors.scan import AZIMUTHS
 from radarsim.sensors.sensor import Frames, Rig, Sensor
@@ -87,7 +87,8 @@ class CauseMaps:
 
     def __init__(self, config: RadarConfig):
         self.config, self.row = config, azimuth_row(config)
-        self.taper = Heatmaps._taper(len(self.row))
+        self.taper = windows.taylor(len(self.row), nbar=4, sll=25) if len(self.row) > 2 else np.ones(len(self.row))
+        self.taper /= self.taper.sum()
         y = virtual_positions(config).reshape(-1, 3)[self.row, 1]
         steering = np.exp(2j * np.pi / config.wavelength * y[:, None] * np.sin(AZIMUTHS))
         self._steering = (steering * self.taper[:, None]).astype(np.complex64)
@@ -112,10 +113,10 @@ class CauseMaps:
     ) -> Float[np.ndarray, "cause range azimuth"]:
         """Power of each cause in the square of the amplitudes' unit."""
         n = self.config.samples
-        spectra = np.zeros((_INSTANTS, len(Provenance), n, len(self.row)), np.complex64)
+        spectra = np.zeros((_INSTANTS, len(Provenance), n, 2, len(self.row)), np.float32)
         _spread(spectra, lengths, amplitudes, provenance, self.row, self._instants, self._kernel, self._per_metre,
                 self._per_rate, self.config.center_frequency / SPEED_OF_LIGHT)  # fmt: skip
-        return self.beams(spectra)
+        return self.beams(spectra[..., 0, :] + 1j * spectra[..., 1, :])
 
     def beams(self, spectra: Complex[np.ndarray, "instant *cell antenna"]) -> Float[np.ndarray, "*cell azimuth"]:
         """Mean power of the windowed sum over instants."""
@@ -125,24 +126,33 @@ class CauseMaps:
 
 @njit(parallel=True, fastmath=True, cache=True)
 def _spread(spectra, lengths, amplitudes, provenance, row, instants, kernel, per_metre, per_rate, wavenumber):
-    """spectra[instant, cause, bin, antenna] += A exp(j phase) K(tone - bin); see `synthesis` for phase and tone."""
-    n = spectra.shape[2]
-    fine, width = _FINE, _WIDTH
-    for task in prange(len(instants) * len(row)):
-        i, a = task // len(row), task % len(row)
+    """spectra[instant, cause, bin, (re, im), antenna] += A exp(j phase) K(tone - bin).
+
+    Phase and tone are those of `synthesis`. The tone is taken to be the same for all antennas: across the array it
+    changes by less than a fifth of a bin.
+    """
+    antennas, n = len(row), spectra.shape[2]
+    for i in prange(len(instants)):
         s = instants[i]
+        re, im = np.empty(antennas, np.float32), np.empty(antennas, np.float32)
         for e in range(len(amplitudes)):
-            c0, c1, c2 = lengths[e, row[a]]
-            length, rate = c0 + s * (c1 + s * c2), c1 + 2 * s * c2
-            tone = length * per_metre + rate * per_rate
-            first = int(np.floor(tone)) - width + 1
-            # Tones beyond the sample rate come back, turned by the half sample between the middle and bin's phase.
-            turn = wavenumber * length - (int(np.floor(tone)) // n) * ((n - 1) / 2)
-            turn -= np.floor(turn)
-            value = np.complex64(amplitudes[e] * np.exp(2j * np.pi * turn))
-            for k in range(2 * width):
-                x = (first + k - tone + width) * fine
-                at = min(max(int(x), 0), 2 * width * fine - 1)
-                part = np.float32(x - at)
-                weight = kernel[at] + part * (kernel[at + 1] - kernel[at])
-                spectra[i, provenance[e], (first + k) % n, a] += weight * value
+            c0, c1, c2 = lengths[e, row[antennas // 2]]
+            tone = (c0 + s * (c1 + s * c2)) * per_metre + (c1 + 2 * s * c2) * per_rate
+            below = int(np.floor(tone))
+            size = np.float32(abs(amplitudes[e]))
+            # A tone N bins higher has turned (N - 1) / 2 cycles more between the middle and the first sample.
+            turn = np.arctan2(amplitudes[e].imag, amplitudes[e].real) / (2 * np.pi) - below // n * ((n - 1) / 2)
+            for a in range(antennas):
+                c0, c1, c2 = lengths[e, row[a]]
+                cycles = turn + wavenumber * (c0 + s * (c1 + s * c2))
+                sine, cosine = _sincos_cycles(np.float32(cycles - np.floor(cycles + 0.5)))
+                re[a] = size * cosine
+                im[a] = size * sine
+            for k in range(2 * _WIDTH):
+                x = (below - _WIDTH + 1 + k - tone + _WIDTH) * _FINE
+                at = min(max(int(x), 0), 2 * _WIDTH * _FINE - 1)
+                weight = kernel[at] + np.float32(x - at) * (kernel[at + 1] - kernel[at])
+                cell = spectra[i, provenance[e], (below - _WIDTH + 1 + k) % n]
+                for a in range(antennas):
+                    cell[0, a] += weight * re[a]
+                    cell[1, a] += weight * im[a]

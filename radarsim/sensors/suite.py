@@ -4,6 +4,7 @@ import zlib
 from collections.abc import Sequence
 
 import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from radarize.errors import InputError
 from radarsim.sensors.causes import AdcByCause, CauseCounts
@@ -58,6 +59,7 @@ class Suite:
     """
 
     def __init__(self, rig: Rig, names: Sequence[str], seed: int, by_cause: bool = False):
+        self._threads = ThreadpoolController()
         kinds = ALWAYS | {name: SENSORS[name] for name in chosen(names)}
         if by_cause:
             kinds["adc_by_cause"] = AdcByCause
@@ -69,4 +71,5 @@ class Suite:
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Rows of all streams for a batch of frames."""
-        return {path: rows for sensor in self.sensors.values() for path, rows in sensor.observe(frames).items()}
+        with self._threads.limit(limits=1, user_api="blas"):  # as in `Simulator`: it would fight numba's threads
+            return {path: rows for sensor in self.sensors.values() for path, rows in sensor.observe(frames).items()}

@@ -1,0 +1,75 @@
+"""Maps by cause against the heat maps of the I/Q by cause."""
+
+import numpy as np
+import pytest
+
+from radarize.heatmaps import Heatmaps
+from radarize.radar.presets import PRESETS
+from radarsim.motion import plan_motion
+from radarsim.physics.echoes import Provenance
+from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.scene.scene import Scene
+from radarsim.sensors.causes import CAUSES
+from radarsim.sensors.ghosts import NOISE, Ghosts
+from radarsim.sensors.scan import AZIMUTHS
+from radarsim.sensors.sensor import Rig
+from radarsim.sensors.sight import Sight
+from radarsim.simulate import Simulator
+
+CONFIG = PRESETS["radarize"]
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """Two frames of people in an office: (ghost sensor, its rows, map of the I/Q by cause)."""
+    scene = Scene.load("visitors")
+    route, physics = np.random.default_rng(1).spawn(2)
+    motion = plan_motion(scene, "handheld", 5.0, route)
+    simulator = Simulator(scene, motion, CONFIG, physics, front_end=FrontEndConfig(mismatch=None))
+    sensor = Ghosts(Rig(scene, motion, CONFIG, simulator.front_end, Sight(scene)), np.random.default_rng(0))
+    frames = simulator.observe(np.array([1.4, 3.0]), by_cause=True)
+    iq = np.stack([frames.by_cause.real, frames.by_cause.imag], axis=-1).astype(np.float32)
+    maps = Heatmaps(CONFIG, azimuths=AZIMUTHS)
+    reference = np.stack([maps.range_azimuth(part).numpy() for part in iq])
+    return sensor, sensor.observe(frames), reference
+
+
+@pytest.mark.parametrize(
+    ("cause", "least"),
+    [(Provenance.DIRECT, 1e-3), (Provenance.FLOOR_CEILING, 1e-3), (Provenance.GHOST_1, 1e-3), (Provenance.MOVING, 0.1)],
+)
+def test_maps_are_those_of_the_iq(seen, cause, least):
+    """Four instants stand for 32 loops, within half a dB. (Limbs too fast for the radar smear over the I/Q's map.)"""
+    sensor, rows, reference = seen
+    expected = reference[:, cause]
+    found = 10 ** (rows["truth/cause_power"][:, cause] / 10)
+    strong = expected > np.maximum(least * expected.max(), 10 ** (sensor._floor / 10))
+    off = 10 * np.log10(found[strong] / expected[strong])
+    assert strong.sum() > 20
+    median, most = (0.2, 0.5) if cause != Provenance.MOVING else (1.0, 3.0)
+    assert abs(np.median(off)) < median and np.quantile(np.abs(off), 0.9) < most
+    assert 10 * np.log10(found[strong].sum() / expected[strong].sum()) == pytest.approx(0, abs=1.0)
+
+
+def test_the_label_is_the_strongest_cause(seen):
+    _, rows, reference = seen
+    top_two = np.sort(reference, axis=1)[:, -2:]
+    clear = (top_two[:, 1] > 10 * top_two[:, 0]) & (rows["truth/cause"] != NOISE)
+    assert clear.mean() > 0.1
+    assert np.mean(rows["truth/cause"][clear] == reference.argmax(axis=1)[clear]) > 0.97
+    assert set(np.unique(rows["truth/cause"])) <= {*range(len(CAUSES)), NOISE}
+    assert np.all(rows["truth/cause"][:, 1:3] == CAUSES.index("leakage"))
+
+
+def test_cells_below_the_noise_are_noise(seen):
+    """The level it takes for noise is that of a map of noise alone."""
+    sensor, rows, reference = seen
+    rng = np.random.default_rng(0)
+    empty = sensor._front_end.receive(np.zeros(CONFIG.frame_shape[:-1], np.complex64), rng)
+    leakage = sensor._front_end.by_cause([])[0]
+    quiet = empty - leakage
+    adc = np.stack([quiet.real, quiet.imag], axis=-1).astype(np.float32)[None]
+    level = Heatmaps(CONFIG, azimuths=AZIMUTHS).range_azimuth(adc)[0].numpy()[30:70]
+    assert 10 * np.log10(np.median(level)) == pytest.approx(sensor._floor, abs=1.0)
+    silent = reference.sum(axis=1) < 10 ** ((sensor._floor - 6) / 10)
+    assert silent.sum() == 0 or np.mean(rows["truth/cause"][silent] == NOISE) > 0.95

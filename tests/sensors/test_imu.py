@@ -1,0 +1,97 @@
+"""The IMU: exact physics below its errors, and errors as specified."""
+
+import numpy as np
+import pytest
+from mounting import CONFIG, frames, rig, stream, tumble
+from scipy.spatial.transform import Rotation
+
+from radarsim.motion import Motion
+from radarsim.sensors.depth import MOUNT
+from radarsim.sensors.imu import ACCELEROMETER, GYROSCOPE, RATE, STANDARD_GRAVITY, Imu, Triad
+
+
+def test_samples_come_at_200_hz_without_gaps():
+    imu = Imu(rig(Motion.still((0, 0, 1), duration=5)), np.random.default_rng(0))
+    times = np.concatenate([imu.observe(frames(a, b))["imu/time"] for a, b in ((0, 1), (1, 9), (9, 17), (17, 100))])
+    assert np.diff(times) == pytest.approx(np.full(len(times) - 1, 1 / RATE))
+    assert times[0] == 0 and 100 * CONFIG.frame_period - 1 / RATE <= times[-1] < 100 * CONFIG.frame_period
+
+
+def test_at_rest_it_feels_gravity_upward():
+    tilted = Imu(rig(Motion.still((0, 0, 1), pitch=np.deg2rad(30))), np.random.default_rng(0))
+    force, turn = tilted.truth(np.array([0.2]))
+    # Nose down by 30 degrees: up is half backward.
+    assert force[0] == pytest.approx(STANDARD_GRAVITY * np.array([-0.5, 0, np.sqrt(0.75)]), abs=1e-6)
+    assert turn[0] == pytest.approx([0, 0, 0], abs=1e-9)
+
+
+def test_centripetal_force_at_the_lever_arm():
+    rate, arm = 2.0, 0.3
+    motion = Motion.linear((0, 0, 1), (0, 0, 0), yaw_rate=rate, lever_arm=(arm, 0, 0))
+    force, turn = Imu(rig(motion), np.random.default_rng(0)).truth(np.array([0.1, 0.4]))
+    assert force == pytest.approx(np.tile([-(rate**2) * (arm + MOUNT[0]), 0, STANDARD_GRAVITY], (2, 1)), abs=2e-3)
+    assert turn == pytest.approx(np.tile([0, 0, rate], (2, 1)), abs=1e-6)
+
+
+def integrate(imu: Imu, here: Motion, dt: float, duration: float) -> tuple[float, float]:
+    """Strapdown integration of exact samples, written from the definitions: errors at its end, m and rad."""
+    times = np.arange(0, duration, dt)
+    force, turn = imu.truth(times)
+    attitude, position = here.rotation(times[:1])[0], here.position(times[:1])[0]
+    velocity = here.velocity(times[:1])[0]
+    gravity = np.array([0, 0, -STANDARD_GRAVITY])
+    # Second order in the rate, with the coning term of a linearly changing one (Savage 1998).
+    a, b = turn[:-1] * dt, turn[1:] * dt
+    turns = Rotation.from_rotvec((a + b) / 2 + np.cross(a, b) / 12)
+    for k in range(len(times) - 1):
+        before = attitude.apply(force[k]) + gravity
+        attitude = attitude * turns[k]
+        after = attitude.apply(force[k + 1]) + gravity
+        position = position + velocity * dt + (2 * before + after) * dt**2 / 6
+        velocity = velocity + (before + after) * dt / 2
+    end = times[-1:]
+    return np.linalg.norm(position - here.position(end)[0]), (attitude.inv() * here.rotation(end)[0]).magnitude()
+
+
+def test_it_integrates_back_to_the_trajectory():
+    """Ten seconds of tumbling: centimetres from 200 samples a second, and less with the step's square."""
+    motion = tumble(10.0, np.random.default_rng(2))
+    imu = Imu(rig(motion), np.random.default_rng(0))
+    way, turn = integrate(imu, motion.mounted(MOUNT), 1 / RATE, 10.0)
+    assert way < 0.015 and turn < 1e-3
+    finer, finer_turn = integrate(imu, motion.mounted(MOUNT), 1 / (4 * RATE), 10.0)
+    assert finer < way / 8 and finer_turn < turn / 8
+
+
+@pytest.mark.parametrize("errors", [ACCELEROMETER, GYROSCOPE])
+def test_allan_deviation_is_as_specified(errors):
+    """Noise, instability and random walk each where they rule, over 27 runs of 15 minutes."""
+    size, runs = int(900 * RATE), 27
+    averages = (1, 4, 20, 200, 2000, 20000)
+    variance = np.zeros(len(averages))
+    for run in range(runs):
+        value, _ = Triad(errors, np.random.default_rng(run)).measure(np.zeros((size, 3)))
+        total = np.concatenate([np.zeros((1, 3)), np.cumsum(value, axis=0)])
+        for i, m in enumerate(averages):  # overlapping estimate
+            step = max(m // 8, 1)
+            second = total[2 * m :: step] - 2 * total[m:-m:step] + total[: -2 * m : step]
+            variance[i] += np.mean(second**2) / (2 * m**2) / runs
+    expected = errors.allan_deviation(np.array(averages) / RATE)
+    assert np.sqrt(variance) == pytest.approx(expected, rel=0.06)
+    # White noise at the start, and a floor of the instability's size at its end.
+    assert expected[1] == pytest.approx(errors.noise / np.sqrt(4 / RATE), rel=0.06)
+    assert 0.5 * errors.instability < expected[-1] < 2 * errors.instability
+
+
+def test_the_bias_is_told():
+    imu = Imu(rig(Motion.still((0, 0, 1), duration=30)), np.random.default_rng(3))
+    rows = imu.observe(frames(0, 900))
+    found = np.hstack([rows["imu/accelerometer"], rows["imu/gyroscope"]]) - [0, 0, STANDARD_GRAVITY, 0, 0, 0]
+    spread = np.r_[[ACCELEROMETER.noise] * 3, [GYROSCOPE.noise] * 3] / np.sqrt(30)
+    assert np.all(np.abs((found - rows["imu/bias"]).mean(axis=0)) < 4 * spread)
+
+
+def test_batches_do_not_matter_to_the_truth():
+    where = rig(tumble(2.0, np.random.default_rng(0)))
+    times = [stream(Imu(where, np.random.default_rng(0)), "imu/time", 50, batch) for batch in (1, 8, 50)]
+    assert np.array_equal(times[0], times[1]) and np.array_equal(times[1], times[2])

@@ -1,0 +1,109 @@
+"""Recordings with all sensors: documented, independent of each other, whole after a crash."""
+
+import hashlib
+import json
+
+import h5py
+import numpy as np
+import pytest
+
+from radarize.contents import contents
+from radarize.errors import InputError
+from radarize.evaluation.recording_report import report_recording
+from radarize.recording import Recording, RecordingWriter
+from radarsim.scene.scene import Scene
+from radarsim.sensors.suite import SENSORS, chosen
+from radarsim.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    """A second of the office with every sensor."""
+    return simulate("office", tmp_path_factory.mktemp("all") / "walk.h5", duration=1.0, seed=2, sensors=["all"])
+
+
+def digests(path) -> dict[str, str]:
+    with h5py.File(path) as file:
+        found = {}
+        file.visititems(
+            lambda name, item: found.update({name: hashlib.sha256(np.ascontiguousarray(item[:]).tobytes()).hexdigest()})
+            if isinstance(item, h5py.Dataset)
+            else None
+        )
+    return found
+
+
+def test_everything_is_there_and_documented(walk):
+    found = contents(walk)["data_sets"]
+    for name in ("truth/depth", "truth/occupancy", "truth/cause_power", "truth/cause", "imu/accelerometer",
+                 "imu/gyroscope", "tracking/pose", "points/cloud"):  # fmt: skip
+        assert name in found
+    for name, item in found.items():
+        assert item["about"] and (item["unit"] or item["dtype"] in ("uint8", "int32", "bool")), name
+    json.dumps(found)
+    with Recording(walk) as recording:
+        assert recording.read("truth/depth").shape == (30, 120, 212)
+        assert len(recording.read("imu/time")) == len(recording.read("imu/gyroscope")) == 200
+        assert np.ptp(recording.rows("imu/time", 10, 12)) < 2 * recording.config.frame_period
+        numbers = recording.rows("points/frame", 5, 9)
+        assert set(numbers) <= {5, 6, 7, 8}
+        assert len(recording.rows("points/cloud", 5, 9)) == len(numbers)
+        with pytest.raises(InputError, match="has no /truth/thermal; there are"):
+            recording.rows("truth/thermal", 0, 1)
+        with pytest.raises(InputError, match="written once"):
+            recording.rows("truth/floor_plan", 0, 1)
+
+
+def test_sensors_do_not_change_each_other(walk, tmp_path):
+    everything = digests(walk)
+    some = digests(simulate("office", tmp_path / "a.h5", duration=1.0, seed=2, sensors=["imu", "depth"]))
+    assert {"imu/gyroscope", "truth/depth"} <= set(some) and "truth/cause" not in some
+    assert all(everything[name] == digest for name, digest in some.items())
+
+
+def test_a_scene_at_hand_will_do(tmp_path):
+    path = simulate(Scene.load("office"), tmp_path / "a.h5", duration=0.1, seed=2)
+    other = simulate("office", tmp_path / "b.h5", duration=0.1, seed=2)
+    assert digests(path) == digests(other)
+
+
+def test_unknown_and_excluding_sensors_are_refused(tmp_path):
+    with pytest.raises(InputError, match="'sonar' is unknown, expected all or some of depth,"):
+        simulate("office", tmp_path / "a.h5", duration=0.1, sensors=["sonar"])
+    with pytest.raises(InputError, match="depth and depth-strip"):
+        chosen(["all", "depth-strip"])
+    assert chosen(["imu", "imu", "depth-strip"]) == ["depth-strip", "imu"]
+    assert set(chosen(["all"])) == set(SENSORS) - {"depth-strip"}
+    assert not (tmp_path / "a.h5").exists()
+
+
+def test_a_crash_leaves_streams_that_end_with_the_last_whole_frame(walk, tmp_path):
+    """The file as a reader finds it when the writer died after more rows had reached the disk than frames."""
+    with Recording(walk) as source, h5py.File(walk) as file:
+        names = [n for n in source.names() if "clock" in file[n].attrs and n.split("/")[0] != "radar"]
+        from radarize.recording import Stream
+
+        streams = {
+            n: Stream(file[n].shape[1:], file[n].dtype.str, file[n].attrs["unit"], file[n].attrs["about"],
+                      file[n].attrs["clock"]) for n in names
+        }  # fmt: skip
+        writer = RecordingWriter(tmp_path / "b.h5", source.config, streams=streams)
+        for start, stop in ((0, 8), (8, 16)):
+            writer.append(
+                source.adc(start, stop), source.times[start:stop], rows={n: source.rows(n, start, stop) for n in names}
+            )
+        writer.flush()
+        writer.append(source.adc(16, 24), source.times[16:24], rows={n: source.rows(n, 16, 24) for n in names})
+        writer._file.flush()  # rows are on the disk, the frames do not count yet
+        for name in ("imu/time", "points/frame"):
+            writer._file[name].resize(len(writer._file[name]) + 50, axis=0)  # made room for what never came
+        with Recording(writer.part) as growing:
+            assert len(growing) == 16
+            for name in names:
+                assert np.array_equal(growing.read(name), source.rows(name, 0, 16), equal_nan=True), name
+        writer.close(keep_part=True)
+
+
+def test_the_report_shows_them(walk, tmp_path):
+    page = report_recording(walk, tmp_path / "walk.html").read_text()
+    assert "Depth" in page and "Point cloud" in page and "IMU" in page

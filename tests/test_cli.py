@@ -53,7 +53,8 @@ def test_help_is_instant(name):
 @pytest.mark.parametrize(
     "command",
     ["radarize import", "radarize info", "radarize run", "radarize evaluate", "radarize report", "radarsim simulate",
-     "radarsim calibrate", "radarsim scene", "radarsim scene info", "radarsim scene preview", "radarsim scene import",
+     "radarsim dataset", "radarsim calibrate", "radarsim scene", "radarsim scene info", "radarsim scene preview",
+     "radarsim scene import",
      "radarsim export", "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
@@ -79,6 +80,7 @@ def test_every_command_explains_itself(capsys, command):
         ("radarsim simulate", ["office", "-o", "out.h5", "--platform", "drone"], "drone"),
         ("radarsim simulate", ["office", "-o", "out.h5", "--frontend", "no.yaml"], "no.yaml: cannot be read"),
         ("radarsim simulate", ["office", "-o", "out.h5", "--engine", "unreal"], "unreal"),
+        ("radarsim dataset", ["missing.yaml", "-o", "out"], "no specification 'missing.yaml', expected"),
         ("radarsim calibrate", ["missing.h5", "-o", "board.yaml"], "missing.h5: no such file"),
         ("radarsim export", ["missing.h5", "--to", "tum", "-o", "x.tum"], "missing.h5: no such file"),
         ("radarsim scene info", ["castle"], "castle"),

@@ -8,7 +8,7 @@ from radarize.errors import InputError
 from radarsim.drive import drive
 from radarsim.motion import Motion, Mounting
 from radarsim.platforms import PLATFORMS, Platform
-from radarsim.scene.clearance import LOWEST, Clearance, ground_level, nearest
+from radarsim.scene.clearance import Clearance, ground_level, nearest
 from radarsim.scene.scene import Scene
 from radarsim.tour import SLACK, route, tour
 
@@ -50,7 +50,8 @@ def plan(
         mounting = Mounting((carrier.lever_arm, 0.0, 0.0), tilt)
     arm = np.hypot(*mounting.lever_arm[:2])
     height = ground_level(scene) + carrier.height
-    clearance = Clearance.of(scene, LOWEST, max(carrier.top, carrier.height + mounting.lever_arm[2] + 0.25))
+    low, top = carrier.body
+    clearance = Clearance.of(scene, low, max(top, carrier.height + mounting.lever_arm[2] + 0.25))
     try:
         if waypoints is not None:
             _check(scene, carrier, clearance, waypoints)
@@ -84,7 +85,7 @@ def _check(scene: Scene, carrier: Platform, clearance: Clearance, places: Float[
     if not len(close):
         return
     number, (x, y) = close[0] + 1, places[close[0]]
-    heights = ground_level(scene) + np.linspace(LOWEST, carrier.top, 40)
+    heights = ground_level(scene) + np.linspace(*carrier.body, 40)
     distance, item = nearest(scene, np.column_stack([np.tile([x, y], (len(heights), 1)), heights]))
     what = scene.objects[item[distance.argmin()]].name
     if room[close[0]] > 0:

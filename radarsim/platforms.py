@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from radarsim.scene.clearance import LOWEST
+
 
 @dataclass(frozen=True)
 class Platform:
@@ -16,7 +18,7 @@ class Platform:
 
     Attributes:
         height: of the sensor, m.
-        top: highest point of the carrier, m: everything below is an obstacle.
+        top: highest point of the carrier, m.
         radius: clearance of the carrier's middle, m; the sensor's own is checked besides.
         footprint: radius of the carrier itself, m.
         speed: usual, m/s; slower in curves.
@@ -52,6 +54,11 @@ class Platform:
     tremor: float = 0.0
     free_heading: bool = False
 
+    @property
+    def body(self) -> tuple[float, float]:
+        """Lowest and highest point above the ground, m: everything between is an obstacle."""
+        return LOWEST, self.top
+
 
 PLATFORMS: dict[str, Platform] = {
     "handheld": Platform(
@@ -66,7 +73,7 @@ PLATFORMS: dict[str, Platform] = {
         tilt=np.deg2rad(0.5), tremor=np.deg2rad(0.15),
     ),
     "robot": Platform(
-        height=0.20, top=0.45, radius=0.36, footprint=0.17, speed=0.46, unsteadiness=0.05, top_speed=0.5,
+        height=0.20, top=0.45, radius=0.36, footprint=0.17, speed=0.41, unsteadiness=0.12, top_speed=0.5,
         acceleration=0.4, turn_rate=np.deg2rad(45), smoothing=0.15, reversing=0.35, lever_arm=0.10,
         tilt=np.deg2rad(0.5), tremor=np.deg2rad(0.1),
     ),

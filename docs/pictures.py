@@ -1,4 +1,8 @@
-"""Draws the pictures of the README: python -m docs.pictures RUN REC.h5 (the demo's, after `make demo`)."""
+"""Draws the pictures of the README.
+
+python -m docs.pictures                  the scenes': plans and renderings
+python -m docs.pictures RUN REC.h5       those of the demo besides, after `make demo`
+"""
 
 import sys
 from pathlib import Path
@@ -62,15 +66,23 @@ def trajectory_and_map(run: Path) -> plt.Figure:
     return figure
 
 
-def main(run: Path, recording: Path) -> None:
+def scenes() -> None:
+    """Plans and renderings of the office and of a floor of each style."""
+    for name in ("office", *(f"buildings/{kind}" for kind in "abcd")):
+        for path in preview(Scene.load(name), HERE, samples=64):
+            small = Image.open(path).convert("RGB")
+            small.thumbnail((900, 900))
+            small.quantize(96).save(path, optimize=True)
+
+
+def main() -> None:
     HERE.mkdir(exist_ok=True)
-    for path in preview(Scene.load("office"), HERE):
-        small = Image.open(path)
-        small.thumbnail((960, 960))
-        small.convert("RGB").quantize(64).save(path, optimize=True)
-    heat_maps(recording, seconds=5.5).savefig(HERE / "heatmaps.png", dpi=70)
-    trajectory_and_map(run).savefig(HERE / "run.png", dpi=75)
+    scenes()
+    if len(sys.argv) == 3:
+        run, recording = map(Path, sys.argv[1:])
+        heat_maps(recording, seconds=5.5).savefig(HERE / "heatmaps.png", dpi=70)
+        trajectory_and_map(run).savefig(HERE / "run.png", dpi=75)
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), Path(sys.argv[2]))
+    main()

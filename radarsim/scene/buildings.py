@@ -73,15 +73,17 @@ def _surfaces(site: Site, plan: FloorPlan) -> None:
     spans = [o.span for o in plan.openings]
     planes: dict[tuple, list[walls.Face]] = {}
     sheath = plan.skeleton.outline.exterior
-    reveals = shapely.union_all([shapely.box(s[0], s[1], s[3], s[4]) for s in spans]).buffer(1e-3)
+    # Within the wall's thickness, short of its faces.
+    depths = [(1e-3, -5e-3) if o.side in "ns" else (-5e-3, 1e-3) for o in plan.openings]
+    reveals = shapely.union_all(
+        [shapely.box(s[0] - dx, s[1] - dy, s[3] + dx, s[4] + dy) for s, (dx, dy) in zip(spans, depths, strict=True)]
+    )
     found = walls.faces(solids, [*rooms, *spans], pillars)
     middles = np.array([face.corners.mean(axis=0) for face in found])
     points = shapely.points(middles[:, :2])
     near = shapely.distance(points, sheath)
     in_reveal = shapely.covers(reveals, points)
-    floors = {room.name: (room.floor.buffer(0.01), room) for room in plan.rooms}
-    corridors = shapely.union_all([f for f, room in floors.values() if room.kind == "corridor"])
-    in_corridor = shapely.covers(corridors, points)
+    in_corridor = shapely.covers(shapely.union_all([room.floor.buffer(0.01) for room in plan.corridors]), points)
     at_column = shapely.covers(shapely.union_all([shapely.box(*p[:2], *p[3:5]) for p in pillars]), points)
     for k, face in enumerate(found):
         level = face.sign * face.level

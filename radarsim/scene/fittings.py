@@ -83,7 +83,7 @@ def cubicle(rng: np.random.Generator) -> Piece:
     """Toilet cubicle: bowl and cistern, a partition on one side, a front with its door ajar."""
     bowl = cylinder((-0.25, 0, 0.2), 0.19, 0.4, 12, ("-z",))
     cistern = span((-0.7, -0.2, 0.4), (-0.55, 0.2, 0.85))
-    panel = span((-0.7, 0.455, 0.15), (0.7, 0.475, 2.0))
+    panel = span((-0.7, 0.456, 0.15), (0.675, 0.474, 2.0))
     front = [span((0.68, a, 0.15), (0.70, b, 2.0)) for a, b in ((-0.475, -0.32), (0.32, 0.455))]
     door = placed(box((0, 0.3, 1.08), (0.02, 0.6, 1.85)), (0.67, -0.32, 0), (0, 0, rng.uniform(0.1, 1.0)))
     return Piece("cubicle", 1.4, 0.95, {"marble": joined(bowl, cistern), "chipboard": joined(panel, *front, door)})

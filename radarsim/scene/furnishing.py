@@ -95,7 +95,7 @@ class _Layout:
         for place in self.line(side, furniture.desk, count, start=self.rng.uniform(0.3, 0.6), gap=0.4, off=0.06):
             self.site.seat(self.room, *place)
 
-    def tables(self, rows: int, make: Make, seats: tuple[int, ...], gap: float = 0.0) -> None:
+    def tables(self, rows: int, make: Make, seats: tuple[int, ...], gap: float = 0.01) -> None:
         """Tables in the middle, end to end along the room's longer side, with chairs along `seats` (their sides)."""
         room, rng = self.room, self.rng
         along_x = room.size[0] >= room.size[1]

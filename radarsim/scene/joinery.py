@@ -97,13 +97,18 @@ def _glazing(
         mullions = mullions[np.diff(mullions, prepend=-1.0) > BAR]
         holes = [clear]
         levels = np.array([bottom + half, DOOR_HEIGHT + half, top - half])
-    bars = [shapes.box((m, 0, (bottom + top) / 2), (BAR, BAR, top - bottom), ("-z", "+z")) for m in mullions]
+    # Faces that touch the wall are left out.
+    bars = []
+    for k, m in enumerate(mullions):
+        hidden = ("-z", "+z") + ("-x",) * (k == 0) + ("+x",) * (k == len(mullions) - 1)
+        bars.append(shapes.box((m, 0, (bottom + top) / 2), (BAR, BAR, top - bottom), hidden))
     for k, level in enumerate(levels):
         for a, b in zip(mullions[:-1], mullions[1:], strict=True):
             in_door = any(a >= h[0] - 1e-6 and b <= h[1] + 1e-6 for h in holes)
             if holes and (k == 0 and in_door or k == 1 and not in_door):
                 continue
-            bars.append(shapes.box(((a + b) / 2, 0, level), (b - a - BAR, BAR, BAR), ("-x", "+x")))
+            hidden = ("-x", "+x") + ("-z",) * (k == 0) + ("+z",) * (k == len(levels) - 1)
+            bars.append(shapes.box(((a + b) / 2, 0, level), (b - a - BAR, BAR, BAR), hidden))
     pieces = [(half, bottom + half, width - half, top - half)]
     if door:
         low, high = holes[0]

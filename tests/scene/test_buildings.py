@@ -172,6 +172,16 @@ def test_styles_differ_in_material(floors):
     assert mean["B", "metal"] < mean["D", "metal"] < mean["C", "metal"]
 
 
+def test_facade_is_of_one_material():
+    """All that faces outward on the outline, below windows and above as well."""
+    building = Building(kind="D", seed=4, furnished=False)
+    edge = building.skeleton().outline.exterior
+    for item in building.build():
+        if item.name.split()[0] in ("outer", "wall", "corridor", "reveals", "facade"):
+            outside = shapely.distance(shapely.points(item.mesh.triangles_center[:, :2]), edge) < 1e-3
+            assert outside.all() if "facade" in item.name else not outside.any(), item.name
+
+
 def test_description_of_a_building():
     scene = Scene.of({"building": {"kind": "C", "seed": 2, "floor": 1}}, "c2")
     assert scene.name == "c2" and len(scene.objects) > 100

@@ -6,6 +6,7 @@ import trimesh
 from scipy import ndimage
 
 from radarsim.scene import walls
+from radarsim.scene.buildings import Building
 from radarsim.scene.clearance import Clearance
 from radarsim.scene.office import Office
 from radarsim.scene.scene import Scene
@@ -55,10 +56,10 @@ def test_is_an_office(office):
     assert all(len(o.mesh.facets) or len(o.mesh.faces) == 1 for o in office.objects)
 
 
-@pytest.mark.parametrize("seed", [0, 7])
-def test_no_face_lies_on_another(seed):
+@pytest.mark.parametrize("building", [Office(seed=0), Office(seed=7), Building(kind="A"), Building(kind="C")])
+def test_no_face_lies_on_another(building):
     """From just outside any face one looks into the open, not into a coplanar copy: its own surface is the nearest."""
-    scene = Scene("office", Office(seed=seed).build())
+    scene = Scene("x", building.build())
     rng = np.random.default_rng(0)
     weight = rng.dirichlet(np.ones(3), len(scene.triangles))
     points = np.einsum("tk,tkd->td", weight, scene.triangles)

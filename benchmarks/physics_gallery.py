@@ -34,6 +34,7 @@ from radarsim.physics.frontend_config import FrontEndConfig, PhaseNoise
 from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.phasenoise import density
 from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.surface import Surface
 from radarsim.physics.view import View
 from radarsim.scene import shapes
 from radarsim.scene.materials import material

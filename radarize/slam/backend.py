@@ -199,7 +199,7 @@ class Slam:
             submap.grid, node.points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
         )
         noise = uncertainty(result, c.translation_floor, c.rotation_floor)
-        self.graph.add_motion(submap.anchor, len(self.nodes), result.pose, noise)
+        self.graph.add_match(submap.anchor, len(self.nodes), result.pose, noise)
         return compose(self._local[submap.anchor], result.pose)
 
     def _insert(self, number: int, node: Node) -> None:

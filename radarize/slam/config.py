@@ -109,7 +109,9 @@ class LoopConfig(_Section):
         candidates: at most so many submaps are searched per node, nearest first.
         every: only every so-many-th node is searched for.
         nodes: points of so many nodes, the latest ones, are searched for together: one view may be too poor.
-        min_score: mean probability at the points that a closure needs.
+        front: so far in front of its points, m, a node must find the submap free: else a wall fits to any other one,
+            a corridor's left to its right. 0: not asked, where every view is rich enough.
+        min_score: mean probability at the points, and of being free in front of them, that a closure needs.
         levels: halvings of the resolution in the branch-and-bound search.
         sigma: as `MatcherConfig.sigma`, for closures.
         translation_floor, rotation_floor: no closure is believed better than this, m and rad.
@@ -123,9 +125,10 @@ class LoopConfig(_Section):
     radius: float = Field(10.0, gt=0)
     distance: float = Field(3.0, gt=0)
     angle: float = Field(0.5, gt=0)
-    candidates: int = Field(2, gt=0)
+    candidates: int = Field(4, gt=0)
     every: int = Field(2, gt=0)
     nodes: int = Field(1, gt=0)
+    front: float = Field(0.0, ge=0)
     min_score: float = Field(0.6, gt=0, lt=1)
     levels: int = Field(5, ge=0, le=8)
     sigma: float = Field(1.0, gt=0)
@@ -182,6 +185,7 @@ PRESETS: dict[str, SlamConfig] = {
             candidates=3,
             every=2,
             nodes=8,
+            front=0.25,
             min_score=0.5,
             levels=4,
             sigma=1.0,

@@ -77,7 +77,7 @@ class LoopSearch:
         self.config = config
         self._pool = ThreadPoolExecutor(_WORKERS, thread_name_prefix="loops")
         self._asked: deque[tuple[int, Future]] = deque()
-        self._pyramid = lru_cache(_PYRAMIDS)(lambda submap: Pyramid.of(submap.grid, config.levels, config.distance, free=True))
+        self._pyramid = lru_cache(_PYRAMIDS)(lambda submap: Pyramid.of(submap.grid, config.levels, config.distance, free=config.front > 0))
 
     def ask(self, questions: Sequence[Question]) -> None:
         """Begin to search."""
@@ -106,7 +106,7 @@ class LoopSearch:
             angle=min(question.angle, max(3 * turn, 0.05)),
             min_score=c.min_score,
             penalty=(price / place**2, price / turn**2),
-            fronts=question.fronts,
+            fronts=question.fronts if c.front else None,
         )
         if found is None:
             return None

@@ -9,8 +9,6 @@ from radarize.pose import between, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.matcher import thin
 
-FRONT = 0.25  # m
-
 
 @dataclass(frozen=True)
 class Scan:
@@ -38,7 +36,7 @@ class Node:
         origins, ends: of the rays, m.
         hits: False for rays that saw nothing as far as their end.
         points: ends of hits, thinned for matching.
-        fronts: places a quarter of a metre before the ends of hits, thinned.
+        fronts: places `LoopConfig.front` before the ends of hits, thinned.
     """
 
     time: float
@@ -57,7 +55,8 @@ class Node:
         rays = [_rays(scan, between(reference.odometry, scan.odometry), config) for scan in used]
         origins, ends, hits = (np.concatenate(parts) for parts in zip(*rays, strict=True))
         echo, way = ends[hits], ends[hits] - origins[hits]
-        before = echo - way * (FRONT / np.maximum(np.linalg.norm(way, axis=1), FRONT))[:, None]
+        before = echo - way * (config.loop.front / np.maximum(np.linalg.norm(way, axis=1), config.grid.min_range))[:, None]
+        before = before if config.loop.front else before[:0]
         # Rays are half of what a session keeps in memory: single precision is 1 um at 10 m.
         return cls(
             reference.time,

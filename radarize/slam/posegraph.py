@@ -1,8 +1,8 @@
 """The pose graph: what nodes know of each other, and the poses that agree best with it.
 
 While a session runs, closures that are believed go into iSAM2 (Kaess et al., IJRR 2012), which solves anew only what
-they touch. At its end graduated non-convexity (Yang et al., RA-L 2020) with motions and matches as known inliers
-decides over all closures afresh (`gtsam.GncLMOptimizer`, truncated least squares). Robust kernels do worse: they keep
+they touch. At its end graduated non-convexity (Yang et al., RA-L 2020) with odometry as known inliers decides over all
+closures and matches afresh (`gtsam.GncLMOptimizer`, truncated least squares). Robust kernels do worse: they keep
 some false closures and weaken true ones.
 """
 
@@ -31,6 +31,8 @@ class PoseGraph:
         self.accepted: Bool[np.ndarray, "closure"] = np.zeros(0, bool)
         self._poses, self._count = np.zeros((64, 3)), 0
         self._certain: list[gtsam.BetweenFactorPose2] = []
+        self._matches: list[gtsam.BetweenFactorPose2] = []
+        self._matches_kept: Bool[np.ndarray, "match"] = np.zeros(0, bool)
         self._uncertain: list[gtsam.BetweenFactorPose2] = []
         self._isam: gtsam.ISAM2 | None = None
         self._news = gtsam.NonlinearFactorGraph()  # not in iSAM2 yet
@@ -50,9 +52,14 @@ class PoseGraph:
         return self._count - 1
 
     def add_motion(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
-        """A relative pose that is known not to be an outlier: odometry, or a match to the submap being built."""
+        """A relative pose that is known not to be an outlier: odometry."""
         self._certain.append(_factor(of, to, relative, covariance))
         self._news.add(self._certain[-1])
+
+    def add_match(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
+        """A match to the submap being built: believed at once, seldom false."""
+        self._matches.append(_factor(of, to, relative, covariance))
+        self._news.add(self._matches[-1])
 
     def add_closure(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
         """A relative pose from a loop search, which may be false; it is not believed yet."""
@@ -85,8 +92,8 @@ class PoseGraph:
         """Decide over all closures afresh, and move poses to the optimum."""
         if self._count < 2:
             return
-        if self._uncertain:
-            self.accepted = self._judge()
+        if self._uncertain or self._matches:
+            self._judge()
         graph = self._graph(self._believed())
         values = gtsam.LevenbergMarquardtOptimizer(graph, self._values(), _levenberg()).optimize()
         self._poses[: self._count] = gtsam.utilities.extractPose2(values)
@@ -100,26 +107,27 @@ class PoseGraph:
         return np.stack([marginals.marginalCovariance(k) for k in range(self._count)])
 
     def _believed(self) -> list:
-        return [factor for factor, keep in zip(self._uncertain, self.accepted, strict=True) if keep]
+        new = np.ones(len(self._matches) - len(self._matches_kept), bool)
+        keep = np.concatenate([self._matches_kept, new, self.accepted])
+        return [factor for factor, keep in zip([*self._matches, *self._uncertain], keep, strict=True) if keep]
 
-    def _judge(self) -> Bool[np.ndarray, "closure"]:
-        graph = self._graph(self._uncertain)
-        known = graph.size() - len(self._uncertain)
+    def _judge(self) -> None:
+        graph = self._graph([*self._matches, *self._uncertain])
+        known = 1 + len(self._certain)
         parameters = gtsam.GncLMParams(_levenberg())
         parameters.setLossType(gtsam.GncLossType.TLS)
         parameters.setKnownInliers(list(range(known)))
         optimizer = gtsam.GncLMOptimizer(graph, self._values(), parameters)
         optimizer.setInlierCostThresholdsAtProbability(self.inlier_probability)
         optimizer.optimize()
-        return np.asarray(optimizer.getWeights())[known:] > 0.5
+        kept = np.asarray(optimizer.getWeights())[known:] > 0.5
+        self._matches_kept, self.accepted = kept[: len(self._matches)], kept[len(self._matches) :]
 
-    def _graph(self, closures: list) -> gtsam.NonlinearFactorGraph:
+    def _graph(self, others: list) -> gtsam.NonlinearFactorGraph:
         graph = gtsam.NonlinearFactorGraph()
         anchor = gtsam.noiseModel.Isotropic.Sigma(3, 1e-6)
         graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*self._poses[0]), anchor))
-        for factor in self._certain:
-            graph.add(factor)
-        for factor in closures:
+        for factor in (*self._certain, *others):
             graph.add(factor)
         return graph
 

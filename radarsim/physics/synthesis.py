@@ -71,10 +71,10 @@ class Synthesizer:
     Args:
         config: radar configuration.
         accuracy: bound on the amplitude error of the expansion at the worst sample of the worst echo, relative to that
-            echo. All samples of all echoes together are 25 dB better.
+            echo. All samples of all echoes together are 20 dB better.
     """
 
-    def __init__(self, config: RadarConfig, accuracy: float = 0.04):
+    def __init__(self, config: RadarConfig, accuracy: float = 4e-3):
         self.config = config
         self.accuracy = accuracy
         clock = BurstClock.of(config)

@@ -15,7 +15,7 @@ from numba import njit
 from radarsim.physics.antenna import Antenna
 
 #: Distance up to which about all scatterers in the middle of the beam are used, m.
-FULL_DETAIL = 1.1
+FULL_DETAIL = 0.9
 _PEAK = 10 ** (Antenna().peak_dbi / 20)
 
 

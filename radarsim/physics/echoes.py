@@ -17,7 +17,9 @@ from numba import njit, prange
 
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
-from radarsim.physics.synthesis import BurstClock, parabolas
+from radarsim.physics.amplitudes import dot, length, minus
+from radarsim.physics.amplitudes import vector as vec
+from radarsim.physics.synthesis import BurstClock, parabola
 
 
 class Provenance(IntEnum):
@@ -80,10 +82,17 @@ class Echoes:
         position, rotation = motion.position(times), motion.rotation(times).as_matrix()
         tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1)
         rx = position[:, None] + rx_positions(config) @ rotation.transpose(0, 2, 1)
-        values = np.empty((len(self), tx.shape[1] * rx.shape[1], 3))
-        _point_lengths(self.points, self.moves, tx, rx, values)
-        _image_lengths(self.images, tx, rx, values[len(self.points) :])
-        return parabolas(values)
+        out = np.empty((len(self), tx.shape[1] * rx.shape[1], 3))
+        _point_lengths(self.points, self.moves, tx, rx, out)
+        _image_lengths(self.images, tx, rx, out[len(self.points) :])
+        return out
+
+
+@njit(inline="always")
+def _distance(p, q, move):
+    """From p + move to q."""
+    x, y, z = p[0] + move[0] - q[0], p[1] + move[1] - q[1], p[2] + move[2] - q[2]
+    return np.sqrt(x * x + y * y + z * z)
 
 
 @njit(parallel=True, cache=True)
@@ -92,33 +101,36 @@ def _point_lengths(points, moves, tx, rx, out):
     n_rx = rx.shape[1]
     still = len(points) - len(moves)
     for e in prange(len(points)):
-        back = np.empty(n_rx)
-        a, b = points[e, 0].copy(), points[e, 1].copy()
+        a, b = points[e]
+        there, back = np.empty((nodes, n_tx)), np.empty((nodes, n_rx))
         for i in range(nodes):
+            move_a, move_b = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
             if e >= still:
-                a, b = points[e, 0] + moves[e - still, 0, i], points[e, 1] + moves[e - still, 1, i]
-            for r in range(n_rx):
-                d = b - rx[i, r]
-                back[r] = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+                move_a, move_b = vec(moves[e - still, 0, i]), vec(moves[e - still, 1, i])
             for k in range(n_tx):
-                d = a - tx[i, k]
-                there = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
-                for r in range(n_rx):
-                    out[e, k * n_rx + r, i] = there + back[r]
+                there[i, k] = _distance(a, tx[i, k], move_a)
+            for r in range(n_rx):
+                back[i, r] = _distance(b, rx[i, r], move_b)
+        for k in range(n_tx):
+            for r in range(n_rx):
+                low, mid, high = there[0, k] + back[0, r], there[1, k] + back[1, r], there[2, k] + back[2, r]
+                fit = out[e, k * n_rx + r]
+                fit[0], fit[1], fit[2] = parabola(low, mid, high)
 
 
 @njit(cache=True)
 def _image_lengths(images, tx, rx, out):
     nodes, n_tx, _ = tx.shape
     n_rx = rx.shape[1]
+    seen, way = np.empty((nodes, 3)), np.empty(nodes)
     for e in range(len(images)):
         m = images[e]
-        for i in range(nodes):
-            for r in range(n_rx):
-                q = rx[i, r]
-                x = m[0, 0] * q[0] + m[0, 1] * q[1] + m[0, 2] * q[2] + m[0, 3]
-                y = m[1, 0] * q[0] + m[1, 1] * q[1] + m[1, 2] * q[2] + m[1, 3]
-                z = m[2, 0] * q[0] + m[2, 1] * q[1] + m[2, 2] * q[2] + m[2, 3]
-                for k in range(n_tx):
-                    p = tx[i, k]
-                    out[e, k * n_rx + r, i] = np.sqrt((p[0] - x) ** 2 + (p[1] - y) ** 2 + (p[2] - z) ** 2)
+        for r in range(n_rx):
+            for i in range(nodes):
+                for d in range(3):
+                    seen[i, d] = dot(vec(m[d]), vec(rx[i, r])) + m[d, 3]
+            for k in range(n_tx):
+                for i in range(nodes):
+                    way[i] = length(minus(vec(tx[i, k]), vec(seen[i])))
+                fit = out[e, k * n_rx + r]
+                fit[0], fit[1], fit[2] = parabola(way[0], way[1], way[2])

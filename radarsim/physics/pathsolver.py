@@ -25,7 +25,7 @@ from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.physics.antenna import Antenna, amplitude_gain, gain_tables
 from radarsim.physics.echoes import Provenance
-from radarsim.physics.synthesis import BurstClock, parabolas
+from radarsim.physics.synthesis import BurstClock, parabola
 from radarsim.scene.scene import Scene
 
 RAYS = 100_000
@@ -64,7 +64,7 @@ class Paths:
         out = np.einsum("pd,tkd->pkt", self.departure, tx)
         back = np.einsum("pd,trd->prt", self.arrival, rx)
         values = self.length[:, None, None, None] - out[:, :, None] - back[:, None]
-        return parabolas(values.reshape(len(self), -1, len(times)))
+        return np.stack(parabola(*np.moveaxis(values.reshape(len(self), -1, len(times)), -1, 0)), axis=-1)
 
 
 class PathSolverFinder:

@@ -19,7 +19,7 @@ from radarsim.physics.lobes import weights
 from radarsim.physics.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.scene.scene import Scene
 
-#: Scatterers per square metre at full detail; with level of detail some fifteen are left in a range-azimuth cell of
+#: Scatterers per square metre at full detail; with level of detail twelve or more are left in a range-azimuth cell of
 #: the `radarize` preset in an office.
 DENSITY = 300.0
 #: Edge of the cells that tiles are gathered in, and longest edge of a triangle, m.

@@ -52,7 +52,7 @@ def test_help_is_instant(name):
 
 @pytest.mark.parametrize(
     "command",
-    ["radarize import", "radarize info", "radarize run", "radarize evaluate", "radarize report", "radarsim simulate",
+    ["radarize import", "radarize info", "radarize run", "radarize slam", "radarize evaluate", "radarize report", "radarsim simulate",
      "radarsim calibrate", "radarsim scene", "radarsim scene info", "radarsim scene preview", "radarsim export",
      "radarsim doctor"],
 )  # fmt: skip

@@ -115,6 +115,30 @@ def run_(
 
 
 @app.command()
+def slam(
+    scans: Annotated[Path, typer.Argument(metavar="SCANS|RUN", help="Scans (.npz), or a run's folder.")],
+    odometry: Annotated[
+        Path | None, typer.Argument(metavar="[ODOMETRY]", help="Poses (TUM); else scans alone.")
+    ] = None,
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")] = ...,
+    preset: Annotated[str | None, typer.Option(help="radar (of a RUN), lidar (of a file) or cartographer.")] = None,
+    config: Annotated[Path | None, typer.Option(help="Settings that differ from the preset (.yaml).")] = None,
+    reference: Annotated[Path | None, typer.Option(help="True poses (TUM), for `radarize evaluate`.")] = None,
+):
+    """Estimate trajectory and map from scans and odometry of any sensor.
+
+    SCANS holds ranges (scan, beam), angle_min, angle_increment, range_max and, unless one a second, times.
+    """
+    from radarize.slam.config import SlamConfig
+    from radarize.slam.log import run
+
+    name = preset or ("radar" if scans.is_dir() else "lidar")
+    settings = SlamConfig.load(config, name) if config else SlamConfig.preset(name)
+    with progress("slam") as report:
+        print(run(scans, odometry, output, config=settings, reference=reference, progress=report))
+
+
+@app.command()
 def evaluate(
     run: RunFolder,
     reference: Annotated[Path | None, typer.Option(help="True poses (TUM); by default the run's own.")] = None,

@@ -130,6 +130,15 @@ class Slam:
         span = np.maximum(knots[after] - knots[before], 1e-9)
         return times, interpolate(forward, backward, np.clip((times - knots[before]) / span, 0, 1))
 
+    def covariances(self) -> Float[np.ndarray, "scan 3 3"]:
+        """Covariance of every pose of `trajectory` for (x, y, yaw) in its own frame, given the first node: that of the
+        node next to it in time."""
+        times, _ = self.trajectory()
+        if not len(times):
+            return np.zeros((0, 3, 3))
+        knots = np.array([node.time for node in self.nodes])
+        return self.graph.covariances()[np.abs(knots[:, None] - times).argmin(axis=0)]
+
     def map(self) -> OccupancyGrid:
         """Occupancy grid of all nodes, drawn anew at their optimised poses."""
         grid = OccupancyGrid.empty(self.config.grid.map_resolution)

@@ -120,8 +120,8 @@ def search(
 
 @numba.njit(cache=True, nogil=True)
 def _fill(buffer, starts, rows, columns):
-    # Cell (i, j) of level h bounds base cells (i - 1) * size ... (i + 1) * size - 1 along each axis: the maximum of 2 x 2
-    # blocks of `size`, which in turn are the maxima of four blocks half as large.
+    # Cell (i, j) of level h bounds base cells (i - 1) * size ... (i + 1) * size - 1 along each axis: the maximum of
+    # 2 x 2 blocks of `size`, which in turn are the maxima of four blocks half as large.
     blocks = buffer[: rows[0] * columns[0]].reshape((rows[0], columns[0]))
     for h in range(1, len(starts)):
         coarse = np.zeros((rows[h] - 1, columns[h] - 1), np.uint8)
@@ -169,7 +169,9 @@ def _nearest(low, size):
 
 
 @numba.njit(cache=True, nogil=True)
-def _search(buffer, starts, rows, columns, points, echoes, guess, angles, angle_penalty, scale, half, min_score, penalty):
+def _search(
+    buffer, starts, rows, columns, points, echoes, guess, angles, angle_penalty, scale, half, min_score, penalty
+):
     # Shifts (dx, dy) count from the window's corner, so a block's shift at its level is one number for all points.
     top = len(starts) - 1
     size = 1 << top

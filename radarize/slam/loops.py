@@ -77,7 +77,10 @@ class LoopSearch:
         self.config = config
         self._pool = ThreadPoolExecutor(_WORKERS, thread_name_prefix="loops")
         self._asked: deque[tuple[int, Future]] = deque()
-        self._pyramid = lru_cache(_PYRAMIDS)(lambda submap: Pyramid.of(submap.grid, config.levels, config.distance, free=config.front > 0))
+        self._pyramid = lru_cache(_PYRAMIDS)(self._build)
+
+    def _build(self, submap: Submap) -> Pyramid:
+        return Pyramid.of(submap.grid, self.config.levels, self.config.distance, free=self.config.front > 0)
 
     def ask(self, questions: Sequence[Question]) -> None:
         """Begin to search."""
@@ -155,9 +158,7 @@ class Jury:
         if first.node == second.node and first.anchor == second.anchor:
             return False
         poses = self.graph.poses
-        carried = compose(
-            compose(poses[first.anchor], first.pose), between(poses[first.node], poses[second.node])
-        )
+        carried = compose(compose(poses[first.anchor], first.pose), between(poses[first.node], poses[second.node]))
         error = between(carried, compose(poses[second.anchor], second.pose))
         drift = self.drift.between(first.node, second.node) + self.drift.between(first.anchor, second.anchor)
         return self._fits(error, first.covariance + second.covariance + drift)

@@ -154,8 +154,9 @@ def _refine(probability, unit, ox, oy, resolution, points, guess, prior, prior_w
         step = -np.linalg.solve(full, gradient + prior_gradient)
         trial = pose + step
         new_cost, new_score, new_prior_gradient, new_prior_hessian = _cost(
-            probability, unit, ox, oy, resolution, points, trial, prior, prior_weight, weight, trial_hessian, trial_gradient
-        )
+            probability, unit, ox, oy, resolution, points, trial,
+            prior, prior_weight, weight, trial_hessian, trial_gradient,
+        )  # fmt: skip
         if new_cost < cost:
             small = np.abs(step[0]) + np.abs(step[1]) < 1e-4 and np.abs(step[2]) < 1e-5
             pose, cost, score = trial, new_cost, new_score

@@ -55,8 +55,8 @@ class Node:
         rays = [_rays(scan, between(reference.odometry, scan.odometry), config) for scan in used]
         origins, ends, hits = (np.concatenate(parts) for parts in zip(*rays, strict=True))
         echo, way = ends[hits], ends[hits] - origins[hits]
-        before = echo - way * (config.loop.front / np.maximum(np.linalg.norm(way, axis=1), config.grid.min_range))[:, None]
-        before = before if config.loop.front else before[:0]
+        share = config.loop.front / np.maximum(np.linalg.norm(way, axis=1), config.loop.front + 1e-9)
+        before = echo - share[:, None] * way if config.loop.front else echo[:0]
         # Rays are half of what a session keeps in memory: single precision is 1 um at 10 m.
         return cls(
             reference.time,

@@ -107,7 +107,7 @@ class Drift:
         self._lengths: list[float] = []
 
     def add(self, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"], length: float) -> None:
-        """Append a node: its pose in a frame without jumps, covariance (in its own frame) and length of the last step."""
+        """Append a node: pose in a frame without jumps, covariance (in its own frame) and length of the last step."""
         carry = adjoint(pose)
         self._inverse.append(np.linalg.inv(carry))
         self._sums.append((self._sums[-1] if self._sums else 0) + carry @ covariance @ carry.T)

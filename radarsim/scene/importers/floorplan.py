@@ -155,7 +155,7 @@ def _placed(area, grid: OccupancyGrid):
 
 def _tiles(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Polygon]:
     """Few rectangles that cover the free ground and a little of what bounds it."""
-    from radarsim.physics.planes import strips
+    from radarsim.physics.planes import trapezoids
 
     size = max(1, round(_TILE / grid.resolution))
     around = np.pad(inside, [(0, -n % size) for n in inside.shape])
@@ -164,7 +164,7 @@ def _tiles(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Polygon
     step = size * grid.resolution
     area = shapely.union_all(shapely.box(i * step, j * step, (i + 1) * step, (j + 1) * step))
     area = shapely.union_all([_without_courts(part) for part in shapely.get_parts(area)])
-    return [rectangle(*bounds) for bounds in strips(area)]
+    return [Polygon(corners) for corners in trapezoids(area)]
 
 
 def _lying(tile: Polygon, grid: OccupancyGrid, level: float, facing: int) -> trimesh.Trimesh:

@@ -28,7 +28,8 @@ def test_the_pipeline_needs_no_simulator():
 
 
 def test_the_simulator_takes_only_sensor_and_files_from_the_pipeline():
-    allowed = {f"radarize.{name}" for name in ("radar", "recording", "points", "errors", "tum", "console")} | {"radarize"}
+    names = ("radar", "recording", "points", "errors", "tum", "console")
+    allowed = {f"radarize.{name}" for name in names} | {"radarize"}
     guilty = {
         (f, n)
         for f, names in imported("radarsim").items()

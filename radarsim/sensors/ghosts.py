@@ -22,7 +22,7 @@ from radarsim.sensors.causes import CAUSES
 from radarsim.sensors.scan import AZIMUTHS
 from radarsim.sensors.sensor import Frames, Rig, Sensor
 
-_INSTANTS = 4
+_INSTANTS = 3
 #: Half width of the window's transform, bins, and its table's entries per bin.
 _WIDTH, _FINE = 4, 64
 #: Powers are kept in steps of so many dB, and not below so many dB under the noise: that is what lets them be packed.

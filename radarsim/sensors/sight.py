@@ -48,7 +48,7 @@ class Sight:
         frames, rays, _ = directions.shape
         starts = np.broadcast_to(origins[:, None], directions.shape).reshape(-1, 3)
         ways = directions.reshape(-1, 3)
-        distance, item = self._scene.cast(starts, ways)
+        distance, item = self._scene.cast(starts, ways, coherent=True)
         if through_glass and self._clear.any():
             for _ in range(_PANES):
                 clear = np.flatnonzero((item >= 0) & self._clear[item])

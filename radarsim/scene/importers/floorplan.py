@@ -8,7 +8,6 @@ import trimesh
 from jaxtyping import Bool
 from scipy import ndimage
 from shapely.geometry import MultiPolygon, Polygon
-from shapely.geometry import box as rectangle
 
 from radarize.errors import InputError
 from radarsim.scene import shapes

@@ -90,6 +90,8 @@ for attempt in repair renew; do
     rm -f .venv/.ready
     if install_python_packages; then
         cp requirements.lock .venv/.ready
+        echo "setup: compiling the simulator (half a minute, once)"
+        .venv/bin/python -m radarsim.doctor --first-frame >/dev/null || true # `radarsim doctor` tells what is wrong
         is_complete && exit
     fi
 done

@@ -1,1 +1,7 @@
 """Ray-traced simulation of the IWR1843 radar in indoor meshes, written as raw int16 I/Q."""
+
+import os
+
+# Compiled loops last a millisecond or less. OpenMP's threads would spin between them, for milliseconds, on the cores
+# that Mitsuba's threads and whatever else runs need: that doubled the time of a frame. Read when the library loads.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")

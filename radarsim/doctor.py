@@ -2,6 +2,7 @@
 
 ``python -m radarsim.doctor --missing-packages`` prints the system packages that are missing; `setup.sh` asks it before
 any Python package is installed, so everything here that is not the standard library's is imported late.
+``python -m radarsim.doctor --first-frame`` simulates a frame, which compiles the simulator: the last step of set-up.
 """
 
 import ctypes
@@ -12,6 +13,7 @@ import platform
 import shutil
 import subprocess
 import sys
+import time
 from dataclasses import dataclass
 
 from radarize.errors import InputError
@@ -84,6 +86,7 @@ def findings() -> list[Finding]:
         _llvm(),
         *(_library(library) for library in LIBRARIES if platform.system() == "Linux"),
         _ray_test(),
+        _first_frame(),
         _cuda(),
         _chromium(),
         _disk(),
@@ -127,6 +130,30 @@ def _ray_test() -> Finding:
         return Finding("ray test", "ok", "Mitsuba's llvm_ad_mono_polarized variant hits a wall; Sionna RT imports")
     reason = (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1]
     return Finding("ray test", "missing", reason, llvm.INSTALL if "LLVM" in done.stderr else "./setup.sh")
+
+
+def first_frame() -> float:
+    """Seconds from nothing to a first frame, of a scene with everything in it; slow where it is not yet compiled."""
+    start = time.perf_counter()
+    import numpy as np
+
+    from radarize.radar.presets import PRESETS
+    from radarsim.motion import plan_motion
+    from radarsim.scene.scene import Scene
+    from radarsim.simulate import Simulator
+
+    scene, rng = Scene.load("visitors"), np.random.default_rng(0)
+    Simulator(scene, plan_motion(scene, "handheld", 1.0, rng), PRESETS["radarize"], rng).frames(np.zeros(1))
+    return time.perf_counter() - start
+
+
+def _first_frame() -> Finding:
+    command = [sys.executable, "-m", "radarsim.doctor", "--first-frame"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode == 0:
+        return Finding("first frame", "ok", done.stdout.strip())
+    reason = (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1]
+    return Finding("first frame", "missing", reason, "./setup.sh")
 
 
 def _cuda() -> Finding:
@@ -179,6 +206,9 @@ def examine() -> bool:
 
 
 if __name__ == "__main__":
-    if sys.argv[1:] != ["--missing-packages"]:
-        sys.exit("usage: python -m radarsim.doctor --missing-packages (people type: radarsim doctor)")
-    print(" ".join(missing_packages()))
+    if sys.argv[1:] == ["--missing-packages"]:
+        print(" ".join(missing_packages()))
+    elif sys.argv[1:] == ["--first-frame"]:
+        print(f"simulated after {first_frame():.1f} s")
+    else:
+        sys.exit("usage: python -m radarsim.doctor --missing-packages|--first-frame (people type: radarsim doctor)")

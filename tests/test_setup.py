@@ -136,6 +136,7 @@ def test_doctor_finds_this_machine_usable(capsys):
 def test_doctor_says_what_is_missing(monkeypatch, capsys):
     monkeypatch.setitem(doctor.LIBRARIES, "libnothing.so.7", "libnothing7")
     monkeypatch.setattr(doctor, "_ray_test", lambda: doctor.Finding("ray test", "ok", ""))
+    monkeypatch.setattr(doctor, "_first_frame", lambda: doctor.Finding("first frame", "ok", ""))
     assert "libnothing7" in doctor.missing_packages()
     assert not doctor.examine()
     assert "libnothing.so.7 (missing): apt-get install libnothing7\n" in capsys.readouterr().out

@@ -166,9 +166,9 @@ class Scene:
         self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], margin: float = 1e-3
     ) -> Bool[np.ndarray, "n"]:
         """Whether anything lies on the segment from origin to target, both ends shortened by `margin` (m)."""
+        geometry = self.sionna.mi_scene  # before Dr.Jit is loaded: it looks at the machine's LLVM
         import mitsuba as mi
 
-        geometry = self.sionna.mi_scene
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
         if not len(origins):
             return np.zeros(0, bool)
@@ -184,10 +184,10 @@ class Scene:
 
         `coherent` says that neighbours in the list are neighbours in space, as a picture's rays are: twice as fast.
         """
+        scene, first = self._geometry  # before Dr.Jit is loaded: it looks at the machine's LLVM
         import drjit as dr
         import mitsuba as mi
 
-        scene, first = self._geometry
         origins, directions = np.broadcast_arrays(np.asarray(origins, float), np.asarray(directions, float))
         if not len(origins):
             return np.zeros(0), np.zeros(0, int)

@@ -30,9 +30,7 @@ _MAP = "magma"
 def canvas(columns: int, rows: int = 1, width: float = 11.0, height: float = 2.6):
     """A figure in the page's style and its axes as an array (rows, columns)."""
     with plt.rc_context(_STYLE):
-        figure, axes = plt.subplots(
-            rows, columns, figsize=(width, height * rows), squeeze=False, layout="constrained"
-        )
+        figure, axes = plt.subplots(rows, columns, figsize=(width, height * rows), squeeze=False, layout="constrained")
     return figure, axes
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError
-from radarize.evaluation.mapping import map_errors, scan_endpoints, scan_errors, velocity_errors
+from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints, scan_errors, velocity_errors
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.runfiles import read_map, read_scans, write_whole
 from radarize.evaluation.trajectory import load, matched, trajectory, yaws
@@ -38,8 +38,8 @@ def trajectory_errors(run: Path, reference: Path | None = None) -> dict[str, Tra
     }
 
 
-def seen_surfaces(scans: dict[str, np.ndarray], truth: TrajectoryErrors) -> np.ndarray | None:
-    """Ends of the true scans' beams that the radar could return, in the reference's frame; None if unknown."""
+def true_scans(scans: dict[str, np.ndarray], truth: TrajectoryErrors) -> tuple[np.ndarray, ...] | None:
+    """Positions, yaw, azimuths and ranges of what the radar could return, in the reference's frame; None if unknown."""
     if "truth/scan" not in scans or "truth/scan_azimuths" not in scans:
         return None
     azimuths = scans["truth/scan_azimuths"]
@@ -48,9 +48,7 @@ def seen_surfaces(scans: dict[str, np.ndarray], truth: TrajectoryErrors) -> np.n
     still[:, 6] = 1
     at, poses = matched(trajectory(scans["time"], still), truth.reference, names=("scans.h5", "the reference"))
     rows = np.isin(scans["time"], at.timestamps)
-    return scan_endpoints(
-        poses.positions_xyz[:, :2], yaws(poses), azimuths[inside], scans["truth/scan"][rows][:, inside]
-    )
+    return poses.positions_xyz[:, :2], yaws(poses), azimuths[inside], scans["truth/scan"][rows][:, inside]
 
 
 def evaluate(run: Path, reference: Path | None = None) -> dict[str, object]:
@@ -79,10 +77,11 @@ def evaluate(run: Path, reference: Path | None = None) -> dict[str, object]:
             metrics["velocity"] = velocity_errors(scans)
         if "truth/floor_plan" in scans and (run / "map.yaml").is_file():
             best = errors["slam"]
-            seen = seen_surfaces(scans, best)
-            metrics["map"] = map_errors(
-                read_map(run / "map.yaml"), scans["truth/floor_plan"], best.turn, best.shift, seen
-            )
+            true, grid = true_scans(scans, best), read_map(run / "map.yaml")
+            seen = None if true is None else scan_endpoints(*true)
+            metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
+            if true is not None:
+                metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
     metrics = without_nan(metrics)
     write_whole(run / "metrics.json", json.dumps(metrics, indent=2) + "\n")
     return metrics
@@ -132,6 +131,7 @@ MAP_WORDS = {
     "recall": ("visible wall within 10 cm of an occupied cell (recall)", "%", 100),
     "f1": ("F1", "%", 100),
     "chamfer": ("Chamfer distance", "m", 1),
+    "free_iou": ("free space, intersection over union", "%", 100),
 }
 SCAN_WORDS = {
     "within_10cm": ("returned bearings within 10 cm of the truth", "%", 100),

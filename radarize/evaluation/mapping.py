@@ -7,6 +7,8 @@ from scipy.spatial import cKDTree
 
 from radarize.evaluation.metrics import Statistics
 from radarize.evaluation.runfiles import OccupancyMap
+from radarize.slam.config import GridConfig
+from radarize.slam.grid import OccupancyGrid
 
 #: m: a mapped point this near to a true surface counts as right.
 TOLERANCE = 0.10
@@ -100,6 +102,44 @@ def map_errors(
         "cells": len(cells),
         "seen_length": len(walls) * SPACING,
     }
+
+
+def free_space_iou(
+    grid: OccupancyMap,
+    turn: Float[np.ndarray, "3 3"],
+    shift: Float[np.ndarray, "3"],
+    positions: Float[np.ndarray, "scan 2"],
+    yaw: Float[np.ndarray, "scan"],
+    azimuths: Float[np.ndarray, "beam"],
+    ranges: Float[np.ndarray, "scan beam"],
+) -> float:
+    """Overlap of the map's free space with what true beams passed through: intersection over union of the areas.
+
+    Args:
+        grid: map in the estimate's frame.
+        turn, shift: alignment of the trajectory, from the estimate's to the reference's frame.
+        positions, yaw, azimuths, ranges: true scans in the reference's frame, m and rad; beams that met nothing count
+            as far as the longest that did.
+    """
+    met = np.isfinite(ranges) & (ranges > 0)
+    if not met.any():
+        return float("nan")
+    config = GridConfig()
+    truth = OccupancyGrid.empty(grid.resolution)
+    bearing = yaw[:, None] + azimuths
+    lengths = np.where(met, ranges, ranges[met].max())
+    ends = positions[:, None] + lengths[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
+    for origin, end, hits in zip(positions, ends, met, strict=True):
+        truth.insert(np.broadcast_to(origin, end.shape), end, hits, config)
+    row, column = np.nonzero((truth.probability > 0) & (truth.probability < 0.5))
+    points = truth.origin + (np.column_stack([column, row]) + 0.5) * truth.resolution
+    there = (np.column_stack([points, np.zeros(len(points))]) - shift) @ turn
+    c, s = np.cos(grid.origin[2]), np.sin(grid.origin[2])
+    at = np.floor((there[:, :2] - grid.origin[:2]) @ np.array([[c, -s], [s, c]]) / grid.resolution).astype(int)
+    rows, columns = grid.free.shape
+    inside = (at >= 0).all(axis=1) & (at[:, 0] < columns) & (at[:, 1] < rows)
+    both = grid.free[rows - 1 - at[inside, 1], at[inside, 0]].sum()
+    return float(both / (len(points) + grid.free.sum() - both))
 
 
 def scan_errors(scans: dict[str, np.ndarray]) -> dict[str, float]:

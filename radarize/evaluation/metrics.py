@@ -115,9 +115,7 @@ def evaluate_trajectory(
         position, rotation = _relative_errors(estimate, reference, pairs)
         relative_position[name], relative_rotation[name] = Statistics.of(position), Statistics.of(rotation)
     # Relative errors do not depend on the alignment, absolute ones do.
-    last = RPE.rpe_base(
-        reference.poses_se3[0], reference.poses_se3[-1], estimate.poses_se3[0], estimate.poses_se3[-1]
-    )
+    last = RPE.rpe_base(reference.poses_se3[0], reference.poses_se3[-1], estimate.poses_se3[0], estimate.poses_se3[-1])
     turn, shift = alignment(estimate, reference, in_plane)
     aligned = moved(estimate, turn, shift)
     position_errors = _absolute_errors(aligned, reference, PoseRelation.translation_part)

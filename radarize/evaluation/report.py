@@ -98,9 +98,7 @@ def _figures(page: Page, metrics: dict, errors: dict[str, TrajectoryErrors]) -> 
             lambda e, n=name: f"{e.relative_position[n].mean:.4f} m, {e.relative_rotation[n].mean:.4f} rad",
             "mean relative error, no alignment" if name == "frame" else "",
         )
-    page.table(
-        ("", *(_NAMES[name] for name in names), "what it means"), rows, numbers=tuple(range(1, 1 + len(names)))
-    )
+    page.table(("", *(_NAMES[name] for name in names), "what it means"), rows, numbers=tuple(range(1, 1 + len(names))))
     for name, title, words in (("map", "Map", MAP_WORDS), ("scans", "Scans", SCAN_WORDS)):
         if name in metrics:
             _words(page, title, metrics[name], words)

@@ -96,7 +96,7 @@ class MatcherConfig(_Section):
     enabled: bool = True
     presearch_distance: float = Field(0.3, ge=0)
     presearch_angle: float = Field(0.17, ge=0)
-    sigma: float = Field(0.5, gt=0)
+    sigma: float = Field(0.7, gt=0)
     translation_floor: float = Field(0.01, gt=0)
     rotation_floor: float = Field(0.003, gt=0)
     iterations: int = Field(20, gt=0)
@@ -115,7 +115,7 @@ class LoopConfig(_Section):
         nodes: points of so many nodes, the latest ones, are searched for together: one view may be too poor.
         front: so far in front of its points, m, a node must find the submap free: else a wall fits to any other one,
             a corridor's left to its right. 0: not asked, where every view is rich enough.
-        min_score: mean probability at the points, and of being free in front of them, that a closure needs.
+        min_score: mean probability at the points that a closure needs, and of being free in front of them.
         levels: halvings of the resolution in the branch-and-bound search.
         sigma: as `MatcherConfig.sigma`, for closures.
         translation_floor, rotation_floor: no closure is believed better than this, m and rad.
@@ -130,12 +130,12 @@ class LoopConfig(_Section):
     distance: float = Field(3.0, gt=0)
     angle: float = Field(0.5, gt=0)
     candidates: int = Field(4, gt=0)
-    every: int = Field(2, gt=0)
+    every: int = Field(4, gt=0)
     nodes: int = Field(1, gt=0)
     front: float = Field(0.0, ge=0)
     min_score: float = Field(0.6, gt=0, lt=1)
     levels: int = Field(5, ge=0, le=8)
-    sigma: float = Field(0.5, gt=0)
+    sigma: float = Field(0.7, gt=0)
     translation_floor: float = Field(0.02, gt=0)
     rotation_floor: float = Field(0.006, gt=0)
     lag: int = Field(4, ge=0)

@@ -82,7 +82,8 @@ def search(
         guess: middle of the window, in the submap's frame.
         distance, angle: half-widths of the window, m and rad. The angle steps by one cell at the 90th percentile of
             the points' ranges.
-        min_score: mean probability at the points, and of being free at the fronts, 0...1.
+        min_score: mean probability at the points and, if there are any, of being free at the fronts, the lower of
+            both, 0...1.
         penalty: subtracted from the score per square metre and per square radian away from the guess.
         fronts: places in front of the points, m, for a pyramid that knows what is free.
 
@@ -143,16 +144,26 @@ def _fill(buffer, starts, rows, columns):
 
 
 @numba.njit(cache=True, nogil=True)
-def _bound(buffer, cells, shift, needed):
-    # Sum at the cells, or an upper bound of it as soon as that is below what is needed.
-    total, count = np.int64(0), len(cells)
-    for start in range(0, count, 16):
-        end = min(start + 16, count)
+def _mean(buffer, cells, shift, needed, count):
+    # Mean at the cells, of `count` points with those outside, or an upper bound of it once that is below the needed.
+    total, unit = np.int64(0), 1 / (255.0 * count)
+    for start in range(0, len(cells), 16):
+        end = min(start + 16, len(cells))
         for k in range(start, end):
             total += buffer[cells[k] + shift]
-        if total + 255 * (count - end) < needed:
-            return total + 255 * (count - end)
-    return total
+        bound = (total + 255 * (len(cells) - end)) * unit
+        if bound < needed:
+            return bound
+    return total * unit
+
+
+@numba.njit(cache=True, nogil=True)
+def _bound(buffer, cells, split, shift, needed, echoes, fronts):
+    # The lower one of both means; of bounds it is a bound.
+    score = _mean(buffer, cells[:split], shift, needed, echoes)
+    if fronts > 0 and score > needed:
+        score = min(score, _mean(buffer, cells[split:], shift, needed, fronts))
+    return score
 
 
 @numba.njit(cache=True, nogil=True)
@@ -177,10 +188,10 @@ def _search(
     size = 1 << top
     across = (2 * half + size) // size
     count = len(angles) * across * across
-    unit = 1 / (255.0 * len(points))
-    least = min_score / unit
+    fronts = len(points) - echoes
     # Cells of the points, by angle; those below the top level only of angles that are looked at closer.
     corner, inside = np.empty((len(angles), len(points), 3), np.int32), np.zeros(len(angles), np.int64)
+    split = np.zeros(len(angles), np.int64)
     cells, known = np.empty((len(angles), top + 1, len(points)), np.int32), np.zeros(len(angles), np.bool_)
     bounds, where = np.empty(count), np.empty((count, 3), np.int64)
     n = 0
@@ -194,13 +205,16 @@ def _search(
                 corner[a, inside[a], 0], corner[a, inside[a], 1] = row, column
                 corner[a, inside[a], 2] = 0 if k < echoes else len(buffer) // 2
                 inside[a] += 1
+                split[a] += k < echoes
         _cells(corner[a, : inside[a]], top, starts, columns, cells[a, top])
         for i in range(across):
             for j in range(across):
                 dx, dy = i * size, j * size
                 away = _nearest(dx - half, size) ** 2 + _nearest(dy - half, size) ** 2
-                total = _bound(buffer, cells[a, top, : inside[a]], i + j * columns[top], least)
-                bounds[n] = total * unit - angle_penalty[a] - penalty * away
+                cost = angle_penalty[a] + penalty * away
+                shift = i + j * columns[top]
+                score = _bound(buffer, cells[a, top, : inside[a]], split[a], shift, min_score + cost, echoes, fronts)
+                bounds[n] = score - cost
                 where[n, 0], where[n, 1], where[n, 2] = a, dx, dy
                 n += 1
     best, best_a, best_x, best_y, found = min_score, 0, 0, 0, False
@@ -233,8 +247,9 @@ def _search(
                 if cx <= 2 * half and cy <= 2 * half:
                     away = _nearest(cx - half, size) ** 2 + _nearest(cy - half, size) ** 2
                     shift = (cx >> level) + (cy >> level) * columns[level]
-                    total = _bound(buffer, cells[a, level, : inside[a]], shift, best / unit)
-                    child_bound[c] = total * unit - angle_penalty[a] - penalty * away
+                    cost = angle_penalty[a] + penalty * away
+                    score = _bound(buffer, cells[a, level, : inside[a]], split[a], shift, best + cost, echoes, fronts)
+                    child_bound[c] = score - cost
             for c in np.argsort(child_bound):  # the best child is looked at first
                 if child_bound[c] > best:
                     stack_bound[depth] = child_bound[c]

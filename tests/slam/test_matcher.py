@@ -102,6 +102,33 @@ def test_search_finds_what_trying_everything_finds():
                 assert np.hypot(*(found[0] - truth)[:2]) < 0.1 and abs(found[0][2] - truth[2]) < 0.03
 
 
+def test_a_wall_seen_from_its_other_side_is_another_wall():
+    corridor = np.array([[-5.0, -1.01, 5.0, -1.01], [-5.0, 1.01, 5.0, 1.01]])
+    left, right = corridor[1:], corridor[:1]
+    grid = submap(np.array([[0.2 * k, 0.0, 0.0] for k in range(5)]), right)  # only the right one was seen
+    ends = hits(np.zeros(3), left)
+    fronts = ends * (1 - 0.25 / np.linalg.norm(ends, axis=1))[:, None]
+    window = {"distance": 2.5, "angle": 0.1, "min_score": 0.5}
+    lured = search(Pyramid.of(grid, 5, 2.5), ends, np.zeros(3), **window)
+    assert lured is not None and lured[0][1] == pytest.approx(-2.02, abs=0.1)  # it fits, two metres off
+    pyramid = Pyramid.of(grid, 5, 2.5, free=True)
+    assert search(pyramid, ends, np.zeros(3), fronts=fronts, **window) is None
+    ends = hits(np.zeros(3), right)
+    fronts = ends * (1 - 0.25 / np.linalg.norm(ends, axis=1))[:, None]
+    found = search(pyramid, ends, np.array([0.1, 0.2, 0.02]), fronts=fronts, **window)
+    assert found is not None and abs(found[0][1]) < 0.08 and found[1] > 0.7
+
+
+def test_finished_grids_match_as_others_do():
+    truth = np.array([1.83, 1.47, 0.12])
+    points = thin(hits(truth), 0.05)
+    small = GRID.quantised()
+    assert small.probability.dtype == np.uint8 and small.probability.nbytes * 4 == GRID.probability.nbytes
+    fine, coarse = (match(g, points, truth + [0.05, 0.04, 0.02], sigma=1.0) for g in (GRID, small))
+    np.testing.assert_allclose(fine.pose, coarse.pose, atol=2e-3)
+    assert fine.score == pytest.approx(coarse.score, abs=5e-3)
+
+
 def test_search_says_no_where_nothing_fits():
     elsewhere = hits(np.array([0.0, 0.0, 0.3]), box(-1.3, -0.8, 1.1, 1.0))
     pyramid = Pyramid.of(GRID, 5, 2.0)

@@ -5,7 +5,7 @@ import pytest
 
 from radarize.pose import between, compose
 from radarize.slam.config import OdometryConfig
-from radarize.slam.odometry import Odometry
+from radarize.slam.odometry import Drift, Odometry
 
 
 def test_pose_between_entries_and_outside():
@@ -25,7 +25,7 @@ def test_covariance_of_a_motion_is_that_of_sampled_steps():
     steps = np.array([[0.5, 0.1, 0.3], [0.4, -0.2, -0.5], [0.6, 0.0, 0.2], [0.1, 0.3, 0.8]])
     root = np.array([[0.02, 0, 0], [0.004, 0.01, 0], [0.002, -0.003, 0.015]])
     covariance = root @ root.T
-    odometry = Odometry(OdometryConfig())
+    odometry = Odometry(OdometryConfig(scale=0.0))
     pose = np.array([3.0, -1.0, 2.0])
     odometry.add(0.0, pose, np.zeros((3, 3)))
     for k, step in enumerate(steps):
@@ -40,6 +40,33 @@ def test_covariance_of_a_motion_is_that_of_sampled_steps():
     np.testing.assert_allclose(sampled / np.outer(spread, spread), got / np.outer(spread, spread), atol=0.04)
     _, half = odometry.motion(1.0, 1.5)
     np.testing.assert_allclose(half, covariance / 2, atol=2e-8)
+
+
+def test_an_error_of_scale_comes_on_top():
+    odometry = Odometry(OdometryConfig(scale=0.02))
+    odometry.add(0.0, np.zeros(3), np.zeros((3, 3)))
+    odometry.add(1.0, np.array([3.0, 4.0, 0.5]), np.eye(3) * 1e-6)
+    _, covariance = odometry.motion(0.0, 1.0)
+    np.testing.assert_allclose(covariance.diagonal(), [0.1**2, 0.1**2, 1e-6], rtol=0.02)
+
+
+def test_drift_between_nodes_is_that_of_sampled_walks():
+    rng = np.random.default_rng(9)
+    sigma = np.array([0.02, 0.01, 0.015])
+    steps = np.tile([0.4, 0.05, 0.3], (30, 1))
+    drift, pose = Drift(scale=0.0), np.array([5.0, -3.0, 1.0])
+    drift.add(pose, np.zeros((3, 3)), 0.0)
+    for step in steps:
+        pose = compose(pose, step)
+        drift.add(pose, np.diag(sigma**2), 0.4)
+    whole, samples = np.zeros(3), np.zeros((40_000, 3))
+    for step in steps[10:]:
+        whole, samples = compose(whole, step), compose(samples, step + rng.normal(0, sigma, samples.shape))
+    sampled = np.cov(between(whole, samples).T)
+    got = drift.between(10, 30)
+    np.testing.assert_allclose(np.sqrt(sampled.diagonal()), np.sqrt(got.diagonal()), rtol=0.05)
+    np.testing.assert_array_equal(got, drift.between(30, 10))
+    assert np.sqrt(Drift.between(drift, 0, 30)[2, 2]) > np.sqrt(got[2, 2])
 
 
 def test_model_without_covariance():

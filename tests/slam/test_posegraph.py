@@ -46,11 +46,38 @@ def test_false_closures_do_no_harm(false):
 
 
 def test_odometry_alone_is_left_as_it_is():
-    graph, truth, odometry = lap(0)
-    graph._uncertain.clear()
+    graph = PoseGraph()
+    graph.add_node(np.zeros(3))
+    for k in range(20):
+        graph.add_node(compose(graph.poses[-1], np.array([1.0, 0, 0.1])))
+        graph.add_motion(k, k + 1, np.array([1.0, 0, 0.1]), np.diag(SIGMA**2))
     before = np.array(graph.poses)
     graph.optimise()
     np.testing.assert_allclose(np.array(graph.poses), before, atol=1e-6)
+
+
+def test_updates_on_the_way_end_where_solving_at_once_does():
+    graph, truth, odometry = lap(0)
+    for closure in range(10):
+        graph.believe(closure)
+        graph.update()
+    on_the_way = np.array(graph.poses)
+    graph.optimise()
+    assert ate(truth, on_the_way) < 0.5 * odometry
+    assert np.abs(on_the_way - graph.poses)[:, :2].max() < 0.05
+    graph.add_node(compose(graph.poses[-1], np.array([1.0, 0, 0])))  # and on it goes
+    graph.add_motion(200, 201, np.array([1.0, 0, 0]), np.diag(SIGMA**2))
+    graph.update()
+    np.testing.assert_allclose(between(graph.poses[200], graph.poses[201]), [1, 0, 0], atol=1e-3)
+
+
+def test_a_false_match_is_rejected():
+    graph, truth, _ = lap(0)
+    graph.add_match(40, 44, between(truth[40], truth[44]) + [1.5, 0.5, 0.2], np.diag([0.02, 0.02, 0.01]) ** 2)
+    clean, *_ = lap(0)
+    clean.optimise()
+    graph.optimise()
+    assert ate(truth, np.array(graph.poses)) < 1.05 * ate(truth, np.array(clean.poses))
 
 
 def test_covariances_grow_from_the_start_and_shrink_with_loops():

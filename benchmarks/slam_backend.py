@@ -1,0 +1,257 @@
+"""The SLAM back end: real lidar logs, graphs with false loops, simulated radar, time and memory."""
+
+import argparse
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.results import memory_mb, publish
+from radarize.pose import between, compose, wrap
+from radarize.slam.backend import Slam
+from radarize.slam.config import SlamConfig
+from radarize.slam.log import Log
+from radarize.slam.posegraph import PoseGraph
+from radarize.tum import read_tum
+
+RADISH = Path(__file__).parents[2] / "shared" / "recordings" / "radish"
+#: Cartographer on the same files, its best settings: mean ATE in m and rad, and s.
+CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "orebro": (0.149, 0.0138, 19)}
+#: Recordings made where none are given: scene, platform, duration in s, seed.
+RECORDINGS = [("office", "handheld", 60, 11), ("floor", "handheld", 120, 3), ("floor", "cart", 120, 2),
+              ("corridor", "cart", 60, 3)]  # fmt: skip
+PLAIN = """name: plain
+objects:
+  - {name: south, shape: rectangle, size: [48, 2.6], position: [20, -1.2, 1.3], facing: [0, 1, 0], material: plasterboard}
+  - {name: north, shape: rectangle, size: [48, 2.6], position: [20, 1.2, 1.3], facing: [0, -1, 0], material: plasterboard}
+  - {name: floor, shape: rectangle, size: [48, 2.4], position: [20, 0, 0], facing: [0, 0, 1], material: concrete}
+  - {name: ceiling, shape: rectangle, size: [48, 2.4], position: [20, 0, 2.6], facing: [0, 0, -1], material: concrete}
+"""
+
+
+def planar(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """Times and poses x, y, yaw of a TUM file."""
+    times, poses = read_tum(path)
+    x, y, z, w = poses[:, 3:].T
+    return times, np.column_stack([poses[:, :2], np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))])
+
+
+def ate(truth: np.ndarray, estimate: np.ndarray) -> tuple[float, float]:
+    """Mean error of position (m) and heading (rad) after the best rigid alignment of the positions."""
+    p, q = truth[:, :2] - truth[:, :2].mean(axis=0), estimate[:, :2] - estimate[:, :2].mean(axis=0)
+    dot, cross = (q * p).sum(), (q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0]).sum()
+    angle = np.arctan2(cross, dot)
+    c, s = np.cos(angle), np.sin(angle)
+    position = np.hypot(*(q @ np.array([[c, s], [-s, c]]) - p).T).mean()
+    return float(position), float(np.abs(wrap(estimate[:, 2] + angle - truth[:, 2])).mean())
+
+
+def loop_length(truth: np.ndarray) -> float:
+    """Longest way between two visits of a place (within 1 m and 60 deg), m."""
+    thin = truth[:: max(1, len(truth) // 600)]
+    along = np.concatenate([[0], np.cumsum(np.hypot(*np.diff(thin[:, :2], axis=0).T))])
+    same = np.hypot(*np.moveaxis(thin[:, None, :2] - thin[None, :, :2], -1, 0)) < 1.0
+    same &= np.abs(wrap(thin[:, None, 2] - thin[None, :, 2])) < np.pi / 3
+    return float((np.abs(along[:, None] - along) * same).max())
+
+
+def play(log: Log, config: SlamConfig) -> tuple[Slam, dict[str, float]]:
+    """Feed a log; times of every call of the session while it runs, and of its end."""
+    slam, took = Slam(config), []
+    thread, start, cpu = [], time.perf_counter(), time.process_time()
+    odometry = iter(zip(log.odometry_times, log.odometry, strict=True))
+    k = -1
+    for instant, ranges in zip(log.times, log.ranges, strict=True):
+        before, busy = time.perf_counter(), time.thread_time()
+        while k + 1 < len(log.odometry_times) and log.odometry_times[k + 1] <= instant:
+            k += 1
+            stamp, pose = next(odometry)
+            slam.add_odometry(stamp, pose, None if log.covariances is None else log.covariances[k])
+        slam.add_scan(instant, log.azimuths, ranges)
+        took.append(time.perf_counter() - before)
+        thread.append(time.thread_time() - busy)
+    online = time.process_time() - cpu
+    slam.finish()
+    return slam, {
+        "s": time.perf_counter() - start,
+        "CPU s": time.process_time() - cpu,
+        "CPU ms per scan, all threads": 1e3 * online / len(took),
+        "ms per scan": 1e3 * float(np.mean(took)),
+        "p99 ms": 1e3 * float(np.percentile(took, 99)),
+        "CPU ms per scan": 1e3 * float(np.mean(thread)),
+        "p99 CPU ms": 1e3 * float(np.percentile(thread, 99)),
+    }
+
+
+def row(case: str, log: Log, truth: np.ndarray, config: SlamConfig, against: str = "-") -> dict[str, object]:
+    """Play a log and compare it with the truth at its scans."""
+    slam, took = play(log, config)
+    times, poses = slam.trajectory()
+    kept = np.searchsorted(log.times, times)
+    alone = np.array([slam.odometry.pose(t) for t in times])
+    position, heading = ate(truth[kept], poses)
+    before, _ = ate(truth[kept], alone)
+    return {
+        "case": case,
+        "path m": float(np.hypot(*np.diff(truth[:, :2], axis=0).T).sum()),
+        "loop m": loop_length(truth),
+        "odometry ATE m": before,
+        "ATE m": position,
+        "ATE rad": heading,
+        "ratio": position / before,
+        "to beat": against,
+        "closures": f"{int(slam.graph.accepted.sum())}/{len(slam.graph.closures)}",
+        "submaps": len(slam.submaps),
+        **took,
+    }
+
+
+def lidar(name: str) -> tuple[Log, np.ndarray]:
+    """A log of the Radish repository and its corrected poses."""
+    return (
+        Log.read(RADISH / f"{name}.scans.npz", RADISH / f"{name}.odometry.tum"),
+        planar(RADISH / f"{name}.truth.tum")[1],
+    )
+
+
+def noisier(log: Log, truth: np.ndarray, rng: np.random.Generator) -> Log:
+    """The odometry's own random errors added once more, in another order."""
+    steps = between(log.odometry[:-1], log.odometry[1:])
+    errors = steps - between(truth[:-1], truth[1:])
+    errors[:, 2] = wrap(errors[:, 2])
+    poses = [log.odometry[0]]
+    for step in steps + rng.permutation(errors - np.median(errors, axis=0)):
+        poses.append(compose(poses[-1], step))
+    return replace(log, odometry=np.array(poses))
+
+
+def to_and_fro(log: Log, truth: np.ndarray, legs: int) -> tuple[Log, np.ndarray]:
+    """A log forward, backward, forward...: as long as one likes, and closing loops all the time."""
+    order = np.concatenate([np.arange(len(truth))[:: 1 if leg % 2 == 0 else -1][leg > 0 :] for leg in range(legs)])
+    times = np.arange(float(len(order)))
+    return replace(log, times=times, ranges=log.ranges[order], odometry_times=times, odometry=log.odometry[order]), (
+        truth[order]
+    )
+
+
+def graph_rows(seed: int) -> list[dict[str, object]]:
+    """201 nodes, two laps of a square, ten true closures and some false ones."""
+    rows, clean, sigma = [], np.nan, np.array([0.02, 0.02, 0.01])
+    for false in (0, 2, 5):
+        rng = np.random.default_rng(seed)
+        truth = [np.zeros(3)]
+        for k in range(200):
+            truth.append(compose(truth[-1], np.array([1.0, 0, np.pi / 2 if k % 25 == 24 else 0.0])))
+        truth, graph = np.array(truth), PoseGraph()
+        graph.add_node(truth[0])
+        for k in range(200):
+            step = between(truth[k], truth[k + 1]) + rng.normal(0, sigma)
+            graph.add_node(compose(graph.poses[-1], step))
+            graph.add_motion(k, k + 1, step, np.diag(sigma**2))
+        before, _ = ate(truth, graph.poses)
+        for i in range(5, 95, 9):
+            seen = between(truth[i], truth[i + 100]) + rng.normal(0, 0.03, 3)
+            graph.add_closure(i, i + 100, seen, np.eye(3) * 0.03**2)
+        for i, j in [(10, 60), (30, 180), (55, 85), (3, 140), (20, 70)][:false]:
+            graph.add_closure(i, j, np.array([0.3, -0.2, 0.1]), np.eye(3) * 0.03**2)
+        start = time.perf_counter()
+        graph.optimise()
+        position, heading = ate(truth, graph.poses)
+        clean = position if not false else clean
+        rows.append({
+            "case": f"graph of 201 nodes, {false} false loops", "path m": 200.0, "odometry ATE m": before,
+            "ATE m": position, "ATE rad": heading, "ratio": position / before, "to beat": f"{1.05 * clean:.3f} m",
+            "closures": f"{int(graph.accepted.sum())}/{len(graph.closures)}", "s": time.perf_counter() - start,
+        })  # fmt: skip
+    return rows
+
+
+def simulated(folder: Path) -> Path:
+    """Make the recordings and run the pipeline on them."""
+    from radarize.pipeline import run
+    from radarsim.simulate import simulate
+
+    (folder / "plain.yaml").write_text(PLAIN)
+    t = np.arange(0, 41.01, 0.05)
+    x = np.where(t < 1, t**2 / 2, np.where(t < 40, t - 0.5, 39.5 + (t - 40) - (t - 40) ** 2 / 2))
+    yaw = 0.05 * np.sin(2 * np.pi * 0.9 * t) * np.minimum(t, 1)
+    zero = np.zeros_like(t)
+    route = np.column_stack([t, x, 0.05 * np.sin(t / 2), zero + 1.2, zero, zero, np.sin(yaw / 2), np.cos(yaw / 2)])
+    np.savetxt(folder / "plain.tum", route)
+    jobs = [(f"{s}_{p}{n}", s, {"platform": p, "duration": d, "seed": n}) for s, p, d, n in RECORDINGS]
+    jobs += [("plain", str(folder / "plain.yaml"), {"trajectory": folder / "plain.tum", "duration": 41, "seed": 1})]
+    for name, scene, settings in jobs:
+        run(simulate(scene, folder / f"{name}.h5", **settings), folder / name)
+    return folder
+
+
+def radar_rows(folder: Path) -> list[dict[str, object]]:
+    """Every run in a folder, its own odometry and scans."""
+    rows = []
+    for path in sorted(p.parent for p in folder.glob("*/reference.tum")):
+        log = Log.read(path)
+        times, truth = planar(path / "reference.tum")
+        truth = truth[np.abs(times[None] - log.times[:, None]).argmin(axis=1)]
+        entry = row(f"radar, {path.name}", log, truth, SlamConfig.preset("radar"))
+        rows.append({**entry, "to beat": "half of odometry" if entry["loop m"] >= 80 else "1.05 x odometry"})
+    return rows
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, help="folder of runs (radarize run -o); by default five are made")
+    parser.add_argument("--no-radar", action="store_true")
+    parser.add_argument("--seeds", type=int, default=3, help="of disturbances, for each log")
+    parser.add_argument("--seed", type=int, default=7)
+    options = parser.parse_args()
+    lidar_preset, rows, notes = SlamConfig.preset("lidar"), [], []
+    warm, _ = lidar("orebro")
+    play(replace(warm, times=warm.times[:60], ranges=warm.ranges[:60]), lidar_preset)
+    for name, (metres, radians, seconds) in CARTOGRAPHER.items():
+        log, truth = lidar(name)
+        target = f"{metres} m, {radians} rad, {seconds} s"
+        rows.append(row(f"lidar, {name}", log, truth, lidar_preset, target))
+        disturbed: dict[str, list[float]] = {"odometry noise x 2": [], "a third of the scans lost": []}
+        for seed in range(options.seeds):
+            rng = np.random.default_rng(options.seed + seed)
+            entry = row("", noisier(log, truth, rng), truth, lidar_preset)
+            disturbed["odometry noise x 2"].append(entry["ATE m"])
+            keep = np.sort(rng.permutation(len(truth))[: 2 * len(truth) // 3])
+            fewer = replace(log, times=log.times[keep], ranges=log.ranges[keep])
+            entry = row("", fewer, truth[keep], lidar_preset)
+            disturbed["a third of the scans lost"].append(entry["ATE m"])
+        notes += [
+            f"{name}, {what}, {options.seeds} seeds: ATE " + ", ".join(f"{v:.3f}" for v in values) + " m."
+            for what, values in disturbed.items()
+        ]
+    rows += graph_rows(options.seed)
+    log, truth = to_and_fro(*lidar("intel"), legs=3)
+    resident = memory_mb()
+    rows.append(row("lidar, intel to and fro to 500 submaps", log, truth, lidar_preset, "5 ms, p99 30 ms"))
+    notes.append(
+        f"Memory grew by {10 * (memory_mb() - resident) / rows[-1]['path m']:.2f} MB per 10 m on the way to "
+        f"{rows[-1]['submaps']} submaps, the final optimisation included."
+    )
+    if not options.no_radar:
+        with tempfile.TemporaryDirectory() as folder:
+            rows += radar_rows(options.data or simulated(Path(folder)))
+    columns = dict.fromkeys(key for entry in rows for key in entry)
+    publish(
+        "slam_backend",
+        "SLAM back end",
+        [{column: entry.get(column, "-") for column in columns} for entry in rows],
+        seed=options.seed,
+        notes=[
+            "Mean errors after alignment; closures: believed / found. One preset for all logs, one for all radar runs. "
+            "Lidar's targets are Cartographer's on the same files, with its best settings.",
+            "Per scan: what `add_odometry` and `add_scan` take of the caller, wall and processor time; the loop search "
+            "runs in two threads beside it. s, CPU s: the whole log, final optimisation included.",
+            *notes,
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()

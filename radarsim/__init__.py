@@ -5,3 +5,6 @@ import os
 # Compiled loops last a millisecond or less. OpenMP's threads would spin between them, for milliseconds, on the cores
 # that Mitsuba's threads and whatever else runs need: that doubled the time of a frame. Read when the library loads.
 os.environ.setdefault("OMP_WAIT_POLICY", "passive")
+
+# Open3D brings an old TBB along, of which Numba complains before it takes the next: it need not look there first.
+os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")

@@ -193,7 +193,7 @@ class Slam:
         prior = between(self._local[submap.anchor], predicted)
         guess = prior
         if c.presearch_distance > 0:
-            weight = np.linalg.inv(covariance) * c.sigma**2 / len(node.points)
+            weight = np.linalg.inv(covariance) * c.presearch_sigma**2 / len(node.points)
             found = search(
                 Pyramid.of(submap.grid, 3, c.presearch_distance),
                 node.points,

@@ -86,6 +86,8 @@ class MatcherConfig(_Section):
         enabled: without it nodes follow odometry and submaps serve the loop search only.
         presearch_distance, presearch_angle: half-widths of the correlative search before refinement, m and rad;
             0 switches it off.
+        presearch_sigma: as `sigma`, for the weight of odometry in that search: far from a match the points, most of
+            them on the same few walls, are wrong together.
         sigma: standard deviation of the residual 1 - p of one point, points taken as independent. It sets the weight of
             a match against odometry, and the covariance it enters the graph with.
         translation_floor, rotation_floor: no match is believed better than this, m and rad.
@@ -96,6 +98,7 @@ class MatcherConfig(_Section):
     enabled: bool = True
     presearch_distance: float = Field(0.3, ge=0)
     presearch_angle: float = Field(0.17, ge=0)
+    presearch_sigma: float = Field(2.0, gt=0)
     sigma: float = Field(0.7, gt=0)
     translation_floor: float = Field(0.01, gt=0)
     rotation_floor: float = Field(0.003, gt=0)
@@ -130,7 +133,7 @@ class LoopConfig(_Section):
     distance: float = Field(3.0, gt=0)
     angle: float = Field(0.5, gt=0)
     candidates: int = Field(4, gt=0)
-    every: int = Field(4, gt=0)
+    every: int = Field(2, gt=0)
     nodes: int = Field(1, gt=0)
     front: float = Field(0.0, ge=0)
     min_score: float = Field(0.6, gt=0, lt=1)

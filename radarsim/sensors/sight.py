@@ -1,5 +1,7 @@
 """The first surface along a ray, things that move included."""
 
+from functools import cached_property
+
 import numpy as np
 from jaxtyping import Float
 from numba import njit, prange
@@ -7,8 +9,7 @@ from numba import njit, prange
 from radarsim.physics.crowd import Crowd
 from radarsim.scene.scene import Scene
 
-#: Panes that light passes one after the other; after that it is taken to be lost in reflections.
-_PANES = 8
+#: What light passes. A scene without these panes is one pass of rays; going on from pane to pane took three times that.
 _CLEAR = ("glass", "acrylic")
 
 
@@ -25,7 +26,14 @@ class Sight:
         self._half = np.array([part.half for part in parts]).reshape(-1, 3)
         self._capsule = np.array([part.capsule for part in parts], bool)
         self._crowd = Crowd(scene.movers, np.random.default_rng(0), density=0.0)  # for its poses
-        self._clear = np.array([o.material.name in _CLEAR for o in scene.objects])
+
+    @cached_property
+    def _behind_glass(self) -> Scene | None:
+        """The scene without its clear panes; None where nothing else is there."""
+        solid = [o for o in self._scene.objects if o.material.name not in _CLEAR]
+        if len(solid) == len(self._scene.objects):
+            return self._scene
+        return Scene(self._scene.name, solid) if solid else None
 
     def distance(
         self,
@@ -48,15 +56,8 @@ class Sight:
         frames, rays, _ = directions.shape
         starts = np.broadcast_to(origins[:, None], directions.shape).reshape(-1, 3)
         ways = directions.reshape(-1, 3)
-        distance, item = self._scene.cast(starts, ways, coherent=True)
-        if through_glass and self._clear.any():
-            for _ in range(_PANES):
-                clear = np.flatnonzero((item >= 0) & self._clear[item])
-                if not len(clear):
-                    break
-                step = distance[clear] + 1e-4
-                beyond, item[clear] = self._scene.cast(starts[clear] + step[:, None] * ways[clear], ways[clear])
-                distance[clear] = step + beyond
+        scene = self._behind_glass if through_glass else self._scene
+        distance = np.full(len(ways), np.inf) if scene is None else scene.hit(starts, ways, coherent=True)[0]
         distance = distance.reshape(frames, rays)
         if len(self._half):
             turn, center = self._crowd.poses(np.asarray(times, float))

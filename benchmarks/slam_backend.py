@@ -22,13 +22,18 @@ CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "ore
 #: Recordings made where none are given: scene, platform, duration in s, seed.
 RECORDINGS = [("office", "handheld", 60, 11), ("floor", "handheld", 120, 3), ("floor", "cart", 120, 2),
               ("corridor", "cart", 60, 3)]  # fmt: skip
+#: A corridor of 48 m without any feature.
 PLAIN = """name: plain
 objects:
-  - {name: south, shape: rectangle, size: [48, 2.6], position: [20, -1.2, 1.3], facing: [0, 1, 0], material: plasterboard}
-  - {name: north, shape: rectangle, size: [48, 2.6], position: [20, 1.2, 1.3], facing: [0, -1, 0], material: plasterboard}
-  - {name: floor, shape: rectangle, size: [48, 2.4], position: [20, 0, 0], facing: [0, 0, 1], material: concrete}
-  - {name: ceiling, shape: rectangle, size: [48, 2.4], position: [20, 0, 2.6], facing: [0, 0, -1], material: concrete}
-"""
+""" + "".join(
+    f"  - {{name: {name}, shape: rectangle, size: {size}, position: {at}, facing: {facing}, material: {material}}}\n"
+    for name, size, at, facing, material in [
+        ("south", [48, 2.6], [20, -1.2, 1.3], [0, 1, 0], "plasterboard"),
+        ("north", [48, 2.6], [20, 1.2, 1.3], [0, -1, 0], "plasterboard"),
+        ("floor", [48, 2.4], [20, 0, 0], [0, 0, 1], "concrete"),
+        ("ceiling", [48, 2.4], [20, 0, 2.6], [0, 0, -1], "concrete"),
+    ]
+)
 
 
 def planar(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -55,6 +60,11 @@ def loop_length(truth: np.ndarray) -> float:
     same = np.hypot(*np.moveaxis(thin[:, None, :2] - thin[None, :, :2], -1, 0)) < 1.0
     same &= np.abs(wrap(thin[:, None, 2] - thin[None, :, 2])) < np.pi / 3
     return float((np.abs(along[:, None] - along) * same).max())
+
+
+def length(poses: np.ndarray) -> float:
+    """From the first pose to the one farthest from it, m."""
+    return float(np.hypot(*(poses[:, :2] - poses[0, :2]).T).max())
 
 
 def play(log: Log, config: SlamConfig) -> tuple[Slam, dict[str, float]]:
@@ -101,6 +111,7 @@ def row(case: str, log: Log, truth: np.ndarray, config: SlamConfig, against: str
         "ATE m": position,
         "ATE rad": heading,
         "ratio": position / before,
+        "length %": 100 * length(poses) / length(truth[kept]) - 100,
         "to beat": against,
         "closures": f"{int(slam.graph.accepted.sum())}/{len(slam.graph.closures)}",
         "submaps": len(slam.submaps),

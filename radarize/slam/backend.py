@@ -31,9 +31,14 @@ class Slam:
         times, poses = slam.trajectory()
         slam.map().save("map")
 
+    The same input gives the same bytes: searches for loops run in threads, but what they find is taken in a fixed
+    number of nodes later (`radarize.slam.loops`).
+
     Odometry and scans come in any interleaving: a scan waits until odometry has reached its time. Entries that are not
     later than the one before them are left out and counted in `skipped`; scans before the first odometry entry take
-    its pose, scans after the last one the last. Without any odometry motion is taken to go on as matched before.
+    its pose, scans after the last one the last; a jump in time is a step like any other. Empty scans and such of nan
+    alone follow odometry; no scans at all give an empty trajectory and map. Without any odometry motion is taken to go
+    on as matched before.
 
     Args:
         config: all parameters; the default is the preset ``lidar``.

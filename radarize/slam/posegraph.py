@@ -8,7 +8,7 @@ some false closures and weaken true ones.
 
 import gtsam
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 
 class PoseGraph:
@@ -22,17 +22,17 @@ class PoseGraph:
 
     Attributes:
         closures: (of, to) of all closures.
-        accepted: of each closure, whether it is believed.
+        accepted: (closure,) of each, whether it is believed.
     """
 
     def __init__(self, inlier_probability: float = 0.99):
         self.inlier_probability = inlier_probability
         self.closures: list[tuple[int, int]] = []
-        self.accepted: Bool[np.ndarray, "closure"] = np.zeros(0, bool)
+        self.accepted = np.zeros(0, bool)
         self._poses, self._count = np.zeros((64, 3)), 0
         self._certain: list[gtsam.BetweenFactorPose2] = []
         self._matches: list[gtsam.BetweenFactorPose2] = []
-        self._matches_kept: Bool[np.ndarray, "match"] = np.zeros(0, bool)
+        self._matches_kept = np.zeros(0, bool)
         self._uncertain: list[gtsam.BetweenFactorPose2] = []
         self._isam: gtsam.ISAM2 | None = None
         self._news = gtsam.NonlinearFactorGraph()  # not in iSAM2 yet

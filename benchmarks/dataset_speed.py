@@ -18,7 +18,7 @@ from radarize.recording import RecordingWriter
 from radarsim.dataset.local import work
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task
-from radarsim.motion import plan_motion
+from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.sensors.sensor import Rig
 from radarsim.sensors.sight import Sight

@@ -7,7 +7,7 @@ import numpy as np
 from rich.progress import track
 
 from benchmarks.results import publish
-from radarsim.motion import plan_motion
+from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
 from radarsim.scene.scene import Scene
 from radarsim.statistics import Statistics

@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.results import memory_mb, peak_memory_mb, publish
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.motion import plan_motion
 from radarsim.physics.pathsolver import DEPTH, RAYS
 from radarsim.physics.surface import DENSITY, Surface
 from radarsim.physics.synthesis import BurstClock
+from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.simulate import Simulator
 

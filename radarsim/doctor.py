@@ -138,7 +138,7 @@ def first_frame() -> float:
     import numpy as np
 
     from radarize.radar.presets import PRESETS
-    from radarsim.motion import plan_motion
+    from radarsim.planner import plan_motion
     from radarsim.scene.scene import Scene
     from radarsim.simulate import Simulator
 

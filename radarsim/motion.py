@@ -205,17 +205,3 @@ def motion_from_tum(path: str | Path, mounting: Mounting | None = None) -> Motio
     )
     carried = mounting or Mounting()
     return Motion(float(times[-1]), curve, RotationSpline(times, attitude), carried.lever_arm, carried.rotation)
-
-
-def plan_motion(
-    scene: "Scene",
-    platform: str,
-    duration: float | None,
-    rng: np.random.Generator,
-    waypoints: Float[np.ndarray, "n 2"] | None = None,
-    mounting: Mounting | None = None,
-) -> Motion:
-    """A tour through a scene on a platform, or a walk through way-points: see `radarsim.planner.plan`."""
-    from radarsim.planner import plan
-
-    return plan(scene, platform, duration, rng, waypoints, mounting)

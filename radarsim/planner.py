@@ -16,7 +16,7 @@ CLEARANCE = 0.22  # of the sensor on the clearance map, m; of its real place it 
 _ATTEMPTS = 12
 
 
-def plan(
+def plan_motion(
     scene: Scene,
     platform: str,
     duration: float | None,

@@ -14,7 +14,7 @@ from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.recording import RecordingWriter
-from radarsim.motion import Motion, Mounting, motion_from_tum, plan_motion
+from radarsim.motion import Motion, Mounting, motion_from_tum
 from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
 from radarsim.physics.direct import DirectSum
@@ -26,6 +26,7 @@ from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.physics.pathsolver import PathSolverFinder
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
+from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.sensors.sensor import Frames, Rig
 from radarsim.sensors.sight import Sight

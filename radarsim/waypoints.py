@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-import yaml
 from jaxtyping import Float
 
 from radarize.errors import InputError
 from radarize.tum import read_tum
+from radarize.yamlfile import read_yaml
 
 _APART = 0.5  # m between the way-points taken from a trajectory
 
@@ -27,21 +27,14 @@ def read_waypoints(path: str | Path) -> Float[np.ndarray, "n 2"]:
     if path.suffix == ".tum":
         rows = _thinned(read_tum(path)[1][:, :2])
     else:
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: cannot be read ({error})") from error
-        rows = _yaml(path, text) if path.suffix in (".yaml", ".yml") else _lines(path, text)
+        rows = _listed(path) if path.suffix in (".yaml", ".yml") else _lines(path)
     if len(rows) < 2:
         raise InputError(f"{path}: holds {len(rows)} way-points, expected at least 2")
     return np.array(rows, float)
 
 
-def _yaml(path: Path, text: str) -> list[list[float]]:
-    try:
-        data = yaml.safe_load(text)
-    except yaml.YAMLError as error:
-        raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+def _listed(path: Path) -> list[list[float]]:
+    data = read_yaml(path)
     if isinstance(data, dict) and set(data) == {"waypoints"}:
         data = data["waypoints"]
     if not isinstance(data, list):
@@ -49,7 +42,11 @@ def _yaml(path: Path, text: str) -> list[list[float]]:
     return [_place(f"{path}, way-point {number}", item) for number, item in enumerate(data, 1)]
 
 
-def _lines(path: Path, text: str) -> list[list[float]]:
+def _lines(path: Path) -> list[list[float]]:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from error
     rows = []
     for number, line in enumerate(text.splitlines(), 1):
         words = line.split("#")[0].replace(",", " ").split()

@@ -8,7 +8,8 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
-from radarsim.motion import Motion, Mounting, motion_from_tum, plan_motion
+from radarsim.motion import Motion, Mounting, motion_from_tum
+from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS

@@ -8,9 +8,9 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.recording import Recording
-from radarsim.motion import plan_motion
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.sensors.causes import CAUSES
 from radarsim.simulate import simulate

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarsim.motion import plan_motion
+from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
 from radarsim.scene.scene import Scene
 from tests.distances import column, least_distance, obstacles

@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 
 from radarize.errors import InputError
 from radarize.recording import Recording
-from radarsim.motion import plan_motion
+from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
 from radarsim.scene.scene import Scene
 from radarsim.simulate import simulate

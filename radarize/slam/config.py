@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import Literal
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from radarize.errors import InputError
+from radarize.yamlfile import read_yaml
 
 
 class _Section(BaseModel):
@@ -180,17 +180,15 @@ class SlamConfig(_Section):
         """
         settings = cls.preset(preset).model_dump()
         try:
-            changes = yaml.safe_load(Path(path).read_text()) or {}
+            changes = read_yaml(path) or {}
             for section, fields in changes.items():
                 settings[section] = {**settings.get(section, {}), **fields}
             return cls.model_validate(settings)
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
         except ValidationError as error:
             first = error.errors()[0]
             where = ".".join(map(str, first["loc"]))
             raise InputError(f"{path}: {where} is {first['input']!r}, expected: {first['msg']}") from error
-        except (yaml.YAMLError, AttributeError, TypeError) as error:
+        except (AttributeError, TypeError) as error:
             raise InputError(f"{path}: holds no sections with fields, expected e.g. 'grid: {{nodes: 10}}'") from error
 
 

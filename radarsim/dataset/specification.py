@@ -29,12 +29,12 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from radarize.errors import InputError
 from radarize.radar.cfg import load_config
 from radarize.radar.limits import check_limits
+from radarize.yamlfile import read_yaml
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task
 from radarsim.physics.frontend_config import FrontEndConfig
@@ -107,12 +107,7 @@ class Specification(_Strict):
             InputError: missing file, malformed YAML, an unknown key or a wrong value, with file and field.
         """
         path = _find(path)
-        try:
-            data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: cannot be read ({error})") from error
-        except yaml.YAMLError as error:
-            raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+        data = read_yaml(path)
         if not isinstance(data, dict):
             raise InputError(f"{path}: holds {type(data).__name__}, expected keys such as buildings and recordings")
         try:

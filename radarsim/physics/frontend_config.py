@@ -10,6 +10,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from radarize.errors import InputError
+from radarize.yamlfile import read_yaml
 from radarsim.physics.antenna import ISOTROPIC, Antenna
 
 
@@ -177,12 +178,7 @@ class FrontEndConfig(_Strict):
         Raises:
             InputError: unreadable, malformed YAML, unknown or impossible value; with file and field.
         """
-        try:
-            data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: cannot be read, expected a front-end file (.yaml)") from error
-        except yaml.YAMLError as error:
-            raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+        data = read_yaml(path)
         if not isinstance(data, dict | None):
             raise InputError(f"{path}: holds {type(data).__name__}, expected keys such as tx_power_dbm and leakage")
         try:

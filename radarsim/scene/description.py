@@ -19,10 +19,10 @@ from typing import Annotated, Literal
 
 import numpy as np
 import trimesh
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from radarize.errors import InputError
+from radarize.yamlfile import read_yaml
 from radarsim.scene import shapes
 from radarsim.scene.buildings import Building
 from radarsim.scene.materials import Material, constant, decibel, material
@@ -181,13 +181,7 @@ def read(path: Path) -> tuple[str, list[SceneObject], list[Mover]]:
     Raises:
         InputError: unreadable, malformed YAML, unknown key, value, material or mesh file.
     """
-    try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from error
-    except yaml.YAMLError as error:
-        raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
-    name, objects, moving = built(data, str(path), path.parent)
+    name, objects, moving = built(read_yaml(path), str(path), path.parent)
     return name or path.stem, objects, moving
 
 

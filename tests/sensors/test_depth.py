@@ -6,7 +6,8 @@ import pytest
 from mounting import box, rig
 from scipy.spatial.transform import Rotation
 
-from radarsim.motion import Motion, plan_motion
+from radarsim.motion import Motion
+from radarsim.planner import plan_motion
 from radarsim.scene.movers import Person
 from radarsim.scene.scene import Scene
 from radarsim.sensors.depth import MOUNT, QUARTER, STRIP, DepthCamera, Intrinsics, Stereo

@@ -5,9 +5,9 @@ import pytest
 
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
-from radarsim.motion import plan_motion
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.sensors.causes import CAUSES
 from radarsim.sensors.ghosts import NOISE, Ghosts

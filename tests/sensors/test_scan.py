@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from mounting import CONFIG, box, frames, rig
 
-from radarsim.motion import Motion, plan_motion
+from radarsim.motion import Motion
+from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.sensors.depth import MOUNT, QUARTER, DepthCamera
 from radarsim.sensors.scan import AZIMUTHS, Cell, Occupancy, PlanarScan

@@ -4,10 +4,10 @@ import re
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-import yaml
 from pydantic import TypeAdapter, ValidationError
 
 from radarize.errors import InputError
+from radarize.yamlfile import read_yaml
 from radarsim.scene.description import CustomMaterial
 from radarsim.scene.importers.part import Part
 from radarsim.scene.materials import MATERIALS, material
@@ -53,12 +53,7 @@ class MaterialMap:
         material(default)
         if path is None:
             return cls({}, default)
-        try:
-            data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InputError(f"{path}: cannot be read ({error})") from error
-        except yaml.YAMLError as error:
-            raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+        data = read_yaml(path)
         if not isinstance(data, dict):
             raise InputError(f"{path}: holds {type(data).__name__}, expected lines 'pattern: material'")
         for pattern, choice in data.items():

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-import yaml
 from PIL import Image
 from pydantic import BaseModel, Field, ValidationError
 
 from radarize.errors import InputError
+from radarize.yamlfile import read_yaml
 from radarsim.scene.importers.grid import OccupancyGrid
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -34,8 +34,8 @@ class MapFile(BaseModel):
 def is_map(path: Path) -> bool:
     """Whether a .yaml file is a map's rather than anything else."""
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        data = read_yaml(path)
+    except InputError:
         return False
     return isinstance(data, dict) and "image" in data
 
@@ -52,12 +52,7 @@ def grid(path: Path) -> OccupancyGrid:
             raise InputError(f"{path}: has no {beside.name} beside it, expected the map's resolution and origin there")
         path = beside
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
-        about = MapFile.model_validate(data)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from error
-    except yaml.YAMLError as error:
-        raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+        about = MapFile.model_validate(read_yaml(path))
     except ValidationError as error:
         problem = error.errors()[0]
         field = ".".join(str(part) for part in problem["loc"]) or "file"

@@ -12,8 +12,9 @@ from PIL import Image
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
-from radarsim.motion import Motion, plan_motion
+from radarsim.motion import Motion
 from radarsim.physics.facets import Facets
+from radarsim.planner import plan_motion
 from radarsim.scene.importers import import_scene
 from radarsim.scene.importers.carmen import scans_of
 from radarsim.scene.scene import Scene

@@ -209,14 +209,14 @@ PRESETS: dict[str, SlamConfig] = {
             presearch_distance=0.0, presearch_angle=0.0, sigma=3.0, translation_floor=0.03, rotation_floor=0.015
         ),
         loop=LoopConfig(
-            radius=6.0,
-            distance=2.0,
+            radius=8.0,
+            distance=3.0,
             angle=0.5,
-            candidates=3,
+            candidates=5,
             every=2,
             nodes=8,
             front=0.25,
-            min_score=0.5,
+            min_score=0.4,
             levels=4,
             sigma=1.0,
             translation_floor=0.05,

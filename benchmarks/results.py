@@ -51,7 +51,9 @@ def publish(name: str, title: str, rows: list[dict[str, object]], *, seed: int, 
         seed: that everything was drawn from.
         notes: sentences below the table.
     """
-    command = f"python -m benchmarks.{name} {' '.join(sys.argv[1:])}".strip()
+    # Folders are the machine's business, not the reader's.
+    options = [Path(word).name if Path(word).is_absolute() else word for word in sys.argv[1:]]
+    command = f"python -m benchmarks.{name} {' '.join(options)}".strip()
     facts = {"title": title, "command": command, "seed": seed, "machine": machine(), "rows": rows, "notes": notes}
     FOLDER.mkdir(exist_ok=True)
     (FOLDER / f"{name}.json").write_text(json.dumps(facts, indent=2) + "\n")

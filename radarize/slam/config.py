@@ -133,7 +133,7 @@ class LoopConfig(_Section):
     distance: float = Field(3.0, gt=0)
     angle: float = Field(0.5, gt=0)
     candidates: int = Field(4, gt=0)
-    every: int = Field(2, gt=0)
+    every: int = Field(4, gt=0)
     nodes: int = Field(1, gt=0)
     front: float = Field(0.0, ge=0)
     min_score: float = Field(0.6, gt=0, lt=1)

@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Float
 from pydantic import BaseModel, ConfigDict, ValidationError
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save as serialise
 from torch import Tensor, nn
 
 from radarize import __version__
@@ -104,7 +104,7 @@ def save(net: nn.Module, header: Header, path: Path) -> Path:
     """
     halves = {}
     for name, values in net.state_dict().items():
-        halves[name] = values.detach().cpu().half() if values.is_floating_point() else values.cpu()
+        halves[name] = values.half() if values.is_floating_point() else values
         if not halves[name].isfinite().all():
             raise InputError(f"{path}: {name} has values that float16 does not hold, expected a network that converged")
     write(halves, header.model_dump(), path)
@@ -145,9 +145,10 @@ def write(tensors: dict[str, Tensor], about: dict[str, Any], path: Path) -> None
     part = path.with_name(path.name + ".part")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        save_file(
-            {name: values.contiguous() for name, values in tensors.items()}, part, {"radarize": json.dumps(about)}
-        )
+        content = {name: values.detach().cpu().contiguous() for name, values in tensors.items()}
+        part.write_bytes(
+            serialise(content, {"radarize": json.dumps(about)})
+        )  # its own writer hides the file from others
         os.replace(part, path)
     except (OSError, SafetensorError) as error:
         raise InputError(f"{path}: cannot be written ({error})") from error

@@ -42,6 +42,8 @@ def test_round_trip(kind, tmp_path):
     with safe_open(path, "pt") as file:
         assert json.loads(file.metadata()["radarize"])["kind"] == kind
         assert {str(file.get_tensor(name).dtype) for name in file.keys()} <= {"torch.float16", "torch.int64"}  # noqa: SIM118
+    (tmp_path / "other").touch()
+    assert path.stat().st_mode == (tmp_path / "other").stat().st_mode  # as readable as any file
     assert not list(tmp_path.glob("*.part"))
 
 

@@ -1,5 +1,6 @@
 """Networks as ONNX, for run times other than torch."""
 
+import logging
 import os
 import warnings
 from pathlib import Path
@@ -33,6 +34,8 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
         import onnxscript  # noqa: F401
     except ImportError as error:
         raise InputError("ONNX needs packages that are not installed; type: pip install 'radarize[onnx]'") from error
+    # It lists what it would do with torchvision.
+    logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
     part = path.with_name(path.name + ".part")
     # Not "mean", which is what torch calls the average over an image.
     outputs = ["probability"] if header.kind == "segmentation" else ["estimate", "covariance"]

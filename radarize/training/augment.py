@@ -76,7 +76,7 @@ def lost_chirps(maps: Maps, generator: Generator) -> Maps:
     """Up to a fifth of the chirps lost at random: their energy spreads over all Doppler bins."""
     lost = _uniform(maps, 0.0, 0.2, generator)
     power = _power(maps)
-    return _decibels(power + lost / (1 - lost) * power.mean(dim=3, keepdim=True) * maps.shape[3] / (maps.shape[3] + 1))
+    return _decibels(power + lost / (1 - lost) * power.mean(dim=3, keepdim=True))
 
 
 def lost_frames(maps: Maps, generator: Generator, share: float = 0.02) -> Maps:

@@ -1,6 +1,6 @@
 """The three trainings: which maps, which labels, which loss, and the paper's hyper-parameters (its section 5)."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import torch
@@ -86,8 +86,8 @@ class Task:
         """Names and values, from the means of what `judge` says."""
         raise NotImplementedError
 
-    def calibrate(self, net: nn.Module, batches: Sequence[tuple[Maps, Tensor]]) -> None:
-        """Make a trained network's uncertainty honest on validation data."""
+    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+        """Make a trained network's uncertainty honest on validation data, which is gone through once."""
         raise NotImplementedError
 
 
@@ -102,7 +102,7 @@ class _Motion(Task):
         normalised = found.errors_squared(label) / mean.shape[1]
         return torch.stack([found.negative_log_likelihood(label), squared, trivial, normalised], dim=1)
 
-    def calibrate(self, net: nn.Module, batches: Sequence[tuple[Maps, Tensor]]) -> None:
+    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         net.spread.zero_()
         normalised = torch.cat([self.judge(net, *batch)[:, 3] for batch in batches])
         net.spread.fill_(0.5 * normalised.mean().log())
@@ -197,7 +197,7 @@ class Segmentation(Task):
         loss, near, there = means.tolist()
         return {"loss": loss, "share_found_within_9_cm": near / max(there, 1e-9)}
 
-    def calibrate(self, net: nn.Module, batches: Sequence[tuple[Maps, Tensor]]) -> None:
+    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """By plain likelihood: multiplied along a bearing, cells' probabilities are that of its first surface."""
         pairs = [(net(maps)[:, :, ::4], label[:, :, ::4]) for maps, label in batches]
         known = [label != losses.UNKNOWN for _, label in pairs]

@@ -1,7 +1,7 @@
 """The training loop: an epoch, its validation, a checkpoint, and again until it gets no better.
 
 Everything random follows from the seed and the numbers of epoch and step, so that a training that was killed goes on
-from its checkpoint as if nothing had happened, bit for bit on the same machine.
+from its checkpoint as if nothing had happened: bit for bit on processors; GPUs add up in changing orders.
 """
 
 import math
@@ -133,7 +133,7 @@ class Trainer:
         """Take the best weights, calibrate them, and say how they do. For the first process alone."""
         self.net.load_state_dict(self.best[1])
         self.net.eval()
-        self.task.calibrate(self.net, list(self._validation(0, 1)))
+        self.task.calibrate(self.net, self._validation(0, 1))
         sums = sum(self.task.judge(self.net, *batch).double().sum(dim=0) for batch in self._validation(0, 1))
         return self.task.metrics(sums.cpu() / len(self._validated))
 

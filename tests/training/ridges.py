@@ -37,8 +37,8 @@ def walls(frames: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray
     return maps, np.where(rows < first, 0, np.where(rows == first, 1, 2)).astype(np.uint8)
 
 
-def write(path: Path, law: str, frames: int = 300, seed: int = 0, strength: float = 1.0) -> Path:
-    """A recording of maps by one of the laws ``velocity``, ``yaw`` and ``occupancy``, in noise."""
+def write(path: Path, law: str, frames: int = 300, seed: int = 0, blank: float = 0.0) -> Path:
+    """A recording of noisy maps by law ``velocity``, ``yaw`` or ``occupancy``; a share of its frames is blank."""
     rng = np.random.default_rng(seed)
     maker = MapMaker(CONFIG)
     velocity = np.zeros((frames, 6))
@@ -54,8 +54,9 @@ def write(path: Path, law: str, frames: int = 300, seed: int = 0, strength: floa
         "truth/pose": np.column_stack([zero, zero, zero, zero, zero, np.sin(yaw / 2), np.cos(yaw / 2)]),
         "truth/occupancy": label,
     }
+    seen = (rng.random((frames, 1, 1)) >= blank).astype(float)
     for name in MAPS:
-        values = strength * drawn[name] + rng.normal(0, 2, (frames, *maker.shape(name))) + rng.uniform(5, 25)
+        values = seen * drawn[name] + rng.normal(0, 2, (frames, *maker.shape(name))) + rng.uniform(5, 25)
         rows[f"maps/{name}"] = values.astype(np.float16)
     streams = {name: Stream(data.shape[1:], data.dtype.str, "", "") for name, data in rows.items()}
     with RecordingWriter(path, CONFIG, streams=streams, raw=False) as writer:

@@ -58,6 +58,16 @@ def judged(kind: str, weights: Path, recording: Path) -> dict[str, float]:
         return task.metrics(task.judge(net, table.window(frames), task.label(table, frames)).double().mean(dim=0))
 
 
+def hazards(weights: Path, recording: Path) -> tuple[float, float]:
+    """Cells that hold the first surface, and how many of them the network expects."""
+    net, header = load(weights, CONFIG)
+    table = Table.read([recording], header.maps, ("occupancy",))
+    label = table.truth["occupancy"]
+    with torch.no_grad():
+        likely = net.estimate(table.window(table.starts(1)[:, None]))
+    return float((label == losses.SURFACE).sum()), float(likely[label != losses.UNKNOWN].sum())
+
+
 @pytest.mark.parametrize("kind", TASKS)
 def test_networks_learn(kind, tmp_path):
     data = data_set(tmp_path / "data", LAWS[kind], count=8, frames=80)
@@ -65,6 +75,8 @@ def test_networks_learn(kind, tmp_path):
     found = judged(kind, weights, write(tmp_path / "other.h5", LAWS[kind], seed=9))
     if kind == "segmentation":
         assert found["share_found_within_9_cm"] > 0.95
+        surface, likely = hazards(weights, tmp_path / "other.h5")
+        assert likely == pytest.approx(surface, rel=0.3)  # though surfaces weighed as much as all free cells
     else:
         error, trivial = (value for name, value in found.items() if name.startswith("rm"))
         assert error < 0.2 * trivial
@@ -78,14 +90,14 @@ def test_networks_learn(kind, tmp_path):
 
 def test_uncertainty_follows_what_is_seen(tmp_path):
     """Of maps that show nothing but noise, the network claims what is known without them."""
-    for k, strength in enumerate((1, 1, 0, 0)):
-        write(tmp_path / "data" / f"{k}.h5", "velocity", 150, k, strength)
-    settings = replace(QUICK["translation"], epochs=8)
+    for k in range(5):
+        write(tmp_path / "data" / f"{k}.h5", "velocity", 120, k, blank=0.4)
+    settings = replace(QUICK["translation"], epochs=12)
     weights = train("translation", tmp_path / "data", tmp_path / "net.safetensors", settings=settings)
     net, header = load(weights)
     claimed = []
-    for strength in (1, 0):
-        path = write(tmp_path / f"{strength}.h5", "velocity", 100, 9, strength)
+    for blank in (0, 1):
+        path = write(tmp_path / f"{blank}.h5", "velocity", 100, 9, blank)
         table = Table.read([path], header.maps, ("velocity",))
         with torch.no_grad():
             covariance = net.estimate(table.window(table.starts(1)[:, None]))[1]
@@ -186,14 +198,17 @@ def test_workers_read_the_same(small):
     assert Team(0, 1, torch.device("cpu")).share(torch.nn.Identity()) is not None
 
 
-def test_the_command(small, tmp_path):
-    arguments = ["train", "translation", "--data", str(small), "-o", str(tmp_path / "net.safetensors")]
+def test_the_command(tmp_path):
+    data = data_set(tmp_path / "data", "velocity", frames=60)
+    (data / "dataset.json").write_text('{"splits": {"random-0": {"train": ["0"], "validation": ["2"], "test": ["1"]}}}')
+    arguments = ["train", "translation", "--data", str(data), "-o", str(tmp_path / "net.safetensors")]
+    arguments += ["--split", "random-0"]
     tiny = ["--width", "2", "--frames", "1", "--epochs", "1", "--batch", "32", "--seed", "1", "--device", "cpu"]
     done = CliRunner().invoke(app, [*arguments, *tiny])
     assert done.exit_code == 0 and done.stdout.strip() == str(tmp_path / "net.safetensors")
     assert "rmse_m_s" in done.stderr
     header = load(tmp_path / "net.safetensors", CONFIG)[1]
-    assert (header.width, header.epochs, header.seed, header.data) == (2, 1, 1, small.name)
+    assert (header.width, header.epochs, header.seed, header.data, header.split) == (2, 1, 1, "data", "random-0")
 
 
 @pytest.mark.parametrize(

@@ -115,6 +115,51 @@ def run_(
 
 
 @app.command()
+def train(
+    task: Annotated[str, typer.Argument(metavar="TASK", help="translation, rotation or segmentation.")],
+    data: Annotated[Path, typer.Option(help="Folder of recordings, see `radarsim dataset`.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Weights to write (.safetensors).")],
+    split: Annotated[str | None, typer.Option(help="Of the data set; else every tenth recording validates.")] = None,
+    width: Annotated[int | None, typer.Option(help="Of the network (16); the paper's is 64.")] = None,
+    frames: Annotated[int | None, typer.Option(help="That the network sees (3, 2, 1).")] = None,
+    epochs: Annotated[int | None, typer.Option(help="At most (30, 30, 5).")] = None,
+    batch: Annotated[int | None, typer.Option(help="Items of a step (128, 128, 48).")] = None,
+    rate: Annotated[float | None, typer.Option(help="Learning rate (1e-3, 1e-3, 1e-4).")] = None,
+    patience: Annotated[int | None, typer.Option(help="Epochs without progress before it ends (15).")] = None,
+    seed: Annotated[int | None, typer.Option(help="Of everything random (0).")] = None,
+    device: Annotated[str | None, typer.Option(help="cpu or cuda; a GPU where there is one.")] = None,
+    workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where a training was stopped.")] = False,
+    onnx: Annotated[bool, typer.Option("--onnx", help="Write the network as ONNX as well.")] = False,
+):
+    """Train a network on recordings; figures in brackets are the three tasks' defaults.
+
+    On several GPUs: torchrun --nproc-per-node 4 -m radarize.cli train ...
+    """
+    from dataclasses import replace
+
+    from radarize.training.tasks import TASKS
+    from radarize.training.train import train
+
+    if task not in TASKS:
+        raise InputError(f"task is {task!r}, expected one of: {', '.join(TASKS)}")
+    choices = {
+        "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "patience": patience,
+        "seed": seed,
+    }  # fmt: skip
+    settings = replace(TASKS[task].defaults, **{name: value for name, value in choices.items() if value is not None})
+    try:
+        with progress("train") as report:
+            written = train(
+                task, data, output, split=split, settings=settings, device=device, workers=workers, resume=resume,
+                onnx=onnx, progress=report, say=lambda line: typer.echo(line, err=True),
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        raise InputError("stopped; with --resume the same command goes on after the last whole epoch") from None
+    print(written)
+
+
+@app.command()
 def slam(
     scans: Annotated[Path, typer.Argument(metavar="SCANS|RUN", help="Scans (.npz), or a run's folder.")],
     odometry: Annotated[

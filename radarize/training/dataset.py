@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from jaxtyping import Float
 from torch.utils.data import Dataset
 
 from radarize.errors import InputError
@@ -107,7 +108,8 @@ class Frames(Dataset):
             elif field == "time":
                 item[field] = recording.times[frames]
             elif field == "turn":
-                item[field] = _turns(recording.rows("truth/pose", first, frames.stop)[:: self.spacing])
+                poses = recording.rows("truth/pose", first, frames.stop)[:: self.spacing]
+                item[field] = wrap(np.diff(yaws(poses)))
         return {name: _tensor(item[name]) for name in self.fields}
 
     def _maps(self, recording: Recording, frames: slice, names: tuple[str, ...], maker: MapMaker) -> dict:
@@ -155,11 +157,10 @@ def recordings(folder: str | Path, split: str | None = None, part: str = "train"
     return found
 
 
-def _turns(poses: np.ndarray) -> np.ndarray:
-    """Change of yaw (of the boresight's direction on the floor) from pose to pose, rad."""
+def yaws(poses: Float[np.ndarray, "frame 7"]) -> Float[np.ndarray, "frame"]:
+    """Direction of the boresight on the floor, rad."""
     x, y, z, w = poses[:, 3:].T
-    yaw = np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
-    return wrap(np.diff(yaw))
+    return np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
 
 
 def _tensor(values: np.ndarray) -> torch.Tensor:

@@ -1,0 +1,54 @@
+"""Networks as ONNX, for run times other than torch."""
+
+import logging
+import os
+import warnings
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from radarize.errors import InputError
+from radarize.nets.weights import Header, example
+
+
+class Estimate(nn.Module):
+    """A network whose `forward` is its `estimate`."""
+
+    def __init__(self, net: nn.Module):
+        super().__init__()
+        self.net = net
+
+    def forward(self, maps: torch.Tensor):
+        return self.net.estimate(maps)
+
+
+def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
+    """Write a network's `estimate` as one ONNX file: input ``maps`` (item, frame, map, row, azimuth) in dB, any number
+    of items; outputs ``estimate`` and ``covariance``, or ``probability``.
+
+    Raises:
+        InputError: the packages for it are missing, or the file cannot be written.
+    """
+    try:
+        import onnxscript  # noqa: F401
+    except ImportError as error:
+        raise InputError("ONNX needs packages that are not installed; type: pip install 'radarize[onnx]'") from error
+    # It lists what it would do with torchvision.
+    logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
+    part = path.with_name(path.name + ".part")
+    # Not "mean", which is what torch calls the average over an image.
+    outputs = ["probability"] if header.kind == "segmentation" else ["estimate", "covariance"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        program = torch.onnx.export(
+            Estimate(net).eval().cpu(), (example(header),), input_names=["maps"], output_names=outputs,
+            dynamic_shapes=({0: torch.export.Dim("item")},), dynamo=True, verbose=False,
+        )  # fmt: skip
+    program.model.metadata_props["radarize"] = header.model_dump_json()
+    try:
+        program.save(part, external_data=False)
+        os.replace(part, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
+    return path

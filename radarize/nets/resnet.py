@@ -1,0 +1,59 @@
+"""ResNet18 (He et al., "Deep residual learning for image recognition", 2016) of any width."""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn.functional import relu
+
+
+class Block(nn.Module):
+    """Two 3 x 3 convolutions beside a shortcut."""
+
+    def __init__(self, inputs: int, outputs: int, stride: int):
+        super().__init__()
+        self.body = nn.Sequential(
+            nn.Conv2d(inputs, outputs, 3, stride, 1, bias=False),
+            nn.BatchNorm2d(outputs),
+            nn.ReLU(),
+            nn.Conv2d(outputs, outputs, 3, 1, 1, bias=False),
+            nn.BatchNorm2d(outputs),
+        )
+        self.shortcut = nn.Identity()
+        if stride != 1 or inputs != outputs:
+            self.shortcut = nn.Sequential(nn.Conv2d(inputs, outputs, 1, stride, bias=False), nn.BatchNorm2d(outputs))
+
+    def forward(self, x: Tensor) -> Tensor:
+        return relu(self.body(x) + self.shortcut(x))
+
+
+class ResNet18(nn.Module):
+    """Images to numbers.
+
+    Args:
+        inputs: channels of an image.
+        outputs: numbers.
+        width: channels of the first stage; 64 in the original, whose cost falls with the square of it.
+        stride: of the first convolution, rows and columns; 2, 2 in the original.
+        pool: whether the first convolution is followed by a 2 x 2 maximum, as in the original. Heat maps have 40
+            columns where photographs have 224: they bear less shrinking.
+    """
+
+    def __init__(self, inputs: int, outputs: int, width: int = 16, stride: tuple[int, int] = (2, 2), pool: bool = True):
+        super().__init__()
+        self.stem = nn.Sequential(nn.Conv2d(inputs, width, 7, stride, 3, bias=False), nn.BatchNorm2d(width), nn.ReLU())
+        if pool:
+            self.stem.append(nn.MaxPool2d(3, 2, 1))
+        widths = [width, width, 2 * width, 4 * width, 8 * width]
+        self.stages = nn.Sequential(
+            *(
+                nn.Sequential(Block(before, after, 1 if before == after else 2), Block(after, after, 1))
+                for before, after in zip(widths[:-1], widths[1:], strict=True)
+            )
+        )
+        self.head = nn.Linear(8 * width, outputs)
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d):
+                nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
+
+    def forward(self, x: Float[Tensor, "item channel row column"]) -> Float[Tensor, "item output"]:
+        return self.head(torch.mean(self.stages(self.stem(x)), dim=(2, 3)))

@@ -1,0 +1,53 @@
+"""U-Net (Ronneberger et al., "U-Net: convolutional networks for biomedical image segmentation", 2015) of any width."""
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+from torch.nn.functional import max_pool2d, pad
+
+
+def double_convolution(inputs: int, outputs: int) -> nn.Sequential:
+    """Two 3 x 3 convolutions that keep the size."""
+    layers: list[nn.Module] = []
+    for channels in (inputs, outputs):
+        layers += [nn.Conv2d(channels, outputs, 3, padding=1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU()]
+    return nn.Sequential(*layers)
+
+
+class Up(nn.Module):
+    """Twice the size by a transposed convolution, then the encoder's image of that size beside it."""
+
+    def __init__(self, inputs: int, outputs: int):
+        super().__init__()
+        self.grow = nn.ConvTranspose2d(inputs, outputs, 2, 2)
+        self.mix = double_convolution(2 * outputs, outputs)
+
+    def forward(self, x: Tensor, beside: Tensor) -> Tensor:
+        x = self.grow(x)
+        rows, columns = (beside.shape[axis] - x.shape[axis] for axis in (2, 3))  # 1 where an odd size was halved
+        return self.mix(torch.cat([beside, pad(x, (0, columns, 0, rows))], dim=1))
+
+
+class UNet(nn.Module):
+    """Images to images of the same size, of 16 rows and columns at least.
+
+    Args:
+        inputs, outputs: channels.
+        width: channels of the first level; the deepest of five has 16 times as many (paper: 64 and 1024).
+    """
+
+    def __init__(self, inputs: int, outputs: int, width: int = 16):
+        super().__init__()
+        widths = [width * 2**level for level in range(5)]
+        self.down = nn.ModuleList(double_convolution(a, b) for a, b in zip([inputs, *widths[:-1]], widths, strict=True))
+        self.up = nn.ModuleList(Up(b, a) for a, b in zip(widths[-2::-1], widths[:0:-1], strict=True))
+        self.head = nn.Conv2d(width, outputs, 1)
+
+    def forward(self, x: Float[Tensor, "item input row column"]) -> Float[Tensor, "item output row column"]:
+        levels = [self.down[0](x)]
+        for convolution in self.down[1:]:
+            levels.append(convolution(max_pool2d(levels[-1], 2)))
+        x = levels.pop()
+        for up in self.up:
+            x = up(x, levels.pop())
+        return self.head(x)

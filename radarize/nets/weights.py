@@ -1,0 +1,177 @@
+"""Trained networks as files: safetensors in float16, with a header that says what they were trained on and for."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import torch
+from jaxtyping import Float
+from pydantic import BaseModel, ConfigDict, ValidationError
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save as serialise
+from torch import Tensor, nn
+
+from radarize import __version__
+from radarize.errors import InputError
+from radarize.nets import NETS
+from radarize.radar.config import RadarConfig
+from radarize.training.maps import AZIMUTHS
+
+#: Steps of range or speed that differ by less read as the same grid.
+_TOLERANCE = 0.01
+
+
+class Grid(BaseModel):
+    """Cells of a map: a network that knows one grid reads wrong speeds and ranges off another.
+
+    Attributes:
+        rows: range bins, or Doppler bins.
+        step: m, or m/s, from row to row.
+        azimuths: columns.
+        field: rad, from the first column to the last.
+        frame_period: s.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    rows: int
+    step: float
+    azimuths: int
+    field: float
+    frame_period: float
+
+    @classmethod
+    def of(cls, config: RadarConfig, name: str) -> "Grid":
+        """The grid of a radar's map."""
+        doppler = name.startswith("doppler")
+        return cls(
+            rows=config.loops if doppler else config.samples,
+            step=config.velocity_resolution if doppler else config.range_resolution,
+            azimuths=len(AZIMUTHS),
+            field=float(AZIMUTHS[-1] - AZIMUTHS[0]),
+            frame_period=config.frame_period,
+        )
+
+    def difference(self, other: "Grid") -> str | None:
+        """What differs of another grid, in words; None if nothing does."""
+        for name, own in self:
+            if abs(own - getattr(other, name)) > _TOLERANCE * abs(own):
+                return f"{name.replace('_', ' ')} {getattr(other, name):.6g} instead of {own:.6g}"
+        return None
+
+
+class Header(BaseModel):
+    """What the file says of itself.
+
+    Attributes:
+        kind: key of `radarize.nets.NETS`.
+        frames, maps, width: what the network is built with.
+        grid: of its maps.
+        spacings: frames from one of the window to the next, as trained.
+        data: name of the data set; split: of it.
+        seed, epochs: of the training.
+        metrics: on its validation data.
+        version: of this package.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: str
+    frames: int
+    maps: tuple[str, ...]
+    width: int
+    grid: Grid
+    spacings: tuple[int, ...] = (1,)
+    data: str = ""
+    split: str | None = None
+    seed: int = 0
+    epochs: int = 0
+    metrics: dict[str, float] = {}
+    version: str = __version__
+
+
+def build(header: Header) -> nn.Module:
+    """The network of a header, untrained."""
+    return NETS[header.kind](header.frames, header.maps, header.width)
+
+
+def save(net: nn.Module, header: Header, path: Path) -> Path:
+    """Write a network.
+
+    Raises:
+        InputError: weights that float16 does not hold, or that the disk does not.
+    """
+    halves = {}
+    for name, values in net.state_dict().items():
+        halves[name] = values.half() if values.is_floating_point() else values
+        if not halves[name].isfinite().all():
+            raise InputError(f"{path}: {name} has values that float16 does not hold, expected a network that converged")
+    write(halves, header.model_dump(), path)
+    return path
+
+
+def load(path: Path, config: RadarConfig | None = None) -> tuple[nn.Module, Header]:
+    """A network in float32, ready for use.
+
+    Args:
+        path: file that `save` wrote.
+        config: of the radar whose maps it is to read.
+
+    Raises:
+        InputError: no such file, no weights of this project, or trained for maps of another grid.
+    """
+    tensors, about = read(path)
+    try:
+        header = Header.model_validate(about)
+        if header.kind not in NETS:
+            raise InputError(f"{path}: is a network for {header.kind!r}, expected one of: {', '.join(NETS)}")
+        net = build(header)
+        net.load_state_dict(tensors)
+    except (ValidationError, ValueError, RuntimeError) as error:
+        reason = str(error).splitlines()[0].rstrip(":")
+        raise InputError(f"{path}: its weights do not fit its header ({reason})") from error
+    if config is not None and (difference := header.grid.difference(Grid.of(config, header.maps[0]))):
+        raise InputError(f"{path}: does not fit this radar, whose maps have {difference}; it needs weights of its own")
+    return net.eval(), header
+
+
+def write(tensors: dict[str, Tensor], about: dict[str, Any], path: Path) -> None:
+    """A safetensors file with JSON in its header, whole or not at all.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        content = {name: values.detach().cpu().contiguous() for name, values in tensors.items()}
+        part.write_bytes(
+            serialise(content, {"radarize": json.dumps(about)})
+        )  # its own writer hides the file from others
+        os.replace(part, path)
+    except (OSError, SafetensorError) as error:
+        raise InputError(f"{path}: cannot be written ({error})") from error
+
+
+def read(path: Path) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
+    """What `write` wrote.
+
+    Raises:
+        InputError: no such file, or none of this project.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file, expected weights (.safetensors)")
+    try:
+        with safe_open(path, "pt") as file:
+            about = json.loads((file.metadata() or {})["radarize"])
+            return {name: file.get_tensor(name) for name in file.keys()}, about  # noqa: SIM118
+    except (OSError, SafetensorError, KeyError, ValueError) as error:
+        reason = "has no header of radarize" if isinstance(error, KeyError) else str(error)
+        raise InputError(f"{path}: is no file of weights of this project ({reason})") from error
+
+
+def example(header: Header) -> Float[Tensor, "2 frame map row azimuth"]:
+    """Maps of noise in the shape that a network reads."""
+    noise = torch.Generator().manual_seed(0)
+    return 10 * torch.randn(2, header.frames, len(header.maps), header.grid.rows, header.grid.azimuths, generator=noise)

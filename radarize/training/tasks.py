@@ -1,0 +1,227 @@
+"""The three trainings: which maps, which labels, which loss, and the paper's hyper-parameters (its section 5)."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float, Int
+from torch import Generator, Tensor, nn
+from torch.nn.functional import binary_cross_entropy_with_logits
+
+from radarize.nets import NETS
+from radarize.nets.gaussian import Gaussian
+from radarize.nets.maps import Maps
+from radarize.training import augment, losses
+from radarize.training.table import Table
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Hyper-parameters.
+
+    Attributes:
+        width: of the network; the paper's is 64.
+        frames: of a window.
+        epochs, batch, rate, betas: of Adam; a batch is what all processes take together.
+        plateau: epochs without a better validation loss after which the rate halves.
+        patience: such epochs after which training ends.
+        seed: of weights, order and augmentation.
+    """
+
+    width: int = 16
+    frames: int = 2
+    epochs: int = 30
+    batch: int = 128
+    rate: float = 1e-3
+    betas: tuple[float, float] = (0.9, 0.999)
+    plateau: int = 10
+    patience: int = 15
+    seed: int = 0
+
+
+class Task:
+    """What the trainer needs to know of a network's task.
+
+    Attributes:
+        kind: key of `radarize.nets.NETS`.
+        maps: that its network reads.
+        truth: that its labels are made of, a key of `radarize.training.table.TRUTH`.
+        spacings: frames from one of a window to the next, drawn for every item; the last is what is validated.
+        defaults: settings.
+    """
+
+    kind: str
+    maps: tuple[str, ...]
+    truth: str
+    spacings: Sequence[int] = (1,)
+    defaults: Settings
+
+    def net(self, settings: Settings) -> nn.Module:
+        """A network with random weights from torch's generator."""
+        return NETS[self.kind](settings.frames, self.maps, settings.width)
+
+    def frames(
+        self, starts: Int[Tensor, "item"], spacing: Int[Tensor, "item"], count: int
+    ) -> Int[Tensor, "item frame"]:
+        """Frames of windows."""
+        return starts[:, None] + spacing[:, None] * torch.arange(count)
+
+    def label(self, table: Table, frames: Int[Tensor, "item frame"]) -> Tensor:
+        """What the network should say of windows."""
+        return table.truth[self.truth][frames[:, -1]]
+
+    def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
+        """Items as they might as well have been."""
+        raise NotImplementedError
+
+    def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
+        """What training makes small; calls the network once."""
+        raise NotImplementedError
+
+    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
+        """Of what `estimate` says of each item: the validation loss, then what `metrics` needs."""
+        raise NotImplementedError
+
+    def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
+        """Names and values, from the means of what `judge` says."""
+        raise NotImplementedError
+
+    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+        """Make a trained network's uncertainty honest on validation data, which is gone through once."""
+        raise NotImplementedError
+
+
+class _Motion(Task):
+    """Velocity or turn."""
+
+    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+        mean, covariance = net.estimate(maps)
+        found = Gaussian(mean, torch.linalg.cholesky(covariance))
+        squared = (mean - label).square().sum(dim=1)
+        trivial = label.square().sum(dim=1)
+        normalised = found.errors_squared(label) / mean.shape[1]
+        return torch.stack([found.negative_log_likelihood(label), squared, trivial, normalised], dim=1)
+
+    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+        net.spread.zero_()
+        normalised = torch.cat([self.judge(net, *batch)[:, 3] for batch in batches])
+        net.spread.fill_(0.5 * normalised.mean().log())
+
+
+class Translation(_Motion):
+    """Velocity, m/s."""
+
+    kind, truth = "translation", "velocity"
+    maps = ("doppler_azimuth", "doppler_elevation_aware")
+    defaults = Settings(frames=3)
+
+    def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
+        left, back = (augment.chosen(maps, generator) for _ in range(2))
+        maps = torch.where(left, augment.mirrored(maps), maps)
+        maps = torch.where(back, augment.receding(maps), maps)
+        label = torch.where(left.flatten(1), label * label.new_tensor([1.0, -1.0]), label)
+        label = torch.where(back.flatten(1), -label, label)
+        maps = augment.other_radar(maps, generator, doppler=True)
+        return (augment.lost_frames(maps, generator) if maps.shape[1] > 1 else maps), label
+
+    def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+        return losses.likelihood(net(maps), label)
+
+    def metrics(self, means: Tensor) -> dict[str, float]:
+        loss, squared, trivial, normalised = means.tolist()
+        return {
+            "loss": loss,
+            "rmse_m_s": squared**0.5,
+            "rms_speed_m_s": trivial**0.5,
+            "normalised_error_squared": normalised,
+        }
+
+
+class Rotation(_Motion):
+    """Turn, rad, over up to 8 frames: the paper's 4 of 15 Hz."""
+
+    kind, truth = "rotation", "yaw"
+    maps = ("range_azimuth",)
+    spacings = range(1, 9)
+    defaults = Settings()
+
+    def label(self, table: Table, frames: Tensor) -> Tensor:
+        yaw = table.truth[self.truth]
+        turn = yaw[frames[:, -1]] - yaw[frames[:, 0]]
+        return torch.remainder(turn + torch.pi, 2 * torch.pi) - torch.pi
+
+    def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
+        left = augment.chosen(maps, generator)
+        maps = torch.where(left, augment.mirrored(maps), maps)
+        return augment.other_radar(maps, generator, doppler=False), torch.where(left.flatten(1), -label, label)
+
+    def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+        return losses.cyclic(net(torch.cat([maps, maps.flip(1)])), label)
+
+    def metrics(self, means: Tensor) -> dict[str, float]:
+        loss, squared, trivial, normalised = means.tolist()
+        return {
+            "loss": loss,
+            "rmse_rad": squared**0.5,
+            "rms_turn_rad": trivial**0.5,
+            "normalised_error_squared": normalised,
+        }
+
+
+class Segmentation(Task):
+    """Occupancy."""
+
+    kind, truth = "segmentation", "occupancy"
+    maps = ("range_azimuth", "elevation_aware")
+    defaults = Settings(frames=1, epochs=5, batch=48, rate=1e-4, betas=(0.8, 0.9))
+    #: Cells of range by which a first surface may be off to count as found: 9 cm.
+    near = 2
+
+    def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
+        left = augment.chosen(maps, generator)
+        maps = torch.where(left, augment.mirrored(maps), maps)
+        label = torch.where(left[:, :, 0, 0], augment.mirrored_columns(label, losses.UNKNOWN), label)
+        return augment.other_radar(maps, generator, doppler=False), label
+
+    def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+        return losses.surfaces(net(maps), label)
+
+    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+        logits = net(maps)
+        found, truth = _first(logits > 0), _first(label == losses.SURFACE)
+        there = truth < label.shape[1]
+        near = ((found - truth).abs() <= self.near) & there
+        return torch.stack([losses.surfaces(logits, label), near.sum(dim=1), there.sum(dim=1)], dim=1)
+
+    def metrics(self, means: Tensor) -> dict[str, float]:
+        loss, near, there = means.tolist()
+        return {"loss": loss, "share_found_within_9_cm": near / max(there, 1e-9)}
+
+    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+        """By plain likelihood: multiplied along a bearing, cells' probabilities are that of its first surface."""
+        pairs = [(net(maps)[:, :, ::4], label[:, :, ::4]) for maps, label in batches]
+        known = [label != losses.UNKNOWN for _, label in pairs]
+        logits = torch.cat([found[k] for (found, _), k in zip(pairs, known, strict=True)]).detach()
+        truth = torch.cat([label[k] for (_, label), k in zip(pairs, known, strict=True)]).eq(losses.SURFACE).float()
+        fit = torch.tensor([1.0, 0.0], device=logits.device, requires_grad=True)
+        optimiser = torch.optim.LBFGS([fit], line_search_fn="strong_wolfe", max_iter=30)
+
+        def closure() -> Tensor:
+            optimiser.zero_grad()
+            loss = binary_cross_entropy_with_logits(logits * fit[0] + fit[1], truth)
+            loss.backward()
+            return loss
+
+        with torch.enable_grad():
+            optimiser.step(closure)
+        net.scale.copy_(fit[0].detach())
+        net.offset.copy_(fit[1].detach())
+
+
+def _first(cells: Tensor) -> Int[Tensor, "item bearing"]:
+    """Range bin of the first true cell per bearing; the number of bins where there is none."""
+    return torch.where(cells.any(dim=1), cells.int().argmax(dim=1), cells.shape[1])
+
+
+#: Tasks by name.
+TASKS = {task.kind: task() for task in (Translation, Rotation, Segmentation)}

@@ -1,0 +1,161 @@
+"""`radarize train`: from a folder of recordings to a file of weights."""
+
+import csv
+import io
+import os
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from radarize.errors import InputError
+from radarize.nets.weights import Header, save
+from radarize.training.dataset import recordings
+from radarize.training.table import Table
+from radarize.training.tasks import TASKS, Settings
+from radarize.training.team import team
+from radarize.training.trainer import Trainer
+
+#: Without a split, every so manieth recording validates.
+_TENTH = 10
+
+
+def train(
+    kind: str,
+    data: Path,
+    output: Path,
+    *,
+    split: str | None = None,
+    settings: Settings | None = None,
+    device: str | None = None,
+    workers: int = 1,
+    resume: bool = False,
+    onnx: bool = False,
+    progress: Callable[..., None] = lambda *where: None,
+    say: Callable[[str], None] = lambda line: None,
+) -> Path:
+    """Train a network on recordings, alone or as one of the processes that `torchrun` started.
+
+    Args:
+        kind: a key of `TASKS`.
+        data: folder of recordings, of samples or of maps.
+        output: weights to write (.safetensors). The log is beside it (.csv), and so is the checkpoint of the last
+            epoch (.checkpoint) until training has ended.
+        split: of the data set; every tenth recording validates if None.
+        settings: hyper-parameters; the task's own if None.
+        device: ``cpu`` or ``cuda``; a GPU where there is one if None.
+        workers: processes that read.
+        resume: go on from the checkpoint, if there is one.
+        onnx: write the network as ONNX as well.
+        progress: called with (stage, done, in all).
+        say: takes a line for every epoch.
+
+    Returns:
+        the weights' path.
+
+    Raises:
+        InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
+            is no number.
+    """
+    if kind not in TASKS:
+        raise InputError(f"task is {kind!r}, expected one of: {', '.join(TASKS)}")
+    task, output, data = TASKS[kind], Path(output), Path(data)
+    settings = settings or task.defaults
+    _check(kind, settings, output)
+    checkpoint = output.with_suffix(".checkpoint")
+    if checkpoint.exists() and not resume:
+        raise InputError(f"{checkpoint}: is left of a training that did not end; --resume goes on, or remove it")
+    with team(device) as crew:
+        lead = crew.rank == 0
+        report, note = (progress, say) if lead else (_nothing, _nothing)
+        parts = _read(kind, data, split, settings.seed, workers, report)
+        _fit(kind, Trainer(task, settings, *parts, crew), output, data, split, resume, onnx, report, note)
+    return output
+
+
+def _fit(
+    kind: str,
+    trainer: Trainer,
+    output: Path,
+    data: Path,
+    split: str | None,
+    resume: bool,
+    onnx: bool,
+    progress: Callable[..., None],
+    say: Callable[[str], None],
+) -> None:
+    checkpoint, log = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
+    about = {"kind": kind, "data": data.resolve().name, "split": split}
+    lead, settings = trainer.team.rank == 0, trainer.settings
+    if resume and checkpoint.exists():
+        trainer.restore(checkpoint, about)
+        say(f"resuming after epoch {len(trainer.history)}")
+    trainer.team.wait()  # before the first one replaces what the others read
+    while not trainer.finished:
+        found = trainer.train_epoch(partial(progress, "training"))
+        if lead:
+            trainer.save(checkpoint, about)
+            _write_log(trainer.history, log)
+            say(_words(found))
+    if lead:
+        metrics = trainer.finish()
+        header = Header(
+            frames=settings.frames, maps=trainer.task.maps, width=settings.width, grid=trainer.training.grid,
+            spacings=tuple(trainer.task.spacings), seed=settings.seed, epochs=len(trainer.history), metrics=metrics,
+            **about,
+        )  # fmt: skip
+        save(trainer.net, header, output)
+        if onnx:
+            from radarize.nets.export import export_onnx
+
+            export_onnx(trainer.net, header, output.with_suffix(".onnx"))
+        checkpoint.unlink(missing_ok=True)
+        say("calibrated: " + _words(metrics))
+    trainer.team.wait()
+
+
+def _words(numbers: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.5g}" for name, value in numbers.items())
+
+
+def _nothing(*where) -> None:
+    pass
+
+
+def _read(
+    kind: str, data: Path, split: str | None, seed: int, workers: int, progress: Callable[..., None]
+) -> tuple[Table, Table]:
+    """Training and validation data."""
+    if split is None:
+        found = recordings(data)
+        if len(found) < 2:
+            raise InputError(f"{data}: holds one recording, expected at least two, one of which validates")
+        apart = set(np.random.default_rng(seed).permutation(len(found))[: max(1, len(found) // _TENTH)])
+        parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
+    else:
+        parts = [recordings(data, split, part) for part in ("train", "validation")]
+    table = Table.read(parts[0] + parts[1], TASKS[kind].maps, (TASKS[kind].truth,), workers, progress)
+    return table.divide(len(parts[0]))
+
+
+def _check(kind: str, settings: Settings, output: Path) -> None:
+    for name in ("width", "frames", "epochs", "batch", "rate", "plateau", "patience"):
+        if not (value := getattr(settings, name)) > 0:
+            raise InputError(f"{name} is {value}, expected a positive number")
+    if kind == "rotation" and settings.frames < 2:
+        raise InputError(f"frames is {settings.frames}, expected at least two to turn between")
+    if settings.seed < 0:
+        raise InputError(f"seed is {settings.seed}, expected no negative number")
+    if output.is_dir() or output.suffix != ".safetensors":
+        raise InputError(f"output is {output}, expected a file NAME.safetensors")
+
+
+def _write_log(history: list[dict[str, float]], path: Path) -> None:
+    text = io.StringIO()
+    rows = csv.DictWriter(text, history[0])
+    rows.writeheader()
+    rows.writerows(history)
+    part = path.with_name(path.name + ".part")
+    part.write_text(text.getvalue())
+    os.replace(part, path)

@@ -1,0 +1,117 @@
+"""The networks: sizes by formula, what they are blind to, and their normal distributions."""
+
+import numpy as np
+import pytest
+import torch
+
+from radarize.mapping.scans import BEARINGS
+from radarize.nets import NETS, RotationNet, SegmentationNet, TranslationNet
+from radarize.nets.gaussian import Gaussian
+from radarize.nets.resnet import ResNet18
+from radarize.nets.unet import UNet
+from radarize.training.maps import AZIMUTHS
+
+
+def parameters(net: torch.nn.Module) -> int:
+    return sum(values.numel() for values in net.parameters())
+
+
+def resnet_parameters(inputs: int, outputs: int, w: int) -> int:
+    """Convolutions have k^2 weights a pair of channels, batch normalisation two a channel."""
+    count = 49 * inputs * w + 2 * w
+    for before, after in ((w, w), (w, 2 * w), (2 * w, 4 * w), (4 * w, 8 * w)):
+        count += 9 * before * after + 3 * 9 * after * after + 4 * 2 * after
+        count += before * after + 2 * after if before != after else 0
+    return count + 8 * w * outputs + outputs
+
+
+@pytest.mark.parametrize(("inputs", "outputs", "width"), [(3, 1000, 64), (3, 2, 64), (8, 5, 16)])
+def test_resnet_is_the_textbooks(inputs, outputs, width):
+    assert parameters(ResNet18(inputs, outputs, width)) == resnet_parameters(inputs, outputs, width)
+
+
+def test_resnet_of_the_paper_has_11_million_parameters():
+    """11,689,512 for a thousand classes of photographs (He et al.; torchvision lists the same)."""
+    assert parameters(ResNet18(3, 1000, 64)) == 11_689_512
+    assert parameters(ResNet18(3, 1000, 64)) - 513_000 == 11_176_512
+    wide = TranslationNet(1, ("doppler_azimuth",), 64)
+    assert parameters(wide) == resnet_parameters(3, 5, 64)
+    assert parameters(TranslationNet(3, ("a", "b"), 16)) < 720_000  # 1.4 MB in float16
+
+
+def test_unet_is_the_textbooks():
+    """31.04 M for width 64, three channels and two classes, with batch normalisation."""
+    widths = [64, 128, 256, 512, 1024]
+    count = 64 * 2 + 2
+    for before, after in zip([3, *widths[:-1]], widths, strict=True):
+        count += 9 * (before + after) * after + 4 * after
+    for w in widths[:-1]:
+        count += 4 * 2 * w * w + w + 9 * (2 * w + w) * w + 4 * w
+    assert parameters(UNet(3, 2, 64)) == count == 31_037_698
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(96, 88), (24, 40), (17, 31)])
+def test_unet_keeps_any_size(rows, columns):
+    assert UNet(2, 1, 2)(torch.zeros(2, 2, rows, columns)).shape == (2, 1, rows, columns)
+
+
+@pytest.mark.parametrize("dimensions", [1, 2])
+def test_gaussian(dimensions):
+    """Against torch's own multivariate normal distribution."""
+    torch.manual_seed(0)
+    found = Gaussian.of(torch.randn(50, Gaussian.numbers(dimensions)), dimensions)
+    truth = torch.randn(50, dimensions)
+    expected = torch.distributions.MultivariateNormal(found.mean, found.covariance).log_prob(truth)
+    constant = dimensions / 2 * np.log(2 * np.pi)
+    assert torch.allclose(found.negative_log_likelihood(truth), -expected - constant, atol=1e-4)
+    assert torch.allclose(found.log_variance, found.covariance.diagonal(dim1=1, dim2=2).log(), atol=1e-5)
+
+
+def test_the_likelihood_finds_mean_and_covariance():
+    """Of samples of a known distribution, with and without the weighting."""
+    torch.manual_seed(0)
+    factor = torch.tensor([[0.5, 0.0], [-0.3, 0.2]])
+    truth = torch.randn(500, 2) @ factor.T + torch.tensor([1.0, -2.0])
+    for beta in (0.0, 0.5):
+        numbers = torch.zeros(1, Gaussian.numbers(2), requires_grad=True)
+        optimiser = torch.optim.Adam([numbers], 0.03)
+        for _ in range(300):
+            found = Gaussian.of(numbers.expand(len(truth), -1), 2)
+            loss = found.negative_log_likelihood(truth, beta).mean()
+            optimiser.zero_grad(), loss.backward(), optimiser.step()
+        found = Gaussian.of(numbers.detach(), 2)
+        assert torch.allclose(found.mean[0], truth.mean(dim=0), atol=0.02)
+        assert torch.allclose(found.covariance[0], torch.cov(truth.T), atol=0.02)
+
+
+def test_squared_errors_of_an_honest_distribution():
+    torch.manual_seed(0)
+    found = Gaussian.of(torch.randn(1, 5).expand(20000, -1), 2)
+    truth = torch.distributions.MultivariateNormal(found.mean, found.covariance).sample()
+    assert found.errors_squared(truth).mean() == pytest.approx(2, rel=0.05)
+
+
+@pytest.mark.parametrize("kind", NETS)
+def test_gain_does_not_matter(kind):
+    torch.manual_seed(0)
+    net = NETS[kind](2, ("a", "b"), 4).eval()
+    maps = 10 * torch.randn(3, 2, 2, 32, 40)
+    for a, b in zip(net.estimate(maps), net.estimate(maps + 17), strict=True):
+        assert torch.allclose(a, b, atol=1e-4)
+
+
+def test_a_turn_back_is_the_turn_negated():
+    torch.manual_seed(0)
+    net = RotationNet(2, ("range_azimuth",), 4).eval()
+    maps = 10 * torch.randn(3, 2, 1, 96, 40)
+    (there, one), (back, other) = net.estimate(maps), net.estimate(maps.flip(1))
+    assert torch.allclose(there, -back, atol=1e-6) and torch.allclose(one, other)
+    assert there.shape == (3, 1) and one.shape == (3, 1, 1) and (one > 0).all()
+
+
+def test_segmentation_sees_the_columns_of_its_bearings():
+    net = SegmentationNet(1, ("range_azimuth",), 4).eval()
+    shown = torch.tensor(AZIMUTHS, dtype=torch.float32) @ net.resampling
+    assert np.allclose(shown, BEARINGS, atol=1e-6)
+    found = net.estimate(torch.zeros(2, 1, 1, 96, 40))
+    assert found.shape == (2, 96, 88) and ((found > 0) & (found < 1)).all()

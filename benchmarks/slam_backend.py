@@ -14,7 +14,7 @@ from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.slam.log import Log
 from radarize.slam.posegraph import PoseGraph
-from radarize.tum import read_tum
+from radarize.tum import planar, read_tum
 
 RADISH = Path(__file__).parents[2] / "shared" / "recordings" / "radish"
 #: Cartographer on the same files, its best settings: mean ATE in m and rad, and s.
@@ -34,13 +34,6 @@ objects:
         ("ceiling", [48, 2.4], [20, 0, 2.6], [0, 0, -1], "concrete"),
     ]
 )
-
-
-def planar(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Times and poses x, y, yaw of a TUM file."""
-    times, poses = read_tum(path)
-    x, y, z, w = poses[:, 3:].T
-    return times, np.column_stack([poses[:, :2], np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))])
 
 
 def ate(truth: np.ndarray, estimate: np.ndarray) -> tuple[float, float]:
@@ -123,7 +116,7 @@ def lidar(name: str) -> tuple[Log, np.ndarray]:
     """A log of the Radish repository and its corrected poses."""
     return (
         Log.read(RADISH / f"{name}.scans.npz", RADISH / f"{name}.odometry.tum"),
-        planar(RADISH / f"{name}.truth.tum")[1],
+        planar(read_tum(RADISH / f"{name}.truth.tum")[1]),
     )
 
 
@@ -203,8 +196,8 @@ def radar_rows(folder: Path) -> list[dict[str, object]]:
     rows = []
     for path in sorted(p.parent for p in folder.glob("*/reference.tum")):
         log = Log.read(path)
-        times, truth = planar(path / "reference.tum")
-        truth = truth[np.abs(times[None] - log.times[:, None]).argmin(axis=1)]
+        times, truth = read_tum(path / "reference.tum")
+        truth = planar(truth)[np.abs(times[None] - log.times[:, None]).argmin(axis=1)]
         entry = row(f"radar, {path.name}", log, truth, SlamConfig.preset("radar"))
         rows.append({**entry, "to beat": "half of odometry" if entry["loop m"] >= 80 else "1.05 x odometry"})
     return rows

@@ -1,13 +1,12 @@
 """TUM trajectory files: ``time x y z qx qy qz qw`` a line, ``#`` comments."""
 
-import contextlib
-import os
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
+from radarize.replacing import replacing
 
 
 def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]]:
@@ -55,17 +54,15 @@ def write_tum(path: str | Path, times: Float[np.ndarray, "pose"], poses: Float[n
     Raises:
         InputError: the file cannot be written.
     """
-    path = Path(path)
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
         np.savetxt(part, np.column_stack([times, poses]), fmt="%.9f")
-        os.replace(part, path)
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            part.unlink()
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
-    return path
+    return Path(path)
+
+
+def planar(poses: Float[np.ndarray, "pose 7"]) -> Float[np.ndarray, "pose 3"]:
+    """Poses as x, y, yaw (m, rad): yaw is where the x axis, the boresight, points on the floor."""
+    x, y, z, w = poses[:, 3:].T
+    return np.column_stack([poses[:, :2], np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))])
 
 
 def planar_poses(poses: Float[np.ndarray, "pose 3"]) -> Float[np.ndarray, "pose 7"]:

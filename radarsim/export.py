@@ -1,7 +1,5 @@
 """Recordings as files for other programs."""
 
-import contextlib
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -9,6 +7,7 @@ from radarize.errors import InputError
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.dca1000 import encode
 from radarize.recording import Recording
+from radarize.replacing import replacing
 from radarize.tum import write_tum
 
 _BATCH_BYTES = 16 << 20
@@ -44,12 +43,11 @@ def _dca1000(source: Recording, output: Path) -> Path:
     if source.cfg_text and _says_the_same(source.cfg_text, config):
         text = source.cfg_text
 
-    def samples(file) -> None:
+    with replacing(settings) as part:
+        part.write_bytes(text.encode())
+    with replacing(binary) as part, part.open("wb") as file:
         for _, adc in source.batches(max(1, _BATCH_BYTES // config.frame_bytes)):
             file.write(encode(adc, config).astype("<i2", copy=False).data)
-
-    _write(settings, lambda file: file.write(text.encode()))
-    _write(binary, samples)
     return binary
 
 
@@ -66,22 +64,6 @@ def _tum(source: Recording, output: Path) -> Path:
     times, poses = source.read("truth/time"), source.read("truth/pose")
     shared = min(len(times), len(poses))
     return write_tum(output, times[:shared], poses[:shared])
-
-
-def _write(path: Path, write: Callable) -> None:
-    """Write a file under a temporary name and rename it when it is whole."""
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with part.open("wb") as file:
-            write(file)
-        os.replace(part, path)
-    except BaseException as error:
-        with contextlib.suppress(OSError):
-            part.unlink()
-        if isinstance(error, OSError):
-            raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-        raise
 
 
 _WRITERS: dict[str, Callable[[Recording, Path], Path]] = {"dca1000": _dca1000, "tum": _tum}

@@ -1,12 +1,10 @@
 """One recording from one scene and one motion: the simulator's main loop."""
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, Int16
-from threadpoolctl import ThreadpoolController
 
 from radarize import __version__
 from radarize.errors import InputError
@@ -32,21 +30,11 @@ from radarsim.sensors.sensor import Frames, Rig
 from radarsim.sensors.sight import Sight
 from radarsim.sensors.suite import Suite, chosen
 from radarsim.statistics import crossings
+from radarsim.threads import one_blas_thread
 from radarsim.waypoints import read_waypoints
 
 _BATCH = 8
 _TOUR = 40.0  # s, unless asked for
-
-
-def _on_one_blas_thread(method: Callable) -> Callable:
-    """Numba's and Mitsuba's threads spin for work; a BLAS that wakes threads of its own beside them costs a third."""
-
-    @wraps(method)
-    def limited(self, *arguments, **named):
-        with self._threads.limit(limits=1, user_api="blas"):
-            return method(self, *arguments, **named)
-
-    return limited
 
 
 class Simulator:
@@ -73,7 +61,6 @@ class Simulator:
         engine: str = "radarsim",
     ):
         self.motion, self.config = motion, config
-        self._threads = ThreadpoolController()
         world, crowd, self._noise, board = rng.spawn(4)
         self.front_end = FrontEnd(config, front_end, board)
         weakest, antenna = self.front_end.weakest, self.front_end.settings.pattern
@@ -88,7 +75,7 @@ class Simulator:
             )  # fmt: skip
         self.synthesize = Synthesizer(config) if device == "cpu" else DirectSum(config, device)
 
-    @_on_one_blas_thread
+    @one_blas_thread
     def echoes(self, times: Float[np.ndarray, "frame"]) -> list[Echoes]:
         """Echoes of the frames that start at `times` (s), found at the middle of each burst."""
         middle = np.asarray(times) + self.config.burst_center
@@ -101,7 +88,7 @@ class Simulator:
         frames = self.observe(times)
         return frames.samples, frames.echoes
 
-    @_on_one_blas_thread
+    @one_blas_thread
     def observe(self, times: Float[np.ndarray, "frame"], by_cause: bool = False) -> Frames:
         """All there is to know of the frames that start at `times` (s), with the counts of each cause if asked for."""
         echoes = self.echoes(times)

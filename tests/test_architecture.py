@@ -28,7 +28,8 @@ def test_the_pipeline_needs_no_simulator():
 
 
 def test_the_simulator_takes_only_sensor_and_files_from_the_pipeline():
-    modules = ("radar", "recording", "errors", "tum", "console", "yamlfile", "heatmaps", "points", "training.maps")
+    files = ("recording", "tum", "yamlfile", "replacing", "errors", "console")
+    modules = ("radar", *files, "heatmaps", "points", "training.maps")
     allowed = {f"radarize.{name}" for name in modules} | {"radarize"}
     guilty = {
         (f, n)

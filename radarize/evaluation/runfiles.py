@@ -10,6 +10,7 @@ import yaml
 from jaxtyping import Bool, Float, UInt8
 
 from radarize.errors import InputError
+from radarize.replacing import replacing
 
 
 @dataclass(frozen=True)
@@ -148,12 +149,6 @@ def write_whole(path: Path, text: str) -> Path:
     Raises:
         InputError: it cannot be written.
     """
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as part:
         part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise InputError(f"cannot write {path}: {error.strerror}") from error
     return path

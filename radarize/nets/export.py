@@ -1,7 +1,6 @@
 """Networks as ONNX, for run times other than torch."""
 
 import logging
-import os
 import warnings
 from pathlib import Path
 
@@ -10,6 +9,7 @@ from torch import nn
 
 from radarize.errors import InputError
 from radarize.nets.weights import Header, example
+from radarize.replacing import replacing
 
 
 class Estimate(nn.Module):
@@ -36,7 +36,6 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
         raise InputError("ONNX needs packages that are not installed; type: pip install 'radarize[onnx]'") from error
     # It lists what it would do with torchvision.
     logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
-    part = path.with_name(path.name + ".part")
     # Not "mean", which is what torch calls the average over an image.
     outputs = ["probability"] if header.kind == "segmentation" else ["estimate", "covariance"]
     with warnings.catch_warnings():
@@ -46,9 +45,6 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
             dynamic_shapes=({0: torch.export.Dim("item")},), dynamo=True, verbose=False,
         )  # fmt: skip
     program.model.metadata_props["radarize"] = header.model_dump_json()
-    try:
+    with replacing(path) as part:
         program.save(part, external_data=False)
-        os.replace(part, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror})") from error
     return path

@@ -1,7 +1,6 @@
 """Trained networks as files: safetensors in float16, with a header that says what they were trained on and for."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from radarize import __version__
 from radarize.errors import InputError
 from radarize.nets import NETS
 from radarize.radar.config import RadarConfig
+from radarize.replacing import replacing
 from radarize.training.maps import AZIMUTHS
 
 #: Steps of range or speed that differ by less read as the same grid.
@@ -142,16 +142,10 @@ def write(tensors: dict[str, Tensor], about: dict[str, Any], path: Path) -> None
     Raises:
         InputError: it cannot be written.
     """
-    part = path.with_name(path.name + ".part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        content = {name: values.detach().cpu().contiguous() for name, values in tensors.items()}
-        part.write_bytes(
-            serialise(content, {"radarize": json.dumps(about)})
-        )  # its own writer hides the file from others
-        os.replace(part, path)
-    except (OSError, SafetensorError) as error:
-        raise InputError(f"{path}: cannot be written ({error})") from error
+    content = {name: values.detach().cpu().contiguous() for name, values in tensors.items()}
+    data = serialise(content, {"radarize": json.dumps(about)})
+    with replacing(path) as part:
+        part.write_bytes(data)  # safetensors' own writer hides the file from other users
 
 
 def read(path: Path) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:

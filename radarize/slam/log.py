@@ -1,9 +1,9 @@
 """Plain files in and out: scans and odometry of any sensor, and the folder that a session leaves behind."""
 
 import json
-import os
 import shutil
 import zipfile
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,9 +14,10 @@ from jaxtyping import Float
 
 from radarize import __version__
 from radarize.errors import InputError
+from radarize.replacing import replacing
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
-from radarize.tum import planar_poses, read_tum, write_tum
+from radarize.tum import planar, planar_poses, read_tum, write_tum
 
 
 @dataclass(frozen=True)
@@ -61,11 +62,9 @@ class Log:
         if odometry is None:
             return cls(times, azimuths, ranges, np.zeros(0), np.zeros((0, 3)))
         stamps, poses = read_tum(odometry)
-        x, y, z, w = poses[:, 3:].T
-        planar = np.column_stack([poses[:, :2], np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))])
         if covariances is not None and len(covariances) != len(stamps):
             covariances = None  # the odometry is another one
-        return cls(times, azimuths, ranges, stamps, planar, covariances)
+        return cls(times, azimuths, ranges, stamps, planar(poses), covariances)
 
     def feed(self, slam: Slam, progress: Callable[[int, int], None] | None = None) -> None:
         """Give everything to a session, in order of time, and finish it.
@@ -74,18 +73,16 @@ class Log:
             slam: a new session.
             progress: called with (scans done, scans in all).
         """
-        k = 0
+        spreads = self.covariances if self.covariances is not None else [None] * len(self.odometry_times)
+        odometry = deque(zip(self.odometry_times, self.odometry, spreads, strict=True))
         for done, i in enumerate(np.argsort(self.times, kind="stable"), 1):
-            while k < len(self.odometry_times) and self.odometry_times[k] <= self.times[i]:
-                spread = None if self.covariances is None else self.covariances[k]
-                slam.add_odometry(self.odometry_times[k], self.odometry[k], spread)
-                k += 1
+            while odometry and odometry[0][0] <= self.times[i]:
+                slam.add_odometry(*odometry.popleft())
             slam.add_scan(self.times[i], self.azimuths, self.ranges[i])
             if progress:
                 progress(done, len(self.times))
-        for n in range(k, len(self.odometry_times)):
-            spread = None if self.covariances is None else self.covariances[n]
-            slam.add_odometry(self.odometry_times[n], self.odometry[n], spread)
+        for entry in odometry:
+            slam.add_odometry(*entry)
         slam.finish()
 
 
@@ -189,13 +186,16 @@ def _run_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
 
 
 def _write_scans(path: Path, source: Path, log: Log, slam: Slam) -> None:
-    part = path.with_name(path.name + ".part")
-    if source.is_dir():
-        shutil.copyfile(source / "scans.h5", part)
-    with h5py.File(part, "a") as file:
+    with replacing(path) as part:
+        if source.is_dir():
+            shutil.copyfile(source / "scans.h5", part)
+        _add_scans(part, log, slam)
+
+
+def _add_scans(path: Path, log: Log, slam: Slam) -> None:
+    with h5py.File(path, "a") as file:
         values = {"time": log.times, "azimuths": log.azimuths, "ranges": log.ranges}
         for name, data in {**values, "trajectory_covariance": slam.covariances()}.items():
             if name in file:
                 del file[name]
             file.create_dataset(name, data=data)
-    os.replace(part, path)

@@ -7,20 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float
 from torch.utils.data import Dataset
 
 from radarize.errors import InputError
 from radarize.pose import wrap
 from radarize.recording import Recording
 from radarize.training.maps import MAPS, MapMaker, maps_of
+from radarize.tum import planar
 
 #: Truth by the name of a field, as the path in the recording and the columns of it.
 TRUTH = {
     "velocity": ("truth/velocity", slice(0, 3)),  # m/s, sensor frame, at the burst's centre
     "pose": ("truth/pose", slice(None)),  # position m, quaternion x y z w
     "scan": ("truth/scan", slice(None)),  # m, first surface by bearing
-    "depth": ("truth/depth", slice(None)),  # m
+    "depth": ("truth/depth", slice(None)),  # mm, 0 where there is none
     "occupancy": ("truth/occupancy", slice(None)),  # polar labels
 }
 DEFAULT = ("range_azimuth", "elevation_aware", "doppler_azimuth", "doppler_elevation_aware", "velocity", "turn", "scan")
@@ -109,7 +109,7 @@ class Frames(Dataset):
                 item[field] = recording.times[frames]
             elif field == "turn":
                 poses = recording.rows("truth/pose", first, frames.stop)[:: self.spacing]
-                item[field] = wrap(np.diff(yaws(poses)))
+                item[field] = wrap(np.diff(planar(poses)[:, 2]))
         return {name: _tensor(item[name]) for name in self.fields}
 
     def _maps(self, recording: Recording, frames: slice, names: tuple[str, ...], maker: MapMaker) -> dict:
@@ -155,12 +155,6 @@ def recordings(folder: str | Path, split: str | None = None, part: str = "train"
     if not found:
         raise InputError(f"{index}: {split}/{part} is empty, expected at least one recording")
     return found
-
-
-def yaws(poses: Float[np.ndarray, "frame 7"]) -> Float[np.ndarray, "frame"]:
-    """Direction of the boresight on the floor, rad."""
-    x, y, z, w = poses[:, 3:].T
-    return np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
 
 
 def _tensor(values: np.ndarray) -> torch.Tensor:

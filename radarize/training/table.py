@@ -14,13 +14,13 @@ from torch import Tensor
 from radarize.errors import InputError
 from radarize.nets.weights import Grid
 from radarize.recording import Recording
-from radarize.training.dataset import yaws
 from radarize.training.maps import MapMaker, maps_of
+from radarize.tum import planar
 
 #: What labels are made of, by name: path in the recording, and what is kept of a recording's rows of it.
 TRUTH: dict[str, tuple[str, Callable[[np.ndarray], np.ndarray]]] = {
     "velocity": ("truth/velocity", lambda rows: rows[:, :2].astype(np.float32)),
-    "yaw": ("truth/pose", lambda rows: yaws(rows)[:, None].astype(np.float32)),
+    "yaw": ("truth/pose", lambda rows: planar(rows)[:, 2:].astype(np.float32)),
     "occupancy": ("truth/occupancy", lambda rows: rows),
 }
 _BATCH = 32

@@ -1,5 +1,6 @@
 """The three trainings: which maps, which labels, which loss, and the paper's hyper-parameters (its section 5)."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -39,7 +40,7 @@ class Settings:
     seed: int = 0
 
 
-class Task:
+class Task(ABC):
     """What the trainer needs to know of a network's task.
 
     Attributes:
@@ -70,29 +71,36 @@ class Task:
         """What the network should say of windows."""
         return table.truth[self.truth][frames[:, -1]]
 
+    @abstractmethod
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         """Items as they might as well have been."""
-        raise NotImplementedError
 
+    @abstractmethod
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
         """What training makes small; calls the network once."""
-        raise NotImplementedError
 
+    @abstractmethod
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
         """Of what `estimate` says of each item: the validation loss, then what `metrics` needs."""
-        raise NotImplementedError
 
+    @abstractmethod
     def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
         """Names and values, from the means of what `judge` says."""
-        raise NotImplementedError
 
+    @abstractmethod
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Make a trained network's uncertainty honest on validation data, which is gone through once."""
-        raise NotImplementedError
 
 
 class _Motion(Task):
-    """Velocity or turn."""
+    """Velocity or turn.
+
+    Attributes:
+        error, size: what the log calls the error and the size of what is told, RMS.
+    """
+
+    error: str
+    size: str
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         mean, covariance = net.estimate(maps)
@@ -101,6 +109,15 @@ class _Motion(Task):
         trivial = label.square().sum(dim=1)
         normalised = found.errors_squared(label) / mean.shape[1]
         return torch.stack([found.negative_log_likelihood(label), squared, trivial, normalised], dim=1)
+
+    def metrics(self, means: Tensor) -> dict[str, float]:
+        loss, squared, trivial, normalised = means.tolist()
+        return {
+            "loss": loss,
+            self.error: squared**0.5,
+            self.size: trivial**0.5,
+            "normalised_error_squared": normalised,
+        }
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         net.spread.zero_()
@@ -112,6 +129,7 @@ class Translation(_Motion):
     """Velocity, m/s."""
 
     kind, truth = "translation", "velocity"
+    error, size = "rmse_m_s", "rms_speed_m_s"
     maps = ("doppler_azimuth", "doppler_elevation_aware")
     defaults = Settings(frames=3)
 
@@ -127,20 +145,12 @@ class Translation(_Motion):
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         return losses.likelihood(net(maps), label)
 
-    def metrics(self, means: Tensor) -> dict[str, float]:
-        loss, squared, trivial, normalised = means.tolist()
-        return {
-            "loss": loss,
-            "rmse_m_s": squared**0.5,
-            "rms_speed_m_s": trivial**0.5,
-            "normalised_error_squared": normalised,
-        }
-
 
 class Rotation(_Motion):
     """Turn, rad, over up to 8 frames: the paper's 4 of 15 Hz."""
 
     kind, truth = "rotation", "yaw"
+    error, size = "rmse_rad", "rms_turn_rad"
     maps = ("range_azimuth",)
     spacings = range(1, 9)
     defaults = Settings()
@@ -157,15 +167,6 @@ class Rotation(_Motion):
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         return losses.cyclic(net(torch.cat([maps, maps.flip(1)])), label)
-
-    def metrics(self, means: Tensor) -> dict[str, float]:
-        loss, squared, trivial, normalised = means.tolist()
-        return {
-            "loss": loss,
-            "rmse_rad": squared**0.5,
-            "rms_turn_rad": trivial**0.5,
-            "normalised_error_squared": normalised,
-        }
 
 
 class Segmentation(Task):

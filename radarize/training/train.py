@@ -2,7 +2,6 @@
 
 import csv
 import io
-import os
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -11,6 +10,7 @@ import numpy as np
 
 from radarize.errors import InputError
 from radarize.nets.weights import Header, save
+from radarize.replacing import replacing
 from radarize.training.dataset import recordings
 from radarize.training.table import Table
 from radarize.training.tasks import TASKS, Settings
@@ -156,6 +156,5 @@ def _write_log(history: list[dict[str, float]], path: Path) -> None:
     rows = csv.DictWriter(text, history[0])
     rows.writeheader()
     rows.writerows(history)
-    part = path.with_name(path.name + ".part")
-    part.write_text(text.getvalue())
-    os.replace(part, path)
+    with replacing(path) as part:
+        part.write_text(text.getvalue())

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from radarize import __version__
 from radarize.errors import InputError
+from radarize.replacing import replacing
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Event, Stale, Task
 
@@ -145,13 +146,8 @@ def _examine(tasks: tuple[Task, ...], folder: Path, replace: bool) -> list[Task]
 
 
 def _write_index(specification: Specification, folder: Path) -> None:
-    part = folder / f"{INDEX}.part"
-    try:
+    with replacing(folder / INDEX) as part:
         part.write_text(json.dumps({"version": __version__, **specification.as_data()}, indent=1) + "\n")
-        os.replace(part, folder / INDEX)
-    except OSError as error:
-        part.unlink(missing_ok=True)
-        raise InputError(f"{folder / INDEX}: cannot be written ({error.strerror})") from error
 
 
 def _finished(outcome: Outcome, tasks: tuple[Task, ...], folder: Path) -> str:

@@ -29,13 +29,13 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from radarize.errors import InputError
 from radarize.radar.cfg import load_config
 from radarize.radar.limits import check_limits
 from radarize.yamlfile import read_yaml
-from radarsim.dataset.splits import Split
+from radarsim.dataset.splits import Split, Strict
 from radarsim.dataset.task import Task
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.scene.description import Description, find, shipped
@@ -44,11 +44,7 @@ Platform = Literal["handheld", "cart", "robot"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Recordings(_Strict):
+class Recordings(Strict):
     """Some recordings of one building.
 
     Attributes:
@@ -70,7 +66,7 @@ class Recordings(_Strict):
         return (self.platform,) if isinstance(self.platform, str) else self.platform
 
 
-class Specification(_Strict):
+class Specification(Strict):
     """A data set's specification; see the head of this file."""
 
     name: Name

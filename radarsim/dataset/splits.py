@@ -13,11 +13,13 @@ Members = dict[str, list[str]]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
-class _Strict(BaseModel):
+class Strict(BaseModel):
+    """What a specification is made of: no unknown keys, no changes."""
+
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class RandomSplit(_Strict):
+class RandomSplit(Strict):
     """Drawn anew for each of `folds` splits, called NAME-0, NAME-1, ..."""
 
     kind: Literal["random"]
@@ -45,7 +47,7 @@ class RandomSplit(_Strict):
         return found
 
 
-class PlatformSplit(_Strict):
+class PlatformSplit(Strict):
     """Trained on some platforms, tested on others (all others by default)."""
 
     kind: Literal["platform"]
@@ -70,7 +72,7 @@ class PlatformSplit(_Strict):
         return {name: _parts(training, [t for t in tasks if t.platform in tested], self.validation, rng)}
 
 
-class BuildingSplit(_Strict):
+class BuildingSplit(Strict):
     """Leave one building out: for each of `held_out` a split NAME-BUILDING, trained on all others."""
 
     kind: Literal["building"]

@@ -10,6 +10,7 @@ import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from radarize.errors import InputError
+from radarize.replacing import replacing
 from radarize.yamlfile import read_yaml
 from radarsim.physics.antenna import ISOTROPIC, Antenna
 
@@ -199,10 +200,5 @@ class FrontEndConfig(_Strict):
         text = "".join(f"# {remark}\n" for remark in remarks) + yaml.safe_dump(
             self.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=120
         )
-        try:
-            part = Path(path).with_name(Path(path).name + ".part")
-            part.parent.mkdir(parents=True, exist_ok=True)
+        with replacing(path) as part:
             part.write_text(text, encoding="utf-8")
-            part.replace(path)
-        except OSError as error:
-            raise InputError(f"cannot write {path}: {error.strerror or error}") from error

@@ -4,7 +4,6 @@ import zlib
 from collections.abc import Sequence
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from radarize.errors import InputError
 from radarsim.sensors.causes import AdcByCause, CauseCounts
@@ -16,6 +15,7 @@ from radarsim.sensors.pose import TruePose
 from radarsim.sensors.scan import Occupancy, PlanarScan
 from radarsim.sensors.sensor import Frames, Rig, Sensor
 from radarsim.sensors.tracking import TrackingCamera
+from radarsim.threads import one_blas_thread
 
 #: Sensors that cost next to nothing and are always there.
 ALWAYS = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}
@@ -59,7 +59,6 @@ class Suite:
     """
 
     def __init__(self, rig: Rig, names: Sequence[str], seed: int, by_cause: bool = False):
-        self._threads = ThreadpoolController()
         kinds = ALWAYS | {name: SENSORS[name] for name in chosen(names)}
         if by_cause:
             kinds["adc_by_cause"] = AdcByCause
@@ -69,7 +68,7 @@ class Suite:
         self.streams = {path: s for sensor in self.sensors.values() for path, s in sensor.streams.items()}
         self.products = {path: p for sensor in self.sensors.values() for path, p in sensor.products.items()}
 
+    @one_blas_thread
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Rows of all streams for a batch of frames."""
-        with self._threads.limit(limits=1, user_api="blas"):  # as in `Simulator`: it would fight numba's threads
-            return {path: rows for sensor in self.sensors.values() for path, rows in sensor.observe(frames).items()}
+        return {path: rows for sensor in self.sensors.values() for path, rows in sensor.observe(frames).items()}

@@ -16,6 +16,7 @@ import trimesh
 import yaml
 
 from radarize.errors import InputError
+from radarize.replacing import replacing
 from radarsim.scene.importers import carmen, floorplan, meshes, mitsuba, rosmap
 from radarsim.scene.importers.cleaning import clean, decimate, edges_of_many
 from radarsim.scene.importers.flatten import flatten
@@ -279,9 +280,8 @@ def _write(path: Path, parts: list[Part], source: Path) -> None:
         )
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(fresh, folder)
-        half = path.with_name(path.name + ".part")
-        half.write_text(text, encoding="utf-8")
-        os.replace(half, path)
+        with replacing(path) as half:
+            half.write_text(text, encoding="utf-8")
     finally:
         shutil.rmtree(fresh, ignore_errors=True)
 

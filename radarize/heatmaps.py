@@ -136,6 +136,16 @@ class Heatmaps:
         """What the range bins of a unit echo sum to."""
         return float(self.config.samples * (self._range_window**2).sum())
 
+    @staticmethod
+    def limited(spectrum: torch.Tensor, limit: float = 300.0) -> torch.Tensor:
+        """A spectrum whose range-Doppler cells level off at `limit` times the noise floor, their phases kept.
+
+        A wall's specular flash is 40 dB above its own texture: unlimited, its sidelobes are all that sums show.
+        """
+        power = spectrum.real.square().sum(dim=-1) + spectrum.imag.square().sum(dim=-1)
+        floor = power.flatten(1).median(dim=1).values.clamp_min(1e-9)[:, None, None]
+        return spectrum * torch.rsqrt(1 + power / (limit * floor))[..., None]
+
     def covariance(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"], antennas: np.ndarray
     ) -> Complex64[torch.Tensor, "frame range antenna antenna"]:
@@ -244,8 +254,15 @@ class Heatmaps:
         """Power over speed and azimuth, summed over range: a static world draws v cos(phi - theta)."""
         return self.doppler_azimuth_of(self.spectrum(adc, valid))
 
-    def doppler_azimuth_of(self, spectrum: torch.Tensor, elevation_aware: bool = False) -> torch.Tensor:
-        """`doppler_azimuth` of a spectrum at hand, from the elevation pairs if asked for.
+    def doppler_azimuth_of(
+        self, spectrum: torch.Tensor, method: str = "bartlett", elevation_aware: bool = False
+    ) -> torch.Tensor:
+        """`doppler_azimuth` of a spectrum at hand.
+
+        Args:
+            spectrum: see `spectrum`.
+            method: see `range_azimuth`.
+            elevation_aware: by Bartlett from the elevation pairs instead of the row.
 
         Raises:
             InputError: `elevation_aware` without elevation pairs.
@@ -259,7 +276,7 @@ class Heatmaps:
             x, steering = spectrum[..., torch.as_tensor(self.row, device=self.device)], self._steering
         x = x.transpose(1, 2)  # (frame, doppler, range, antenna)
         covariance = x.transpose(-1, -2) @ x.conj() / self._range_energy
-        return self._bartlett(covariance, steering)
+        return self._capon(covariance) if method == "capon" else self._bartlett(covariance, steering)
 
     def range_profile(self, adc, valid=None) -> Float32[torch.Tensor, "frame range"]:
         """Power over range, summed over Doppler and averaged over all antennas."""

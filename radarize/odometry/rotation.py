@@ -103,9 +103,7 @@ class MapRotation:
     ) -> tuple[Float32[np.ndarray, "frame r a"], Float32[np.ndarray, "frame r a"]]:
         """Contrast of the Capon map, dB over the surroundings, and u_z (shrunk to the horizon where incoherent)."""
         s = self.settings
-        power = spectrum.real.square().sum(dim=-1) + spectrum.imag.square().sum(dim=-1)
-        floor = power.flatten(1).median(dim=1).values.clamp_min(1e-9)[:, None, None]
-        limited = spectrum * torch.rsqrt(1 + power / (s.limit * floor))[..., None]
+        limited = self._heatmaps.limited(spectrum, s.limit)
         capon = self._heatmaps.range_azimuth_of(limited, "capon")[:, self._first :]
         floor = capon.flatten(1).median(dim=1).values.clamp_min(1e-9)[:, None, None]
         level = 10 * torch.log10((capon / floor).clamp_min(1))

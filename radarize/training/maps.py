@@ -2,15 +2,15 @@
 
 | map | axes | for |
 |---|---|---|
-| range_azimuth | range x azimuth, row of 8 antennas | rotation, segmentation |
-| elevation_aware | range x azimuth, pairs that look at the horizon | segmentation |
-| doppler_azimuth | Doppler x azimuth, row of 8 antennas | translation |
-| doppler_elevation_aware | Doppler x azimuth, pairs that look at the horizon | translation |
+| range_azimuth | range x azimuth, row of 8 antennas, Capon | rotation, segmentation |
+| elevation_aware | range x azimuth, pairs that look at the horizon, Bartlett | segmentation |
+| doppler_azimuth | Doppler x azimuth, row of 8 antennas, Capon, limited | translation |
+| doppler_elevation_aware | Doppler x azimuth, pairs that look at the horizon, Bartlett, limited | translation |
 
-Azimuth has 40 columns of 3 deg, symmetric about the boresight, so that a flip is a mirror: the beam of 8 elements is
-13 deg wide, and 15 columns spread over the sine would already hold all of a Bartlett map. Range and Doppler keep their
-bins. Decibels are of squared ADC counts, rounded to a quarter: far below the speckle's 5.6 dB, exact in float16, and
-compressible to 0.4 of its size.
+Azimuth has 80 columns of 1.5 deg, symmetric about the boresight, so that a flip is a mirror: Capon's ridges are that
+wide. Range and Doppler keep their bins. Maps over Doppler are of the limited spectrum (`Heatmaps.limited`), or a single
+flash would drown the ridge on which the whole static world lies. Decibels are of squared ADC counts, rounded to a
+quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of its size.
 """
 
 from pathlib import Path
@@ -32,7 +32,7 @@ MAPS = {
     "doppler_elevation_aware": "power over closing speed and azimuth near the horizon, of antenna pairs",
 }
 #: Columns, rad, positive to the left, ascending.
-AZIMUTHS = np.radians(np.arange(-58.5, 60.0, 3.0))
+AZIMUTHS = np.radians(np.arange(-59.25, 60.0, 1.5))
 #: dB; what is weaker reads this. An ADC's rounding alone gives about as much.
 FLOOR = -30.0
 STEP = 0.25
@@ -76,15 +76,19 @@ class MapMaker:
         Raises:
             InputError: samples that do not fit the configuration.
         """
-        heatmaps = self.heatmaps
-        spectrum = heatmaps.spectrum(adc, valid)
+        return self.of(self.heatmaps.spectrum(adc, valid), names)
+
+    def of(self, spectrum: torch.Tensor, names: tuple[str, ...] | None = None) -> dict[str, np.ndarray]:
+        """Maps of a spectrum at hand."""
+        heatmaps, names = self.heatmaps, names or self.names
+        limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else None
         makers = {
-            "range_azimuth": heatmaps.range_azimuth_of,
-            "elevation_aware": heatmaps.elevation_aware_of,
-            "doppler_azimuth": heatmaps.doppler_azimuth_of,
-            "doppler_elevation_aware": lambda x: heatmaps.doppler_azimuth_of(x, elevation_aware=True),
+            "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
+            "elevation_aware": lambda: heatmaps.elevation_aware_of(spectrum),
+            "doppler_azimuth": lambda: heatmaps.doppler_azimuth_of(limited, "capon"),
+            "doppler_elevation_aware": lambda: heatmaps.doppler_azimuth_of(limited, elevation_aware=True),
         }
-        return {name: _decibels(makers[name](spectrum)) for name in names or self.names}
+        return {name: _decibels(makers[name]()) for name in names}
 
 
 def _decibels(power: torch.Tensor) -> np.ndarray:

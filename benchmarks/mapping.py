@@ -13,8 +13,8 @@ from benchmarks.results import publish
 from radarize.evaluation.evaluate import evaluate
 from radarize.evaluation.runfiles import read_scans
 from radarize.evaluation.scans import true_ranges, wrong_by_cause
-from radarize.mapping.scans import METHODS
-from radarize.pipeline import run
+from radarize.odometry.methods import ODOMETRY
+from radarize.pipeline import BEST, SCANS, run
 from radarize.recording import Recording
 from radarsim.sensors.causes import CAUSES
 
@@ -43,13 +43,15 @@ SOURCES = {
 }
 
 
-def judge(case: Case, methods: Sequence[str], odometry: str, runs: Path) -> dict[str, dict[str, dict]]:
+def judge(
+    case: Case, methods: Sequence[str], odometry: str, weights: Path | None, runs: Path
+) -> dict[str, dict[str, dict]]:
     """Metrics of a run by every method, with the causes of its scans' errors."""
     found = {}
     for method in methods:
         folder = runs / f"{case.path.stem}.{odometry}.{method}"
         if not (folder / "run.json").is_file():  # what a run writes last
-            run(case.path, folder, scans=method, odometry=odometry)
+            run(case.path, folder, scans=method, odometry=odometry, weights=weights)
         metrics = evaluate(folder)
         ate = metrics["slam"]["ate"]
         metrics["slam"] = {"ate": ate["position"]["mean"], "ate_rotation": ate["rotation"]["mean"]}
@@ -81,12 +83,14 @@ def mean(found: Sequence[dict[str, dict]], part: str, name: str) -> float:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     add_options(parser)
-    parser.add_argument("--methods", nargs="+", choices=METHODS, default=tuple(METHODS))
-    parser.add_argument("--odometry", default="doppler", help="as for radarize run; the same for all methods")
+    parser.add_argument("--methods", nargs="+", choices=SCANS, default=tuple(reversed(SCANS)))
+    parser.add_argument("--odometry", choices=ODOMETRY, default=BEST["odometry"], help="the same for all methods")
+    parser.add_argument("--weights", type=Path, metavar="DIR", help="of the networks; by default the shipped ones")
     parser.add_argument("--runs", type=Path, metavar="DIR", help="keep the runs there, and use those that are there")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary, cases(options.data) as found:
-        work = partial(judge, methods=options.methods, odometry=options.odometry, runs=options.runs or Path(temporary))
+        runs = options.runs or Path(temporary)
+        work = partial(judge, methods=options.methods, odometry=options.odometry, weights=options.weights, runs=runs)
         judged = through(work, found, options.processes, "recordings")
     rows = []
     for name, members in groups(found).items():

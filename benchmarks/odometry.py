@@ -14,9 +14,10 @@ from benchmarks.results import publish
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
 from radarize.evaluation.motion import turn_errors, velocity_errors
 from radarize.evaluation.trajectory import trajectory
-from radarize.odometry.integration import Odometry
-from radarize.pipeline import BATCH, ODOMETRY
+from radarize.odometry.methods import ODOMETRY, Weights, make_odometry
+from radarize.pipeline import BATCH
 from radarize.recording import Recording
+from radarize.training.maps import MapMaker
 from radarize.tum import planar, planar_poses
 
 #: Frames that the paper's network tells a turn over: 0.27 s.
@@ -48,13 +49,13 @@ class Followed:
 
 
 def follow(case: Case, methods: Sequence[str], weights: Path | None) -> dict[str, Followed]:
-    """A recording by every method; they share its spectra."""
+    """A recording by every method; they share its spectra and maps."""
     with Recording(case.path) as recording:
-        odometries = {method: Odometry(recording.config, method, weights) for method in methods}
+        maker = MapMaker(recording.config)
+        odometries = {method: make_odometry(method, maker, Weights(weights)) for method in methods}
         tracks = {method: [] for method in methods}
-        spectrum_of = next(iter(odometries.values())).heatmaps.spectrum
         for frames, adc in recording.batches(BATCH):
-            spectrum = spectrum_of(adc, recording.valid(frames.start, frames.stop))
+            spectrum = maker.heatmaps.spectrum(adc, recording.valid(frames.start, frames.stop))
             for method, odometry in odometries.items():
                 tracks[method].append(odometry.follow(spectrum, recording.times[frames]))
         poses, velocity = recording.read("truth/pose"), recording.read("truth/velocity")[:, :2]
@@ -113,16 +114,18 @@ def row(found: Sequence[Followed]) -> dict[str, object]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     add_options(parser)
-    parser.add_argument("--methods", nargs="+", choices=ODOMETRY, default=ODOMETRY)
-    parser.add_argument(
-        "--platform-weights", type=Path, metavar="DIR", help="weights trained by hand only: tested on cart and robot"
+    parser.add_argument("--methods", nargs="+", choices=ODOMETRY, default=tuple(ODOMETRY))
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--weights", type=Path, metavar="DIR", help="of the networks; by default the shipped ones")
+    which.add_argument(
+        "--platform-weights", type=Path, metavar="DIR", help="trained by hand only: tested on cart and robot"
     )
     options = parser.parse_args()
     setting = "platforms" if options.platform_weights else "whole"
     with cases(options.data) as found:
         if options.platform_weights:
             found = [case for case in found if case.platform != "handheld"]
-        work = partial(follow, methods=options.methods, weights=options.platform_weights)
+        work = partial(follow, methods=options.methods, weights=options.platform_weights or options.weights)
         followed = through(work, found, options.processes, "recordings")
     rows = [
         {"method": method, "on": name, "recordings": len(members)} | row([followed[i][method] for i in members])

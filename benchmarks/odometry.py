@@ -4,7 +4,6 @@ import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -129,9 +128,8 @@ def main() -> None:
         followed = through(work, found, options.processes, "recordings")
     rows = [
         {"method": method, "on": name, "recordings": len(members)} | row([followed[i][method] for i in members])
-        for method, (name, members) in chain.from_iterable(
-            ((method, group) for group in groups(found).items()) for method in options.methods
-        )
+        for name, members in groups(found).items()
+        for method in options.methods
     ]
     blank = dict.fromkeys(rows[0], "-")
     paper, target = PAPER[setting], TARGET[setting]

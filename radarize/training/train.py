@@ -135,7 +135,7 @@ def _read(
         parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
     else:
         parts = [recordings(data, split, part) for part in ("train", "validation")]
-    table = Table.read(parts[0] + parts[1], TASKS[kind].maps, (TASKS[kind].truth,), workers, progress)
+    table = Table.read(parts[0] + parts[1], TASKS[kind].maps, TASKS[kind].truth, workers, progress)
     return table.divide(len(parts[0]))
 
 

@@ -28,7 +28,7 @@ def test_the_first_likely_cell_is_the_surface(tmp_path):
         grid=Grid.of(CONFIG, "range_azimuth"),
     )  # fmt: skip
     net = build(header)
-    net(example(header))
+    net(*example(header))
     maker = MapMaker(CONFIG)
     scans = Segmentation(maker, save(net.eval(), header, tmp_path / "s.safetensors"))
     spectrum = torch.zeros(2, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)

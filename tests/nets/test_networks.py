@@ -8,6 +8,7 @@ from radarize.mapping.scans import BEARINGS
 from radarize.nets import NETS, RotationNet, SegmentationNet, TranslationNet
 from radarize.nets.correlation import Correlation
 from radarize.nets.gaussian import Gaussian
+from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
 from radarize.nets.unet import UNet
 from radarize.training.maps import AZIMUTHS
@@ -97,7 +98,8 @@ def test_gain_does_not_matter(kind):
     torch.manual_seed(0)
     net = NETS[kind](2, ("a", "b"), 4).eval()
     maps = 10 * torch.randn(3, 2, 2, 32, 80)
-    for a, b in zip(net.estimate(maps), net.estimate(maps + 17), strict=True):
+    told = (torch.zeros(3, 2),) if kind == "rotation" else ()
+    for a, b in zip(net.estimate(maps, *told), net.estimate(maps + 17, *told), strict=True):
         assert torch.allclose(a, b, atol=1e-4)
 
 
@@ -105,7 +107,8 @@ def test_a_turn_back_is_the_turn_negated():
     torch.manual_seed(0)
     net = RotationNet(2, ("range_azimuth",), 4).eval()
     maps = 10 * torch.randn(3, 2, 1, 96, 80)
-    (there, one), (back, other) = net.estimate(maps), net.estimate(maps.flip(1))
+    travel = torch.tensor([[0.2, 0.0], [0.1, -0.1], [0.0, 0.3]])
+    (there, one), (back, other) = net.estimate(maps, travel), net.estimate(maps.flip(1), -travel)
     assert torch.allclose(there, -back, atol=1e-6) and torch.allclose(one, other)
     assert there.shape == (3, 1) and one.shape == (3, 1, 1) and (one > 0).all()
 
@@ -125,10 +128,26 @@ def test_the_second_look_sees_the_ridge_flat_and_in_the_middle():
         assert shifted.argmax() == net.near + 1
 
 
+def test_maps_from_a_step_away():
+    """A pole stands where it stands: against its place seen from there."""
+    ranges = np.arange(96)[:, None] * 0.0446
+
+    def pole(ahead: float, left: float) -> torch.Tensor:
+        off = (ranges - np.hypot(ahead, left)) / 0.15, (AZIMUTHS - np.arctan2(left, ahead)) / 0.1
+        return torch.tensor(np.exp(-0.5 * off[0] ** 2 - 0.5 * off[1] ** 2), dtype=torch.float32)[None, None]
+
+    for forward, left in ((0.3, -0.2), (-0.2, 0.1), (0.0, 0.3)):
+        seen = Moved(0.0446)(pole(2.0, 0.5), torch.tensor([[forward, left]]))
+        expected = pole(2.0 - forward, 0.5 - left)
+        at, there = (np.unravel_index(int(maps.argmax()), (96, 80)) for maps in (seen, expected))
+        assert np.abs(np.subtract(at, there)).max() <= 1
+        assert (seen - expected).abs().max() < 0.2  # its polar width changes with its distance
+
+
 def test_correlation_is_the_sum_of_products():
     """Against loops over steps, shifts and cells; what is shifted out of the map counts for nothing."""
     torch.manual_seed(0)
-    layer = Correlation(1, 20, features=1, turns=3, steps=1)
+    layer = Correlation(1, 10, features=1, turns=3, steps=1)
     layer.features = torch.nn.Identity()
     maps = torch.randn(1, 2, 1, 5, 10)
     found = layer(maps)

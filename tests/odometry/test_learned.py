@@ -25,7 +25,7 @@ def weights(folder, kind: str, **about):
     header = Header(kind=kind, frames=2, maps=maps, width=2, grid=Grid.of(SLOW, maps[0]), **(fields | about))
     torch.manual_seed(0)
     net = build(header)
-    net(example(header))
+    net(*example(header))
     return save(net.eval(), header, folder / f"{kind}.safetensors")
 
 
@@ -66,7 +66,7 @@ def test_batches_do_not_matter(tmp_path):
         rotation = LearnedRotation(maker, weights(tmp_path, "rotation"))
         parts = list(zip(everything.split(cuts), np.split(times, np.cumsum(cuts)[:-1]), strict=True))
         v = [velocity.estimate(part) for part, _ in parts]
-        r = [rotation.estimate(part, when) for part, when in parts]
+        r = [rotation.estimate(part, when, found) for (part, when), found in zip(parts, v, strict=True)]
         results.append(
             [np.concatenate(x) for x in ([p.velocity for p in v], [p.covariance for p in v], [p.yaw for p in r])]
         )
@@ -80,7 +80,7 @@ class Oracle:
     def __init__(self, yaw: np.ndarray, noise: float, rng: np.random.Generator):
         self.yaw, self.noise, self.rng = torch.tensor(yaw), noise, rng
 
-    def estimate(self, frames: torch.Tensor):
+    def estimate(self, frames: torch.Tensor, travel: torch.Tensor):
         first, last = frames.long().T
         turn = self.yaw[last] - self.yaw[first] + torch.tensor(self.rng.normal(0, self.noise, len(first)))
         return turn[:, None], torch.full((len(first), 1, 1), self.noise**2)
@@ -100,13 +100,13 @@ def test_turns_of_several_spacings_make_one_yaw(tmp_path, monkeypatch):
         at = torch.arange(count)
         shown = [torch.stack([(at - stride * s).clamp_min(0), at], dim=1) for s in rotation.spacings]
         monkeypatch.setattr(rotation._windows, "push", lambda spectrum, spacings, shown=shown: shown)
-        found = rotation.estimate(None, times)
+        found = rotation.estimate(None, times, Velocities(*np.zeros((3, count, 2))))
         error = np.cumsum(found.yaw)[-1] - (truth[-1] - truth[0])
         ends.append(error)
         honest.append(error**2 / found.variance.sum())
         chained.append(np.sqrt(count / (stride * 4)) * noise * rng.normal())
     assert np.std(ends) < np.std(chained)
-    assert 0.6 < np.mean(honest) < 1.6
+    assert 0.3 < np.mean(honest) < 1.2  # below 1, for it began without knowing its rate
 
 
 class Says:

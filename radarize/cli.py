@@ -12,6 +12,7 @@ app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
 
 RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="A recording.")]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
+Beside = Annotated[list[Path] | None, typer.Option(help="Another run of the same recording; may be repeated.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 
@@ -97,14 +98,19 @@ def info(recording: RecordingFile, as_json: AsJson = False):
 def run_(
     recording: RecordingFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
-    odometry: Annotated[str | None, typer.Option(help="Where the motion comes from: doppler.")] = None,
-    scans: Annotated[str | None, typer.Option(help="How scans are made: elevation-aware, first-echo...")] = None,
+    odometry: Annotated[str | None, typer.Option(help="Where motion comes from: fused, learned or doppler.")] = None,
+    scans: Annotated[
+        str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
+    ] = None,
     settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected.")] = None,
+    weights: Annotated[
+        Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
+    ] = None,
 ):
     """Estimate trajectory and map of a recording."""
     from radarize.pipeline import run
 
-    choices = {"odometry": odometry, "scans": scans, "settings": settings}
+    choices = {"odometry": odometry, "scans": scans, "settings": settings, "weights": weights}
     given = {name: value for name, value in choices.items() if value is not None}
     try:
         with progress("run") as report:
@@ -188,27 +194,33 @@ def slam(
 @app.command()
 def evaluate(
     run: RunFolder,
+    beside: Beside = None,
     reference: Annotated[Path | None, typer.Option(help="True poses (TUM); by default the run's own.")] = None,
     as_json: AsJson = False,
 ):
     """Compare a run with the truth; writes metrics.json."""
+    from radarize.evaluation import comparison
     from radarize.evaluation.evaluate import evaluate, show
 
     with working("evaluating"):
         metrics = evaluate(run, reference)
+        rows = comparison.compare([run, *beside], reference) if beside else []
     _print_json(metrics) if as_json else show(metrics)
+    if rows and not as_json:
+        comparison.show(rows)
 
 
 @app.command()
 def report(
     source: Annotated[Path, typer.Argument(metavar="RUN|REC.h5", help="A run's folder, or a recording.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (.html).")] = None,
+    beside: Beside = None,
 ):
     """Draw a run or a recording as one HTML page."""
     from radarize.evaluation.report import report_recording, report_run
 
     with working("drawing"):
-        written = report_run(source, output) if source.is_dir() else report_recording(source, output)
+        written = report_run(source, output, beside or ()) if source.is_dir() else report_recording(source, output)
     print(written)
 
 

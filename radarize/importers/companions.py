@@ -112,18 +112,24 @@ class TrackedPose(Companion):
         return (np.array([place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w]),)
 
     def rows(self, times: Float[np.ndarray, "frame"], first: int, end: float) -> dict[str, np.ndarray]:
-        """Pose and velocity in the middle of bursts; the latter from half a frame before to half a frame after."""
+        """Pose and velocity in the middle of bursts; the latter from half a frame before to half a frame after, or on
+        the side of the middle that is known.
+        """
         half = self.config.frame_period / 2
         middle = times + self.config.burst_center
         known = [(time, pose) for time, pose in self._waiting if np.isfinite(pose).all() and np.any(pose[3:])]
         pose, before, after = (_interpolated(known, at) for at in (middle, middle - half, middle + half))
-        velocity = np.full((len(times), 6), np.nan)
-        moved = np.isfinite(pose[:, 0]) & np.isfinite(before[:, 0]) & np.isfinite(after[:, 0])
+        velocity, span = np.full((len(times), 6), np.nan), np.zeros((len(times), 1))
+        for side in (before, after):
+            there = np.isfinite(side[:, :1])
+            side[:] = np.where(there, side, pose)
+            span += half * there
+        moved = np.isfinite(pose[:, 0]) & (span[:, 0] > 0)
         if moved.any():
             turn = Rotation.from_quat(pose[moved, 3:])
             linear = turn.inv().apply(after[moved, :3] - before[moved, :3])
             angular = (Rotation.from_quat(before[moved, 3:]).inv() * Rotation.from_quat(after[moved, 3:])).as_rotvec()
-            velocity[moved] = np.hstack([linear, angular]) / (2 * half)
+            velocity[moved] = np.hstack([linear, angular]) / span[moved]
         self._until(end - _LARGEST_GAP - half)
         return {"truth/time": middle, "truth/pose": pose, "truth/velocity": velocity}
 

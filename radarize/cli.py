@@ -28,10 +28,22 @@ def _antennas(text: str | None, option: str) -> int | tuple[int, ...] | None:
 
 @app.command("import")
 def import_(
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help=".bin, .pcap, or a folder of mmWave Studio.")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), or "
+            "an array of samples (.npy, .npz, .mat).",
+        ),
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
     config: Annotated[str | None, typer.Option(help="A .cfg, a .mmwave.json or a preset's name.")] = None,
     poses: Annotated[Path | None, typer.Option(help="True poses of the sensor (TUM).")] = None,
+    shape: Annotated[
+        str | None, typer.Option(metavar="AXES", help="Of an array: frame,loop,tx,rx,sample in its order, or lengths.")
+    ] = None,
+    variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
+    latency: Annotated[float, typer.Option(help="From a frame's start to its receipt in a bag, s.")] = 0.0,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -75,10 +87,11 @@ def import_(
         radar, cfg_text = load_config(config)
     with keeping(output), progress("import") as report:
         written = import_recording(
-            source, output, config=radar, cfg_text=cfg_text, poses=poses, overrides=overrides, progress=report
-        )
+            source, output, config=radar, cfg_text=cfg_text, poses=poses, shape=shape, variable=variable,
+            latency=latency, overrides=overrides, progress=report,
+        )  # fmt: skip
     with Recording(written) as recording:
-        for name in ("warnings", "assumed"):
+        for name in ("warnings", "assumed", "found"):
             if text := recording.attributes.get(name):
                 typer.echo(f"{name}: {text}", err=True)
         print(f"{written}: {len(recording)} frames")
@@ -195,6 +208,23 @@ def evaluate(
     with working("evaluating"):
         metrics = evaluate(run, reference)
     _print_json(metrics) if as_json else show(metrics)
+
+
+@app.command()
+def export(
+    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File or, of a bag, folder to write.")],
+    format: Annotated[
+        str, typer.Option(help="bin (DCA1000 and .cfg), ros2 (a bag), tum (poses) or map (for map_server).")
+    ],
+    run: Annotated[Path | None, typer.Option(help="Run of the recording, for scans and odometry in the bag.")] = None,
+):
+    """Write a recording or a run for other programs."""
+    from radarize.exporters import export
+
+    with progress("export") as report:
+        written = export(source, format, output, run=run, progress=report)
+    print(written)
 
 
 @app.command()

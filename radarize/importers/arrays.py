@@ -13,7 +13,7 @@ from numpy.lib import format as npy
 from radarize.errors import InputError
 
 #: Bytes of a compressed member unpacked at a time.
-_PIECE = 16 << 20
+_PIECE = 1 << 18
 
 
 class ArrayFile(ABC):

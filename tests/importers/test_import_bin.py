@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
+from radarize.exporters import export
 from radarize.importers import capture, import_recording
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
 from radarize.recording import Recording, RecordingWriter
-from radarsim.export import export
 
 CONFIG = RadarConfig(
     start_frequency=77e9,
@@ -54,7 +54,7 @@ def test_import_of_an_export_is_the_recording(tmp_path, order, iq_order):
     frames = room(config, 3)
     with RecordingWriter(tmp_path / "a.h5", config) as writer:
         writer.append(frames, config.frame_period * np.arange(3))
-    export(tmp_path / "a.h5", "dca1000", tmp_path / "out.bin")
+    export(tmp_path / "a.h5", "bin", tmp_path / "out.bin")
     import_recording(tmp_path / "out.bin", tmp_path / "b.h5")
     with Recording(tmp_path / "b.h5") as recording:
         assert recording.config == config

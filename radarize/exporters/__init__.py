@@ -1,19 +1,17 @@
 """Recordings and runs as files for other programs, one module per format."""
 
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 from radarize.errors import InputError
-from radarize.exporters.bin import export_bin
-from radarize.exporters.plain import export_map, export_tum
-from radarize.exporters.ros2 import export_ros2
 
-#: Formats by name: functions of source, output, run and progress.
-FORMATS: dict[str, Callable[..., Path]] = {
-    "bin": export_bin,
-    "ros2": export_ros2,
-    "tum": export_tum,
-    "map": export_map,
+#: Formats by name: module of this package and function; loaded when asked for, since a bag needs the whole pipeline.
+FORMATS = {
+    "bin": ("bin", "export_bin"),
+    "ros2": ("ros2", "export_ros2"),
+    "tum": ("plain", "export_tum"),
+    "map": ("plain", "export_map"),
 }
 
 
@@ -46,4 +44,6 @@ def export(
         raise InputError(f"export format is {format!r}, expected one of {', '.join(FORMATS)}")
     if run is not None and format != "ros2":
         raise InputError(f"export format is {format}, but a run is given beside the source, expected that of ros2 only")
-    return FORMATS[format](Path(source), Path(output), run=run, progress=progress)
+    module, function = FORMATS[format]
+    writer = getattr(import_module(f"radarize.exporters.{module}"), function)
+    return writer(Path(source), Path(output), run=run, progress=progress)

@@ -88,8 +88,8 @@ def _check_pair(recording: Recording, log: Log, run: Path) -> None:
     middle = recording.times + recording.config.burst_center
     if len(log.times) != len(middle) or np.abs(log.times - middle).max() > recording.config.frame_period:
         raise InputError(
-            f"{run}: has {len(log.times)} scans from {log.times[0]:.3f} s on, expected the run of {recording.path} with "
-            f"{len(middle)} frames from {middle[0]:.3f} s on"
+            f"{run}: has {len(log.times)} scans from {log.times[0]:.3f} s on, expected the run of {recording.path} "
+            f"with {len(middle)} frames from {middle[0]:.3f} s on"
         )
 
 

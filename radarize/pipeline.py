@@ -183,6 +183,7 @@ def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[st
 
 def _write_scans(pipeline: Pipeline, source: Recording, path: Path, times: np.ndarray) -> None:
     with h5py.File(path, "w") as file:
+
         def put(name: str, data: np.ndarray, unit: str) -> None:
             file.create_dataset(name, data=data).attrs["unit"] = unit
 

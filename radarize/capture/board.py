@@ -64,8 +64,8 @@ class Network:
         number = getattr(error, "errno", None)
         if number == errno.EADDRNOTAVAIL:
             return (
-                f"--host {self.host}: no network interface of this computer has that address, expected the one that the "
-                f"DCA1000 sends to (sudo ip address add {self.host}/24 dev INTERFACE)"
+                f"--host {self.host}: no network interface of this computer has that address, expected the one that "
+                f"the DCA1000 sends to (sudo ip address add {self.host}/24 dev INTERFACE)"
             )
         if number == errno.EADDRINUSE:
             return f"--host {self.host}: UDP port {port} is taken, expected it free; is another capture running?"
@@ -149,8 +149,9 @@ class Board:
                     )
                 return reply.status
         raise InputError(
-            f"--dca {self.network.dca}: no DCA1000 answers at UDP port {self.network.command_port} ({command.name} sent "
-            f"{_ATTEMPTS} times); is it powered, its Ethernet cable in, and no firewall between it and {self.network.host}?"
+            f"--dca {self.network.dca}: no DCA1000 answers {command.name} at UDP port {self.network.command_port} "
+            f"({_ATTEMPTS} times asked); is it powered, its Ethernet cable in, and no firewall before "
+            f"{self.network.host}?"
         )
 
     def status(self, patience: float = 0.0) -> Status:

@@ -22,11 +22,12 @@ def record(
     frames: int | None = None,
     attributes: dict[str, object] | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> list[str]:
+) -> Path:
     """Write a stream's frames to a recording until the user stops it, there are enough, or nothing comes any more.
 
     Lost samples are zero and marked; frames that were dropped because the disk is too slow are left out. Stamps are
-    those of the radar's clock, from 0 on, whatever was lost.
+    those of the radar's clock, from 0 on, whatever was lost. What the user should know is joined in the recording's
+    attribute ``warnings``.
 
     Args:
         stream: an open one; stopped here.
@@ -38,7 +39,7 @@ def record(
         progress: called with frames done and wanted (0: until stopped).
 
     Returns:
-        What the user should know; also in the recording's attribute ``warnings``.
+        `output`.
 
     Raises:
         InputError: nothing came, or the file cannot be written; frames written before are kept in its ``.part``.
@@ -53,4 +54,4 @@ def record(
                 progress(int(batch["number"][-1]) + 1, frames or 0)
         warnings = stream.troubles() + writer.losses.warnings()
         writer.annotate(warnings="; ".join(warnings), first_packet_time=stream.counts.first)
-    return warnings
+    return output

@@ -30,6 +30,7 @@ class Sensor(Stream):
         slots: frames that may wait.
 
     Attributes:
+        port: the radar's.
         text: what the radar is sent.
         version: of the board's firmware, once entered.
 
@@ -53,7 +54,7 @@ class Sensor(Stream):
         self.text, self.version = text_for(config, text, name), ""
         self._notes: list[str] = []
         self._running = False
-        network = network or Network()
+        self.port, network = port, network or Network()
         with contextlib.ExitStack() as stack:
             self._uart = stack.enter_context(Uart(port, baud))
             self._board = stack.enter_context(Board(network))
@@ -100,6 +101,11 @@ class Sensor(Stream):
         deadline = time.monotonic() + _LAST_PACKET
         while not self._board.status(0.1) & Status.RECORD_COMPLETED and time.monotonic() < deadline:
             pass
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """What a recording should say about its origin."""
+        return {"source": f"radar at {self.port}, DCA1000 at {self._board.network.dca}"}
 
     def silent(self, seconds: float, at_all: bool) -> None:
         """Why nothing comes.

@@ -97,7 +97,7 @@ class Uart:
             heard = self._listen(patience)
         except (serial.SerialException, OSError) as error:
             raise InputError(f"--port {self.port}: lost while sending {command!r}; is it still plugged in?") from error
-        if heard.count(0xFFFD) or any(byte >= 0x80 for byte in heard):
+        if not heard.isascii():
             raise InputError(
                 f"--port {self.port}: answers {command!r} with unreadable bytes ({heard[:8].hex(' ')}), expected text; "
                 f"--baud {self.baud} is wrong, or this is the data port"
@@ -158,7 +158,7 @@ def _why(error: Exception) -> str:
     number = getattr(error, "errno", None)
     if number in (errno.ENOENT, errno.ENXIO, errno.ENODEV):
         there = ", ".join(sorted(port.device for port in list_ports.comports())) or "none"
-        return f"no such serial port (present: {there}), expected the radar's command port; is its USB cable plugged in?"
+        return f"no such serial port (present: {there}), expected the radar's command port; is its USB cable in?"
     if number in (errno.EACCES, errno.EPERM):
         return "permission denied; add yourself to its group (sudo usermod -aG dialout $USER) and log in again"
     if number in (errno.EBUSY, errno.EAGAIN) or "lock" in str(error):

@@ -177,11 +177,13 @@ def train(
     output: Annotated[Path, typer.Option("--output", "-o", help="Weights to write (.safetensors).")],
     split: Annotated[str | None, typer.Option(help="Of the data set; else every tenth recording validates.")] = None,
     width: Annotated[int | None, typer.Option(help="Of the network (16); the paper's is 64.")] = None,
-    frames: Annotated[int | None, typer.Option(help="That the network sees (3, 2, 1).")] = None,
+    frames: Annotated[int | None, typer.Option(help="That the network sees (2, 2, 1).")] = None,
     epochs: Annotated[int | None, typer.Option(help="At most (30, 30, 5).")] = None,
     batch: Annotated[int | None, typer.Option(help="Items of a step (128, 128, 48).")] = None,
     rate: Annotated[float | None, typer.Option(help="Learning rate (1e-3, 1e-3, 1e-4).")] = None,
+    schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, or cosine for few epochs.")] = None,
     patience: Annotated[int | None, typer.Option(help="Epochs without progress before it ends (15).")] = None,
+    precision: Annotated[str | None, typer.Option(help="Of convolutions: float32, or bfloat16.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of everything random (0).")] = None,
     device: Annotated[str | None, typer.Option(help="cpu or cuda; a GPU where there is one.")] = None,
     workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
@@ -200,8 +202,8 @@ def train(
     if task not in TASKS:
         raise InputError(f"task is {task!r}, expected one of: {', '.join(TASKS)}")
     choices = {
-        "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "patience": patience,
-        "seed": seed,
+        "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
+        "patience": patience, "precision": precision, "seed": seed,
     }  # fmt: skip
     settings = replace(TASKS[task].defaults, **{name: value for name, value in choices.items() if value is not None})
     try:

@@ -55,7 +55,7 @@ def test_help_is_instant(name):
     ["radarize import", "radarize info", "radarize run", "radarize slam", "radarize train", "radarize evaluate",
      "radarize report", "radarize export", "radarsim simulate", "radarsim dataset", "radarsim calibrate",
      "radarsim scene", "radarsim scene info", "radarsim scene preview", "radarsim scene import", "radarsim export",
-     "radarsim doctor"],
+     "radarsim emulate", "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
     code, out, _ = call(capsys, command, "--help")

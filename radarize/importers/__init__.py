@@ -114,6 +114,7 @@ def import_recording(
         if products:
             end = last + radar.frame_period
             capture.warnings += _apart(products["truth/time"].data, start_time, end, Path(poses))
+        capture.warnings += writer.losses.warnings()
         writer.annotate(warnings="; ".join(capture.warnings), assumed=", ".join(capture.assumed))
     return output
 

@@ -75,25 +75,12 @@ def encode(frames: Int16[np.ndarray, "frame loop tx rx sample 2"], config: Radar
     return np.ascontiguousarray(groups, dtype=np.int16).reshape(-1)
 
 
-def detect_iq_order(raw: Int16[np.ndarray, "word"], config: RadarConfig) -> tuple[str, float]:
-    """Find out whether I or Q comes first: the wrong order mirrors range.
-
-    Echoes are near, with leakage nearest of all, so the lower half of the beat spectrum holds more energy than the
-    upper one when the order is right (+14 to +36 dB on real captures).
-
-    Args:
-        raw: words of whole frames; the first few are enough.
-        config: its `iq_order` is ignored.
-
-    Returns:
-        ``"iiqq"`` or ``"qqii"``, and by how many dB the halves differ: small values mean undecided.
-    """
-    decibels = range_balance(decode(raw, config.model_copy(update={"iq_order": "iiqq"})))
-    return ("iiqq" if decibels > 0 else "qqii" if decibels < 0 else config.iq_order), abs(decibels)
-
-
 def range_balance(frames: Int16[np.ndarray, "frame loop tx rx sample 2"]) -> float:
-    """Energy of the beat spectrum's lower half against the upper one, dB: negative where I and Q are swapped."""
+    """Energy of the beat spectrum's lower half against the upper one, dB: negative where I and Q are swapped.
+
+    Echoes are near, with leakage nearest of all, so the lower half holds more energy (+14 to +36 dB on real captures);
+    swapping I and Q mirrors range. Small values mean undecided; 0 is silence.
+    """
     samples = frames.shape[-2]
     signal = np.ascontiguousarray(frames, np.float32).view(np.complex64).reshape(-1, samples)
     signal = signal - signal.mean(axis=1, keepdims=True)

@@ -327,7 +327,7 @@ def test_depth_encodings():
 def test_frames_named_once_are_enough(tmp_path):
     """The radar's topic may have any name."""
     write(tmp_path / "a.bag", SMALL, [0.0, 0.05])
-    data = (tmp_path / "a.bag").read_bytes().replace(RADAR.encode(), b"/other7/radar_dat")
+    data = (tmp_path / "a.bag").read_bytes().replace(RADAR.encode(), b"/other7/radar_data")
     (tmp_path / "a.bag").write_bytes(data)
     with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", config=SMALL)) as recording:
-        assert recording.attributes["topics"] == "/other7/radar_dat"
+        assert recording.attributes["topics"] == "/other7/radar_data"

@@ -203,7 +203,9 @@ def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[st
     slam_times, slam_poses = pipeline.slam.trajectory()
     write_tum(output / "trajectory.tum", slam_times, planar_poses(slam_poses))
     if source.has("truth/pose") and source.has("truth/time"):
-        write_tum(output / "reference.tum", source.read("truth/time"), source.read("truth/pose"))
+        true_times, true_poses = source.read("truth/time"), source.read("truth/pose")
+        known = np.isfinite(true_poses).all(axis=1)  # a tracking camera may have been blind for a while
+        write_tum(output / "reference.tum", true_times[known], true_poses[known])
     pipeline.slam.map().save(output / "map")
     _write_scans(pipeline, source, output / "scans.h5", times)
     frames = len(times)

@@ -60,6 +60,7 @@ def test_ridge(velocity, rate, lever):
     # a beam of 15 deg sees a span of speeds where the ridge is steep, and speckle picks one of them
     assert abs(np.median(error)) < 0.03
     assert np.quantile(np.abs(error), 0.9) < 0.2
+
     # the mirrored map, the wrong Doppler sign and a swapped lever arm all miss
     def misfit(v):
         wrong = v[0] * np.cos(maps.azimuths) + v[1] * np.sin(maps.azimuths)

@@ -26,9 +26,11 @@ def digests(path) -> dict[str, str]:
     with h5py.File(path) as file:
         found = {}
         file.visititems(
-            lambda name, item: found.update({name: hashlib.sha256(np.ascontiguousarray(item[:]).tobytes()).hexdigest()})
-            if isinstance(item, h5py.Dataset)
-            else None
+            lambda name, item: (
+                found.update({name: hashlib.sha256(np.ascontiguousarray(item[:]).tobytes()).hexdigest()})
+                if isinstance(item, h5py.Dataset)
+                else None
+            )
         )
     return found
 

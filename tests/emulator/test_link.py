@@ -1,6 +1,5 @@
-"""The board's packets and their times, against the standard's figures and a real capture; what a network does to them."""
+"""The board's packets and their times, against the standard and a real capture; what a network does to them."""
 
-import struct
 from collections import Counter
 
 import numpy as np
@@ -14,6 +13,7 @@ from radarize.radar.dca1000 import FrameAssembler, Packet, decode, encode, packe
 from radarize.radar.dca1000_commands import Status
 from radarsim.emulator.disturbance import DELAYED, REORDERED, Disturbance
 from radarsim.emulator.link import Link
+from tests.emulator.captures import captured
 
 
 class Wire:
@@ -37,18 +37,6 @@ class Wire:
     @property
     def decoded(self) -> list[Packet]:
         return [Packet.decode(packet) for _, packet in self.sent]
-
-
-def captured(path) -> list[tuple[float, int, bytes]]:
-    """Time, port and payload of the UDP packets in a capture."""
-    data, at, found = path.read_bytes(), 24, []
-    while at < len(data):
-        seconds, microseconds, size, _ = struct.unpack_from("<IIII", data, at)
-        frame = data[at + 16 : at + 16 + size]
-        port, length = struct.unpack_from(">HH", frame, 36)
-        found.append((seconds + microseconds * 1e-6, port, frame[42 : 34 + length]))
-        at += 16 + size
-    return found
 
 
 def test_a_real_capture_comes_out_as_it_was(recordings):

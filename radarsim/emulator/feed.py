@@ -71,7 +71,7 @@ class Feed:
             while isinstance(item, bytes) and not self._closed.is_set():
                 try:
                     item = receiver.recv()
-                except EOFError:
+                except (EOFError, OSError):  # perhaps in the middle of a frame
                     item = InputError("the process that makes frames has died")
                 if isinstance(item, InputError) and not self._closed.is_set():
                     self.failure = item

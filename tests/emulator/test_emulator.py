@@ -371,11 +371,15 @@ def test_a_scene_is_simulated_as_simulate_does_it(tmp_path):
     with Recording(tmp_path / "office.h5") as recording:
         expected = encode(recording.adc(0, len(recording)), SMALL).tobytes()
     walk = Walk("office", duration=0.2, seed=3, radar=str(tmp_path / "small.cfg"))
-    with emulated(walk) as (_, client, _):
+    with emulated(walk) as (emulator, client, said):
         client.record()
         assert client.configure(SMALL)[-1].endswith("Done\n\r" + PROMPT)
-        received = b"".join(Packet.decode(data).payload for data in client.packets())
-    assert len(received) > 8 * SMALL.frame_bytes and received == expected[: len(received)]
+        arrived = []
+        while not any("end of the source" in line for line in said):
+            arrived += client.packets(silence=0.1)
+            assert emulator.ready >= 0  # or the source's own error
+        received = b"".join(Packet.decode(data).payload for data in arrived)
+    assert received == expected[: len(received)] and len(expected) - len(received) < 1456
 
 
 # --- the command line, and an independent client ----------------------------------------------------------------------
@@ -420,7 +424,7 @@ def test_xwr_captures_what_was_recorded(tmp_path):
     "arguments, says",
     [
         (["nowhere.h5"], "nowhere.h5: no such file"),
-        (["nowhere"], "nowhere: no such scene"),
+        (["nowhere"], "no scene 'nowhere'"),
         (["REC", "--board", "203.0.113.5"], "203.0.113.5:4096 cannot be the board's address"),
         (["REC", "--loss", "2"], "loss"),
     ],

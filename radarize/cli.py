@@ -5,13 +5,22 @@ from typing import Annotated, Literal
 
 import typer
 
-from radarize.console import keeping, new_app, progress, run, working
+from radarize.console import keeping, new_app, progress, run, until_interrupted, working
 from radarize.errors import InputError
 
 app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
 
 RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="A recording.")]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
+RadarFile = Annotated[str | None, typer.Option("--config", help="A .cfg or a preset's name.")]
+PortName = Annotated[str | None, typer.Option("--port", help="The radar's serial command port.")]
+Baud = Annotated[int, typer.Option(help="Of the command port.")]
+Host = Annotated[str, typer.Option(help="This computer's address, which the DCA1000 sends to.")]
+Dca = Annotated[str, typer.Option(help="The DCA1000's address.")]
+CommandPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of the DCA1000's commands.")]
+DataPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of its samples.")]
+Duration = Annotated[float | None, typer.Option(min=0.0, help="End after so many seconds.")]
+FrameCount = Annotated[int | None, typer.Option(min=1, help="End after so many frames.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 
@@ -66,7 +75,6 @@ def import_(
     }
     overrides = {name: value for name, value in fields.items() if value is not None}
     from radarize.importers import import_recording
-    from radarize.recording import Recording
 
     radar, cfg_text = None, ""
     if config is not None:
@@ -77,11 +85,59 @@ def import_(
         written = import_recording(
             source, output, config=radar, cfg_text=cfg_text, poses=poses, overrides=overrides, progress=report
         )
+    _tell(written)
+
+
+def _tell(written: Path) -> None:
+    """How many frames a new recording has, and what its attributes warn of."""
+    from radarize.recording import Recording
+
     with Recording(written) as recording:
         for name in ("warnings", "assumed"):
             if text := recording.attributes.get(name):
                 typer.echo(f"{name}: {text}", err=True)
         print(f"{written}: {len(recording)} frames")
+
+
+@app.command()
+def capture(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
+    config: RadarFile = None,
+    port: PortName = None,
+    baud: Baud = 115200,
+    host: Host = "192.168.33.30",
+    dca: Dca = "192.168.33.180",
+    command_port: CommandPort = 4096,
+    data_port: DataPort = 4098,
+    duration: Duration = None,
+    frames: FrameCount = None,
+):
+    """Record a real radar: IWR1843BOOST with a DCA1000. Ctrl-C ends it and leaves a whole file."""
+    from radarize.capture.record import record
+
+    sensor = _sensor(config, port, baud, host, dca, command_port, data_port)
+    most = _frames_within(duration, frames, sensor.config.frame_period)
+    with until_interrupted() as stopping, progress("capture") as report, sensor:
+        record(sensor, output, stopping, text=sensor.text, frames=most, attributes=sensor.facts, progress=report)
+    _tell(output)
+
+
+def _sensor(config: str | None, port: str | None, baud: int, *network):
+    """The sensor that the options of `capture` and `live` describe."""
+    from radarize.capture.board import Network
+    from radarize.capture.sensor import Sensor
+    from radarize.radar.cfg import load_config
+
+    for name, value in (("--config", config), ("--port", port)):
+        if value is None:
+            raise InputError(f"{name} is missing, expected {'a .cfg or a preset' if name == '--config' else 'a TTY'}")
+    radar, text = load_config(config)
+    return Sensor(radar, text, config, port, baud=baud, network=Network(*network))
+
+
+def _frames_within(duration: float | None, frames: int | None, period: float) -> int | None:
+    limits = [frames, None if duration is None else max(round(duration / period), 1)]
+    return min((limit for limit in limits if limit is not None), default=None)
 
 
 @app.command()
@@ -121,11 +177,13 @@ def train(
     output: Annotated[Path, typer.Option("--output", "-o", help="Weights to write (.safetensors).")],
     split: Annotated[str | None, typer.Option(help="Of the data set; else every tenth recording validates.")] = None,
     width: Annotated[int | None, typer.Option(help="Of the network (16); the paper's is 64.")] = None,
-    frames: Annotated[int | None, typer.Option(help="That the network sees (3, 2, 1).")] = None,
+    frames: Annotated[int | None, typer.Option(help="That the network sees (2, 2, 1).")] = None,
     epochs: Annotated[int | None, typer.Option(help="At most (30, 30, 5).")] = None,
     batch: Annotated[int | None, typer.Option(help="Items of a step (128, 128, 48).")] = None,
     rate: Annotated[float | None, typer.Option(help="Learning rate (1e-3, 1e-3, 1e-4).")] = None,
+    schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, or cosine for few epochs.")] = None,
     patience: Annotated[int | None, typer.Option(help="Epochs without progress before it ends (15).")] = None,
+    precision: Annotated[str | None, typer.Option(help="Of convolutions: float32, or bfloat16.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of everything random (0).")] = None,
     device: Annotated[str | None, typer.Option(help="cpu or cuda; a GPU where there is one.")] = None,
     workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
@@ -144,8 +202,8 @@ def train(
     if task not in TASKS:
         raise InputError(f"task is {task!r}, expected one of: {', '.join(TASKS)}")
     choices = {
-        "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "patience": patience,
-        "seed": seed,
+        "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
+        "patience": patience, "precision": precision, "seed": seed,
     }  # fmt: skip
     settings = replace(TASKS[task].defaults, **{name: value for name, value in choices.items() if value is not None})
     try:

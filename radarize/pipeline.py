@@ -10,19 +10,26 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+import torch
 
 from radarize import __version__
 from radarize.errors import InputError
 from radarize.mapping.scans import BEARINGS, METHODS, ScanConfig, make_scans
-from radarize.odometry.integration import Odometry
+from radarize.mapping.segmentation import Segmentation
+from radarize.odometry.methods import ODOMETRY, Weights, make_odometry
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
+from radarize.training.maps import MapMaker
 from radarize.tum import planar_poses, write_tum
 
-#: Odometry by name. Learned estimators will join.
-ODOMETRY = ("doppler",)
+#: Scans by name: a network's, and those of heat maps alone.
+SCANS = ("segmentation", *METHODS)
+#: Methods without networks, for radars that the shipped ones do not fit.
+CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
+#: Methods of choice.
+BEST = {"odometry": "fused", "scans": "segmentation"}
 #: Readings of the paper's pipeline: what the physics asks for.
 SETTINGS = ("corrected",)
 #: Frames a batch: enough to vectorise over, few enough to stay in cache.
@@ -36,12 +43,28 @@ class Pipeline:
 
     Args:
         config: radar configuration.
-        scans: how scans are made, a key of `radarize.mapping.scans.METHODS`.
+        scans: how scans are made, one of `SCANS`.
+        odometry: where motion comes from, a key of `ODOMETRY`.
+        weights: of the networks; the shipped ones if None.
+
+    Raises:
+        InputError: an unknown method, or networks that do not fit the radar.
     """
 
-    def __init__(self, config: RadarConfig, scans: str = "first-echo"):
+    def __init__(
+        self,
+        config: RadarConfig,
+        scans: str = CLASSICAL["scans"],
+        odometry: str = CLASSICAL["odometry"],
+        weights: Weights | None = None,
+    ):
+        if scans not in SCANS:
+            raise InputError(f"scans is {scans!r}, expected one of {', '.join(SCANS)}")
+        weights = weights or Weights()
         self.config, self.scans = config, scans
-        self.odometry = Odometry(config)
+        self.maker = MapMaker(config)
+        self.odometry = make_odometry(odometry, self.maker, weights)
+        self.segmentation = Segmentation(self.maker, weights.of("segmentation")) if scans == "segmentation" else None
         self.heatmaps = self.odometry.heatmaps
         self.scan_config = ScanConfig()
         self.slam = Slam(SlamConfig.preset("radar"))
@@ -64,23 +87,7 @@ class Pipeline:
         with self._stage("spectra"):
             spectrum = self.heatmaps.spectrum(adc, valid)
         track = self.odometry.follow(spectrum, times, self._stage)
-        with self._stage("maps"):
-            # Scans want Capon's sharp beams; the horizon is told from two maps of one beamformer, Bartlett's.
-            sharp = self.heatmaps.range_azimuth_of(spectrum, "capon").numpy()
-            level = reference = None
-            if self.scans == "elevation-aware":
-                level = self.heatmaps.elevation_aware_of(spectrum).numpy()
-                reference = self.heatmaps.range_azimuth_of(spectrum).numpy()
-        with self._stage("scans"):
-            ranges = make_scans(
-                sharp,
-                self.heatmaps.ranges,
-                self.heatmaps.azimuths,
-                level,
-                reference=reference,
-                method=self.scans,
-                config=self.scan_config,
-            )
+        ranges = self._scan(spectrum)
         with self._stage("slam"):
             for instant, pose, spread, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):
                 self.slam.add_odometry(instant, pose, spread)
@@ -91,6 +98,28 @@ class Pipeline:
         self.velocity_covariances.append(track.velocity_covariance)
         self.step_covariances.append(track.covariance)
         self.ranges.append(ranges.astype(np.float32))
+
+    def _scan(self, spectrum: torch.Tensor) -> np.ndarray:
+        if self.segmentation is not None:
+            with self._stage("scans"):
+                return self.segmentation.scan(spectrum)
+        with self._stage("maps"):
+            # Scans want Capon's sharp beams; the horizon is told from two maps of one beamformer, Bartlett's.
+            sharp = self.heatmaps.range_azimuth_of(spectrum, "capon").numpy()
+            level = reference = None
+            if self.scans == "elevation-aware":
+                level = self.heatmaps.elevation_aware_of(spectrum).numpy()
+                reference = self.heatmaps.range_azimuth_of(spectrum).numpy()
+        with self._stage("scans"):
+            return make_scans(
+                sharp,
+                self.heatmaps.ranges,
+                self.heatmaps.azimuths,
+                level,
+                reference=reference,
+                method=self.scans,
+                config=self.scan_config,
+            )
 
     def finish(self) -> None:
         """Close the last loops and optimise."""
@@ -104,13 +133,25 @@ class Pipeline:
         self.stage_seconds[name] += clock.perf_counter() - start
 
 
+def best_methods(config: RadarConfig) -> tuple[dict[str, str], str]:
+    """Odometry and scans of choice for a radar, and if these are the classical ones, why."""
+    maker = MapMaker(config)
+    try:
+        make_odometry(BEST["odometry"], maker)
+        Segmentation(maker)
+    except InputError as error:
+        return CLASSICAL, str(error)
+    return BEST, ""
+
+
 def run(
     recording: Path,
     output: Path,
     *,
-    odometry: str = "doppler",
-    scans: str = "first-echo",
+    odometry: str | None = None,
+    scans: str | None = None,
     settings: str = "corrected",
+    weights: Path | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Run the pipeline on a recording.
@@ -119,7 +160,9 @@ def run(
         recording: ``.h5`` file, simulated or real.
         output: folder to write: trajectory.tum (SLAM), odometry.tum, reference.tum (if the recording has true poses),
             map.pgm and map.yaml, scans.h5, run.json.
-        odometry, scans, settings: methods by name.
+        odometry, scans: methods by name; if None, networks where they fit the radar, else the classical ones.
+        settings: reading of the paper.
+        weights: folder of the networks' weights; the shipped ones if None.
         progress: called with (frames done, frames in all).
 
     Returns:
@@ -128,15 +171,17 @@ def run(
     Raises:
         InputError: unusable recording or unknown method.
     """
-    chosen = (("odometry", odometry, ODOMETRY), ("scans", scans, METHODS), ("settings", settings, SETTINGS))
+    chosen = (("odometry", odometry, ODOMETRY), ("scans", scans, SCANS), ("settings", settings, SETTINGS))
     for name, value, known in chosen:
-        if value not in known:
+        if value is not None and value not in known:
             raise InputError(f"{name} is {value!r}, expected one of {', '.join(known)}")
     output = Path(output)
     with Recording(recording) as source:
         if not len(source):
             raise InputError(f"{recording}: has no whole frame, expected at least one")
-        pipeline = Pipeline(source.config, scans)
+        methods, why = (BEST, "") if weights else best_methods(source.config)
+        odometry, scans = odometry or methods["odometry"], scans or methods["scans"]
+        pipeline = Pipeline(source.config, scans, odometry, Weights(weights))
         if scans == "elevation-aware" and pipeline.heatmaps.pairs is None:
             raise InputError(
                 f"{recording}: its antennas have no vertical pairs, which scans=elevation-aware needs; use first-echo"
@@ -147,7 +192,8 @@ def run(
                 progress(frames.stop, len(source))
         pipeline.finish()
         output.mkdir(parents=True, exist_ok=True)
-        _write(pipeline, source, output, {"odometry": odometry, "scans": scans, "settings": settings})
+        methods = {"odometry": odometry, "scans": scans, "settings": settings, "no_networks": why}
+        _write(pipeline, source, output, methods)
     return output
 
 

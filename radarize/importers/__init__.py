@@ -87,6 +87,7 @@ def import_recording(
                 progress(done, max(done, capture.expected_frames))
         if products:
             capture.warnings += _apart(products["truth/time"].data, start_time, done * radar.frame_period, Path(poses))
+        capture.warnings += writer.losses.warnings()
         writer.annotate(warnings="; ".join(capture.warnings), assumed=", ".join(capture.assumed))
     return output
 

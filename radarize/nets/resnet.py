@@ -36,6 +36,9 @@ class ResNet18(nn.Module):
         stride: of the first convolution, rows and columns; 2, 2 in the original.
         pool: whether the first convolution is followed by a 2 x 2 maximum, as in the original. Heat maps have 40
             columns where photographs have 224: they bear less shrinking.
+
+    Attributes:
+        coarse: whether training rounds convolutions to bfloat16, which is up to twice as fast.
     """
 
     def __init__(self, inputs: int, outputs: int, width: int = 16, stride: tuple[int, int] = (2, 2), pool: bool = True):
@@ -51,9 +54,12 @@ class ResNet18(nn.Module):
             )
         )
         self.head = nn.Linear(8 * width, outputs)
+        self.coarse = False
         for module in self.modules():
             if isinstance(module, nn.Conv2d):
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
 
     def forward(self, x: Float[Tensor, "item channel row column"]) -> Float[Tensor, "item output"]:
-        return self.head(torch.mean(self.stages(self.stem(x)), dim=(2, 3)))
+        with torch.autocast(x.device.type, torch.bfloat16, enabled=self.coarse and self.training):
+            x = self.stages(self.stem(x))
+        return self.head(torch.mean(x.float(), dim=(2, 3)))

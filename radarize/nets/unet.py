@@ -34,6 +34,9 @@ class UNet(nn.Module):
     Args:
         inputs, outputs: channels.
         width: channels of the first level; the deepest of five has 16 times as many (paper: 64 and 1024).
+
+    Attributes:
+        coarse: see `ResNet18`.
     """
 
     def __init__(self, inputs: int, outputs: int, width: int = 16):
@@ -42,12 +45,14 @@ class UNet(nn.Module):
         self.down = nn.ModuleList(double_convolution(a, b) for a, b in zip([inputs, *widths[:-1]], widths, strict=True))
         self.up = nn.ModuleList(Up(b, a) for a, b in zip(widths[-2::-1], widths[:0:-1], strict=True))
         self.head = nn.Conv2d(width, outputs, 1)
+        self.coarse = False
 
     def forward(self, x: Float[Tensor, "item input row column"]) -> Float[Tensor, "item output row column"]:
-        levels = [self.down[0](x)]
-        for convolution in self.down[1:]:
-            levels.append(convolution(max_pool2d(levels[-1], 2)))
-        x = levels.pop()
-        for up in self.up:
-            x = up(x, levels.pop())
-        return self.head(x)
+        with torch.autocast(x.device.type, torch.bfloat16, enabled=self.coarse and self.training):
+            levels = [self.down[0](x)]
+            for convolution in self.down[1:]:
+                levels.append(convolution(max_pool2d(levels[-1], 2)))
+            x = levels.pop()
+            for up in self.up:
+                x = up(x, levels.pop())
+        return self.head(x.float())

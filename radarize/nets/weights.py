@@ -1,6 +1,7 @@
 """Trained networks as files: safetensors in float16, with a header that says what they were trained on and for."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -53,10 +54,10 @@ class Grid(BaseModel):
             frame_period=config.frame_period,
         )
 
-    def difference(self, other: "Grid") -> str | None:
+    def difference(self, other: "Grid", ignore: tuple[str, ...] = ()) -> str | None:
         """What differs of another grid, in words; None if nothing does."""
         for name, own in self:
-            if abs(own - getattr(other, name)) > _TOLERANCE * abs(own):
+            if name not in ignore and abs(own - getattr(other, name)) > _TOLERANCE * abs(own):
                 return f"{name.replace('_', ' ')} {getattr(other, name):.6g} instead of {own:.6g}"
         return None
 
@@ -90,10 +91,29 @@ class Header(BaseModel):
     metrics: dict[str, float] = {}
     version: str = __version__
 
+    def stride(self, config: RadarConfig) -> int:
+        """Frames of a radar from one to the next of those that the network was trained on: 2 at 30 Hz, if at 15 Hz.
+
+        Raises:
+            ValueError: the radar's frames do not come as often, or not at a whole multiple.
+        """
+        ratio = self.grid.frame_period / config.frame_period
+        if round(ratio) < 1 or abs(ratio - round(ratio)) > _TOLERANCE * ratio:
+            raise ValueError(
+                f"frame period {config.frame_period:.6g} instead of {self.grid.frame_period:.6g} or a part"
+            )
+        return round(ratio)
+
+
+def make(kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid) -> nn.Module:
+    """An untrained network for maps of a grid."""
+    scale = {"step": grid.step} if kind == "translation" else {}
+    return NETS[kind](frames, maps, width, **scale)
+
 
 def build(header: Header) -> nn.Module:
     """The network of a header, untrained."""
-    return NETS[header.kind](header.frames, header.maps, header.width)
+    return make(header.kind, header.frames, header.maps, header.width, header.grid)
 
 
 def save(net: nn.Module, header: Header, path: Path) -> Path:
@@ -131,9 +151,22 @@ def load(path: Path, config: RadarConfig | None = None) -> tuple[nn.Module, Head
     except (ValidationError, ValueError, RuntimeError) as error:
         reason = str(error).splitlines()[0].rstrip(":")
         raise InputError(f"{path}: its weights do not fit its header ({reason})") from error
-    if config is not None and (difference := header.grid.difference(Grid.of(config, header.maps[0]))):
-        raise InputError(f"{path}: does not fit this radar, whose maps have {difference}; it needs weights of its own")
+    if config is not None:
+        difference = header.grid.difference(Grid.of(config, header.maps[0]), ignore=("frame_period",))
+        try:
+            header.stride(config)
+        except ValueError as error:
+            difference = difference or str(error)
+        if difference:
+            raise InputError(
+                f"{path}: does not fit this radar, whose maps have {difference}; it needs weights of its own"
+            )
     return net.eval(), header
+
+
+def shipped(kind: str) -> Path:
+    """Weights that come with the package: for the ``radarize`` preset, trained on simulated buildings."""
+    return Path(__file__).parents[1] / "weights" / f"{kind}.safetensors"
 
 
 def write(tensors: dict[str, Tensor], about: dict[str, Any], path: Path) -> None:

@@ -80,10 +80,17 @@ class MapRotation:
     """Rotation estimator with a local map; frames are pushed in order, in batches of any size.
 
     The pose inside the local map is a running one: x, y from the velocities, yaw and turning rate from a filter with a
-    constant rate, which the matches correct.
+    constant rate, which the matches correct; or, where another estimator says how far the sensor has turned, by that.
+
+    Args:
+        heatmaps: of the radar.
+        settings: of the matcher.
+        prior: estimator of turns, to start the search from.
     """
 
-    def __init__(self, heatmaps: Heatmaps, settings: RotationSettings | None = None):
+    def __init__(
+        self, heatmaps: Heatmaps, settings: RotationSettings | None = None, prior: "RotationEstimator | None" = None
+    ):
         s = self.settings = settings or RotationSettings()
         sines = np.linspace(-s.field, s.field, s.columns)
         self._sines = sines
@@ -97,6 +104,7 @@ class MapRotation:
         self._position = np.zeros(2)
         self._heading = np.zeros(2)  # yaw, rate
         self._spread = np.diag([0.0, 1.0])
+        self._prior = prior
 
     def features(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
@@ -133,13 +141,20 @@ class MapRotation:
             times: burst centres, s.
             velocities: velocities there.
         """
+        prior = None if self._prior is None else self._prior.estimate(spectrum, times, velocities)
         result = np.zeros((3, len(times)))
         for i, (feature, u_z) in enumerate(zip(*self.features(spectrum), strict=True)):
-            result[:, i] = self._push(feature, u_z, float(times[i]), velocities.velocity[i])
+            turn = None if prior is None else (prior.yaw[i], prior.variance[i])
+            result[:, i] = self._push(feature, u_z, float(times[i]), velocities.velocity[i], turn)
         return Rotations(*result)
 
     def _push(
-        self, feature: np.ndarray, u_z: np.ndarray, time: float, velocity: np.ndarray
+        self,
+        feature: np.ndarray,
+        u_z: np.ndarray,
+        time: float,
+        velocity: np.ndarray,
+        turn: tuple[float, float] | None,
     ) -> tuple[float, float, float]:
         s = self.settings
         if self._state is None:
@@ -149,9 +164,13 @@ class MapRotation:
         dt = time - before
         transition = np.array([[1.0, dt], [0.0, 1.0]])
         start = self._heading[0]
-        self._heading = transition @ self._heading
-        change = (s.jerk * dt / 0.033) ** 2
-        self._spread = transition @ self._spread @ transition.T + change * np.array([[dt**2 / 4, dt / 2], [dt / 2, 1]])
+        if turn is None:
+            self._heading = transition @ self._heading
+            change = (s.jerk * dt / 0.033) ** 2 * np.array([[dt**2 / 4, dt / 2], [dt / 2, 1]])
+            self._spread = transition @ self._spread @ transition.T + change
+        else:
+            self._heading = np.array([start + turn[0], turn[0] / dt])
+            self._spread = np.diag([self._spread[0, 0] + turn[1], turn[1] / dt**2])
         middle = (start + self._heading[0]) / 2
         c, d = np.cos(middle), np.sin(middle)
         self._position += dt * np.array([[c, -d], [d, c]]) @ ((last_velocity + velocity) / 2)

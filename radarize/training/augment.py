@@ -1,7 +1,8 @@
 """What a net must not learn from: handedness, and how one radar differs from another.
 
-All take maps in dB as (item, frame, map, row, azimuth), draw from a generator on their device, and treat each item by
-itself. Maps have no phases: what mismatched channels and lost chirps do is imitated by what they do to powers.
+All take maps as (item, frame, map, row, azimuth), in dB or, where it says so, as powers, draw from a generator on their
+device, and treat each item by itself. Maps have no phases: what mismatched channels and lost chirps do is imitated by
+what they do to powers.
 """
 
 import math
@@ -17,7 +18,10 @@ from radarize.training.maps import FLOOR
 _LOOKS = 32
 
 
-def chosen(maps: Maps, generator: Generator, share: float = 0.5) -> Bool[Tensor, "item 1 1 1 1"]:
+Chosen = Bool[Tensor, "item 1 1 1 1"]
+
+
+def chosen(maps: Maps, generator: Generator, share: float = 0.5) -> Chosen:
     """Which items something happens to."""
     return torch.rand((len(maps), 1, 1, 1, 1), generator=generator, device=maps.device) < share
 
@@ -46,37 +50,36 @@ def other_radar(maps: Maps, generator: Generator, doppler: bool) -> Maps:
         generator: of random numbers.
         doppler: whether rows are Doppler bins, not range bins.
     """
-    effects = [noise, mismatch, *([lost_chirps] if doppler else [range_gain])]
-    for effect in effects:
-        maps = torch.where(chosen(maps, generator), effect(maps, generator), maps)
-    return maps.clamp_min(FLOOR)
+    power = 10 ** (maps / 10)
+    for effect in (noise, mismatch, lost_chirps if doppler else range_gain):
+        power = effect(power, generator, chosen(maps, generator))
+    return (10 * torch.log10(power)).clamp_min(FLOOR)
 
 
-def range_gain(maps: Maps, generator: Generator) -> Maps:
-    """Gain that changes slowly over range by some dB: filters, antenna gain in elevation, free-space exponents."""
-    return maps + 2.0 * _smooth(maps, 3, generator)
+def range_gain(power: Maps, generator: Generator, where: Chosen) -> Maps:
+    """On powers: gain that changes slowly over range by some dB: filters, antenna gain in elevation, exponents."""
+    return power * _linear(2.0 * where * _smooth(power, 3, generator))
 
 
-def noise(maps: Maps, generator: Generator) -> Maps:
-    """Receiver noise 15 dB below to 6 dB above what an item's weakest cells have."""
-    weakest = maps.flatten(2)[..., ::8].quantile(0.1, dim=2).amin(dim=1)[:, None, None, None, None]
-    level = weakest + _uniform(maps, -15.0, 6.0, generator)
-    looks = torch.randn(maps.shape, generator=generator, device=maps.device) / math.sqrt(_LOOKS)
-    return _decibels(_power(maps) + _power(level) * (1 + looks).clamp_min(0.1))
+def noise(power: Maps, generator: Generator, where: Chosen) -> Maps:
+    """On powers: receiver noise 15 dB below to 6 dB above what an item's weakest cells have."""
+    weakest = power.flatten(2)[..., ::16].quantile(0.1, dim=2).amin(dim=1)[:, None, None, None, None]
+    level = where * weakest * _linear(_uniform(power, -15.0, 6.0, generator))
+    looks = torch.randn(power.shape, generator=generator, device=power.device) / math.sqrt(_LOOKS)
+    return power + level * (1 + looks).clamp_min(0.1)
 
 
-def mismatch(maps: Maps, generator: Generator) -> Maps:
-    """Antennas of unequal gain and phase: sidelobes 35 to 18 dB down at all azimuths, and a ripple over azimuth."""
-    power = _power(maps)
-    lobes = _power(_uniform(maps, -35.0, -18.0, generator)) * power.amax(dim=4, keepdim=True)
-    return _decibels(power + lobes) + 0.7 * _smooth(maps, 4, generator)
+def mismatch(power: Maps, generator: Generator, where: Chosen) -> Maps:
+    """On powers: antennas of unequal gain and phase: sidelobes 35 to 18 dB down at all azimuths, and a ripple over
+    azimuth."""
+    lobes = where * _linear(_uniform(power, -35.0, -18.0, generator)) * power.amax(dim=4, keepdim=True)
+    return (power + lobes) * _linear(0.7 * where * _smooth(power, 4, generator))
 
 
-def lost_chirps(maps: Maps, generator: Generator) -> Maps:
-    """Up to a fifth of the chirps lost at random: their energy spreads over all Doppler bins."""
-    lost = _uniform(maps, 0.0, 0.2, generator)
-    power = _power(maps)
-    return _decibels(power + lost / (1 - lost) * power.mean(dim=3, keepdim=True))
+def lost_chirps(power: Maps, generator: Generator, where: Chosen) -> Maps:
+    """On powers: up to a fifth of the chirps lost at random: their energy spreads over all Doppler bins."""
+    lost = where * _uniform(power, 0.0, 0.2, generator)
+    return power + lost / (1 - lost) * power.mean(dim=3, keepdim=True)
 
 
 def lost_frames(maps: Maps, generator: Generator, share: float = 0.02) -> Maps:
@@ -101,9 +104,5 @@ def _uniform(maps: Maps, low: float, high: float, generator: Generator) -> Tenso
     return low + (high - low) * torch.rand((len(maps), 1, 1, 1, 1), generator=generator, device=maps.device)
 
 
-def _power(decibels: Tensor) -> Tensor:
+def _linear(decibels: Tensor) -> Tensor:
     return 10 ** (decibels / 10)
-
-
-def _decibels(power: Tensor) -> Tensor:
-    return 10 * torch.log10(power)

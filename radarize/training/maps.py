@@ -55,6 +55,8 @@ class MapMaker:
     def __init__(self, config: RadarConfig, device: str = "cpu"):
         self.heatmaps = Heatmaps(config, AZIMUTHS, device=device)
         self.names = tuple(n for n in MAPS if self.heatmaps.pairs is not None or "elevation" not in n)
+        self._spectrum: torch.Tensor | None = None
+        self._made: dict[str, np.ndarray] = {}
 
     def shape(self, name: str) -> tuple[int, int]:
         """Rows and columns of a map."""
@@ -79,16 +81,21 @@ class MapMaker:
         return self.of(self.heatmaps.spectrum(adc, valid), names)
 
     def of(self, spectrum: torch.Tensor, names: tuple[str, ...] | None = None) -> dict[str, np.ndarray]:
-        """Maps of a spectrum at hand."""
-        heatmaps, names = self.heatmaps, names or self.names
-        limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else None
+        """Maps of a spectrum at hand; those of the last one are remembered, for several networks ask for the same."""
+        if spectrum is not self._spectrum:
+            self._spectrum, self._made = spectrum, {}
+        names = names or self.names
+        wanted = [name for name in names if name not in self._made]
+        heatmaps = self.heatmaps
+        limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in wanted) else None
         makers = {
             "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
             "elevation_aware": lambda: heatmaps.elevation_aware_of(spectrum),
             "doppler_azimuth": lambda: heatmaps.doppler_azimuth_of(limited, "capon"),
             "doppler_elevation_aware": lambda: heatmaps.doppler_azimuth_of(limited, elevation_aware=True),
         }
-        return {name: _decibels(makers[name]()) for name in names}
+        self._made |= {name: _decibels(makers[name]()) for name in wanted}
+        return {name: self._made[name] for name in names}
 
 
 def _decibels(power: torch.Tensor) -> np.ndarray:

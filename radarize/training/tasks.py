@@ -9,9 +9,9 @@ from jaxtyping import Float, Int
 from torch import Generator, Tensor, nn
 from torch.nn.functional import binary_cross_entropy_with_logits
 
-from radarize.nets import NETS
 from radarize.nets.gaussian import Gaussian
 from radarize.nets.maps import Maps
+from radarize.nets.weights import Grid, make
 from radarize.training import augment, losses
 from radarize.training.table import Table
 
@@ -24,8 +24,11 @@ class Settings:
         width: of the network; the paper's is 64.
         frames: of a window.
         epochs, batch, rate, betas: of Adam; a batch is what all processes take together.
+        schedule: of the rate: ``plateau``, or ``cosine``, which warms up and then falls to nothing in the last epoch:
+            as good in a third of the epochs.
         plateau: epochs without a better validation loss after which the rate halves.
         patience: such epochs after which training ends.
+        precision: of convolutions, ``float32`` or ``bfloat16``.
         seed: of weights, order and augmentation.
     """
 
@@ -35,8 +38,10 @@ class Settings:
     batch: int = 128
     rate: float = 1e-3
     betas: tuple[float, float] = (0.9, 0.999)
+    schedule: str = "plateau"
     plateau: int = 10
     patience: int = 15
+    precision: str = "float32"
     seed: int = 0
 
 
@@ -47,19 +52,24 @@ class Task(ABC):
         kind: key of `radarize.nets.NETS`.
         maps: that its network reads.
         truth: that its labels are made of, a key of `radarize.training.table.TRUTH`.
-        spacings: frames from one of a window to the next, drawn for every item; the last is what is validated.
+        reach: s, from one frame of a window to the next, at most; None: the very next. Drawn for every item; the
+            farthest is what is validated.
         defaults: settings.
     """
 
     kind: str
     maps: tuple[str, ...]
     truth: str
-    spacings: Sequence[int] = (1,)
+    reach: float | None = None
     defaults: Settings
 
-    def net(self, settings: Settings) -> nn.Module:
-        """A network with random weights from torch's generator."""
-        return NETS[self.kind](settings.frames, self.maps, settings.width)
+    def net(self, settings: Settings, grid: Grid) -> nn.Module:
+        """A network for maps of a grid, with random weights from torch's generator."""
+        return make(self.kind, settings.frames, self.maps, settings.width, grid)
+
+    def spacings(self, frame_period: float) -> Sequence[int]:
+        """Frames from one of a window to the next, for frames that come every `frame_period` (s)."""
+        return range(1, 2 if self.reach is None else max(2, round(self.reach / frame_period) + 1))
 
     def frames(
         self, starts: Int[Tensor, "item"], spacing: Int[Tensor, "item"], count: int
@@ -131,7 +141,7 @@ class Translation(_Motion):
     kind, truth = "translation", "velocity"
     error, size = "rmse_m_s", "rms_speed_m_s"
     maps = ("doppler_azimuth", "doppler_elevation_aware")
-    defaults = Settings(frames=3)
+    defaults = Settings(frames=2)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         left, back = (augment.chosen(maps, generator) for _ in range(2))
@@ -143,16 +153,16 @@ class Translation(_Motion):
         return (augment.lost_frames(maps, generator) if maps.shape[1] > 1 else maps), label
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
-        return losses.likelihood(net(maps), label)
+        return losses.likelihood(net(maps), label.repeat(2, 1)).unflatten(0, (2, -1)).mean(dim=0)
 
 
 class Rotation(_Motion):
-    """Turn, rad, over up to 8 frames: the paper's 4 of 15 Hz."""
+    """Turn, rad, over up to 0.27 s: the paper's 4 frames of 15 Hz."""
 
     kind, truth = "rotation", "yaw"
     error, size = "rmse_rad", "rms_turn_rad"
     maps = ("range_azimuth",)
-    spacings = range(1, 9)
+    reach = 4 / 15
     defaults = Settings()
 
     def label(self, table: Table, frames: Tensor) -> Tensor:
@@ -166,7 +176,7 @@ class Rotation(_Motion):
         return augment.other_radar(maps, generator, doppler=False), torch.where(left.flatten(1), -label, label)
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
-        return losses.cyclic(net(torch.cat([maps, maps.flip(1)])), label)
+        return losses.cyclic(net(maps), label)
 
 
 class Segmentation(Task):

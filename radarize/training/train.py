@@ -102,7 +102,7 @@ def _fit(
         metrics = trainer.finish()
         header = Header(
             frames=settings.frames, maps=trainer.task.maps, width=settings.width, grid=trainer.training.grid,
-            spacings=tuple(trainer.task.spacings), seed=settings.seed, epochs=len(trainer.history), metrics=metrics,
+            spacings=tuple(trainer.spacings), seed=settings.seed, epochs=len(trainer.history), metrics=metrics,
             **about,
         )  # fmt: skip
         save(trainer.net, header, output)
@@ -145,6 +145,9 @@ def _check(kind: str, settings: Settings, output: Path) -> None:
             raise InputError(f"{name} is {value}, expected a positive number")
     if kind == "rotation" and settings.frames < 2:
         raise InputError(f"frames is {settings.frames}, expected at least two to turn between")
+    for name, known in (("schedule", ("plateau", "cosine")), ("precision", ("float32", "bfloat16"))):
+        if (value := getattr(settings, name)) not in known:
+            raise InputError(f"{name} is {value!r}, expected {' or '.join(known)}")
     if settings.seed < 0:
         raise InputError(f"seed is {settings.seed}, expected no negative number")
     if output.is_dir() or output.suffix != ".safetensors":

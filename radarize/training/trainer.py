@@ -21,6 +21,9 @@ from radarize.training.table import Table
 from radarize.training.tasks import Settings, Task
 from radarize.training.team import Team
 
+#: Share of a cosine schedule in which the rate rises.
+_WARM = 0.05
+
 
 class Trainer:
     """Trains one network.
@@ -43,7 +46,8 @@ class Trainer:
     def __init__(self, task: Task, settings: Settings, training: Table, validation: Table, team: Team):
         self.task, self.settings, self.team = task, settings, team
         self.training, self.validation = training, validation
-        reach = (settings.frames - 1) * max(task.spacings) + 1
+        self.spacings = task.spacings(training.grid.frame_period)
+        reach = (settings.frames - 1) * max(self.spacings) + 1
         self._starts, self._validated = training.starts(reach), validation.starts(reach)
         for name, starts in (("training", self._starts), ("validation", self._validated)):
             if len(starts) < 2 * team.size:
@@ -54,7 +58,10 @@ class Trainer:
             )
         with torch.random.fork_rng(devices=[]):
             torch.manual_seed(settings.seed)
-            self.net = task.net(settings).to(team.device)
+            self.net = task.net(settings, training.grid).to(team.device, memory_format=torch.channels_last)
+        for module in self.net.modules():
+            if hasattr(module, "coarse"):
+                module.coarse = settings.precision == "bfloat16"
         self._shared = team.share(self.net)
         self._optimiser = torch.optim.Adam(self.net.parameters(), settings.rate, settings.betas)
         self._schedule = ReduceLROnPlateau(self._optimiser, factor=0.5, patience=settings.plateau)
@@ -89,6 +96,7 @@ class Trainer:
         self._shared.train()
         total = torch.zeros(())
         for step in range(self.steps):
+            self._warm_or_cool(epoch * self.steps + step)
             mine = slice(step * settings.batch + self.team.rank, (step + 1) * settings.batch, self.team.size)
             maps, label = self._items(self.training, order[mine], spacings[mine])
             maps, label = self.task.augment(maps, label, self._generator(epoch, step))
@@ -110,13 +118,23 @@ class Trainer:
             raise InputError(
                 f"the validation loss is {found['loss']} after epoch {epoch + 1}, expected a smaller --rate"
             )
-        self._schedule.step(found["loss"])
+        if settings.schedule == "plateau":
+            self._schedule.step(found["loss"])
         if found["loss"] < self.best[0]:
             self.best = found["loss"], {name: values.clone() for name, values in self.net.state_dict().items()}
         trained = float(self.team.sum(total)) / self.team.size / self.steps
         seconds = round(time.monotonic() - began, 1)
         self.history.append({"epoch": epoch + 1, "seconds": seconds, "rate": rate, "training_loss": trained, **found})
         return self.history[-1]
+
+    def _warm_or_cool(self, step: int) -> None:
+        """The cosine schedule's rate at a step of all (Loshchilov and Hutter, "SGDR", 2017, without restarts)."""
+        if self.settings.schedule == "cosine":
+            total = self.settings.epochs * self.steps
+            warm = min(1.0, (step + 1) / (_WARM * total))
+            rate = self.settings.rate * warm * (1 + math.cos(math.pi * step / total)) / 2
+            for group in self._optimiser.param_groups:
+                group["lr"] = rate
 
     @torch.no_grad()
     def validate(self) -> dict[str, float]:
@@ -164,7 +182,7 @@ class Trainer:
             InputError: it is unreadable, or of another training: only the number of epochs and the patience may change.
         """
         tensors, found = weights.read(path)
-        flexible = ("epochs", "patience")
+        flexible = ("patience",) if self.settings.schedule == "cosine" else ("epochs", "patience")
         expected = {**about, **{n: v for n, v in asdict(self.settings).items() if n not in flexible}}
         for name, value in expected.items():
             other = {**found, **found.get("settings", {})}.get(name)
@@ -194,7 +212,7 @@ class Trainer:
         """Windows of an epoch and their spacings, the same for all processes."""
         rng = np.random.default_rng((self.settings.seed, epoch))
         order = self._starts[torch.from_numpy(rng.permutation(len(self._starts)))]
-        return order, torch.from_numpy(rng.choice(np.asarray(self.task.spacings), len(order)))
+        return order, torch.from_numpy(rng.choice(np.asarray(self.spacings), len(order)))
 
     def _generator(self, epoch: int, step: int) -> Generator:
         seed = np.random.SeedSequence((self.settings.seed, epoch, step, self.team.rank)).generate_state(1, np.uint64)
@@ -206,6 +224,6 @@ class Trainer:
 
     def _validation(self, rank: int, size: int) -> Iterator[tuple[Tensor, Tensor]]:
         mine = self._validated[rank::size]
-        spacing = torch.tensor(self.task.spacings[-1])
+        spacing = torch.tensor(self.spacings[-1])
         for starts in mine.split(self.settings.batch):
             yield self._items(self.validation, starts, spacing.expand(len(starts)))

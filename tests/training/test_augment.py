@@ -8,7 +8,7 @@ from ridges import CONFIG, ridge, walls
 from radarize.mapping.scans import BEARINGS
 from radarize.training import augment
 from radarize.training.losses import FREE, SURFACE, UNKNOWN
-from radarize.training.maps import FLOOR
+from radarize.training.maps import AZIMUTHS, FLOOR
 from radarize.training.tasks import TASKS
 
 VELOCITY = np.array([[0.7, 0.4]])
@@ -65,7 +65,8 @@ def test_signs_of_all_tasks():
     found, changed = TASKS["segmentation"].augment(items(shown).repeat(1, 1, 2, 1, 1), label, generator)
     flipped = torch.tensor([not torch.equal(a, b) for a, b in zip(changed, label, strict=True)])
     assert 10 < flipped.sum() < count - 10
-    nearest = found[:, 0, 0, :, 33].argmax(dim=1)  # 40.5 deg to the left
+    column = int(np.argmin(np.abs(AZIMUTHS - BEARINGS[84])))
+    nearest = found[:, 0, 0, :, column].argmax(dim=1)
     surface = (changed[:, :, 84] == SURFACE).int().argmax(dim=1)
     seen = (changed[:, :, 84] == SURFACE).any(dim=1)
     assert ((nearest - surface).abs()[seen] <= 1).float().mean() > 0.9
@@ -84,10 +85,16 @@ def test_signs_of_all_tasks():
 def test_effects_are_of_their_size(effect, least, most):
     """dB; peaks move little, and what adds power never takes any away."""
     maps = items(np.repeat(ridge(VELOCITY), 50, axis=0)).repeat(1, 2, 1, 1, 1)
-    changed = effect(maps, torch.Generator().manual_seed(0)) - maps
+
+    def change(where: bool) -> torch.Tensor:
+        chosen = torch.full((50, 1, 1, 1, 1), where)
+        return 10 * torch.log10(effect(10 ** (maps / 10), torch.Generator().manual_seed(0), chosen)) - maps
+
+    changed = change(True)
+    assert change(False).abs().max() < 1e-4
     assert least - 1e-3 <= changed.min() and changed.max() <= most
     assert changed.std(dim=0).max() > 0.3
-    assert torch.equal(effect(maps, torch.Generator().manual_seed(0)) - maps, changed)
+    assert torch.equal(change(True), changed)
 
 
 def test_a_lost_frame_has_no_samples():

@@ -99,12 +99,13 @@ def run_(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
     odometry: Annotated[str | None, typer.Option(help="Where the motion comes from: doppler.")] = None,
     scans: Annotated[str | None, typer.Option(help="How scans are made: elevation-aware, first-echo...")] = None,
-    settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected.")] = None,
+    settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected, or published.")] = None,
+    weights: Annotated[Path | None, typer.Option(help="Folder of networks' weights; else the shipped ones.")] = None,
 ):
     """Estimate trajectory and map of a recording."""
     from radarize.pipeline import run
 
-    choices = {"odometry": odometry, "scans": scans, "settings": settings}
+    choices = {"odometry": odometry, "scans": scans, "settings": settings, "weights": weights}
     given = {name: value for name, value in choices.items() if value is not None}
     try:
         with progress("run") as report:

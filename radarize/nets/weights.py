@@ -107,9 +107,7 @@ class Header(BaseModel):
         return round(ratio)
 
 
-def make(
-    kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid, setting: str = "corrected"
-) -> nn.Module:
+def make(kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid, setting: str = "corrected") -> nn.Module:
     """An untrained network for maps of a grid."""
     net = SETTINGS[setting].nets[kind]
     return net(frames, maps, width, step=grid.step) if kind == "translation" else net(frames, maps, width)

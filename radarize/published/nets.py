@@ -27,7 +27,8 @@ class Attention(nn.Module):
         )
 
     def forward(self, x: Tensor) -> Tensor:
-        return x * torch.sigmoid(self.mix(x.mean(dim=(2, 3), keepdim=True)) + self.mix(x.amax(dim=(2, 3), keepdim=True)))
+        mean, most = x.mean(dim=(2, 3), keepdim=True), x.amax(dim=(2, 3), keepdim=True)
+        return x * torch.sigmoid(self.mix(mean) + self.mix(most))
 
 
 class PublishedMotionNet(nn.Module):

@@ -13,8 +13,8 @@ from torch import Tensor
 
 from radarize.errors import InputError
 from radarize.nets.weights import Grid
-from radarize.recording import Recording
 from radarize.published import labels
+from radarize.recording import Recording
 from radarize.settings import SETTINGS
 from radarize.training.maps import maps_of
 from radarize.tum import planar

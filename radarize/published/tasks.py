@@ -36,7 +36,7 @@ class PublishedTranslation(_Plain, Translation):
     defaults = Settings(width=64, frames=1, patience=30)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
-        """Half of the items go backwards. Zero Doppler is the lower edge of row 30, not the middle, which flips overlook."""
+        """Half of the items go backwards. Zero Doppler is the lower edge of row 30 of 60, which becomes row 29."""
         back = augment.chosen(maps, generator)
         return torch.where(back, maps.flip(3), maps), torch.where(back.flatten(1), -label, label)
 

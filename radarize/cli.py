@@ -171,7 +171,7 @@ def run_(
     scans: Annotated[
         str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
     ] = None,
-    settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected.")] = None,
+    settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected, or published.")] = None,
     weights: Annotated[
         Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
     ] = None,
@@ -208,6 +208,7 @@ def train(
     workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where a training was stopped.")] = False,
     onnx: Annotated[bool, typer.Option("--onnx", help="Write the network as ONNX as well.")] = False,
+    settings: Annotated[str, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
 ):
     """Train a network on recordings; figures in brackets are the three tasks' defaults.
 
@@ -215,21 +216,19 @@ def train(
     """
     from dataclasses import replace
 
-    from radarize.training.tasks import TASKS
-    from radarize.training.train import train
+    from radarize.training.train import find_task, train
 
-    if task not in TASKS:
-        raise InputError(f"task is {task!r}, expected one of: {', '.join(TASKS)}")
     choices = {
         "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
         "patience": patience, "precision": precision, "seed": seed,
     }  # fmt: skip
-    settings = replace(TASKS[task].defaults, **{name: value for name, value in choices.items() if value is not None})
+    given = {name: value for name, value in choices.items() if value is not None}
+    hyper = replace(find_task(task, settings).defaults, **given)
     try:
         with progress("train") as report:
             written = train(
-                task, data, output, split=split, settings=settings, device=device, workers=workers, resume=resume,
-                onnx=onnx, progress=report, say=lambda line: typer.echo(line, err=True),
+                task, data, output, split=split, settings=hyper, device=device, workers=workers, resume=resume,
+                onnx=onnx, setting=settings, progress=report, say=lambda line: typer.echo(line, err=True),
             )  # fmt: skip
     except KeyboardInterrupt:
         raise InputError("stopped; with --resume the same command goes on after the last whole epoch") from None

@@ -50,22 +50,26 @@ class Task(ABC):
 
     Attributes:
         kind: key of `radarize.nets.NETS`.
+        setting: key of `radarize.settings.SETTINGS`.
         maps: that its network reads.
         truth: that its labels are made of, keys of `radarize.training.table.TRUTH`.
         reach: s, from one frame of a window to the next, at most; None: the very next. Drawn for every item; the
             farthest is what is validated.
+        optimiser: algorithm.
         defaults: settings.
     """
 
     kind: str
+    setting: str = "corrected"
     maps: tuple[str, ...]
     truth: tuple[str, ...]
     reach: float | None = None
+    optimiser: type[torch.optim.Optimizer] = torch.optim.Adam
     defaults: Settings
 
     def net(self, settings: Settings, grid: Grid) -> nn.Module:
         """A network for maps of a grid, with random weights from torch's generator."""
-        return make(self.kind, settings.frames, self.maps, settings.width, grid)
+        return make(self.kind, settings.frames, self.maps, settings.width, grid, self.setting)
 
     def spacings(self, frame_period: float) -> Sequence[int]:
         """Frames from one of a window to the next, for frames that come every `frame_period` (s)."""
@@ -176,9 +180,8 @@ class Rotation(_Motion):
         """Turn (rad) and travel (m): the mean of the velocities at the window's ends times its duration."""
         yaw, velocity = (table.truth[name] for name in self.truth)
         first, last = frames[:, 0], frames[:, -1]
-        turn = torch.remainder(yaw[last] - yaw[first] + torch.pi, 2 * torch.pi) - torch.pi
         duration = (last - first)[:, None] * table.grid.frame_period
-        return torch.cat([turn, duration * (velocity[first] + velocity[last]) / 2], dim=1)
+        return torch.cat([turns(yaw, frames), duration * (velocity[first] + velocity[last]) / 2], dim=1)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         left = augment.chosen(maps, generator)
@@ -215,7 +218,7 @@ class Segmentation(Task):
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         logits = net(maps)
-        found, truth = _first(logits > 0), _first(label == losses.SURFACE)
+        found, truth = first_cell(logits > 0), first_cell(label == losses.SURFACE)
         there = truth < label.shape[1]
         near = ((found - truth).abs() <= self.near) & there
         return torch.stack([losses.surfaces(logits, label), near.sum(dim=1), there.sum(dim=1)], dim=1)
@@ -245,9 +248,15 @@ class Segmentation(Task):
         net.offset.copy_(fit[1].detach())
 
 
-def _first(cells: Tensor) -> Int[Tensor, "item bearing"]:
+def first_cell(cells: Tensor) -> Int[Tensor, "item bearing"]:
     """Range bin of the first true cell per bearing; the number of bins where there is none."""
     return torch.where(cells.any(dim=1), cells.int().argmax(dim=1), cells.shape[1])
+
+
+def turns(yaw: Float[Tensor, "frame 1"], frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item 1"]:
+    """Change of yaw over windows, rad, within half a turn."""
+    turn = yaw[frames[:, -1]] - yaw[frames[:, 0]]
+    return torch.remainder(turn + torch.pi, 2 * torch.pi) - torch.pi
 
 
 #: Tasks by name.

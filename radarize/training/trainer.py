@@ -65,7 +65,7 @@ class Trainer:
             if hasattr(module, "coarse"):
                 module.coarse = settings.precision == "bfloat16"
         self._shared = team.share(self.net)
-        self._optimiser = torch.optim.Adam(self.net.parameters(), settings.rate, settings.betas)
+        self._optimiser = task.optimiser(self.net.parameters(), settings.rate, settings.betas)
         self._schedule = ReduceLROnPlateau(self._optimiser, factor=0.5, patience=settings.plateau)
         self.history: list[dict[str, float]] = []
         self.best: tuple[float, dict[str, Tensor]] = (math.inf, {})

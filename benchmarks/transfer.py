@@ -21,7 +21,7 @@ from radarize.evaluation.likeness import frechet_distance, patch_statistics
 from radarize.importers import import_recording
 from radarize.pipeline import best_methods, run
 from radarize.radar.config import RadarConfig
-from radarize.recording import Recording, RecordingWriter
+from radarize.recording import Recording
 from radarize.training.dataset import recordings
 from radarize.training.maps import MapMaker, maps_of
 from radarsim.calibrate import calibrate
@@ -44,19 +44,13 @@ def captures(source: Path, folder: Path) -> dict[str, Path]:
         folder: where recordings are written.
     """
     pcap = source / "iwr1843-pcap" / "test_one_frame.pcap"
-    stored = np.load(source / "xwr-moving-people" / "doppler_example_1.npy", allow_pickle=False)
-    parts = np.stack([stored.real, stored.imag], axis=-1).astype(np.uint16).view(np.int16)
-    config = RadarConfig(
-        start_frequency=77e9, slope=60.012e12, idle_time=30e-6, adc_start_time=6e-6, ramp_end_time=62e-6, samples=128,
-        sample_rate=2.5e6, loops=128, frame_period=50e-3, tx_order=(0, 2),
-    )  # fmt: skip
-    people = folder / "people.h5"
-    with RecordingWriter(people, config) as writer:
-        writer.append(parts.reshape(1, *config.frame_shape), np.zeros(1))
+    people = source / "xwr-moving-people" / "doppler_example_1.npy"
+    chirps = {"tx": (0, 2), "start_frequency": 77e9, "slope": 60.012e12, "sample_rate": 2.5e6, "idle_time": 30e-6,
+              "ramp_end_time": 62e-6, "adc_start_time": 6e-6}  # fmt: skip
     return {
         "pcap": import_recording(pcap, folder / "pcap.h5", overrides={"samples": 256, "loops": 16, "rx": 1}),
         "studio": import_recording(source / "iwr6843-studio", folder / "studio.h5"),
-        "people": people,
+        "people": import_recording(people, folder / "people.h5", shape="loop,virtual,sample", overrides=chirps),
     }
 
 

@@ -21,6 +21,8 @@ from radarize.training.table import Table
 from radarize.training.tasks import Settings, Task
 from radarize.training.team import Team
 
+#: Norm of the gradient from which it is cut; most are about as large.
+_STEEPEST = 1.0
 #: Share of a cosine schedule in which the rate rises.
 _WARM = 0.05
 
@@ -63,7 +65,7 @@ class Trainer:
             if hasattr(module, "coarse"):
                 module.coarse = settings.precision == "bfloat16"
         self._shared = team.share(self.net)
-        self._optimiser = torch.optim.Adam(self.net.parameters(), settings.rate, settings.betas)
+        self._optimiser = task.optimiser(self.net.parameters(), settings.rate, settings.betas)
         self._schedule = ReduceLROnPlateau(self._optimiser, factor=0.5, patience=settings.plateau)
         self.history: list[dict[str, float]] = []
         self.best: tuple[float, dict[str, Tensor]] = (math.inf, {})
@@ -108,6 +110,8 @@ class Trainer:
                 )
             self._optimiser.zero_grad()
             loss.backward()
+            # A likelihood has no bounds: a single item that a network is wrongly sure of would undo many steps.
+            torch.nn.utils.clip_grad_norm_(self.net.parameters(), _STEEPEST)
             self._optimiser.step()
             total += loss.detach().cpu()
             progress(epoch * self.steps + step + 1, settings.epochs * self.steps)

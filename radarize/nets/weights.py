@@ -109,8 +109,8 @@ class Header(BaseModel):
 
 def make(kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid, setting: str = "corrected") -> nn.Module:
     """An untrained network for maps of a grid."""
-    net = SETTINGS[setting].nets[kind]
-    return net(frames, maps, width, step=grid.step) if kind == "translation" else net(frames, maps, width)
+    scale = {} if kind == "segmentation" else {"step": grid.step}
+    return SETTINGS[setting].nets[kind](frames, maps, width, **scale)
 
 
 def build(header: Header) -> nn.Module:
@@ -201,7 +201,10 @@ def read(path: Path) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
         raise InputError(f"{path}: is no file of weights of this project ({reason})") from error
 
 
-def example(header: Header) -> Float[Tensor, "2 frame map row azimuth"]:
-    """Maps of noise in the shape that a network reads."""
+def example(header: Header) -> tuple[Tensor, ...]:
+    """What a network reads, twice: maps of noise, and for turns of setting `corrected` a travel."""
     noise = torch.Generator().manual_seed(0)
-    return 10 * torch.randn(2, header.frames, len(header.maps), header.grid.rows, header.grid.azimuths, generator=noise)
+    shape = (2, header.frames, len(header.maps), header.grid.rows, header.grid.azimuths)
+    maps = 10 * torch.randn(shape, generator=noise)
+    told = header.kind == "rotation" and header.setting == "corrected"
+    return (maps, 0.1 * torch.randn((2, 2), generator=noise)) if told else (maps,)

@@ -151,7 +151,7 @@ def _read(
         parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
     else:
         parts = [recordings(data, split, part) for part in ("train", "validation")]
-    table = Table.read(parts[0] + parts[1], task.maps, (task.truth,), workers, progress, task.setting)
+    table = Table.read(parts[0] + parts[1], task.maps, task.truth, workers, progress, task.setting)
     return table.divide(len(parts[0]))
 
 

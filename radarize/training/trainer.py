@@ -108,6 +108,7 @@ class Trainer:
                 )
             self._optimiser.zero_grad()
             loss.backward()
+            torch.nn.utils.clip_grad_norm_(self.net.parameters(), self.task.steepest)
             self._optimiser.step()
             total += loss.detach().cpu()
             progress(epoch * self.steps + step + 1, settings.epochs * self.steps)

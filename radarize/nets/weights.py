@@ -109,7 +109,7 @@ class Header(BaseModel):
 
 def make(kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid, setting: str = "corrected") -> nn.Module:
     """An untrained network for maps of a grid."""
-    scale = {"step": grid.step} if setting == "corrected" and kind != "segmentation" else {}
+    scale = {} if kind == "segmentation" else {"step": grid.step}
     return SETTINGS[setting].nets[kind](frames, maps, width, **scale)
 
 
@@ -202,8 +202,9 @@ def read(path: Path) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
 
 
 def example(header: Header) -> tuple[Tensor, ...]:
-    """What a network reads, twice: maps of noise, and for turns a travel."""
+    """What a network reads, twice: maps of noise, and for turns of setting `corrected` a travel."""
     noise = torch.Generator().manual_seed(0)
     shape = (2, header.frames, len(header.maps), header.grid.rows, header.grid.azimuths)
     maps = 10 * torch.randn(shape, generator=noise)
-    return (maps, 0.1 * torch.randn((2, 2), generator=noise)) if header.kind == "rotation" else (maps,)
+    told = header.kind == "rotation" and header.setting == "corrected"
+    return (maps, 0.1 * torch.randn((2, 2), generator=noise)) if told else (maps,)

@@ -34,18 +34,26 @@ class Attention(nn.Module):
 class PublishedMotionNet(nn.Module):
     """What the two have in common.
 
+    Args:
+        frames: of a window.
+        maps: names of a frame's maps.
+        width: of the ResNet.
+        step: is not used; the default setting's networks need to know it.
+
     Attributes:
-        kind, dimensions: set by the subclass.
+        kind, dimensions, pool: set by the subclass; the last as of `ResNet18`.
         error: mean squared error on validation data.
     """
 
     kind: str
     dimensions: int
 
-    def __init__(self, frames: int, maps: Sequence[str], width: int, pool: bool):
+    pool: bool
+
+    def __init__(self, frames: int, maps: Sequence[str], width: int = 64, step: float | None = None):
         super().__init__()
         self.frames, self.maps, self.width = frames, tuple(maps), width
-        self.resnet = ResNet18(frames * len(self.maps), self.dimensions, width, pool=pool)
+        self.resnet = ResNet18(frames * len(self.maps), self.dimensions, width, pool=self.pool)
         self.register_buffer("error", torch.ones(self.dimensions))
 
     def forward(self, maps: Maps) -> Float[Tensor, "item dimension"]:
@@ -59,19 +67,16 @@ class PublishedMotionNet(nn.Module):
 class PublishedTranslationNet(PublishedMotionNet):
     """Doppler-azimuth maps of both arrays to the velocity (forward, left), m/s, since the frame before."""
 
-    kind, dimensions = "translation", 2
-
-    def __init__(self, frames: int, maps: Sequence[str], width: int = 64, step: float | None = None):
-        super().__init__(frames, maps, width, pool=True)
+    kind, dimensions, pool = "translation", 2, True
 
 
 class PublishedRotationNet(PublishedMotionNet):
     """Range-azimuth maps of one, three and five frames, at two instants, to the turn between them, rad."""
 
-    kind, dimensions = "rotation", 1
+    kind, dimensions, pool = "rotation", 1, False
 
-    def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
-        super().__init__(frames, maps, width, pool=False)
+    def __init__(self, frames: int, maps: Sequence[str], width: int = 64, step: float | None = None):
+        super().__init__(frames, maps, width)
         for module in self.resnet.modules():
             if isinstance(module, Block):
                 module.body.append(Attention(module.body[-1].num_features))

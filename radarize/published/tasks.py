@@ -1,6 +1,7 @@
 """The artefact's trainings, where they differ from `radarize.training.tasks`: plain errors instead of likelihoods, its
 labels, its augmentations."""
 
+import math
 from collections.abc import Iterable
 
 import torch
@@ -11,7 +12,7 @@ from radarize.nets.maps import Maps
 from radarize.published.heatmaps import PublishedMaps
 from radarize.training import augment
 from radarize.training.table import Table
-from radarize.training.tasks import Rotation, Segmentation, Settings, Translation, first_cell, turns
+from radarize.training.tasks import Motion, Rotation, Segmentation, Settings, Translation, first_cell, turns
 
 _DOPPLER, _RANGE, _LEVEL = (
     tuple(name for name in PublishedMaps.maps if name.startswith(f"published_{kind}"))
@@ -19,10 +20,10 @@ _DOPPLER, _RANGE, _LEVEL = (
 )
 
 
-class _Plain:
-    """Of motion: networks without uncertainty, judged by their squared errors."""
+class Plain(Motion):
+    """Networks without uncertainty, judged by their squared errors."""
 
-    setting = "published"
+    setting, steepest = "published", math.inf
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Keep the validation error as everyone's."""
@@ -30,9 +31,10 @@ class _Plain:
         net.error.copy_(squared.mean(dim=0).clamp_min(1e-6))
 
 
-class PublishedTranslation(_Plain, Translation):
+class PublishedTranslation(Plain):
     """Velocity since the frame before, m/s."""
 
+    kind, error, size = Translation.kind, Translation.error, Translation.size
     maps, truth = _DOPPLER, ("published_velocity",)
     defaults = Settings(width=64, frames=1, patience=30)
 
@@ -55,16 +57,16 @@ class PublishedTranslation(_Plain, Translation):
         return found | {"loss": found["loss"] ** 0.5}
 
 
-class PublishedRotation(_Plain, Rotation):
+class PublishedRotation(Plain):
     """Turn over one to four frames of 15 Hz, rad."""
 
+    kind, error, size, reach = Rotation.kind, Rotation.error, Rotation.size, Rotation.reach
     maps, truth = _RANGE, ("yaw",)
     optimiser = torch.optim.AdamW
     defaults = Settings(width=64, patience=30)
 
     def label(self, table: Table, frames: Tensor) -> Tensor:
-        """Turns; the artefact's network is told of no travel."""
-        return turns(table.truth["yaw"], frames)
+        return turns(table, frames)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         """Half of the items are swapped in time; none are mirrored."""
@@ -85,7 +87,7 @@ class PublishedRotation(_Plain, Rotation):
 class PublishedSegmentation(Segmentation):
     """Occupancy of the depth picture's slab."""
 
-    setting = "published"
+    setting, steepest = "published", math.inf
     maps, truth = _RANGE + _LEVEL, ("published_occupancy",)
     defaults = Settings(width=64, frames=1, epochs=5, batch=48, rate=1e-4, betas=(0.8, 0.9))
 

@@ -56,6 +56,8 @@ class Task(ABC):
         reach: s, from one frame of a window to the next, at most; None: the very next. Drawn for every item; the
             farthest is what is validated.
         optimiser: algorithm.
+        steepest: norm of the gradient from which it is cut; most are about as large. A likelihood has no bounds: a
+            single item that a network is wrongly sure of would undo many steps.
         defaults: settings.
     """
 
@@ -65,6 +67,7 @@ class Task(ABC):
     truth: tuple[str, ...]
     reach: float | None = None
     optimiser: type[torch.optim.Optimizer] = torch.optim.Adam
+    steepest: float = 1.0
     defaults: Settings
 
     def net(self, settings: Settings, grid: Grid) -> nn.Module:
@@ -106,7 +109,7 @@ class Task(ABC):
         """Make a trained network's uncertainty honest on validation data, which is gone through once."""
 
 
-class _Motion(Task):
+class Motion(Task):
     """Velocity or turn.
 
     Attributes:
@@ -141,7 +144,7 @@ class _Motion(Task):
         net.spread.fill_(0.5 * normalised.mean().log())
 
 
-class Translation(_Motion):
+class Translation(Motion):
     """Velocity, m/s."""
 
     kind, truth = "translation", ("velocity",)
@@ -162,7 +165,7 @@ class Translation(_Motion):
         return losses.likelihood(net(maps), label.repeat(2, 1)).unflatten(0, (2, -1)).mean(dim=0)
 
 
-class Rotation(_Motion):
+class Rotation(Motion):
     """Turn, rad, over up to 0.27 s: the paper's 4 frames of 15 Hz.
 
     Labels are turn and travel; the latter is what the network is told, off by as much as velocities are in use.
@@ -178,10 +181,9 @@ class Rotation(_Motion):
 
     def label(self, table: Table, frames: Tensor) -> Float[Tensor, "item 3"]:
         """Turn (rad) and travel (m): the mean of the velocities at the window's ends times its duration."""
-        yaw, velocity = (table.truth[name] for name in self.truth)
-        first, last = frames[:, 0], frames[:, -1]
+        velocity, first, last = table.truth["velocity"], frames[:, 0], frames[:, -1]
         duration = (last - first)[:, None] * table.grid.frame_period
-        return torch.cat([turns(yaw, frames), duration * (velocity[first] + velocity[last]) / 2], dim=1)
+        return torch.cat([turns(table, frames), duration * (velocity[first] + velocity[last]) / 2], dim=1)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         left = augment.chosen(maps, generator)
@@ -248,15 +250,15 @@ class Segmentation(Task):
         net.offset.copy_(fit[1].detach())
 
 
+def turns(table: Table, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item 1"]:
+    """Change of yaw from the first frame of windows to the last, rad."""
+    yaw = table.truth["yaw"]
+    return torch.remainder(yaw[frames[:, -1]] - yaw[frames[:, 0]] + torch.pi, 2 * torch.pi) - torch.pi
+
+
 def first_cell(cells: Tensor) -> Int[Tensor, "item bearing"]:
     """Range bin of the first true cell per bearing; the number of bins where there is none."""
     return torch.where(cells.any(dim=1), cells.int().argmax(dim=1), cells.shape[1])
-
-
-def turns(yaw: Float[Tensor, "frame 1"], frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item 1"]:
-    """Change of yaw over windows, rad, within half a turn."""
-    turn = yaw[frames[:, -1]] - yaw[frames[:, 0]]
-    return torch.remainder(turn + torch.pi, 2 * torch.pi) - torch.pi
 
 
 #: Tasks by name.

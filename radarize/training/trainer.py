@@ -21,8 +21,6 @@ from radarize.training.table import Table
 from radarize.training.tasks import Settings, Task
 from radarize.training.team import Team
 
-#: Norm of the gradient from which it is cut; most are about as large.
-_STEEPEST = 1.0
 #: Share of a cosine schedule in which the rate rises.
 _WARM = 0.05
 
@@ -110,8 +108,7 @@ class Trainer:
                 )
             self._optimiser.zero_grad()
             loss.backward()
-            # A likelihood has no bounds: a single item that a network is wrongly sure of would undo many steps.
-            torch.nn.utils.clip_grad_norm_(self.net.parameters(), _STEEPEST)
+            torch.nn.utils.clip_grad_norm_(self.net.parameters(), self.task.steepest)
             self._optimiser.step()
             total += loss.detach().cpu()
             progress(epoch * self.steps + step + 1, settings.epochs * self.steps)

@@ -155,7 +155,7 @@ def networks(folder, width=2, config=CONFIG):
         )  # fmt: skip
         torch.manual_seed(3)
         net = build(header)
-        net(example(header) / 10)  # moves the batch normalisation's statistics
+        net(example(header)[0] / 10)  # moves the batch normalisation's statistics
         save(net.eval(), header, folder / f"{kind}.safetensors")
     return folder
 

@@ -245,8 +245,9 @@ def test_frames_keep_their_period_and_chirps_theirs(tmp_path):
     chirp = within // (CONFIG.frame_bytes // 96)
     due = frame * CONFIG.frame_period + (chirp + 1) * CONFIG.chirp_time
     behind = np.array(arrivals) - due
-    # The median packet: a busy machine holds some up, and shifts all that follow by what it reports.
-    assert np.ptp(np.median(behind.reshape(-1)[: len(behind) // 4 * 4].reshape(4, -1), axis=1)) < 0.01 + slipped
+    # A busy machine holds packets up, but none is early: the most punctual ones of each quarter tell the radar's clock.
+    quarters = behind[: len(behind) // 4 * 4].reshape(4, -1).min(axis=1)
+    assert np.ptp(quarters) < 5e-3 + slipped
     assert np.diff(arrivals).max() > CONFIG.frame_period - CONFIG.burst_time - 5e-3  # the pause between frames
 
 

@@ -66,7 +66,7 @@ def test_throughput_is_the_data_sheets(delay, megabits):
     times = [time for time, _ in wire.sent]
     rate = 8 * 1466 / np.diff(times).mean() / 1e6
     assert rate == pytest.approx(megabits, rel=0.04)
-    assert np.ptp(np.diff(times)) < 1e-9
+    assert np.diff(times).max() < 2e-4  # one by one or, where that is shorter than a nap, a few together
 
 
 def test_packets_disregard_frames_and_count_from_the_start():

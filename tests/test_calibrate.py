@@ -15,7 +15,6 @@ from radarsim.physics.frontend_config import Band, FrontEndConfig, Leakage, Mism
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.synthesis import Synthesizer
 from radarsim.simulate import simulate
-from tests.importers.conftest import recordings  # noqa: F401
 from tests.physics.rigs import Rig, polar
 
 CONFIG = PRESETS["radarize"]

@@ -98,7 +98,13 @@ class Emulator:
 
     @property
     def ready(self) -> int:
-        """Frames made ahead."""
+        """Frames made ahead.
+
+        Raises:
+            InputError: the source has failed.
+        """
+        if self._feed.failure:
+            raise self._feed.failure
         return self._feed.waiting
 
     # --- what the command line acts on --------------------------------------------------------------------------------
@@ -145,7 +151,7 @@ class Emulator:
             self._feed.close()
             self._feed = self._feeding(config)
         deadline = time.monotonic() + _PREPARATION
-        while not self._feed.waiting:
+        while not self.ready:
             if self._closed.wait(_IDLE) or time.monotonic() > deadline:
                 raise InputError(f"the source gave no frame within {_PREPARATION:g} s")
 

@@ -18,10 +18,14 @@ class Feed:
         source: gives the frames.
         config: to make them for.
         ahead: how many frames may wait; then the source does.
+
+    Attributes:
+        failure: why the source gives no more frames, if it failed.
     """
 
     def __init__(self, source: Source, config: RadarConfig, ahead: int):
         self.config = config
+        self.failure: InputError | None = None
         context = get_context("spawn")
         receiver, sender = context.Pipe(duplex=False)
         self._process = context.Process(target=_produce, args=(source, config, sender), daemon=True)
@@ -67,8 +71,10 @@ class Feed:
             while isinstance(item, bytes) and not self._closed.is_set():
                 try:
                     item = receiver.recv()
-                except EOFError:
+                except (EOFError, OSError):  # perhaps in the middle of a frame
                     item = InputError("the process that makes frames has died")
+                if isinstance(item, InputError) and not self._closed.is_set():
+                    self.failure = item
                 while not self._closed.is_set():
                     try:
                         self._frames.put(item, timeout=0.1)

@@ -91,7 +91,10 @@ class Walk:
     loop: bool = False
 
     def expected(self) -> RadarConfig:
-        """The preset's, or the file's."""
+        """The preset's, or the file's; refuses a scene that is not there."""
+        from radarsim.scene.description import find
+
+        find(self.scene)
         return load_config(self.radar)[0]
 
     def check(self, config: RadarConfig) -> None:

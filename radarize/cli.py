@@ -136,6 +136,54 @@ def capture(
     _tell(output)
 
 
+@app.command()
+def live(
+    replay: Annotated[Path | None, typer.Option(metavar="REC.h5", help="Play a recording instead of a radar.")] = None,
+    config: RadarFile = None,
+    port: PortName = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Record as well (.h5).")] = None,
+    baud: Baud = 115200,
+    host: Host = "192.168.33.30",
+    dca: Dca = "192.168.33.180",
+    command_port: CommandPort = 4096,
+    data_port: DataPort = 4098,
+    duration: Duration = None,
+    frames: FrameCount = None,
+    odometry: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
+    scans: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
+    address: Annotated[str, typer.Option(help="Where to show the page; port 0 is any.")] = "127.0.0.1:8470",
+):
+    """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
+    from contextlib import ExitStack
+
+    from radarize.capture.live import Live, prepare
+    from radarize.capture.page import Page
+    from radarize.capture.replay import Replay
+    from radarize.pipeline import Pipeline, best_methods
+    from radarize.recording import RecordingWriter
+
+    if replay and (config or port):
+        raise InputError(f"--replay {replay} is given with --config or --port, expected one of the two")
+    stream = Replay(replay) if replay else _sensor(config, port, baud, host, dca, command_port, data_port)
+    radar, methods = stream.config, best_methods(stream.config)[0]
+    chosen = {"odometry": odometry or methods["odometry"], "scans": scans or methods["scans"]}
+    with until_interrupted() as stopping, ExitStack() as stack:
+        with working("warming up"):
+            pipeline = prepare(radar, lambda: Pipeline(radar, **chosen))
+        live = Live(pipeline, stack.enter_context(Page(address)))
+        report = stack.enter_context(progress("live"))
+        stack.enter_context(stream)
+        print(f"page: {live.page.url}", flush=True)
+        writer = stack.enter_context(RecordingWriter(output, radar, attributes=stream.facts)) if output else None
+        most = _frames_within(duration, frames, radar.frame_period)
+        live.run(stream, stopping, frames=most, writer=writer, progress=report)
+        if writer:
+            writer.annotate(warnings="; ".join(stream.troubles() + writer.losses.warnings()))
+    for words in stream.troubles() + live.losses.warnings():
+        typer.echo(f"warning: {words}", err=True)
+    print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
+
+
 def _sensor(config: str | None, port: str | None, baud: int, *network):
     """The sensor that the options of `capture` and `live` describe."""
     from radarize.capture.board import Network

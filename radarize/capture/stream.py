@@ -1,5 +1,6 @@
 """Frames from a process of their own, so that nothing the main one does makes it miss a packet."""
 
+import contextlib
 import signal
 import time
 from collections.abc import Callable, Iterator
@@ -122,8 +123,9 @@ class Stream:
         found = self.ring.get(most, patience)
         if found is not None and (len(found) or self._process.is_alive()):
             return found
-        if self._failure.poll():
-            raise InputError(self._failure.recv())
+        with contextlib.suppress(EOFError):
+            if self._failure.poll():
+                raise InputError(self._failure.recv())
         if found is not None:
             raise InputError(f"the receiving process has died (exit code {self._process.exitcode})")
         return None

@@ -147,6 +147,8 @@ def _geometry(config: RadarConfig) -> tuple[np.ndarray, np.ndarray, float, float
     return positions[:, 1].copy(), 4 * np.pi / config.wavelength * delay, height, config.velocity_resolution
 
 
+#: m/s, what nobody walks: keeps the fit regular where all echoes come from one direction.
+UNKNOWN_SPEED = 10.0
 #: A weaker peak beside a stronger one of the same range and Doppler may be its sidelobe (-25 dB, and mismatch).
 SIDELOBE = 0.1
 
@@ -262,6 +264,7 @@ def _fit(echoes, draws, noise, inlier, span):
     scale, inliers = 1.0, 0
     for iteration in range(8):
         normal[:] = 0.0
+        normal[0, 0] = normal[1, 1] = 1 / UNKNOWN_SPEED**2
         normal[2, 2] = 1 / climb**2
         right = np.zeros(3)
         squares, weights, inliers = 0.0, 0.0, 0

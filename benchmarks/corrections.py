@@ -325,7 +325,7 @@ def main() -> None:
         notes=[
             "Each line is the default pipeline without and with one correction. Errors are root mean squares unless "
             "said otherwise; point targets are at 2.5 m, 20 counts of noise under 1000 of signal.",
-            f"Walk: {path.stem}, ego-velocity on its first 4 s; levelling: {SCENE}, {PLATFORM}, {options.duration:g} s.",
+            f"Walk: {path.stem}, ego-velocity on its first 4 s; levels: {SCENE}, {PLATFORM}, {options.duration:g} s.",
             "Zero where the correction takes the truth itself.",
         ],
     )

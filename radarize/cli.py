@@ -5,13 +5,23 @@ from typing import Annotated, Literal
 
 import typer
 
-from radarize.console import keeping, new_app, progress, run, working
+from radarize.console import keeping, new_app, progress, run, until_interrupted, working
 from radarize.errors import InputError
 
 app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
 
 RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="A recording.")]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
+Beside = Annotated[list[Path] | None, typer.Option(help="Another run of the same recording; may be repeated.")]
+RadarFile = Annotated[str | None, typer.Option("--config", help="A .cfg or a preset's name.")]
+PortName = Annotated[str | None, typer.Option("--port", help="The radar's serial command port.")]
+Baud = Annotated[int, typer.Option(help="Of the command port.")]
+Host = Annotated[str, typer.Option(help="This computer's address, which the DCA1000 sends to.")]
+Dca = Annotated[str, typer.Option(help="The DCA1000's address.")]
+CommandPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of the DCA1000's commands.")]
+DataPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of its samples.")]
+Duration = Annotated[float | None, typer.Option(min=0.0, help="End after so many seconds.")]
+FrameCount = Annotated[int | None, typer.Option(min=1, help="End after so many frames.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 
@@ -28,10 +38,22 @@ def _antennas(text: str | None, option: str) -> int | tuple[int, ...] | None:
 
 @app.command("import")
 def import_(
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help=".bin, .pcap, or a folder of mmWave Studio.")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), or "
+            "an array of samples (.npy, .npz, .mat).",
+        ),
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
     config: Annotated[str | None, typer.Option(help="A .cfg, a .mmwave.json or a preset's name.")] = None,
     poses: Annotated[Path | None, typer.Option(help="True poses of the sensor (TUM).")] = None,
+    shape: Annotated[
+        str | None, typer.Option(metavar="AXES", help="Of an array: frame,loop,tx,rx,sample in its order, or lengths.")
+    ] = None,
+    variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
+    latency: Annotated[float, typer.Option(help="From a frame's start to its receipt in a bag, s.")] = 0.0,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -66,7 +88,6 @@ def import_(
     }
     overrides = {name: value for name, value in fields.items() if value is not None}
     from radarize.importers import import_recording
-    from radarize.recording import Recording
 
     radar, cfg_text = None, ""
     if config is not None:
@@ -75,13 +96,110 @@ def import_(
         radar, cfg_text = load_config(config)
     with keeping(output), progress("import") as report:
         written = import_recording(
-            source, output, config=radar, cfg_text=cfg_text, poses=poses, overrides=overrides, progress=report
-        )
+            source, output, config=radar, cfg_text=cfg_text, poses=poses, shape=shape, variable=variable,
+            latency=latency, overrides=overrides, progress=report,
+        )  # fmt: skip
+    _tell(written)
+
+
+def _tell(written: Path) -> None:
+    """How many frames a new recording has, and what its attributes warn of."""
+    from radarize.recording import Recording
+
     with Recording(written) as recording:
-        for name in ("warnings", "assumed"):
+        for name in ("warnings", "assumed", "found"):
             if text := recording.attributes.get(name):
                 typer.echo(f"{name}: {text}", err=True)
         print(f"{written}: {len(recording)} frames")
+
+
+@app.command()
+def capture(
+    output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
+    config: RadarFile = None,
+    port: PortName = None,
+    baud: Baud = 115200,
+    host: Host = "192.168.33.30",
+    dca: Dca = "192.168.33.180",
+    command_port: CommandPort = 4096,
+    data_port: DataPort = 4098,
+    duration: Duration = None,
+    frames: FrameCount = None,
+):
+    """Record a real radar: IWR1843BOOST with a DCA1000. Ctrl-C ends it and leaves a whole file."""
+    from radarize.capture.record import record
+
+    sensor = _sensor(config, port, baud, host, dca, command_port, data_port)
+    most = _frames_within(duration, frames, sensor.config.frame_period)
+    with until_interrupted() as stopping, progress("capture") as report, sensor:
+        record(sensor, output, stopping, text=sensor.text, frames=most, attributes=sensor.facts, progress=report)
+    _tell(output)
+
+
+@app.command()
+def live(
+    replay: Annotated[Path | None, typer.Option(metavar="REC.h5", help="Play a recording instead of a radar.")] = None,
+    config: RadarFile = None,
+    port: PortName = None,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Record as well (.h5).")] = None,
+    baud: Baud = 115200,
+    host: Host = "192.168.33.30",
+    dca: Dca = "192.168.33.180",
+    command_port: CommandPort = 4096,
+    data_port: DataPort = 4098,
+    duration: Duration = None,
+    frames: FrameCount = None,
+    odometry: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
+    scans: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
+    address: Annotated[str, typer.Option(help="Where to show the page; port 0 is any.")] = "127.0.0.1:8470",
+):
+    """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
+    from contextlib import ExitStack
+
+    from radarize.capture.live import Live, prepare
+    from radarize.capture.page import Page
+    from radarize.capture.replay import Replay
+    from radarize.pipeline import Pipeline, best_methods
+    from radarize.recording import RecordingWriter
+
+    if replay and (config or port):
+        raise InputError(f"--replay {replay} is given with --config or --port, expected one of the two")
+    stream = Replay(replay) if replay else _sensor(config, port, baud, host, dca, command_port, data_port)
+    radar, methods = stream.config, best_methods(stream.config)[0]
+    chosen = {"odometry": odometry or methods["odometry"], "scans": scans or methods["scans"]}
+    with until_interrupted() as stopping, ExitStack() as stack:
+        with working("warming up"):
+            pipeline = prepare(radar, lambda: Pipeline(radar, **chosen))
+        live = Live(pipeline, stack.enter_context(Page(address)))
+        report = stack.enter_context(progress("live"))
+        stack.enter_context(stream)
+        print(f"page: {live.page.url}", flush=True)
+        writer = stack.enter_context(RecordingWriter(output, radar, attributes=stream.facts)) if output else None
+        most = _frames_within(duration, frames, radar.frame_period)
+        live.run(stream, stopping, frames=most, writer=writer, progress=report)
+        if writer:
+            writer.annotate(warnings="; ".join(stream.troubles() + writer.losses.warnings()))
+    for words in stream.troubles() + live.losses.warnings():
+        typer.echo(f"warning: {words}", err=True)
+    print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
+
+
+def _sensor(config: str | None, port: str | None, baud: int, *network):
+    """The sensor that the options of `capture` and `live` describe."""
+    from radarize.capture.board import Network
+    from radarize.capture.sensor import Sensor
+    from radarize.radar.cfg import load_config
+
+    for name, value in (("--config", config), ("--port", port)):
+        if value is None:
+            raise InputError(f"{name} is missing, expected {'a .cfg or a preset' if name == '--config' else 'a TTY'}")
+    radar, text = load_config(config)
+    return Sensor(radar, text, config, port, baud=baud, network=Network(*network))
+
+
+def _frames_within(duration: float | None, frames: int | None, period: float) -> int | None:
+    limits = [frames, None if duration is None else max(round(duration / period), 1)]
+    return min((limit for limit in limits if limit is not None), default=None)
 
 
 @app.command()
@@ -97,10 +215,14 @@ def info(recording: RecordingFile, as_json: AsJson = False):
 def run_(
     recording: RecordingFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
-    odometry: Annotated[str | None, typer.Option(help="Where the motion comes from: doppler.")] = None,
-    scans: Annotated[str | None, typer.Option(help="How scans are made: elevation-aware, first-echo...")] = None,
+    odometry: Annotated[str | None, typer.Option(help="Where motion comes from: fused, learned or doppler.")] = None,
+    scans: Annotated[
+        str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
+    ] = None,
     settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected, or published.")] = None,
-    weights: Annotated[Path | None, typer.Option(help="Folder of networks' weights; else the shipped ones.")] = None,
+    weights: Annotated[
+        Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
+    ] = None,
 ):
     """Estimate trajectory and map of a recording."""
     from radarize.pipeline import run
@@ -188,27 +310,50 @@ def slam(
 @app.command()
 def evaluate(
     run: RunFolder,
+    beside: Beside = None,
     reference: Annotated[Path | None, typer.Option(help="True poses (TUM); by default the run's own.")] = None,
     as_json: AsJson = False,
 ):
     """Compare a run with the truth; writes metrics.json."""
+    from radarize.evaluation import comparison
     from radarize.evaluation.evaluate import evaluate, show
 
     with working("evaluating"):
         metrics = evaluate(run, reference)
+        rows = comparison.compare([run, *beside], reference) if beside else []
     _print_json(metrics) if as_json else show(metrics)
+    if rows and not as_json:
+        comparison.show(rows)
+
+
+@app.command()
+def export(
+    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File or, of a bag, folder to write.")],
+    format: Annotated[
+        str, typer.Option(help="bin (DCA1000 and .cfg), ros2 (a bag), tum (poses) or map (for map_server).")
+    ],
+    run: Annotated[Path | None, typer.Option(help="Run of the recording, for scans and odometry in the bag.")] = None,
+):
+    """Write a recording or a run for other programs."""
+    from radarize.exporters import export
+
+    with progress("export") as report:
+        written = export(source, format, output, run=run, progress=report)
+    print(written)
 
 
 @app.command()
 def report(
     source: Annotated[Path, typer.Argument(metavar="RUN|REC.h5", help="A run's folder, or a recording.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (.html).")] = None,
+    beside: Beside = None,
 ):
     """Draw a run or a recording as one HTML page."""
     from radarize.evaluation.report import report_recording, report_run
 
     with working("drawing"):
-        written = report_run(source, output) if source.is_dir() else report_recording(source, output)
+        written = report_run(source, output, beside or ()) if source.is_dir() else report_recording(source, output)
     print(written)
 
 

@@ -1,7 +1,9 @@
 """What both command lines share: errors as one sentence, progress bars, and what an interrupt leaves behind."""
 
 import errno
+import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -110,6 +112,25 @@ def working(label: str) -> Iterator[None]:
 
     with Console(stderr=True).status(label):
         yield
+
+
+@contextmanager
+def until_interrupted() -> Iterator[threading.Event]:
+    """An event that the first Ctrl-C, or a request to terminate, sets; a second one interrupts as usual."""
+    asked = threading.Event()
+    signals = (signal.SIGINT, signal.SIGTERM)
+
+    def note(number, frame) -> None:
+        if asked.is_set():
+            raise KeyboardInterrupt
+        asked.set()
+
+    before = {number: signal.signal(number, note) for number in signals}
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @contextmanager

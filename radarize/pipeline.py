@@ -34,6 +34,9 @@ SCANS = ("segmentation", *METHODS)
 CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
 #: Methods of choice.
 BEST = {"odometry": "fused", "scans": "segmentation"}
+#: A frame with a smaller share of its chirps is left out. On a simulated walk, with the rest of each burst lost, 95 %
+#: of Doppler velocities are within 0.02 m/s from whole bursts, 0.06 m/s from an eighth, 0.21 m/s from a sixteenth.
+LEAST_SHARE = 1 / 8
 #: Frames a batch: enough to vectorise over, few enough to stay in cache.
 BATCH = 16
 #: Heat maps kept for the report, spread over the recording.
@@ -42,6 +45,9 @@ _PICTURES = 6
 
 class Pipeline:
     """Radar SLAM as a stream: push raw frames, then read trajectory and map. Memory grows with the path, not the data.
+
+    Lost chirps weigh nothing. Frames that are lost as a whole, or nearly, leave a gap, over which odometry takes motion
+    to change evenly; `frames` says which ones are left.
 
     Args:
         config: radar configuration.
@@ -66,13 +72,14 @@ class Pipeline:
             raise InputError(f"scans is {scans!r}, expected one of {', '.join(SCANS)}")
         weights = weights or Weights()
         self.config, self.scans, self.chain = config, scans, chain
-        self.stride = chain.stride if chain else 1  # frames from one with a pose to the next
-        self.maker = MapMaker(config)
+        self.maker = MapMaker(config, stage=self._stage)
         self.odometry = make_odometry(odometry, self.maker, weights)
         self.segmentation = Segmentation(self.maker, weights.of("segmentation")) if scans == "segmentation" else None
         self.heatmaps = self.odometry.heatmaps
         self.scan_config = ScanConfig()
         self.slam = Slam(SlamConfig.preset("radar"))
+        self.pushed = 0
+        self.frames: list[np.ndarray] = []  # numbers of those used, counted as pushed
         self.times: list[np.ndarray] = []
         self.poses: list[np.ndarray] = []
         self.velocities: list[np.ndarray] = []
@@ -89,7 +96,19 @@ class Pipeline:
             times: (frame,) stamps, s.
             valid: (frame, loop, tx), False where a chirp was lost.
         """
-        track, ranges = self.chain.push(adc, times, self._stage) if self.chain else self._follow(adc, times, valid)
+        numbers = self.pushed + np.arange(len(times))
+        self.pushed += len(times)
+        if self.chain:
+            used = numbers % self.chain.stride == 0
+            track, ranges = self.chain.push(adc, times, self._stage)
+        else:
+            used = np.ones(len(times), bool) if valid is None else valid.mean(axis=(1, 2)) >= LEAST_SHARE
+            if not used.all():
+                adc, times, valid = adc[used], times[used], valid[used]
+            if not len(times):
+                return
+            track, ranges = self._follow(adc, times, valid)
+        self.frames.append(numbers[used])
         with self._stage("slam"):
             for instant, pose, spread, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):
                 self.slam.add_odometry(instant, pose, spread)
@@ -135,9 +154,11 @@ class Pipeline:
 
     @contextmanager
     def _stage(self, name: str) -> Iterator[None]:
-        start = clock.perf_counter()
+        """Time a step; what steps within it take is theirs."""
+        start, others = clock.perf_counter(), sum(self.stage_seconds.values())
         yield
-        self.stage_seconds[name] += clock.perf_counter() - start
+        within = sum(self.stage_seconds.values()) - others
+        self.stage_seconds[name] += clock.perf_counter() - start - within
 
 
 def best_methods(config: RadarConfig) -> tuple[dict[str, str], str]:
@@ -202,6 +223,8 @@ def run(
             pipeline.push(adc, source.times[frames], source.valid(frames.start, frames.stop))
             if progress:
                 progress(frames.stop, len(source))
+        if not pipeline.times:
+            raise InputError(f"{recording}: all its {len(source)} frames are lost, expected at least one with samples")
         pipeline.finish()
         output.mkdir(parents=True, exist_ok=True)
         methods = {"odometry": odometry, "scans": scans, "settings": settings, "no_networks": why}
@@ -232,7 +255,9 @@ def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[st
     slam_times, slam_poses = pipeline.slam.trajectory()
     write_tum(output / "trajectory.tum", slam_times, planar_poses(slam_poses))
     if source.has("truth/pose") and source.has("truth/time"):
-        write_tum(output / "reference.tum", source.read("truth/time"), source.read("truth/pose"))
+        true_times, true_poses = source.read("truth/time"), source.read("truth/pose")
+        known = np.isfinite(true_poses).all(axis=1)  # a tracking camera may have been blind for a while
+        write_tum(output / "reference.tum", true_times[known], true_poses[known])
     pipeline.slam.map().save(output / "map")
     _write_scans(pipeline, source, output / "scans.h5", times)
     frames = len(source)
@@ -240,6 +265,7 @@ def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[st
         "recording": source.path.name,
         "recording_attributes": {k: v for k, v in source.attributes.items() if isinstance(v, (str, int, float))},
         "frames": frames,
+        "frames_lost": pipeline.pushed - frames,
         "duration_s": float(times[-1] - times[0] + source.config.frame_period),
         "methods": methods,
         "radar": source.config_json(),
@@ -257,6 +283,7 @@ def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[st
 
 
 def _write_scans(pipeline: Pipeline, source: Recording, path: Path, times: np.ndarray) -> None:
+    used = np.concatenate(pipeline.frames)
     with h5py.File(path, "w") as file:
 
         def put(name: str, data: np.ndarray, unit: str) -> None:
@@ -270,17 +297,17 @@ def _write_scans(pipeline: Pipeline, source: Recording, path: Path, times: np.nd
         put("step_covariance", np.concatenate(pipeline.step_covariances), "m^2, m rad, rad^2: of odometry since before")
         for name in ("velocity", "scan", "scan_azimuths", "floor_plan", "pose", "time"):
             if source.has(f"truth/{name}"):
-                rows = slice(None, None, 1 if name in ("scan_azimuths", "floor_plan") else pipeline.stride)
-                unit = str(source.describe(f"truth/{name}")["unit"])
-                put(f"truth/{name}", source.read(f"truth/{name}")[rows], unit)
-        shown = np.unique(np.linspace(0, len(source) - 1, _PICTURES).astype(int))
+                truth = source.read(f"truth/{name}")
+                truth = truth[used] if name in ("velocity", "scan") else truth  # a row for every frame
+                put(f"truth/{name}", truth, str(source.describe(f"truth/{name}")["unit"]))
+        shown = np.unique(np.linspace(0, len(used) - 1, _PICTURES).astype(int))
         maps = pipeline.heatmaps
-        adc = np.concatenate([source.adc(k, k + 1) for k in shown])
+        spectrum = torch.cat([maps.spectrum(source.adc(k, k + 1), source.valid(k, k + 1)) for k in used[shown]])
         put("heatmaps/frames", shown, "index into /time")
-        put("heatmaps/range_azimuth", maps.range_azimuth(adc).numpy(), "counts^2")
-        put("heatmaps/doppler_azimuth", maps.doppler_azimuth(adc).numpy(), "counts^2")
+        put("heatmaps/range_azimuth", maps.range_azimuth_of(spectrum).numpy(), "counts^2")
+        put("heatmaps/doppler_azimuth", maps.doppler_azimuth_of(spectrum).numpy(), "counts^2")
         if maps.pairs is not None:
-            put("heatmaps/elevation_aware", maps.elevation_aware(adc).numpy(), "counts^2")
+            put("heatmaps/elevation_aware", maps.elevation_aware_of(spectrum).numpy(), "counts^2")
         put("heatmaps/ranges", maps.ranges, "m")
         put("heatmaps/azimuths", maps.azimuths, "rad")
         put("heatmaps/velocities", maps.velocities, "m/s, closing positive")

@@ -208,15 +208,67 @@ def import_(
 @app.command()
 def export(
     recording: Annotated[Path, typer.Argument(metavar="REC.h5", help="Recording to convert.")],
-    to: Annotated[Literal["dca1000", "tum"], typer.Option(help="Raw samples + .cfg, or the true poses.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write (.bin or .tum).")],
+    to: Annotated[
+        Literal["dca1000", "rosbag", "tum"], typer.Option(help="Raw samples + .cfg, a ROS 2 bag, or the true poses.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="What to write (.bin, a folder, .tum).")],
 ):
-    """Write a recording in another format."""
-    from radarsim.export import export
+    """Write a recording in another format, as `radarize export` does."""
+    from radarize.exporters import export
 
-    with working(f"exporting {recording.name}"):
-        written = export(recording, to, output)
+    with progress("export") as report:
+        written = export(recording, {"dca1000": "bin", "rosbag": "ros2"}.get(to, to), output, progress=report)
     print(written)
+
+
+@app.command()
+def emulate(
+    source: Annotated[str, typer.Argument(metavar="SOURCE", help="A recording (.h5) to play, or a scene to simulate.")],
+    port_link: Annotated[Path | None, typer.Option(metavar="PATH", help="Name to give the serial port.")] = None,
+    host: Annotated[str, typer.Option(help="Address of the computer that records.")] = "127.0.0.1",
+    board: Annotated[str, typer.Option(help="Address of the virtual DCA1000.")] = "127.0.0.2",
+    command_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of requests and replies.")] = 4096,
+    data_port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port of samples.")] = 4098,
+    loop: Annotated[bool, typer.Option("--loop", help="Begin again at the end, without end.")] = False,
+    loss: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share of the packets to lose.")] = 0.0,
+    duplicate: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share to send twice.")] = 0.0,
+    reorder: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share that 1-8 others overtake.")] = 0.0,
+    delay: Annotated[float, typer.Option(min=0.0, max=1.0, help="Share that 100-400 others overtake.")] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of what happens to packets, and of a scene's walk.")] = 0,
+    platform: Annotated[
+        Literal["handheld", "cart", "robot"], typer.Option(help="How it moves in a scene.")
+    ] = "handheld",
+    duration: Annotated[float, typer.Option(min=0.0, help="Length of the walk through a scene, s.")] = 40.0,
+    radar: Annotated[str, typer.Option(help="Configuration to expect for a scene: a .cfg or a preset.")] = "radarize",
+    ahead: Annotated[float, typer.Option(min=0.0, help="How much to make ahead of time, s.")] = 10.0,
+):
+    """Be an IWR1843 with a DCA1000: a serial port and UDP on this machine, for any capture software."""
+    import time
+
+    import numpy as np
+    from rich.console import Console
+
+    from radarsim.emulator.disturbance import Disturbance
+    from radarsim.emulator.emulator import Emulator
+    from radarsim.emulator.source import Playback, Walk
+
+    recorded = Path(source).suffix == ".h5"
+    given = Playback(Path(source), loop) if recorded else Walk(source, platform, duration, seed, radar, loop)
+    disturbance = Disturbance(loss, duplicate, reorder, delay, np.random.default_rng(seed))
+    console = Console(stderr=True)
+    with Emulator(
+        given, board=board, computer=host, command_port=command_port, data_port=data_port, port_link=port_link,
+        disturbance=disturbance, ahead=ahead, say=lambda line: print(line, flush=True),
+    ) as emulator:  # fmt: skip
+        print(f"serial port {port_link or emulator.port}, 115200 baud", flush=True)
+        print(f"DCA1000 {board}:{command_port}, sends to {host}:{command_port} and {host}:{data_port}", flush=True)
+        try:
+            with console.status("") as status:
+                while True:
+                    status.update(f"{emulator}; {emulator.ready} frames ready; Ctrl-C ends")
+                    time.sleep(0.5)
+        except KeyboardInterrupt:
+            print(f"{emulator}; {disturbance}")
 
 
 @app.command()

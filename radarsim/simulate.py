@@ -33,7 +33,7 @@ from radarsim.statistics import crossings
 from radarsim.threads import one_blas_thread
 from radarsim.waypoints import read_waypoints
 
-_BATCH = 8
+BATCH = 8
 _TOUR = 40.0  # s, unless asked for
 
 
@@ -221,8 +221,8 @@ def simulate(
         products=suite.products,
         streams=suite.streams,
     ) as writer:
-        for first in range(0, frames, _BATCH):
-            batch = simulator.observe(times[first : first + _BATCH], provenance)
+        for first in range(0, frames, BATCH):
+            batch = simulator.observe(times[first : first + BATCH], provenance)
             writer.append(batch.samples, batch.times, rows=suite.observe(batch))
             if progress:
                 progress(first + len(batch), frames)

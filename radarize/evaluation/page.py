@@ -12,7 +12,7 @@ from radarize.evaluation.runfiles import write_whole
 INK, GRID = "#7d8590", "rgba(125,133,144,0.22)"
 COLORS = {"truth": "#8b949e", "slam": "#e4572e", "odometry": "#2a7fd4", "map": "#9a6fd0", "good": "#2e9e6b"}
 
-_STYLE = """
+STYLE = """
 :root { color-scheme: light dark; --ink: #1c2128; --soft: #5c6570; --ground: #ffffff; --card: #f6f7f9; --line: #dfe3e8;
   --accent: #e4572e; }
 @media (prefers-color-scheme: dark) { :root { --ink: #e6e9ee; --soft: #9aa4b0; --ground: #14171b; --card: #1c2026;
@@ -149,7 +149,7 @@ class Page:
             path,
             '<!doctype html><html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
-            f"<title>{_text(self.title)}</title><style>{_STYLE}</style>{script}</head>"
+            f"<title>{_text(self.title)}</title><style>{STYLE}</style>{script}</head>"
             f"<body><main>{''.join(self._body)}</main></body></html>\n",
         )
 

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError
-from radarize.importers.capture import Capture, batch_frames
+from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import DATA_PORT, FrameAssembler, Packet
+from radarize.radar.dca1000 import DATA_PORT, FrameAssembler, decode
 
 #: Magic number -> byte order and ticks per second of the time stamps.
 MAGIC = {
@@ -40,44 +40,32 @@ def open_pcap(path: Path, config: RadarConfig, cfg_text: str = "", assumed: tupl
     return capture
 
 
-def _batches(path: Path, capture: Capture) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _batches(path: Path, capture: Capture) -> Iterator[Batch]:
     assembler = FrameAssembler(capture.config)
     size = batch_frames(capture.config)
     frames: list[tuple[np.ndarray, np.ndarray]] = []
-    yielded = malformed = 0
+    yielded = 0
     for time, payload in _payloads(path, capture):
         capture.attributes.setdefault("first_packet_time", time)
-        try:
-            packet = Packet.decode(payload)
-        except InputError:
-            malformed += 1
-            continue
-        frames += assembler.add(packet)
+        frames += assembler.take(payload)
         if len(frames) >= size:
             yielded += len(frames)
-            yield _stack(frames)
+            yield _stack(frames, capture.config)
             frames.clear()
     frames += assembler.finish()
     if not yielded and not frames:
         raise InputError(
-            f"{path}: holds {assembler.incomplete_bytes} bytes of samples in {assembler.received} data packets to UDP "
-            f"port {DATA_PORT}, expected at least one frame of {capture.config.frame_bytes} bytes"
+            f"{path}: holds {assembler.counts.incomplete_bytes} bytes of samples in {assembler.counts.received} data "
+            f"packets to UDP port {DATA_PORT}, expected at least one frame of {capture.config.frame_bytes} bytes"
         )
-    if assembler.incomplete_bytes:
-        capture.warnings.append(f"{assembler.incomplete_bytes} bytes of an incomplete last frame are left out")
-    if assembler.lost_bytes:
-        capture.warnings.append(f"{assembler.lost_bytes} bytes were lost, their chirps are marked")
-    if late := assembler.late:
-        capture.warnings.append(f"{late} data packets came too late or again and are ignored")
-    if damaged := assembler.damaged + malformed:
-        capture.warnings.append(f"{damaged} data packets have an impossible header or length and are ignored")
+    capture.warnings += assembler.counts.warnings()
     if frames:
-        yield _stack(frames)
+        yield _stack(frames, capture.config)
 
 
-def _stack(frames: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def _stack(frames: list[tuple[np.ndarray, np.ndarray]], config: RadarConfig) -> Batch:
     words, valid = zip(*frames, strict=True)
-    return np.concatenate(words), np.stack(valid)
+    return Batch(decode(np.concatenate(words), config), np.stack(valid))
 
 
 def _read_header(file, path: Path) -> tuple[str, int]:

@@ -163,6 +163,9 @@ class Odometry:
                 step[i] = exponential(dt * (last_velocity + velocity) / 2, rotations.yaw[i])
                 covariance[i, :2, :2] = dt**2 * (last_spread + spread) / 2
                 covariance[i, 2, 2] = rotations.variance[i] + (TURN_SPREAD * rotations.yaw[i]) ** 2
+                # Across lost frames velocity is only known to lead from one end to the other, at the filter's pace.
+                gap = dt if dt > 1.5 * self.config.frame_period else 0.0
+                covariance[i, :2, :2] += np.eye(2) * min(self._filter.acceleration * gap, 2.0) ** 2 * gap**2 / 12
             self._last = (times[i], velocity, spread)
             self._pose = pose[i] = compose(self._pose, step[i])
         return Track(times, pose, step, covariance, velocities.velocity, velocities.covariance)

@@ -79,7 +79,7 @@ class PublishedRotation(Plain):
         return ((label - forth).square() + (-label - back).square()).squeeze(1)
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
-        judged = super().judge(net, maps, label)
+        judged = self._judged(*net.estimate(maps), label)
         judged[:, 0] = self.loss(net, maps, label)
         return judged
 

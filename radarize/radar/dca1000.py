@@ -16,6 +16,7 @@ from radarize.radar.config import RadarConfig
 
 DATA_PORT = 4098
 MAX_PAYLOAD = 1456
+_ONES = bytes([1]) * MAX_PAYLOAD
 HEADER = struct.Struct("<IIH")  # sequence from 1; bytes sent before this packet, 48 bits
 
 
@@ -74,29 +75,19 @@ def encode(frames: Int16[np.ndarray, "frame loop tx rx sample 2"], config: Radar
     return np.ascontiguousarray(groups, dtype=np.int16).reshape(-1)
 
 
-def detect_iq_order(raw: Int16[np.ndarray, "word"], config: RadarConfig) -> tuple[str, float]:
-    """Find out whether I or Q comes first: the wrong order mirrors range.
+def range_balance(frames: Int16[np.ndarray, "frame loop tx rx sample 2"]) -> float:
+    """Energy of the beat spectrum's lower half against the upper one, dB: negative where I and Q are swapped.
 
-    Echoes are near, with leakage nearest of all, so the lower half of the beat spectrum holds more energy than the
-    upper one when the order is right (+14 to +36 dB on real captures).
-
-    Args:
-        raw: words of whole frames; the first few are enough.
-        config: its `iq_order` is ignored.
-
-    Returns:
-        ``"iiqq"`` or ``"qqii"``, and by how many dB the halves differ: small values mean undecided.
+    Echoes are near, with leakage nearest of all, so the lower half holds more energy (+14 to +36 dB on real captures);
+    swapping I and Q mirrors range. Small values mean undecided; 0 is silence.
     """
-    frames = decode(raw, config.model_copy(update={"iq_order": "iiqq"})).astype(np.float32)
-    signal = (frames[..., 0] + 1j * frames[..., 1]).reshape(-1, config.samples)
-    signal -= signal.mean(axis=1, keepdims=True)
-    power = (np.abs(np.fft.fft(signal * np.hanning(config.samples), axis=1)) ** 2).sum(axis=0)
-    half, skip = config.samples // 2, 2  # the window smears the offset into two bins
-    near, far = power[skip:half].sum(), power[half + 1 : config.samples - skip + 1].sum()
-    if not (near > 0 and far > 0):
-        return config.iq_order, 0.0
-    decibels = float(10 * np.log10(near / far))
-    return ("iiqq" if decibels >= 0 else "qqii"), abs(decibels)
+    samples = frames.shape[-2]
+    signal = np.ascontiguousarray(frames, np.float32).view(np.complex64).reshape(-1, samples)
+    signal = signal - signal.mean(axis=1, keepdims=True)
+    power = (np.abs(np.fft.fft(signal * np.hanning(samples), axis=1)) ** 2).sum(axis=0)
+    half, skip = samples // 2, 2  # the window smears the offset into two bins
+    near, far = power[skip:half].sum(), power[half + 1 : samples - skip + 1].sum()
+    return float(10 * np.log10(near / far)) if near > 0 and far > 0 else 0.0
 
 
 # --- packets ----------------------------------------------------------------------------------------------------------
@@ -140,13 +131,54 @@ def packets(stream: bytes, sequence: int = 1, offset: int = 0) -> Iterator[Packe
         sequence += 1
 
 
+@dataclass
+class PacketCounts:
+    """What became of a capture's packets.
+
+    Attributes:
+        received, duplicates, late, damaged: packets that were used, held nothing new, came (perhaps again) after their
+            frame was given out, or had an impossible header or length.
+        lost_bytes: of the frames given out, that never came.
+        incomplete_bytes: that had come of a last frame that is not whole.
+    """
+
+    received: int = 0
+    duplicates: int = 0
+    late: int = 0
+    damaged: int = 0
+    lost_bytes: int = 0
+    incomplete_bytes: int = 0
+
+    def warnings(self) -> list[str]:
+        """What the user should know."""
+        found = (
+            (self.incomplete_bytes, "bytes of an incomplete last frame are left out"),
+            (self.lost_bytes, "bytes were lost, their chirps are marked"),
+            (self.late, "data packets came too late or again and are ignored"),
+            (self.damaged, "data packets have an impossible header or length and are ignored"),
+        )
+        return [f"{count} {words}" for count, words in found if count]
+
+
 class _PartialFrame:
-    """Bytes of a frame that have arrived so far."""
+    """Bytes of a frame that have arrived so far.
+
+    Bytearrays, since at 60,000 packets a second numpy's cost per call would be too much.
+    """
 
     def __init__(self, size: int):
-        self.data = np.zeros(size, np.uint8)
-        self.arrived = np.zeros(size, bool)
+        self.data = bytearray(size)
+        self.arrived = bytearray(size)  # 1 where data came
         self.missing = size
+
+    def place(self, start: int, part: memoryview) -> int:
+        """Put bytes where they belong; returns how many of them had not come before."""
+        end = start + len(part)
+        fresh = len(part) - self.arrived.count(1, start, end)
+        self.data[start:end] = part
+        self.arrived[start:end] = _ONES[: len(part)]
+        self.missing -= fresh
+        return fresh
 
 
 class FrameAssembler:
@@ -162,23 +194,29 @@ class FrameAssembler:
         max_jump: a byte count further than this past the newest one is taken for a damaged header.
 
     Attributes:
-        received, duplicates, late, damaged: packets so far that were used, held nothing new, came (perhaps again) after
-            their frame was given out, or had an impossible header.
-        lost_bytes: bytes of the frames given out that never came.
-        incomplete_bytes: after `finish`, bytes that had come of a last frame that is not whole.
+        counts: packets so far.
     """
 
     def __init__(self, config: RadarConfig, window: int = 1 << 20, max_jump: int = 1 << 28):
         check_layout(config)
         self.config = config
+        self._size = config.frame_bytes
         self.window = window
         self.max_jump = max_jump
-        self.received = self.duplicates = self.late = self.damaged = 0
-        self.lost_bytes = self.incomplete_bytes = 0
+        self.counts = PacketCounts()
         self._started = False
         self._next = 0  # number of the frame to be given out next
         self._newest = 0  # end of the furthest payload so far
         self._partial: dict[int, _PartialFrame] = {}
+
+    def take(self, data: bytes) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """As `add`, with a UDP payload; one that is no data packet is counted as damaged."""
+        try:
+            packet = Packet.decode(data)
+        except InputError:
+            self.counts.damaged += 1
+            return
+        yield from self.add(packet)
 
     def add(self, packet: Packet) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Take a packet; yields frames that are now settled, as `_settle` describes."""
@@ -186,27 +224,27 @@ class FrameAssembler:
         if not self._started:
             self._started = True
             if packet.offset > self.window:  # listening began in the middle of a capture
-                self._next, self._newest = -(-packet.offset // self.config.frame_bytes), packet.offset
+                self._next, self._newest = -(-packet.offset // self._size), packet.offset
         if end > self._newest + self.max_jump:
-            self.damaged += 1
+            self.counts.damaged += 1
             return
         self._place(packet)
         self._newest = max(self._newest, end)
-        size = self.config.frame_bytes
+        size = self._size
         while self._newest >= (self._next + 1) * size + self.window or self._whole(self._next):
             yield self._settle()
 
     def finish(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """No packet will come any more: yields the frames left whose last byte, or a later one, has come."""
-        size = self.config.frame_bytes
+        size = self._size
         while self._newest >= (self._next + 1) * size:
             yield self._settle()
-        self.incomplete_bytes = sum(int(p.arrived.sum()) for p in self._partial.values())
+        self.counts.incomplete_bytes = sum(len(p.data) - p.missing for p in self._partial.values())
         self._partial.clear()
 
     def _place(self, packet: Packet) -> None:
-        size = self.config.frame_bytes
-        payload = np.frombuffer(packet.payload, np.uint8)
+        size = self._size
+        payload = memoryview(packet.payload)
         taken = fresh = 0
         while taken < len(payload):
             number, start = divmod(packet.offset + taken, size)
@@ -216,27 +254,23 @@ class FrameAssembler:
                 continue
             if (partial := self._partial.get(number)) is None:
                 partial = self._partial[number] = _PartialFrame(size)
-            span = slice(start, start + len(part))
-            new = len(part) - int(partial.arrived[span].sum())
-            partial.data[span] = part
-            partial.arrived[span] = True
-            partial.missing -= new
-            fresh += new
+            fresh += partial.place(start, part)
         if fresh:
-            self.received += 1
+            self.counts.received += 1
         elif packet.offset + len(payload) <= self._next * size:
-            self.late += 1
+            self.counts.late += 1
         else:
-            self.duplicates += 1
+            self.counts.duplicates += 1
 
     def _whole(self, number: int) -> bool:
         return number in self._partial and not self._partial[number].missing
 
     def _settle(self) -> tuple[Int16[np.ndarray, "word"], Bool[np.ndarray, "loop tx"]]:
         """Give out the next frame: its words as captured, for `decode`, and which chirps (physical order) are whole."""
-        partial = self._partial.pop(self._next, None) or _PartialFrame(self.config.frame_bytes)
+        partial = self._partial.pop(self._next, None) or _PartialFrame(self._size)
         self._next += 1
-        self.lost_bytes += partial.missing
+        self.counts.lost_bytes += partial.missing
         loops, tx = self.config.frame_shape[:2]
-        fired = partial.arrived.reshape(loops, tx, -1).all(axis=2)
-        return partial.data.view("<i2").astype(np.int16, copy=False), fired[:, list(self.config.slot)]
+        fired = np.frombuffer(partial.arrived, bool).reshape(loops, tx, -1).all(axis=2)
+        words = np.frombuffer(partial.data, "<i2").astype(np.int16, copy=False)
+        return words, fired[:, list(self.config.slot)]

@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float, Int16
 from radarize import __version__
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
+from radarize.recording.losses import Losses
 from radarize.recording.streams import FORMAT, Product, Stream, reason
 
 #: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
@@ -37,6 +38,10 @@ class RecordingWriter:
         products: fixed data sets by path.
         raw: False for a recording without samples (heat maps for training): `append` then takes None for them.
 
+    Attributes:
+        frames: flushed so far.
+        losses: of the frames appended so far.
+
     Raises:
         InputError: the file cannot be created or a write failed (for instance, no space left).
     """
@@ -55,7 +60,7 @@ class RecordingWriter:
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + ".part")
         self.config = config
-        self.frames, self.raw = 0, raw
+        self.frames, self.raw, self.losses = 0, raw, Losses()
         self._file: h5py.File | None = None
         self._notes: dict[str, object] = {}
         self._pending: list[tuple] = []
@@ -129,6 +134,7 @@ class RecordingWriter:
             for name, data in rows.items():
                 self._extend(name, data)
             self._extend("radar/valid", valid)
+            self.losses.add(np.asarray(valid))
             self._pending.append(np.asarray(time, float))
             self._unflushed += len(time)
             if self._unflushed >= self.config.frame_rate:

@@ -13,6 +13,8 @@ flash would drown the ridge on which the whole static world lies. Decibels are o
 quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of its size.
 """
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
@@ -98,6 +100,7 @@ class MapMaker:
     Args:
         config: radar configuration.
         device: torch device for the arithmetic.
+        stage: entered with ``"maps"`` whenever maps are made, to time it.
 
     Attributes:
         names: maps that the array can make; without antennas of two heights, only those of the row.
@@ -106,7 +109,13 @@ class MapMaker:
     maps = MAPS
     history = 0
 
-    def __init__(self, config: RadarConfig, device: str = "cpu"):
+    def __init__(
+        self,
+        config: RadarConfig,
+        device: str = "cpu",
+        stage: Callable[[str], AbstractContextManager] = nullcontext,
+    ):
+        self._stage = stage
         self.heatmaps = Heatmaps(config, AZIMUTHS, device=device)
         self.names = tuple(n for n in MAPS if self.heatmaps.pairs is not None or "elevation" not in n)
         self._spectrum: torch.Tensor | None = None
@@ -154,16 +163,20 @@ class MapMaker:
             self._spectrum, self._made = spectrum, {}
         names = names or self.names
         wanted = [name for name in names if name not in self._made]
+        with self._stage("maps"):
+            self._made |= self._make(spectrum, wanted)
+        return {name: self._made[name] for name in names}
+
+    def _make(self, spectrum: torch.Tensor, names: list[str]) -> dict[str, np.ndarray]:
         heatmaps = self.heatmaps
-        limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in wanted) else None
+        limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else None
         makers = {
             "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
             "elevation_aware": lambda: heatmaps.elevation_aware_of(spectrum),
             "doppler_azimuth": lambda: heatmaps.doppler_azimuth_of(limited, "capon"),
             "doppler_elevation_aware": lambda: heatmaps.doppler_azimuth_of(limited, elevation_aware=True),
         }
-        self._made |= {name: _decibels(makers[name]()) for name in wanted}
-        return {name: self._made[name] for name in names}
+        return {name: _decibels(makers[name]()) for name in names}
 
 
 def _decibels(power: torch.Tensor) -> np.ndarray:

@@ -1,0 +1,179 @@
+"""The DCA1000 as seen from the computer: commands and replies over UDP."""
+
+import errno
+import socket
+import time
+from dataclasses import dataclass
+
+from radarize.errors import InputError
+from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import DATA_PORT
+from radarize.radar.dca1000_commands import (
+    BOARD_ADDRESS,
+    COMMAND_PORT,
+    COMPUTER_ADDRESS,
+    RAW_TWO_LANES,
+    Command,
+    Reply,
+    Request,
+    Status,
+    packet_settings,
+)
+
+#: s for a reply; requests are repeated, since UDP may lose them.
+_PATIENCE, _ATTEMPTS = 1.0, 3
+#: Delay between packets, s, the usual one first, and the Mbit/s that it lets through.
+_THROUGHPUT = {25e-6: 325.0, 10e-6: 545.0, 5e-6: 706.0}
+_TROUBLE = {
+    Status.NO_LVDS: "gets no samples from the radar; is the ribbon cable in, and lvdsStreamCfg -1 0 1 0 configured?",
+    Status.MEMORY_FULL: "its memory is full: the network is too slow, samples are lost",
+    Status.LVDS_BUFFER_FULL: "its LVDS buffer is full: the radar sends too fast, samples are lost",
+}
+
+
+@dataclass(frozen=True)
+class Network:
+    """Addresses and ports; the defaults are those of a board as delivered.
+
+    Attributes:
+        host: this computer's address, where packets arrive.
+        dca: the board's address.
+        command_port, data_port: UDP.
+    """
+
+    host: str = COMPUTER_ADDRESS
+    dca: str = BOARD_ADDRESS
+    command_port: int = COMMAND_PORT
+    data_port: int = DATA_PORT
+
+    def bind(self, port: int) -> socket.socket:
+        """A UDP socket at `host`.
+
+        Raises:
+            InputError: the address is none of this computer, or the port is taken.
+        """
+        receiver = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            receiver.bind((self.host, port))
+        except (OSError, OverflowError) as error:
+            receiver.close()
+            raise InputError(self._why(error, port)) from error
+        return receiver
+
+    def _why(self, error: Exception, port: int) -> str:
+        number = getattr(error, "errno", None)
+        if number == errno.EADDRNOTAVAIL:
+            return (
+                f"--host {self.host}: no network interface of this computer has that address, expected the one that "
+                f"the DCA1000 sends to (sudo ip address add {self.host}/24 dev INTERFACE)"
+            )
+        if number == errno.EADDRINUSE:
+            return f"--host {self.host}: UDP port {port} is taken, expected it free; is another capture running?"
+        return f"--host {self.host}, UDP port {port}: {getattr(error, 'strerror', None) or error}"
+
+
+class Board:
+    """A DCA1000; use as a context manager.
+
+    Args:
+        network: addresses and ports.
+
+    Raises:
+        InputError: the command port cannot be bound.
+    """
+
+    def __init__(self, network: Network):
+        self.network = network
+        self._socket = network.bind(network.command_port)
+        self._reported = Status(0)
+
+    def __enter__(self) -> "Board":
+        return self
+
+    def __exit__(self, *_) -> None:
+        self._socket.close()
+
+    def configure(self, config: RadarConfig) -> str:
+        """Set the board up for raw samples of a configuration; returns the version of its firmware.
+
+        Raises:
+            InputError: it does not answer or refuses, or the radar would send more than it can pass on.
+        """
+        rate = 8e-6 * config.frame_bytes * config.frame_rate
+        if rate > max(_THROUGHPUT.values()):
+            limit = max(_THROUGHPUT.values())
+            raise InputError(f"radar configuration: sends {rate:.0f} Mbit/s, expected at most the DCA1000's {limit:g}")
+        # A quarter to spare for its bursts, where there is one.
+        delay = next((d for d, limit in _THROUGHPUT.items() if rate < 0.75 * limit), min(_THROUGHPUT))
+        self.request(Command.ALIVE)
+        self.request(Command.RESET_FPGA)
+        version = self.request(Command.VERSION, answer=True)
+        self.request(Command.CONFIGURE, RAW_TWO_LANES)
+        self.request(Command.PACKETS, packet_settings(delay))
+        return f"{version & 0x7F}.{version >> 7 & 0x7F}"
+
+    def start(self) -> None:
+        """Pass samples on from now."""
+        self._reported = Status(0)
+        self.request(Command.START)
+
+    def stop(self) -> None:
+        """Pass no more samples on."""
+        self.request(Command.STOP)
+
+    def request(self, command: Command, body: bytes = b"", answer: bool = False) -> int:
+        """Send a command; returns the status of its reply.
+
+        Args:
+            command: what to do.
+            body: its settings.
+            answer: the status is no success or failure but what was asked for.
+
+        Raises:
+            InputError: no reply, or failure.
+        """
+        for _ in range(_ATTEMPTS):
+            try:
+                self._socket.sendto(Request(command, body).encode(), (self.network.dca, self.network.command_port))
+            except OSError as error:
+                raise InputError(f"--dca {self.network.dca}: {error.strerror or error}") from error
+            deadline = time.monotonic() + _PATIENCE
+            while (left := deadline - time.monotonic()) > 0:
+                reply = self._hear(left)
+                if reply is None or reply.command != command:
+                    continue
+                if reply.status and not answer:
+                    raise InputError(
+                        f"--dca {self.network.dca}: the DCA1000 answers {command.name} with status {reply.status}, "
+                        "expected 0 (success); switch it off and on again"
+                    )
+                return reply.status
+        raise InputError(
+            f"--dca {self.network.dca}: no DCA1000 answers {command.name} at UDP port {self.network.command_port} "
+            f"({_ATTEMPTS} times asked); is it powered, its Ethernet cable in, and no firewall before "
+            f"{self.network.host}?"
+        )
+
+    def status(self, patience: float = 0.0) -> Status:
+        """What the board has reported on its own since `start`."""
+        deadline = time.monotonic() + patience
+        while self._hear(max(deadline - time.monotonic(), 0.0)) is not None:
+            pass
+        return self._reported
+
+    def troubles(self) -> list[str]:
+        """Reported troubles in words."""
+        reported = self.status()
+        return [f"the DCA1000 {words}" for bit, words in _TROUBLE.items() if reported & bit]
+
+    def _hear(self, patience: float) -> Reply | None:
+        """The next reply; reports of its own are noted."""
+        self._socket.settimeout(patience)
+        try:
+            data, (sender, _) = self._socket.recvfrom(2048)
+            reply = Reply.decode(data)
+        except (OSError, InputError):
+            return None
+        if sender == self.network.dca and reply.command == Command.STATUS:
+            self._reported |= Status(reply.status)
+        return reply

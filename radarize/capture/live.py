@@ -1,0 +1,112 @@
+"""The pipeline on a stream, with a page that shows it."""
+
+import time
+from collections.abc import Callable
+from threading import Event
+
+import numpy as np
+import torch
+
+from radarize.capture.page import Page
+from radarize.capture.stream import Stream, follow
+from radarize.capture.view import View
+from radarize.pipeline import BATCH, Pipeline
+from radarize.radar.config import RadarConfig
+from radarize.recording import Losses, RecordingWriter
+
+#: s between pictures of a frame, and of the map; redrawing the map takes at most this share of the time.
+_FRAME_INTERVAL, _MAP_INTERVAL, _MAP_SHARE = 0.2, 1.0, 0.05
+
+
+class Live:
+    """A pipeline that follows a stream.
+
+    Args:
+        pipeline: to push frames to; see `prepare`.
+        page: to show it on.
+
+    Attributes:
+        losses: of the frames that came.
+        busy: s spent on the frames so far, showing them included.
+    """
+
+    def __init__(self, pipeline: Pipeline, page: Page):
+        self.pipeline, self.page = pipeline, page
+        self.view = View(pipeline)
+        self.losses = Losses()
+        self.busy = 0.0
+        self._frame_due = self._map_due = 0.0
+
+    def run(
+        self,
+        stream: Stream,
+        stopping: Event,
+        *,
+        frames: int | None = None,
+        writer: RecordingWriter | None = None,
+        progress: Callable[[int, int], None] | None = None,
+    ) -> None:
+        """Follow the stream until the user stops it, there are enough frames, or it ends; then finish the map.
+
+        Args:
+            stream: an open one; stopped here.
+            stopping: set when the user wants to end.
+            frames: end after so many.
+            writer: records the frames as well.
+            progress: called with frames done and wanted (0: until stopped).
+
+        Raises:
+            InputError: see `follow`.
+        """
+        self.page.send("facts", self.view.facts())
+        for batch in follow(stream, stopping, most=BATCH, frames=frames):
+            start = time.monotonic()
+            adc, stamps, valid = batch["adc"], batch["time"], batch["valid"]
+            self.pipeline.push(adc, stamps, valid)
+            self.losses.add(valid)
+            if writer:
+                writer.append(adc, stamps, valid)
+            self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
+            self.busy += time.monotonic() - start
+            if progress:
+                progress(int(batch["number"][-1]) + 1, frames or 0)
+        self.pipeline.finish()
+        self.page.send("map", self.view.map())
+        self.page.send("end", {"troubles": stream.troubles()})
+
+    def _show(self, stream: Stream, adc: np.ndarray, valid: np.ndarray, stamp: float) -> None:
+        now = time.monotonic()
+        if now < self._frame_due or not self.page.watched:
+            return
+        self._frame_due = now + _FRAME_INTERVAL
+        counts = stream.counts
+        figures = {
+            "frames": counts.frames,
+            "dropped": counts.dropped,
+            "lost_chirps": self.losses.lost_chirps,
+            "lost_share": self.losses.lost_chirps / max(self.losses.chirps, 1),
+            "waiting": max(counts.frames - counts.dropped - self.losses.frames, 0),
+            "slots": stream.ring.slots,
+            "troubles": stream.troubles(),
+        }
+        self.page.send("frame", self.view.frame(adc, valid, stamp) | figures)
+        drawn = time.monotonic()
+        self.pipeline.stage_seconds["page"] += drawn - now
+        if now >= self._map_due and self.pipeline.slam.nodes:
+            self.page.send("map", self.view.map())
+            took = time.monotonic() - drawn
+            self.pipeline.stage_seconds["page"] += took
+            self._map_due = now + max(_MAP_INTERVAL, took / _MAP_SHARE)
+
+
+def prepare(config: RadarConfig, make: Callable[[], Pipeline]) -> Pipeline:
+    """A pipeline that is fast from its first frame on: another one has run on noise before, so that whatever is
+    compiled or loaded at first use is there."""
+    torch.set_num_threads(1)  # a frame is too little to share out: threads that wait for each other cost more
+    pipeline, rng = make(), np.random.default_rng(0)
+    for frames in (1, BATCH):
+        adc = rng.integers(-200, 200, (frames, *config.frame_shape), dtype=np.int16)
+        start = pipeline.pushed * config.frame_period
+        pipeline.push(adc, start + np.arange(frames), np.ones(adc.shape[:3], bool))
+    View(pipeline).frame(adc[-1:], np.ones((1, *adc.shape[1:3]), bool), 0.0)
+    return make()

@@ -1,0 +1,121 @@
+"""A local web page that shows the newest state of things: one file, server-sent events, nothing from the network."""
+
+import json
+import threading
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+
+from radarize.errors import InputError
+from radarize.evaluation.page import STYLE
+
+#: Events (HTML standard, section 9.2); a comment now and then tells whether the browser is still there.
+_KEEP_ALIVE = 5.0
+
+
+class Page:
+    """Serves the page; use as a context manager.
+
+    What is sent under a name replaces what was sent before: a browser that cannot keep up, or comes later, gets the
+    newest of every name, and nothing piles up.
+
+    Args:
+        address: to listen on, ``HOST:PORT``; port 0 takes a free one.
+
+    Attributes:
+        url: to open in a browser.
+
+    Raises:
+        InputError: the address cannot be used.
+    """
+
+    def __init__(self, address: str = "127.0.0.1:8470"):
+        host, _, port = address.rpartition(":")
+        try:
+            self._server = _Server((host or "127.0.0.1", int(port)), _Handler)
+        except (OSError, ValueError, OverflowError) as error:
+            why = getattr(error, "strerror", None) or "no port number"
+            raise InputError(f"--address {address}: {why}, expected HOST:PORT to show the page at") from error
+        self._server.page = self
+        self.url = f"http://{host or '127.0.0.1'}:{self._server.server_address[1]}/"
+        self._changed = threading.Condition()
+        self._newest: dict[str, tuple[int, str]] = {}
+        self._count = self._watching = 0
+        self._closed = False
+        self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
+
+    def __enter__(self) -> "Page":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_) -> None:
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        self._server.shutdown()
+        self._server.server_close()  # waits until the browsers have the last events
+
+    @property
+    def watched(self) -> bool:
+        """Whether a browser looks on."""
+        return self._watching > 0
+
+    def send(self, name: str, content: dict[str, object]) -> None:
+        """Show new content (plain data) under a name."""
+        data = json.dumps(content)
+        with self._changed:
+            self._count += 1
+            self._newest[name] = self._count, data
+            self._changed.notify_all()
+
+    def follow(self, write) -> None:
+        """Write events as they come until the page closes; runs in a browser's thread."""
+        seen = 0
+        with self._changed:
+            self._watching += 1
+        try:
+            while True:
+                with self._changed:
+                    if not self._closed and self._count == seen:
+                        self._changed.wait(_KEEP_ALIVE)
+                    news = sorted((at, name, data) for name, (at, data) in self._newest.items() if at > seen)
+                    closed, seen = self._closed, self._count
+                events = "".join(f"event: {name}\ndata: {data}\n\n" for _, name, data in news)
+                write((events or ": still here\n\n").encode())
+                if closed:
+                    return
+        finally:
+            with self._changed:
+                self._watching -= 1
+
+
+class _Server(ThreadingHTTPServer):
+    page: Page
+    daemon_threads = False  # so that closing waits for the last events
+
+    def handle_error(self, request, client_address) -> None:
+        """A browser that went away is no error."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
+    timeout = 10.0  # a browser that takes nothing is let go
+
+    def do_GET(self) -> None:
+        if self.path == "/":
+            html = Path(__file__).with_name("live.html").read_text().replace("/* STYLE */", STYLE)
+            self._head("text/html; charset=utf-8")
+            self.wfile.write(html.encode())
+        elif self.path == "/events":
+            self._head("text/event-stream")
+            self.server.page.follow(self.wfile.write)
+        else:
+            self.send_error(404)
+
+    def _head(self, kind: str) -> None:
+        self.send_response(200)
+        self.send_header("Content-Type", kind)
+        self.send_header("Cache-Control", "no-store")
+        self.end_headers()
+
+    def log_message(self, *_) -> None:
+        """The terminal is for the user's own."""

@@ -1,0 +1,88 @@
+"""Frames on their way from one process to another, through shared memory that neither copies nor grows."""
+
+from multiprocessing import get_context
+
+import numpy as np
+
+from radarize.radar.config import RadarConfig
+
+#: Processes start anew: a fork would copy the threads' locks.
+CONTEXT = get_context("spawn")
+#: `number` of the slot that says that nothing follows.
+_END = -1
+
+
+class FrameRing:
+    """A bounded queue of frames from one writer to one reader. The writer never waits: a frame that finds no free slot
+    is dropped whole.
+
+    Args:
+        config: radar configuration.
+        slots: frames that may wait.
+
+    Attributes:
+        dtype: of a frame: ``number`` (from 0, lost and dropped frames counted), ``time`` (s), ``valid`` (loop, tx) and
+            ``adc`` (loop, tx, rx, sample, iq).
+    """
+
+    def __init__(self, config: RadarConfig, slots: int):
+        self.dtype = np.dtype(
+            [
+                ("number", "i8"),
+                ("time", "f8"),
+                ("valid", "?", config.frame_shape[:2]),
+                ("adc", "i2", config.frame_shape),
+            ]
+        )
+        self.slots = slots
+        self._memory = CONTEXT.RawArray("b", slots * self.dtype.itemsize)
+        self._free, self._filled = CONTEXT.Semaphore(slots), CONTEXT.Semaphore(0)
+        self._at = 0  # the writer's or the reader's next slot: each process has its own copy
+
+    def put(self, number: int, time: float, adc: np.ndarray, valid: np.ndarray) -> bool:
+        """Add a frame; False if there was no room for it."""
+        if not self._free.acquire(block=False):
+            return False
+        self._write(number, time, adc, valid)
+        return True
+
+    def end(self, patience: float) -> bool:
+        """Say that nothing follows; False if no slot became free for `patience` seconds."""
+        if not self._free.acquire(timeout=patience):
+            return False
+        self._write(_END, np.inf, 0, False)
+        return True
+
+    def _write(self, number: int, time: float, adc: np.ndarray | int, valid: np.ndarray | bool) -> None:
+        slot = self._slots[self._at % self.slots]
+        slot["number"], slot["time"], slot["valid"], slot["adc"] = number, time, valid, adc
+        self._at += 1
+        self._filled.release()
+
+    def get(self, most: int, patience: float) -> np.ndarray | None:
+        """The frames that wait, oldest first.
+
+        Args:
+            most: take no more than so many.
+            patience: s, how long to wait for the first.
+
+        Returns:
+            (frame,) of `dtype`, empty if none came; None after the last one.
+        """
+        found, count = np.empty(most, self.dtype), 0
+        while count < most and self._filled.acquire(timeout=0 if count else patience):
+            slot = self._slots[self._at % self.slots]
+            if slot["number"] == _END:
+                self._filled.release()  # the end stays the end
+                if not count:
+                    return None
+                break
+            found[count] = slot
+            count += 1
+            self._at += 1
+            self._free.release()
+        return found[:count]
+
+    @property
+    def _slots(self) -> np.ndarray:
+        return np.frombuffer(self._memory, self.dtype)

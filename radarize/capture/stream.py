@@ -1,0 +1,200 @@
+"""Frames from a process of their own, so that nothing the main one does makes it miss a packet."""
+
+import contextlib
+import signal
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import astuple, dataclass, fields
+from multiprocessing import parent_process
+from threading import Event
+
+import numpy as np
+
+from radarize.capture.ring import CONTEXT, FrameRing
+from radarize.errors import InputError
+from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import PacketCounts
+
+#: s, how often a waiting process looks whether it should end.
+GLANCE = 0.2
+#: s for a process to start: it imports numpy and pydantic, on a machine that may be busy.
+_START_PATIENCE = 60.0
+
+
+@dataclass
+class StreamCounts:
+    """What a stream has done so far.
+
+    Attributes:
+        frames: that came, lost ones included.
+        dropped: of these, that found no room because the reader was too slow.
+        foreign: packets from other senders.
+        first: s since 1970, arrival of the first packet; 0 before.
+    """
+
+    frames: int = 0
+    dropped: int = 0
+    foreign: int = 0
+    first: float = 0.0
+
+
+class Outlet:
+    """The filling process's end of a stream: what a source (`Source`) writes to."""
+
+    def __init__(self, ring: FrameRing, stop, ready, shared):
+        self.ring, self._stop, self._ready, self._shared = ring, stop, ready, shared
+        self.counts = StreamCounts()
+
+    def ready(self) -> None:
+        """The source is listening."""
+        self._ready.set()
+
+    def put(self, time: float, adc: np.ndarray, valid: np.ndarray) -> None:
+        """Hand a frame on, or drop and count it."""
+        self.counts.dropped += not self.ring.put(self.counts.frames, time, adc, valid)
+        self.counts.frames += 1
+
+    def publish(self, packets: PacketCounts) -> None:
+        """Let the reader see the counts."""
+        self._shared[:] = [*astuple(self.counts), *astuple(packets)]
+
+    @property
+    def stopped(self) -> bool:
+        """Whether to end when nothing more comes: the reader said so."""
+        return self._stop.is_set() or self.orphaned
+
+    @property
+    def orphaned(self) -> bool:
+        """Whether the reader is gone."""
+        return not parent_process().is_alive()
+
+
+#: Fills an outlet until it is stopped or has no more; runs in the stream's process, so it must be a module's function.
+Source = Callable[..., None]
+
+
+class Stream:
+    """Frames that a source puts out in a process of its own; use as a context manager.
+
+    Args:
+        config: radar configuration.
+        source: see `Source`; called with an `Outlet` and `arguments`.
+        arguments: picklable.
+        slots: frames that may wait before whole ones are dropped.
+    """
+
+    def __init__(self, config: RadarConfig, source: Source, *arguments: object, slots: int = 64):
+        self.config = config
+        self.ring = FrameRing(config, slots)
+        self._stop, self._ready = CONTEXT.Event(), CONTEXT.Event()
+        self._counts = CONTEXT.RawArray("d", len(fields(StreamCounts)) + len(fields(PacketCounts)))
+        self._failure, failure = CONTEXT.Pipe(duplex=False)
+        shared = (self.ring, self._stop, self._ready, self._counts)
+        self._process = CONTEXT.Process(target=_fill, args=(source, arguments, shared, failure), daemon=True)
+
+    def __enter__(self) -> "Stream":
+        self._process.start()
+        deadline = time.monotonic() + _START_PATIENCE
+        while not self._ready.wait(GLANCE):
+            if not self._process.is_alive() or time.monotonic() > deadline:
+                self.__exit__()
+                raise InputError("the receiving process does not start; is there memory left?")
+        return self
+
+    def __exit__(self, *_) -> None:
+        if self._process.pid is None:
+            return
+        self._stop.set()
+        self._process.join(5 * GLANCE)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+    def stop(self) -> None:
+        """Ask the source to end; what is on its way can still be read."""
+        self._stop.set()
+
+    def frames(self, most: int, patience: float = GLANCE) -> np.ndarray | None:
+        """The frames that wait, see `FrameRing.get`; None after the last one.
+
+        Raises:
+            InputError: the source failed.
+        """
+        found = self.ring.get(most, patience)
+        if found is not None and (len(found) or self._process.is_alive()):
+            return found
+        with contextlib.suppress(EOFError):
+            if self._failure.poll():
+                raise InputError(self._failure.recv())
+        if found is not None:
+            raise InputError(f"the receiving process has died (exit code {self._process.exitcode})")
+        return None
+
+    def troubles(self) -> list[str]:
+        """What the user should know about the stream so far."""
+        counts = self.counts
+        found = []
+        if counts.dropped:
+            found.append(f"{counts.dropped} of {counts.frames} frames were dropped: this computer is too slow for them")
+        return found + self.packets.warnings()
+
+    def silent(self, seconds: float, at_all: bool) -> None:
+        """Nothing came for a while, or nothing at all: note why, or raise InputError."""
+
+    @property
+    def counts(self) -> StreamCounts:
+        """Frames so far."""
+        return _read(StreamCounts, self._counts[: len(fields(StreamCounts))])
+
+    @property
+    def packets(self) -> PacketCounts:
+        """Packets so far."""
+        return _read(PacketCounts, self._counts[len(fields(StreamCounts)) :])
+
+
+def _read(kind: type, values: list[float]):
+    named = zip(fields(kind), values, strict=True)
+    return kind(**{field.name: value if field.type is float else int(value) for field, value in named})
+
+
+def _fill(source: Source, arguments: tuple, shared: tuple, failure) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the main process ends this one, when everything has been received
+    outlet = Outlet(*shared)
+    try:
+        source(outlet, *arguments)
+    except InputError as error:
+        failure.send(str(error))
+    while not outlet.ring.end(GLANCE) and not outlet.orphaned:
+        pass
+
+
+def follow(
+    stream: Stream, stopping: Event, *, most: int, frames: int | None = None, patience: float = 5.0
+) -> Iterator[np.ndarray]:
+    """Batches of frames of `FrameRing.dtype`, until the stream ends, the user stops it, or there are enough.
+
+    Args:
+        stream: an open one; stopped here.
+        stopping: set when the user wants to end; what is on its way is still given out.
+        most: frames in a batch.
+        frames: end before the frame of this number.
+        patience: s without a frame after which the stream is taken to have ended.
+
+    Raises:
+        InputError: no frame at all came, or the source failed.
+    """
+    stopped, last, number = False, time.monotonic(), -1
+    patience += 2 * stream.config.frame_period
+    while (found := stream.frames(most)) is not None:
+        if len(found):
+            last, number = time.monotonic(), int(found["number"][-1])
+            wanted = found if frames is None else found[found["number"] < frames]
+            if len(wanted):
+                yield wanted
+        silent = time.monotonic() - last > patience
+        enough = frames is not None and number >= frames - 1
+        if not stopped and (stopping.is_set() or enough or silent):
+            if silent:
+                stream.silent(patience, number < 0)
+            stopped = True
+            stream.stop()

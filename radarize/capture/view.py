@@ -1,0 +1,136 @@
+"""What a running pipeline looks like: heat maps of the newest frame, map and path so far, and how busy it is."""
+
+import base64
+import io
+import time
+from collections import deque
+
+import matplotlib
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from radarize.evaluation.drawings import DEPTH, LEAKAGE, decibels
+from radarize.heatmaps import Heatmaps
+from radarize.pipeline import Pipeline
+from radarize.pose import between, compose
+
+#: Pixels across the fan, and s over which figures are averaged.
+_FAN, _SPAN = 260, 2.0
+_COLORS = (255 * matplotlib.colormaps["magma"](np.linspace(0, 1, 256))).astype(np.uint8)
+
+
+class Fan:
+    """Range-azimuth maps from above: forward is up, left is left.
+
+    Args:
+        heatmaps: that make the maps.
+    """
+
+    def __init__(self, heatmaps: Heatmaps):
+        reach, edge = heatmaps.ranges[-1], abs(heatmaps.azimuths).max()
+        half = reach * np.sin(min(edge, np.pi / 2))
+        rows = round(_FAN * reach / (2 * half))
+        right, ahead = np.meshgrid(np.linspace(-half, half, _FAN), np.linspace(reach, 0, rows))
+        self.width, self.reach = 2 * half, reach
+        distance, azimuth = np.hypot(right, ahead), np.arctan2(-right, ahead)
+        self._bin = np.clip(np.searchsorted(heatmaps.ranges, distance), 0, len(heatmaps.ranges) - 1)
+        self._column = np.clip(np.searchsorted(heatmaps.azimuths, azimuth), 0, len(heatmaps.azimuths) - 1)
+        self._inside = (distance <= reach) & (abs(azimuth) <= edge)
+        self._near = heatmaps.ranges < LEAKAGE
+
+    def draw(self, power: Float[np.ndarray, "range azimuth"]) -> UInt8[np.ndarray, "row column 4"]:
+        """Colours, transparent outside of the field of view."""
+        picture = colored(power, power[~self._near].max(initial=0.0))[self._bin, self._column]
+        picture[~self._inside] = 0
+        return picture
+
+
+def colored(
+    power: Float[np.ndarray, "row column"], reference: float | None = None
+) -> UInt8[np.ndarray, "row column 4"]:
+    """Power in dB below the reference (by default its largest value) as colours."""
+    level = np.clip(1 + decibels(power, reference) / DEPTH, 0, 1) if power.any() else np.zeros(power.shape)
+    return _COLORS[(255 * level).astype(np.uint8)]
+
+
+def png(pixels: UInt8[np.ndarray, "row column ..."]) -> str:
+    """A picture as a data URL."""
+    from matplotlib.image import imsave
+
+    buffer = io.BytesIO()
+    imsave(buffer, pixels, format="png", cmap="gray", vmin=0, vmax=255)
+    return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
+
+
+class View:
+    """Pictures and figures of a pipeline, as plain data for a page.
+
+    Args:
+        pipeline: to look at.
+    """
+
+    def __init__(self, pipeline: Pipeline):
+        self._pipeline = pipeline
+        self._heatmaps = pipeline.heatmaps
+        self._fan = Fan(self._heatmaps)
+        self._history: deque[tuple[float, int, dict[str, float]]] = deque()  # clock, frames, seconds by stage
+
+    def facts(self) -> dict[str, object]:
+        """What does not change: axes of the heat maps, the budget."""
+        config, maps = self._pipeline.config, self._heatmaps
+        return {
+            "budget_ms": 1e3 * config.frame_period,
+            "fan": {"width": self._fan.width, "reach": self._fan.reach},
+            "doppler": {"speed": -float(maps.velocities[0]), "azimuth": round(float(np.degrees(maps.azimuths[-1])), 1)},
+        }
+
+    def frame(self, adc: np.ndarray, valid: np.ndarray, stamp: float) -> dict[str, object]:
+        """Heat maps of a frame, the pose, and the load; ``adc`` and ``valid`` have a frame axis of one."""
+        spectrum = self._heatmaps.spectrum(adc, valid)
+        doppler = self._heatmaps.doppler_azimuth_of(spectrum)[0].numpy()
+        return {
+            "time": stamp,
+            "pose": self._pose(),
+            "fan": png(self._fan.draw(self._heatmaps.range_azimuth_of(spectrum)[0].numpy())),
+            # Closing speeds up, left to the left.
+            "doppler": png(np.kron(colored(doppler)[::-1, ::-1], np.ones((5, 1, 1), np.uint8))),
+            "load": self._load(),
+        }
+
+    def map(self) -> dict[str, object]:
+        """Map and path after the last loop closure."""
+        slam = self._pipeline.slam
+        grid = slam.map()
+        shade = grid.image()
+        colors = np.stack([shade, shade, shade, np.where(shade == 205, 0, 255).astype(np.uint8)], axis=-1)
+        rows, columns = shade.shape
+        return {
+            "picture": png(colors),
+            "origin": [float(value) for value in grid.origin],
+            "size": [columns * grid.resolution, rows * grid.resolution],
+            "path": np.round(slam.graph.poses[:, :2], 3).tolist(),
+            "loops": int(slam.graph.accepted.sum()),
+        }
+
+    def _pose(self) -> list[float] | None:
+        """Where the sensor is on the map: odometry since the last node, from that node on."""
+        slam = self._pipeline.slam
+        if not self._pipeline.poses:
+            return None
+        now = self._pipeline.poses[-1][-1]
+        if slam.nodes:
+            now = compose(slam.graph.poses[-1], between(slam.odometry.pose(slam.nodes[-1].time), now))
+        return [round(float(value), 4) for value in now]
+
+    def _load(self) -> dict[str, object]:
+        """Frames a second and ms a frame by stage, over the last seconds."""
+        now = time.monotonic(), self._pipeline.pushed, dict(self._pipeline.stage_seconds)
+        self._history.append(now)
+        while len(self._history) > 2 and self._history[1][0] <= now[0] - _SPAN:
+            self._history.popleft()
+        before = self._history[0]
+        seconds, frames = now[0] - before[0], now[1] - before[1]
+        if not frames or seconds <= 0:
+            return {"rate": 0.0, "stages": {}}
+        stages = {name: 1e3 * (total - before[2].get(name, 0.0)) / frames for name, total in now[2].items()}
+        return {"rate": frames / seconds, "stages": {name: round(value, 3) for name, value in stages.items()}}

@@ -1,0 +1,161 @@
+"""Command side of the DCA1000: answers requests and switches the data side.
+
+A real board says that all went well to nearly everything, a start before any settings included (the `test_cmd` capture
+among the real recordings). What fails here is what would not give samples of an IWR1843: settings other than raw, two
+lanes and 16 bit, packets out of range, unknown codes, a second start.
+"""
+
+import socket
+import threading
+from collections.abc import Callable
+
+from radarize.errors import InputError
+from radarize.radar.dca1000 import MAX_PAYLOAD
+from radarize.radar.dca1000_commands import (
+    RAW_TWO_LANES,
+    VERSION_2_8,
+    Command,
+    Reply,
+    Request,
+    Status,
+    read_packet_settings,
+)
+from radarsim.emulator.link import Link
+
+_DONE, _FAILED = 0, 1
+_DEFAULT = (25e-6, MAX_PAYLOAD)  # s between packets of so many bytes
+
+
+class Board:
+    """A DCA1000's answers to requests.
+
+    Args:
+        link: data side.
+        reset_radar: reboots the radar on the board.
+        say: tells the user what happened.
+    """
+
+    def __init__(self, link: Link, reset_radar: Callable[[], None], say: Callable[[str], None]):
+        self._link, self._reset_radar, self._say = link, reset_radar, say
+        self._packets = _DEFAULT
+
+    def execute(self, request: Request) -> int:
+        """Status of the reply to `request`."""
+        match request.command:
+            case Command.ALIVE | Command.STATUS | Command.RADAR_MODE:
+                return _DONE
+            case Command.VERSION:
+                return VERSION_2_8
+            case Command.RESET_FPGA:
+                self._link.stop()
+                self._packets = _DEFAULT
+                return _DONE
+            case Command.RESET_RADAR:
+                self._say("board: radar reset")
+                self._reset_radar()
+                return _DONE
+            case Command.CONFIGURE:
+                return self._configure(request.body)
+            case Command.PACKETS:
+                return self._set_packets(request.body)
+            case Command.EEPROM:
+                self._say("board: EEPROM written; the emulator keeps its addresses")
+                return _DONE
+            case Command.START:
+                return self._start()
+            case Command.STOP:
+                self._link.stop()
+                return _DONE
+        self._say(f"board: request {request.command} fails, the emulator cannot do it")
+        return _FAILED
+
+    def _configure(self, body: bytes) -> int:
+        if body[:5] != RAW_TWO_LANES[:5] or len(body) != len(RAW_TWO_LANES):  # the last is a timer
+            self._say(f"board: settings {body.hex(' ')} fail, expected {RAW_TWO_LANES.hex(' ')} (raw, 2 lanes, 16 bit)")
+            return _FAILED
+        return _DONE
+
+    def _set_packets(self, body: bytes) -> int:
+        try:
+            self._packets = read_packet_settings(body)
+        except InputError as error:
+            self._say(f"board: {error}")
+            return _FAILED
+        return _DONE
+
+    def _start(self) -> int:
+        if self._link.recording:
+            self._say("board: start fails, it is recording")
+            return _FAILED
+        self._link.start(*self._packets)
+        self._say(f"board: recording, {self._packets[0] * 1e6:g} us between packets")
+        return _DONE
+
+
+class BoardSockets:
+    """The board's network interface.
+
+    Replies and data leave from port 1024, as from a real board, and go to fixed ports of the computer: software that
+    listens elsewhere, or connects its socket to the command port, fails here as it would there.
+
+    Args:
+        board, command_port: where requests are taken.
+        computer, data_port: where packets go; replies go to its `command_port`.
+
+    Raises:
+        InputError: the address is in use, or not one of this machine.
+    """
+
+    def __init__(self, board: str, computer: str, command_port: int, data_port: int):
+        self._replies_to, self._data_to = (computer, command_port), (computer, data_port)
+        self._commands = _bound(board, command_port)
+        try:
+            self._out = _bound(board, 1024)
+        except InputError:
+            self._out = _bound(board, 0)  # another emulator has it
+        self._out.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)
+        self._closed = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def serve(self, execute: Callable[[Request], int], say: Callable[[str], None]) -> None:
+        """Answer requests in a thread until closed."""
+        self._thread = threading.Thread(target=self._serve, args=(execute, say), name="commands", daemon=True)
+        self._thread.start()
+
+    def data(self, packet: bytes) -> None:
+        """Send a data packet."""
+        self._out.sendto(packet, self._data_to)
+
+    def report(self, status: Status) -> None:
+        """Send a status that nobody asked for."""
+        self._out.sendto(Reply(Command.STATUS, status).encode(), self._replies_to)
+
+    def close(self) -> None:
+        self._closed.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._commands.close()
+        self._out.close()
+
+    def _serve(self, execute: Callable[[Request], int], say: Callable[[str], None]) -> None:
+        self._commands.settimeout(0.05)
+        while not self._closed.is_set():
+            try:
+                data, _ = self._commands.recvfrom(2048)
+                request = Request.decode(data)
+            except TimeoutError:
+                continue
+            except InputError as error:
+                say(f"board: {error}; no reply")
+                continue
+            self._out.sendto(Reply(request.command, execute(request)).encode(), self._replies_to)
+
+
+def _bound(address: str, port: int) -> socket.socket:
+    out = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        out.bind((address, port))
+    except OSError as error:
+        out.close()
+        raise InputError(f"{address}:{port} cannot be the board's address ({error.strerror})") from error
+    return out

@@ -1,0 +1,204 @@
+"""The command line of TI's `mmwDemo` firmware: which commands it knows, when it refuses them, and its words.
+
+Behaviour and messages: mmWave SDK 3.6, `packages/ti/utils/cli` and `packages/ti/demo/xwr18xx/mmw`; what sensorStart
+finds wrong with the chirps is said in this project's words, where the firmware has numbers only.
+"""
+
+from collections.abc import Callable
+from typing import Protocol
+
+from radarize.errors import InputError
+from radarize.radar.cfg import FIELDS, parse_cfg
+from radarize.radar.config import RadarConfig
+from radarize.radar.limits import check_limits
+
+PROMPT = "mmwDemo:/>"
+BANNER = (
+    "******************************************\n"
+    "xWR18xx MMW Demo 03.06.00.00 (emulated)\n"
+    "******************************************\n"
+)
+#: How many values each configuration command takes. RF commands, which flushCfg forgets, and the demo's own, all of
+#: which every sensorStart without argument wants anew.
+RF = {name: len(FIELDS[name]) for name in ("dfeDataOutputMode", "channelCfg", "adcCfg", "profileCfg", "chirpCfg")}
+RF |= {"frameCfg": len(FIELDS["frameCfg"]), "lowPower": 2, "advFrameCfg": 5, "subFrameCfg": 10, "contModeCfg": 9}
+DEMO = {
+    "adcbufCfg": 5,
+    "guiMonitor": 7,
+    "cfarCfg": 9,
+    "multiObjBeamForming": 3,
+    "calibDcRangeSig": 5,
+    "clutterRemoval": 2,
+    "compRangeBiasAndRxChanPhase": 25,
+    "measureRangeBiasAndRxChanPhase": 3,
+    "aoaFovCfg": 5,
+    "cfarFovCfg": 4,
+    "extendedMaxVelocity": 2,
+    "CQRxSatMonitor": 5,
+    "CQSigImgMonitor": 3,
+    "analogMonitor": 2,
+    "lvdsStreamCfg": 4,
+    "calibData": 3,
+}
+OPTIONAL = {"bpmCfg": 4, "configDataPort": 2}
+_COUNTS = RF | DEMO | OPTIONAL
+#: Read once, at the first sensorStart; other values need a reboot.
+_OPENING = ("channelCfg", "adcCfg", "lowPower")
+_FRAMES = ("profileCfg", "chirpCfg", "frameCfg")
+_USAGE = "Error: Invalid usage of the CLI command\n"
+_PARTIAL = (
+    "Error: You have provided partial configuration between stop and this command and partial configuration cannot be "
+    'undone.Issue the full configuration and do "sensorStart" \n'
+)
+
+
+class Radar(Protocol):
+    """What the commands act on."""
+
+    def start(self, config: RadarConfig, frames: int) -> None:
+        """Send `frames` frames, or, if 0, frames without end; InputError refuses the configuration."""
+
+    def stop(self) -> None:
+        """Returns when the frame in progress has ended."""
+
+
+class CommandLine:
+    """The firmware's answers to lines, as after power-up."""
+
+    def __init__(self, radar: Radar):
+        self._radar = radar
+        self._lines: list[tuple[str, ...]] = []
+        self._pending: set[str] = set()  # the demo's commands since power-up or the last sensorStop
+        self._opened: list[tuple[str, ...]] | None = None
+        self._last: tuple[RadarConfig, int] | None = None
+        self._started = False
+
+    def execute(self, line: str) -> str:
+        """What the firmware writes after `line`, without the echo before and the prompt behind it."""
+        if line.startswith("%"):
+            return "Skipped\n"
+        words = line.split()
+        if not words:
+            return ""
+        name, *values = words
+        if name in self._OWN:
+            text, status = self._OWN[name](self, values)
+        elif name in _COUNTS:
+            text, status = self._configure(name, values)
+        else:
+            return f"'{name}' is not recognized as a CLI command\n"
+        return text + ("Done\n" if status == 0 else f"Error {status}\n")
+
+    def _configure(self, name: str, values: list[str]) -> tuple[str, int]:
+        if self._started and name != "configDataPort":
+            return "Ignored: This command is not allowed after sensor has started\n", 0
+        if len(values) != _COUNTS[name]:
+            return _USAGE, -1
+        modes = [line[1] for line in self._lines if line[0] == "dfeDataOutputMode"]
+        if name in _FRAMES and modes[-1:] not in (["1"], ["3"]):
+            mode = "Frame or Advanced Frame" if name == "profileCfg" else "Chirp"
+            return f"Error: Configuration is valid only if the DFE Output Mode is {mode}\n", -1
+        if name == "dfeDataOutputMode" and values[0] not in ("1", "2", "3"):
+            return "Error: Invalid mode.\n", -1
+        self._lines.append((name, *values))
+        if name in DEMO:
+            self._pending.add(name)
+        return "", 0
+
+    def _flush(self, values: list[str]) -> tuple[str, int]:
+        if self._started:
+            return "Ignored: This command is not allowed after sensor has started\n", 0
+        self._lines = [line for line in self._lines if line[0] not in RF]
+        return "", 0
+
+    def _start(self, values: list[str]) -> tuple[str, int]:
+        anew = not values
+        if len(values) == 1 and values[0] != "0":
+            return (
+                "Error: Reconfig is not supported, only argument of 0 is\n"
+                "(do not reconfig, just re-start the sensor) valid\n"
+            ), -1
+        if len(values) > 1:
+            return _USAGE, -1
+        whole = self._pending == set(DEMO)
+        if self._last is None and not whole:
+            return "Error: Full configuration must be provided before sensor can be started the first time\n", -1
+        if self._started:
+            return "Ignored: Sensor is already started\n", 0
+        if anew and not self._pending:
+            return (
+                'Error: You have provided no configuration, issue "sensorStart 0" OR provide full configuration and '
+                'issue "sensorStart"\n'
+            ), -1
+        if not whole and self._pending:
+            return _PARTIAL, -1
+        if not anew and whole and self._last is not None:
+            return (
+                'Error: You have provided complete new configuration, issue "sensorStart" (without argument) if you '
+                "want it to take effect\n"
+            ), -1
+        return self._run(anew)
+
+    def _run(self, anew: bool) -> tuple[str, int]:
+        debug = "" if self._opened is not None else "Debug: Init Calibration Status = 0x1ffe\n"
+        try:
+            if anew or self._last is None:
+                self._check_opening()
+                config, frames = self._read()
+            else:
+                config, frames = self._last
+            self._radar.start(config, frames)
+        except InputError as error:
+            return f"{debug}Error: mmWave Config failed: {error}\n", -1
+        self._last, self._started = (config, frames), True
+        return debug, 0
+
+    def _check_opening(self) -> None:
+        """Real firmware stops dead here, in an assertion."""
+        opening = sorted({line[0]: line for line in self._lines if line[0] in _OPENING}.values())
+        if self._opened is None:
+            self._opened = opening
+        elif opening != self._opened:
+            raise InputError(f"{', '.join(_OPENING)} differ from the first sensorStart's, expected a reboot in between")
+
+    def _read(self) -> tuple[RadarConfig, int]:
+        """The configuration, and how many frames to send."""
+        config = parse_cfg("\n".join(" ".join(line) for line in self._lines), "commands so far")
+        check_limits(config)
+        last = {line[0]: line[1:] for line in self._lines}
+        if last["lvdsStreamCfg"][FIELDS["lvdsStreamCfg"].index("dataFmt")] != "1":
+            raise InputError("lvdsStreamCfg dataFmt is not 1 (ADC samples), so nothing would go to the DCA1000")
+        return config, int(float(last["frameCfg"][FIELDS["frameCfg"].index("numFrames")]))
+
+    def _stop(self, values: list[str]) -> tuple[str, int]:
+        if not self._started:
+            return "Ignored: Sensor is already stopped\n", 0
+        self._radar.stop()
+        self._started = False
+        self._pending.clear()
+        return "", 0
+
+    def _version(self, values: list[str]) -> tuple[str, int]:
+        return (
+            "Platform                : xWR18xx\n"
+            "mmWave SDK Version      : 03.06.00.00\n"
+            "Device Info             : IWR18xx non-secure ES 01.00\n"
+        ), 0
+
+    def _status(self, values: list[str]) -> tuple[str, int]:
+        state = 2 if self._started else 3 if self._last else 0
+        return f"Sensor State: {state}\nData port baud rate: 921600\n", 0
+
+    def _help(self, values: list[str]) -> tuple[str, int]:
+        return "Help: This will display the usage of the CLI commands\n" + "\n".join(
+            sorted(self._OWN | _COUNTS)
+        ) + "\n", 0
+
+    _OWN: dict[str, Callable[["CommandLine", list[str]], tuple[str, int]]] = {
+        "sensorStart": _start,
+        "sensorStop": _stop,
+        "flushCfg": _flush,
+        "version": _version,
+        "queryDemoStatus": _status,
+        "help": _help,
+    }

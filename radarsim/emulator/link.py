@@ -1,0 +1,135 @@
+"""Data side of the DCA1000: LVDS in, UDP packets out, at the board's pace.
+
+The board fills packets with whatever comes, regardless of frames, so the end of a frame waits for the next one. When
+nothing has come for 2 s, it sends what is left and a status that the recording is completed: so in a real capture.
+"""
+
+import threading
+import time
+from collections.abc import Callable
+
+from radarize.radar.dca1000 import MAX_PAYLOAD, Packet
+from radarize.radar.dca1000_commands import Status
+from radarsim.emulator.disturbance import Disturbance
+
+SILENCE = 2.0  # s
+MEMORY = 256 << 20  # the board's, bytes
+_NEVER = float("inf")
+_JITTER = 1e-3  # s of packets that may follow each other faster, to make up for a late wake-up
+_SHORTEST = 1e-4  # s, shortest wait worth going to sleep for
+#: Time on the wire, s: 1456 bytes of samples and 52 of headers and gaps at 1 Gbit/s. With it, delays of 5, 10, 25 and
+#: 50 us give 683, 526, 314 and 188 Mbit/s of samples; SPRUIJ4A says 706, 545, 325 and 193 with headers.
+_WIRE_TIME = 8e-9 * (MAX_PAYLOAD + 52)
+
+
+class Link:
+    """Packs the radar's bytes and sends them.
+
+    Time passes in `advance` and `take` alone, which one thread calls; `start` and `stop` may come from another.
+
+    Args:
+        send: sends a UDP payload to the computer's data port.
+        report: sends a status to its command port.
+        disturbance: of the packets on their way.
+        clock, sleep: seconds.
+
+    Attributes:
+        recording: between `start` and `stop`, or completion.
+        packets: sent, before disturbance, since power-up.
+    """
+
+    def __init__(
+        self,
+        send: Callable[[bytes], None],
+        report: Callable[[Status], None],
+        disturbance: Disturbance | None = None,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ):
+        self._send, self._report = send, report
+        self._disturb = disturbance or Disturbance()
+        self._clock, self._sleep = clock, sleep
+        self._lock = threading.Lock()
+        self.recording, self.packets = False, 0
+        self._clear()
+
+    def _clear(self) -> None:
+        self._waiting = bytearray()
+        self._sequence, self._offset = 1, 0
+        self._free = 0.0  # when the next packet may leave
+        self._last: float | None = None  # when bytes came last
+
+    def start(self, delay: float = 25e-6, payload: int = MAX_PAYLOAD) -> None:
+        """Record from now on, with `delay` seconds between packets of `payload` bytes."""
+        with self._lock:
+            self._clear()
+            self._spacing, self._payload = delay + _WIRE_TIME, payload
+            self.recording = True
+
+    def stop(self) -> None:
+        """Send what is left and record no more."""
+        with self._lock:
+            if self.recording:
+                self._finish()
+
+    def take(self, data: bytes | memoryview, due: float) -> None:
+        """Bytes that have come over LVDS at `due`; lost unless recording."""
+        self.advance(due)
+        with self._lock:
+            if not self.recording:
+                return
+            self._last = due
+            if len(self._waiting) + len(data) > MEMORY:
+                self.recording = False
+                self._report(Status.MEMORY_FULL)
+                return
+            self._waiting += data
+        self.advance(due)
+
+    def advance(self, until: float) -> None:
+        """Wait until then, sending what leaves before."""
+        while True:
+            with self._lock:
+                departure = self._departure()
+            if departure > max(until, self._clock()):  # later than `until`, where the caller is behind
+                break
+            self._wait(departure)
+            with self._lock:
+                self._depart(departure)
+        self._wait(until)
+
+    def _wait(self, until: float) -> None:
+        if (left := until - self._clock()) > _SHORTEST:
+            self._sleep(left)
+
+    def _departure(self) -> float:
+        """When the next packet leaves, if nothing more comes."""
+        if not self.recording or self._last is None:
+            return _NEVER
+        return max(self._free, self._last) if len(self._waiting) >= self._payload else self._last + SILENCE
+
+    def _depart(self, now: float) -> None:
+        if self._departure() > now:  # stopped, or started anew, while waiting
+            return
+        if len(self._waiting) >= self._payload:
+            self._packet(self._payload)
+            self._free = max(now, self._clock() - _JITTER) + self._spacing
+        else:
+            self._finish()
+            self._report(Status.RECORD_COMPLETED)
+
+    def _finish(self) -> None:
+        while self._waiting:
+            self._packet(self._payload)
+        for packet in self._disturb.rest():
+            self._send(packet)
+        self.recording = False
+
+    def _packet(self, size: int) -> None:
+        payload = bytes(self._waiting[:size])
+        del self._waiting[:size]
+        for packet in self._disturb(Packet(self._sequence, self._offset, payload).encode()):
+            self._send(packet)
+        self._sequence += 1
+        self._offset += len(payload)
+        self.packets += 1

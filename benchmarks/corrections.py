@@ -328,8 +328,8 @@ def main() -> None:
             f"Walk: {path.stem}, ego-velocity on its first 4 s; levels: {SCENE}, {PLATFORM}, {options.duration:g} s.",
             "Zero where the correction takes the truth itself.",
             "The Doppler least squares' thresholds were chosen with windows; without, sidelobes pass for echoes.",
-            "Loss: U-Net of width 4 on 210 frames, the published one counting cells behind surfaces as free; so short a "
-            "training says how fast, not how far, each learns.",
+            "Loss: U-Net of width 4 on 210 frames, the published one counting cells behind surfaces as free; so short "
+            "a training says how fast, not how far, each learns.",
         ],
     )
 

@@ -9,8 +9,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import DATA_PORT
@@ -23,9 +21,11 @@ from radarsim.emulator.link import Link
 from radarsim.emulator.source import NOT_IN_SAMPLES, Source
 from radarsim.emulator.uart import Uart
 
-#: What the radar falls behind by less than this, it makes up for by sending faster; else its clock is set back, since a
-#: burst that no radar sends would overrun whoever receives it. s.
-_TOLERANCE = 5e-3
+#: A busy machine holds the radar up now and then: up to this it catches up, as fast as the board's packets may follow
+#: each other, s. Behind a source that is too slow it does not: its clock is set back, and frames come late.
+_CATCH_UP = 0.25
+_ON_TIME = 5e-3  # s
+_WAKE_UP = 1e-3  # s: the chirps of so long a time are sent together, since waking up for each would cost too much
 _IDLE = 0.01  # s
 _PREPARATION = 120.0  # s, longest wait of sensorStart for the first frame
 
@@ -45,7 +45,7 @@ class Emulator:
     Attributes:
         port: the serial port's path.
         frames: sent so far.
-        late: how many of them came late because the source or this machine was too slow.
+        late: how often the radar's clock was set back because the source or this machine was too slow.
         lateness: s, by how much in all.
 
     Raises:
@@ -133,7 +133,7 @@ class Emulator:
         self._say(f"radar: stopped; {self}")
 
     def __str__(self) -> str:
-        late = f", {self.late} of them late, by {self.lateness:.2f} s in all" if self.late else ""
+        late = f", {self.late} of them late, {self.lateness:.2f} s in all" if self.late else ""
         return f"{self.frames} frames sent{late}; {self.link.packets} packets"
 
     def _reset(self) -> None:
@@ -168,23 +168,28 @@ class Emulator:
 
     def _send(self, feed: Feed) -> None:
         config = feed.config
-        ends = config.chirp_time * np.arange(1, config.loops * len(config.tx_order) + 1)
-        size = config.frame_bytes // len(ends)
+        chirps = config.loops * len(config.tx_order)
+        together = max(round(_WAKE_UP / config.chirp_time), 1)
+        size = config.frame_bytes // chirps
         due = time.monotonic()
         while self._left and not self._stopping.is_set():
             self._touched = True
+            starved = not feed.waiting
             if (frame := self._next(feed)) is None:
-                self._say(f"radar: end of the source; {self}")
+                if not self._stopping.is_set():
+                    self._say(f"radar: end of the source; {self}")
                 break
-            if (behind := time.monotonic() - due) > _TOLERANCE:
+            if (behind := time.monotonic() - due) > (_ON_TIME if starved else _CATCH_UP):
                 if not self.late:
-                    self._say(f"radar: frame {self.frames + 1} is {behind * 1e3:.0f} ms late; this machine is too slow")
+                    why = "the source" if starved else "this machine"
+                    self._say(f"radar: frame {self.frames + 1} is {behind * 1e3:.0f} ms late: {why} is too slow")
                 self.late += 1
                 self.lateness += behind
                 due += behind
-            chirps = memoryview(frame)
-            for number, end in enumerate(ends.tolist()):
-                self.link.take(chirps[number * size : (number + 1) * size], due + end)
+            lvds = memoryview(frame)
+            for first in range(0, chirps, together):
+                end = min(first + together, chirps)
+                self.link.take(lvds[first * size : end * size], due + end * config.chirp_time)
             due += config.frame_period
             self.frames += 1
             self._left -= 1

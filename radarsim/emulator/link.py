@@ -15,6 +15,8 @@ from radarsim.emulator.disturbance import Disturbance
 SILENCE = 2.0  # s
 MEMORY = 256 << 20  # the board's, bytes
 _NEVER = float("inf")
+_JITTER = 1e-3  # s of packets that may follow each other faster, to make up for a late wake-up
+_SHORTEST = 1e-4  # s, shortest wait worth going to sleep for
 #: Time on the wire, s: 1456 bytes of samples and 52 of headers and gaps at 1 Gbit/s. With it, delays of 5, 10, 25 and
 #: 50 us give 683, 526, 314 and 188 Mbit/s of samples; SPRUIJ4A says 706, 545, 325 and 193 with headers.
 _WIRE_TIME = 8e-9 * (MAX_PAYLOAD + 52)
@@ -89,7 +91,7 @@ class Link:
         while True:
             with self._lock:
                 departure = self._departure()
-            if departure > until:
+            if departure > max(until, self._clock()):  # later than `until`, where the caller is behind
                 break
             self._wait(departure)
             with self._lock:
@@ -97,7 +99,7 @@ class Link:
         self._wait(until)
 
     def _wait(self, until: float) -> None:
-        if (left := until - self._clock()) > 0:
+        if (left := until - self._clock()) > _SHORTEST:
             self._sleep(left)
 
     def _departure(self) -> float:
@@ -111,7 +113,7 @@ class Link:
             return
         if len(self._waiting) >= self._payload:
             self._packet(self._payload)
-            self._free = now + self._spacing
+            self._free = max(now, self._clock() - _JITTER) + self._spacing
         else:
             self._finish()
             self._report(Status.RECORD_COMPLETED)

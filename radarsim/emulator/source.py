@@ -2,11 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import cycle
 from math import isclose
 from pathlib import Path
 from typing import Protocol
 
 import numpy as np
+from jaxtyping import Int16
 
 from radarize.errors import InputError
 from radarize.radar.cfg import load_config
@@ -16,6 +18,7 @@ from radarize.recording import Recording
 
 #: What does not change the samples that the radar sends: corrections for whoever reads them.
 NOT_IN_SAMPLES = {"board", "range_bias", "channel_calibration"}
+_KEPT = 256 << 20  # bytes of a recording that, played in a loop, are unpacked once
 
 
 class Source(Protocol):
@@ -66,11 +69,14 @@ class Playback:
     def frames(self, config: RadarConfig) -> Iterator[bytes]:
         """One at a time, packed as `config` says."""
         with Recording(self.path) as recording:
-            while True:
-                for number in range(len(recording)):
-                    yield encode(recording.adc(number, number + 1), config).astype("<i2", copy=False).tobytes()
-                if not self.loop:
-                    return
+            numbers, kept = range(len(recording)), len(recording) * config.frame_bytes <= _KEPT
+            frames = (
+                _packed(recording.adc(number, number + 1), config)
+                for number in (cycle(numbers) if self.loop and not kept else numbers)
+            )
+            if self.loop and kept:
+                frames = cycle(frames)
+            yield from frames
 
 
 @dataclass(frozen=True)
@@ -120,9 +126,13 @@ class Walk:
             times = np.arange(config.frames_within(motion.duration)) * config.frame_period
             for first in range(0, len(times), BATCH):
                 for frame in simulator.frames(times[first : first + BATCH])[0]:
-                    yield encode(frame[None], config).astype("<i2", copy=False).tobytes()
+                    yield _packed(frame[None], config)
             if not self.loop:
                 return
+
+
+def _packed(frame: Int16[np.ndarray, "1 loop tx rx sample 2"], config: RadarConfig) -> bytes:
+    return encode(frame, config).astype("<i2", copy=False).tobytes()
 
 
 def _alike(first: object, second: object) -> bool:

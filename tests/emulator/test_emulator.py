@@ -8,7 +8,6 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,54 +18,16 @@ from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import Packet, decode, encode, packets
 from radarize.radar.dca1000_commands import RAW_TWO_LANES, Command, Reply, Request, Status, packet_settings
-from radarize.recording import Recording, RecordingWriter
+from radarize.radar.presets import PRESETS
+from radarize.recording import Recording
 from radarsim.emulator.commandline import PROMPT
 from radarsim.emulator.disturbance import Disturbance
 from radarsim.emulator.emulator import Emulator
 from radarsim.emulator.source import Playback, Walk
 from tests.emulator.captures import captured
+from tests.emulator.rig import BOARD, COMPUTER, CONFIG, emulator, free_ports, record
 
-BOARD, COMPUTER = "127.0.0.2", "127.0.0.1"
-#: Powers of two, as `xwr` wants them; 25 frames/s of 196,608 bytes.
-CONFIG = RadarConfig(
-    start_frequency=77e9,
-    slope=60e12,
-    idle_time=30e-6,
-    adc_start_time=5e-6,
-    ramp_end_time=60e-6,
-    samples=128,
-    sample_rate=5e6,
-    loops=32,
-    frame_period=40e-3,
-    tx_order=(0, 1, 2),
-)
 SMALL = CONFIG.model_copy(update={"loops": 4, "samples": 32, "frame_period": 20e-3})
-
-
-def record(path: Path, config: RadarConfig, frames: int) -> np.ndarray:
-    """A recording of random samples."""
-    adc = np.random.default_rng(0).integers(-(2**15), 2**15, (frames, *config.frame_shape), dtype=np.int16)
-    with RecordingWriter(path, config) as writer:
-        writer.append(adc, np.arange(frames) * config.frame_period)
-    return adc
-
-
-def free_ports() -> tuple[int, int]:
-    """UDP ports that nobody uses, on the board's address or the computer's."""
-    found: list[int] = []
-    while len(found) < 2:
-        with (
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as computer,
-            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as board,
-        ):
-            computer.bind((COMPUTER, 0))
-            port = computer.getsockname()[1]
-            try:
-                board.bind((BOARD, port))
-            except OSError:
-                continue
-            found.append(port)
-    return found[0], found[1]
 
 
 class Client:
@@ -284,8 +245,9 @@ def test_frames_keep_their_period_and_chirps_theirs(tmp_path):
     chirp = within // (CONFIG.frame_bytes // 96)
     due = frame * CONFIG.frame_period + (chirp + 1) * CONFIG.chirp_time
     behind = np.array(arrivals) - due
-    # The median packet: a busy machine holds some up, and shifts all that follow by what it reports.
-    assert np.ptp(np.median(behind.reshape(-1)[: len(behind) // 4 * 4].reshape(4, -1), axis=1)) < 0.01 + slipped
+    # A busy machine holds packets up, but none is early: the most punctual ones of each quarter tell the radar's clock.
+    quarters = behind[: len(behind) // 4 * 4].reshape(4, -1).min(axis=1)
+    assert np.ptp(quarters) < 5e-3 + slipped
     assert np.diff(arrivals).max() > CONFIG.frame_period - CONFIG.burst_time - 5e-3  # the pause between frames
 
 
@@ -352,7 +314,7 @@ def test_a_source_that_is_too_slow_makes_frames_late_and_says_so(tmp_path):
         client.configure(SMALL)
         received = b"".join(Packet.decode(data).payload for data in client.packets())
         assert emulator.frames == 8 and emulator.late >= 5 and emulator.lateness > 0.1
-    assert any("late; this machine is too slow" in line for line in said)
+    assert any("late: the source is too slow" in line for line in said)
     assert received == encode(adc, SMALL).tobytes()[: len(received)] and len(received) > 7 * SMALL.frame_bytes
 
 
@@ -388,36 +350,49 @@ def test_xwr_captures_what_was_recorded(tmp_path):
     from xwr import DCAConfig, XWRConfig, XWRSystem
 
     adc = record(tmp_path / "r.h5", CONFIG, 25)
-    command_port, data_port = free_ports()
-    command = [
-        sys.executable, "-m", "radarsim.cli", "emulate", tmp_path / "r.h5", "--port-link", tmp_path / "tty",
-        "--command-port", command_port, "--data-port", data_port,
-    ]  # fmt: skip
-    emulator = subprocess.Popen([*map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    try:
-        assert emulator.stdout.readline() == f"serial port {tmp_path / 'tty'}, 115200 baud\n"
-        assert "DCA1000 127.0.0.2" in emulator.stdout.readline()
+    with emulator(tmp_path / "r.h5", tmp_path) as running:
         radar = XWRConfig(
             device="AWR1843", frequency=77.0, idle_time=30.0, adc_start_time=5.0, ramp_end_time=60.0, tx_start_time=1.0,
             freq_slope=60.0, adc_samples=128, sample_rate=5000, frame_length=32, frame_period=40.0,
-            port=str(tmp_path / "tty"),
+            port=str(running.port),
         )  # fmt: skip
         capture = DCAConfig(
-            sys_ip=COMPUTER, fpga_ip=BOARD, config_port=command_port, data_port=data_port, delay=25.0, timeout=1.0
+            sys_ip=COMPUTER, fpga_ip=BOARD, config_port=running.command_port, data_port=running.data_port, delay=25.0
         )
         system = XWRSystem(radar=radar, capture=capture, strict=True)
         frames = list(system.stream())
         system.stop()
-    finally:
-        emulator.send_signal(2)
-        rest = emulator.communicate(timeout=20)[0]
-    assert emulator.returncode == 0 and "25 frames sent" in rest and not (tmp_path / "tty").is_symlink()
+    assert "25 frames sent" in running.said
     # The end of the 25th frame comes 2 s late, after xwr has given up.
     assert len(frames) == 24 and all(frame.complete for frame in frames)
     received = np.stack([np.frombuffer(frame.data, "<i2") for frame in frames]).reshape(24, *radar.raw_shape)
     q0, q1, i0, i1 = (received[..., n::4] for n in range(4))
     samples = np.stack([np.stack([i0, i1], -1), np.stack([q0, q1], -1)], -1).reshape(24, *CONFIG.frame_shape)
     assert np.array_equal(samples, adc[:24])
+
+
+def test_our_own_capture_loses_nothing_in_10_s(tmp_path):
+    """The preset `radarize`, 30 frames/s, both command lines in processes of their own."""
+    preset = PRESETS["radarize"]
+    adc = record(tmp_path / "r.h5", preset, 30)
+    with emulator(tmp_path / "r.h5", tmp_path, "--loop") as running:
+        captured = subprocess.run(
+            [
+                sys.executable, "-m", "radarize.cli", "capture", "--config", "radarize", "--port", running.port,
+                "--host", COMPUTER, "--dca", BOARD, "--command-port", str(running.command_port),
+                "--data-port", str(running.data_port), "--frames", "300", "-o", tmp_path / "out.h5",
+            ],
+            capture_output=True, text=True, timeout=300,
+        )  # fmt: skip
+    assert captured.returncode == 0, captured.stderr
+    with Recording(tmp_path / "out.h5") as recording:
+        assert recording.config == preset and recording.valid(0, 300).all()  # no packet lost
+        numbers = np.round(recording.times / preset.frame_period).astype(int)
+        for first in range(0, len(recording), 30):
+            assert np.array_equal(recording.adc(first, first + 30), adc[numbers[first : first + 30] % 30])
+        if len(recording) < 300 and os.getloadavg()[0] > 2 * len(os.sched_getaffinity(0)):
+            pytest.skip(f"this machine is too busy to write 30 frames/s: {recording.attributes['warnings']}")
+        assert len(recording) == 300 and recording.attributes["warnings"] == ""
 
 
 @pytest.mark.parametrize(

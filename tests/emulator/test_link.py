@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from radarize.errors import InputError
-from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import FrameAssembler, Packet, decode, encode, packets
 from radarize.radar.dca1000_commands import Status
 from radarsim.emulator.disturbance import DELAYED, REORDERED, Disturbance
 from radarsim.emulator.link import Link
 from tests.emulator.captures import captured
+from tests.emulator.rig import CONFIG
 
 
 class Wire:
@@ -66,7 +66,7 @@ def test_throughput_is_the_data_sheets(delay, megabits):
     times = [time for time, _ in wire.sent]
     rate = 8 * 1466 / np.diff(times).mean() / 1e6
     assert rate == pytest.approx(megabits, rel=0.04)
-    assert np.ptp(np.diff(times)) < 1e-9
+    assert np.diff(times).max() < 2e-4  # one by one or, where that is shorter than a nap, a few together
 
 
 def test_packets_disregard_frames_and_count_from_the_start():
@@ -146,18 +146,7 @@ def test_a_share_outside_0_to_1_is_refused():
 
 def test_frames_come_whole_through_a_bad_network():
     """10,000 packets: each sample in its place or lost, and the lost ones marked."""
-    config = RadarConfig(
-        start_frequency=77e9,
-        slope=60e12,
-        idle_time=30e-6,
-        adc_start_time=5e-6,
-        ramp_end_time=60e-6,
-        samples=128,
-        sample_rate=5e6,
-        loops=32,
-        frame_period=40e-3,
-        tx_order=(0, 2, 1),
-    )
+    config = CONFIG
     frames = np.random.default_rng(3).integers(-(2**15), 2**15, (75, *config.frame_shape), dtype=np.int16)
     network = Disturbance(0.01, 0.01, 0.02, 0.005, np.random.default_rng(4))
     wire = Wire(network)
@@ -174,8 +163,9 @@ def test_frames_come_whole_through_a_bad_network():
     assert len(settled) == len(frames)
     received = decode(np.concatenate([words for words, _ in settled]), config)
     valid = np.stack([whole for _, whole in settled])
-    assert assembler.late == 0 and assembler.duplicates == network.duplicated
-    assert network.lost * 1456 - 1456 < assembler.lost_bytes <= network.lost * 1456
+    counts = assembler.counts
+    assert counts.late == 0 and counts.duplicates == network.duplicated
+    assert network.lost * 1456 - 1456 < counts.lost_bytes <= network.lost * 1456
     assert np.array_equal(received[valid], frames[valid])
     assert 0.97 < valid.mean() < 1
     there = received != 0

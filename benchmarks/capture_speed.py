@@ -1,0 +1,133 @@
+"""`radarize capture` against `radarsim emulate`, each a process of its own: frames lost, and what each side costs."""
+
+import argparse
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import psutil
+
+from benchmarks.results import publish
+from radarize.radar.cfg import load_config
+from radarize.radar.config import RadarConfig
+from radarize.recording import Losses, Recording, RecordingWriter
+
+BOARD, COMPUTER = "127.0.0.2", "127.0.0.1"
+LOOP = 64  # frames played again and again
+NOISE = 40  # counts, RMS: about an IWR1843's at 30 dB of gain in a room
+
+
+class Cost:
+    """Processor time of a process and its children, those that have ended included.
+
+    Args:
+        process: started already.
+    """
+
+    def __init__(self, process: subprocess.Popen):
+        self._root, self._seconds = psutil.Process(process.pid), {}
+
+    def look(self) -> None:
+        """Note what has been used so far; call now and then."""
+        try:
+            for each in [self._root, *self._root.children(recursive=True)]:
+                times = each.cpu_times()
+                self._seconds[each.pid] = times.user + times.system
+        except psutil.NoSuchProcess:
+            pass
+
+    @property
+    def seconds(self) -> float:
+        """Used up to the last look."""
+        return sum(self._seconds.values())
+
+
+def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: int, options: list[str]) -> dict:
+    """One capture; a row of the table."""
+    rng = np.random.default_rng(seed)
+    played = rng.normal(0, NOISE, (LOOP, *config.frame_shape)).round().astype(np.int16)
+    with RecordingWriter(folder / "played.h5", config) as writer:
+        writer.append(played, np.arange(LOOP) * config.frame_period)
+    frames = round(seconds / config.frame_period)
+    ours = [sys.executable, "-m", "radarize.cli", "capture", "--config", preset, "--port", str(folder / "tty")]
+    ours += ["--host", COMPUTER, "--dca", BOARD, "--frames", str(frames), "-o", str(folder / "captured.h5")]
+    theirs = [sys.executable, "-m", "radarsim.cli", "emulate", str(folder / "played.h5"), "--loop", *options]
+    theirs += ["--host", COMPUTER, "--board", BOARD, "--port-link", str(folder / "tty"), "--seed", str(seed)]
+    emulator = subprocess.Popen(theirs, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        emulator.stdout.readline()
+        emulator.stdout.readline()
+        time.sleep(3)  # frames are made ahead
+        capture = subprocess.Popen(ours)
+        costs = Cost(emulator), Cost(capture)
+        for cost in costs:
+            cost.look()
+        before, start = [cost.seconds for cost in costs], time.monotonic()
+        while capture.poll() is None:
+            for cost in costs:
+                cost.look()
+            time.sleep(0.5)
+        wall = time.monotonic() - start
+    finally:
+        emulator.send_signal(signal.SIGINT)
+        said = emulator.communicate()[0]
+    if capture.returncode:
+        raise SystemExit("the capture failed")
+    late = re.findall(r"(\d+) of them late, ([\d.]+) s", said)
+    losses = Losses()
+    wrong = 0
+    with Recording(folder / "captured.h5") as recording:
+        numbers = np.round((recording.times - recording.times[0]) / config.frame_period).astype(int)
+        for where, adc in recording.batches(LOOP):
+            valid = recording.valid(where.start, where.stop)
+            losses.add(valid)
+            wrong += int((adc[valid] != played[numbers[where] % LOOP][valid]).any(axis=(1, 2, 3)).sum())
+        warnings = recording.attributes["warnings"]
+    return {
+        "configuration": " ".join([preset, *options]),
+        "frames": frames,
+        "frames/s": config.frame_rate,
+        "Mbit/s": 8e-6 * config.frame_bytes * config.frame_rate,
+        "frames not written": frames - losses.frames,
+        "frames with lost samples": losses.hit_frames,
+        "chirps lost": losses.lost_chirps,
+        "chirps wrong": wrong,
+        "emulator late, s": float(late[-1][1]) if late else 0.0,
+        "capture, share of a core": (costs[1].seconds - before[1]) / wall,
+        "emulator, share of a core": (costs[0].seconds - before[0]) / wall,
+        "_warnings": warnings,
+    }
+
+
+def main() -> None:
+    """The table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=300.0, help="length of the capture")
+    parser.add_argument("--config", default="radarize", help="preset or .cfg")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--bad-seconds", type=float, default=60.0, help="length of another one over a bad network")
+    arguments = parser.parse_args()
+    config, _ = load_config(arguments.config)
+    runs = [(arguments.seconds, [])]
+    if arguments.bad_seconds:
+        runs.append((arguments.bad_seconds, "--loss 0.01 --duplicate 0.01 --reorder 0.01".split()))
+    rows = []
+    for seconds, options in runs:
+        with tempfile.TemporaryDirectory() as folder:
+            rows.append(run(config, arguments.config, seconds, Path(folder), arguments.seed, options))
+    heard = [row.pop("_warnings") for row in rows]
+    notes = [
+        f"Noise of {NOISE} counts RMS, {LOOP} frames played again and again; every sample compared with the one sent.",
+        "Frames are not written if disk or processor are too slow for them; the emulator is late if it gets no time.",
+    ]
+    notes += [f"{row['configuration']}: {said}." for row, said in zip(rows, heard, strict=True) if said]
+    publish("capture_speed", "Capture at the virtual radar", rows, seed=arguments.seed, notes=notes)
+
+
+if __name__ == "__main__":
+    main()

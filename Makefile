@@ -8,9 +8,11 @@ setup:
 
 demo: setup
 	@.venv/bin/radarsim simulate office -o $(RUN)/office.h5 --platform handheld --duration 40 --seed 0
+	@.venv/bin/radarize run $(RUN)/office.h5 -o $(RUN)/doppler --odometry doppler --scans first-echo
+	@.venv/bin/radarize run $(RUN)/office.h5 -o $(RUN)/learned --odometry learned
 	@.venv/bin/radarize run $(RUN)/office.h5 -o $(RUN)
-	@.venv/bin/radarize evaluate $(RUN)
-	@.venv/bin/radarize report $(RUN)
+	@.venv/bin/radarize evaluate $(RUN) --beside $(RUN)/learned --beside $(RUN)/doppler
+	@.venv/bin/radarize report $(RUN) --beside $(RUN)/learned --beside $(RUN)/doppler
 
 test: setup
 	@.venv/bin/python -m pytest $(TESTS)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.results import memory_mb, publish
+from radarize.console import progress
 from radarize.pose import between, compose, wrap
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
@@ -21,7 +22,9 @@ RADISH = Path(__file__).parents[2] / "shared" / "recordings" / "radish"
 CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "orebro": (0.149, 0.0138, 19)}
 #: Recordings made where none are given: scene, platform, duration in s, seed.
 RECORDINGS = [("office", "handheld", 60, 11), ("floor", "handheld", 120, 3), ("floor", "cart", 120, 2),
-              ("corridor", "cart", 60, 3)]  # fmt: skip
+              ("corridor", "cart", 60, 3), ("corridor", "handheld", 100, 1)]  # fmt: skip
+#: How rows of the preset that the paper's settings make are marked.
+CLASSIC = "preset cartographer"
 #: A corridor of 48 m without any feature.
 PLAIN = """name: plain
 objects:
@@ -173,10 +176,11 @@ def graph_rows(seed: int) -> list[dict[str, object]]:
 
 
 def simulated(folder: Path) -> Path:
-    """Make the recordings and run the pipeline on them."""
+    """Make recordings, run the pipeline on them, and keep the runs; what is there already is left as it is."""
     from radarize.pipeline import run
     from radarsim.simulate import simulate
 
+    folder.mkdir(parents=True, exist_ok=True)
     (folder / "plain.yaml").write_text(PLAIN)
     t = np.arange(0, 41.01, 0.05)
     x = np.where(t < 1, t**2 / 2, np.where(t < 40, t - 0.5, 39.5 + (t - 40) - (t - 40) ** 2 / 2))
@@ -184,10 +188,17 @@ def simulated(folder: Path) -> Path:
     zero = np.zeros_like(t)
     route = np.column_stack([t, x, 0.05 * np.sin(t / 2), zero + 1.2, zero, zero, np.sin(yaw / 2), np.cos(yaw / 2)])
     np.savetxt(folder / "plain.tum", route)
-    jobs = [(f"{s}_{p}{n}", s, {"platform": p, "duration": d, "seed": n}) for s, p, d, n in RECORDINGS]
-    jobs += [("plain", str(folder / "plain.yaml"), {"trajectory": folder / "plain.tum", "duration": 41, "seed": 1})]
+    jobs = [("plain", str(folder / "plain.yaml"), {"trajectory": folder / "plain.tum", "duration": 41, "seed": 1})]
+    jobs += [(f"{s}_{p}{n}", s, {"platform": p, "duration": d, "seed": n}) for s, p, d, n in RECORDINGS]
     for name, scene, settings in jobs:
-        run(simulate(scene, folder / f"{name}.h5", **settings), folder / name)
+        if not (folder / name / "run.json").is_file():
+            recording = folder / f"{name}.h5"
+            if not recording.is_file():
+                with progress(f"{name}: recording") as move:
+                    simulate(scene, recording, **settings, progress=move)
+            with progress(f"{name}: odometry and scans") as move:
+                run(recording, folder / name, progress=move)
+            recording.unlink()
     return folder
 
 
@@ -200,12 +211,14 @@ def radar_rows(folder: Path) -> list[dict[str, object]]:
         truth = planar(truth)[np.abs(times[None] - log.times[:, None]).argmin(axis=1)]
         entry = row(f"radar, {path.name}", log, truth, SlamConfig.preset("radar"))
         rows.append({**entry, "to beat": "half of odometry" if entry["loop m"] >= 80 else "1.05 x odometry"})
+        rows.append(row(f"radar, {path.name}, {CLASSIC}", log, truth, SlamConfig.preset("cartographer")))
     return rows
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, help="folder of runs (radarize run -o); by default five are made")
+    parser.add_argument("--data", type=Path, help="folder of runs (radarize run -o); by default some are made")
+    parser.add_argument("--record", action="store_true", help="make those that --data lacks, and keep them")
     parser.add_argument("--no-radar", action="store_true")
     parser.add_argument("--seeds", type=int, default=3, help="of disturbances, for each log")
     parser.add_argument("--seed", type=int, default=7)
@@ -217,6 +230,7 @@ def main() -> None:
         log, truth = lidar(name)
         target = f"{metres} m, {radians} rad, {seconds} s"
         rows.append(row(f"lidar, {name}", log, truth, lidar_preset, target))
+        rows.append(row(f"lidar, {name}, {CLASSIC}", log, truth, SlamConfig.preset("cartographer")))
         disturbed: dict[str, list[float]] = {"odometry noise x 2": [], "a third of the scans lost": []}
         for seed in range(options.seeds):
             rng = np.random.default_rng(options.seed + seed)
@@ -240,7 +254,8 @@ def main() -> None:
     )
     if not options.no_radar:
         with tempfile.TemporaryDirectory() as folder:
-            rows += radar_rows(options.data or simulated(Path(folder)))
+            data = options.data or Path(folder)
+            rows += radar_rows(simulated(data) if options.record or not options.data else data)
     columns = dict.fromkeys(key for entry in rows for key in entry)
     publish(
         "slam_backend",

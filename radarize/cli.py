@@ -12,6 +12,7 @@ app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
 
 RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="A recording.")]
 RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
+Beside = Annotated[list[Path] | None, typer.Option(help="Another run of the same recording; may be repeated.")]
 RadarFile = Annotated[str | None, typer.Option("--config", help="A .cfg or a preset's name.")]
 PortName = Annotated[str | None, typer.Option("--port", help="The radar's serial command port.")]
 Baud = Annotated[int, typer.Option(help="Of the command port.")]
@@ -37,10 +38,22 @@ def _antennas(text: str | None, option: str) -> int | tuple[int, ...] | None:
 
 @app.command("import")
 def import_(
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help=".bin, .pcap, or a folder of mmWave Studio.")],
+    source: Annotated[
+        Path,
+        typer.Argument(
+            metavar="SOURCE",
+            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), or "
+            "an array of samples (.npy, .npz, .mat).",
+        ),
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
     config: Annotated[str | None, typer.Option(help="A .cfg, a .mmwave.json or a preset's name.")] = None,
     poses: Annotated[Path | None, typer.Option(help="True poses of the sensor (TUM).")] = None,
+    shape: Annotated[
+        str | None, typer.Option(metavar="AXES", help="Of an array: frame,loop,tx,rx,sample in its order, or lengths.")
+    ] = None,
+    variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
+    latency: Annotated[float, typer.Option(help="From a frame's start to its receipt in a bag, s.")] = 0.0,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -83,8 +96,9 @@ def import_(
         radar, cfg_text = load_config(config)
     with keeping(output), progress("import") as report:
         written = import_recording(
-            source, output, config=radar, cfg_text=cfg_text, poses=poses, overrides=overrides, progress=report
-        )
+            source, output, config=radar, cfg_text=cfg_text, poses=poses, shape=shape, variable=variable,
+            latency=latency, overrides=overrides, progress=report,
+        )  # fmt: skip
     _tell(written)
 
 
@@ -93,7 +107,7 @@ def _tell(written: Path) -> None:
     from radarize.recording import Recording
 
     with Recording(written) as recording:
-        for name in ("warnings", "assumed"):
+        for name in ("warnings", "assumed", "found"):
             if text := recording.attributes.get(name):
                 typer.echo(f"{name}: {text}", err=True)
         print(f"{written}: {len(recording)} frames")
@@ -201,14 +215,19 @@ def info(recording: RecordingFile, as_json: AsJson = False):
 def run_(
     recording: RecordingFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
-    odometry: Annotated[str | None, typer.Option(help="Where the motion comes from: doppler.")] = None,
-    scans: Annotated[str | None, typer.Option(help="How scans are made: elevation-aware, first-echo...")] = None,
-    settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected.")] = None,
+    odometry: Annotated[str | None, typer.Option(help="Where motion comes from: fused, learned or doppler.")] = None,
+    scans: Annotated[
+        str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
+    ] = None,
+    settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected, or published.")] = None,
+    weights: Annotated[
+        Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
+    ] = None,
 ):
     """Estimate trajectory and map of a recording."""
     from radarize.pipeline import run
 
-    choices = {"odometry": odometry, "scans": scans, "settings": settings}
+    choices = {"odometry": odometry, "scans": scans, "settings": settings, "weights": weights}
     given = {name: value for name, value in choices.items() if value is not None}
     try:
         with progress("run") as report:
@@ -237,6 +256,7 @@ def train(
     workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where a training was stopped.")] = False,
     onnx: Annotated[bool, typer.Option("--onnx", help="Write the network as ONNX as well.")] = False,
+    settings: Annotated[str, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
 ):
     """Train a network on recordings; figures in brackets are the three tasks' defaults.
 
@@ -244,21 +264,19 @@ def train(
     """
     from dataclasses import replace
 
-    from radarize.training.tasks import TASKS
-    from radarize.training.train import train
+    from radarize.training.train import find_task, train
 
-    if task not in TASKS:
-        raise InputError(f"task is {task!r}, expected one of: {', '.join(TASKS)}")
     choices = {
         "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
         "patience": patience, "precision": precision, "seed": seed,
     }  # fmt: skip
-    settings = replace(TASKS[task].defaults, **{name: value for name, value in choices.items() if value is not None})
+    given = {name: value for name, value in choices.items() if value is not None}
+    hyper = replace(find_task(task, settings).defaults, **given)
     try:
         with progress("train") as report:
             written = train(
-                task, data, output, split=split, settings=settings, device=device, workers=workers, resume=resume,
-                onnx=onnx, progress=report, say=lambda line: typer.echo(line, err=True),
+                task, data, output, split=split, settings=hyper, device=device, workers=workers, resume=resume,
+                onnx=onnx, setting=settings, progress=report, say=lambda line: typer.echo(line, err=True),
             )  # fmt: skip
     except KeyboardInterrupt:
         raise InputError("stopped; with --resume the same command goes on after the last whole epoch") from None
@@ -292,27 +310,50 @@ def slam(
 @app.command()
 def evaluate(
     run: RunFolder,
+    beside: Beside = None,
     reference: Annotated[Path | None, typer.Option(help="True poses (TUM); by default the run's own.")] = None,
     as_json: AsJson = False,
 ):
     """Compare a run with the truth; writes metrics.json."""
+    from radarize.evaluation import comparison
     from radarize.evaluation.evaluate import evaluate, show
 
     with working("evaluating"):
         metrics = evaluate(run, reference)
+        rows = comparison.compare([run, *beside], reference) if beside else []
     _print_json(metrics) if as_json else show(metrics)
+    if rows and not as_json:
+        comparison.show(rows)
+
+
+@app.command()
+def export(
+    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="File or, of a bag, folder to write.")],
+    format: Annotated[
+        str, typer.Option(help="bin (DCA1000 and .cfg), ros2 (a bag), tum (poses) or map (for map_server).")
+    ],
+    run: Annotated[Path | None, typer.Option(help="Run of the recording, for scans and odometry in the bag.")] = None,
+):
+    """Write a recording or a run for other programs."""
+    from radarize.exporters import export
+
+    with progress("export") as report:
+        written = export(source, format, output, run=run, progress=report)
+    print(written)
 
 
 @app.command()
 def report(
     source: Annotated[Path, typer.Argument(metavar="RUN|REC.h5", help="A run's folder, or a recording.")],
     output: Annotated[Path | None, typer.Option("--output", "-o", help="Page to write (.html).")] = None,
+    beside: Beside = None,
 ):
     """Draw a run or a recording as one HTML page."""
     from radarize.evaluation.report import report_recording, report_run
 
     with working("drawing"):
-        written = report_run(source, output) if source.is_dir() else report_recording(source, output)
+        written = report_run(source, output, beside or ()) if source.is_dir() else report_recording(source, output)
     print(written)
 
 

@@ -16,13 +16,17 @@ from radarize import __version__
 from radarize.errors import InputError
 from radarize.mapping.scans import BEARINGS, METHODS, ScanConfig, make_scans
 from radarize.mapping.segmentation import Segmentation
+from radarize.odometry.integration import Track
 from radarize.odometry.methods import ODOMETRY, Weights, make_odometry
+from radarize.published.chain import CHAINS, Chain
+from radarize.published.heatmaps import PublishedMaps
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
+from radarize.settings import SETTINGS
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.training.maps import MapMaker
-from radarize.tum import planar_poses, write_tum
+from radarize.tum import planar, planar_poses, write_tum
 
 #: Scans by name: a network's, and those of heat maps alone.
 SCANS = ("segmentation", *METHODS)
@@ -30,8 +34,6 @@ SCANS = ("segmentation", *METHODS)
 CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
 #: Methods of choice.
 BEST = {"odometry": "fused", "scans": "segmentation"}
-#: Readings of the paper's pipeline: what the physics asks for.
-SETTINGS = ("corrected",)
 #: A frame with a smaller share of its chirps is left out. On a simulated walk, with the rest of each burst lost, 95 %
 #: of Doppler velocities are within 0.02 m/s from whole bursts, 0.06 m/s from an eighth, 0.21 m/s from a sixteenth.
 LEAST_SHARE = 1 / 8
@@ -52,6 +54,7 @@ class Pipeline:
         scans: how scans are made, one of `SCANS`.
         odometry: where motion comes from, a key of `ODOMETRY`.
         weights: of the networks; the shipped ones if None.
+        chain: what else makes odometry and scans of samples, then in place of all these.
 
     Raises:
         InputError: an unknown method, or networks that do not fit the radar.
@@ -63,12 +66,13 @@ class Pipeline:
         scans: str = CLASSICAL["scans"],
         odometry: str = CLASSICAL["odometry"],
         weights: Weights | None = None,
+        chain: Chain | None = None,
     ):
         if scans not in SCANS:
             raise InputError(f"scans is {scans!r}, expected one of {', '.join(SCANS)}")
         weights = weights or Weights()
-        self.config, self.scans = config, scans
-        self.maker = MapMaker(config)
+        self.config, self.scans, self.chain = config, scans, chain
+        self.maker = MapMaker(config, stage=self._stage)
         self.odometry = make_odometry(odometry, self.maker, weights)
         self.segmentation = Segmentation(self.maker, weights.of("segmentation")) if scans == "segmentation" else None
         self.heatmaps = self.odometry.heatmaps
@@ -92,17 +96,19 @@ class Pipeline:
             times: (frame,) stamps, s.
             valid: (frame, loop, tx), False where a chirp was lost.
         """
-        used = np.ones(len(times), bool) if valid is None else valid.mean(axis=(1, 2)) >= LEAST_SHARE
-        self.frames.append(self.pushed + np.flatnonzero(used))
+        numbers = self.pushed + np.arange(len(times))
         self.pushed += len(times)
-        if not used.all():
-            adc, times, valid = adc[used], times[used], valid[used]
-        if not len(times):
-            return
-        with self._stage("spectra"):
-            spectrum = self.heatmaps.spectrum(adc, valid)
-        track = self.odometry.follow(spectrum, times, self._stage)
-        ranges = self._scan(spectrum)
+        if self.chain:
+            used = numbers % self.chain.stride == 0
+            track, ranges = self.chain.push(adc, times, self._stage)
+        else:
+            used = np.ones(len(times), bool) if valid is None else valid.mean(axis=(1, 2)) >= LEAST_SHARE
+            if not used.all():
+                adc, times, valid = adc[used], times[used], valid[used]
+            if not len(times):
+                return
+            track, ranges = self._follow(adc, times, valid)
+        self.frames.append(numbers[used])
         with self._stage("slam"):
             for instant, pose, spread, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):
                 self.slam.add_odometry(instant, pose, spread)
@@ -113,6 +119,11 @@ class Pipeline:
         self.velocity_covariances.append(track.velocity_covariance)
         self.step_covariances.append(track.covariance)
         self.ranges.append(ranges.astype(np.float32))
+
+    def _follow(self, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None) -> tuple[Track, np.ndarray]:
+        with self._stage("spectra"):
+            spectrum = self.heatmaps.spectrum(adc, valid)
+        return self.odometry.follow(spectrum, times, self._stage), self._scan(spectrum)
 
     def _scan(self, spectrum: torch.Tensor) -> np.ndarray:
         if self.segmentation is not None:
@@ -143,9 +154,11 @@ class Pipeline:
 
     @contextmanager
     def _stage(self, name: str) -> Iterator[None]:
-        start = clock.perf_counter()
+        """Time a step; what steps within it take is theirs."""
+        start, others = clock.perf_counter(), sum(self.stage_seconds.values())
         yield
-        self.stage_seconds[name] += clock.perf_counter() - start
+        within = sum(self.stage_seconds.values()) - others
+        self.stage_seconds[name] += clock.perf_counter() - start - within
 
 
 def best_methods(config: RadarConfig) -> tuple[dict[str, str], str]:
@@ -176,7 +189,8 @@ def run(
         output: folder to write: trajectory.tum (SLAM), odometry.tum, reference.tum (if the recording has true poses),
             map.pgm and map.yaml, scans.h5, run.json.
         odometry, scans: methods by name; if None, networks where they fit the radar, else the classical ones.
-        settings: reading of the paper.
+        settings: reading of the paper, a key of `SETTINGS`. ``published`` is a chain of its own, which needs weights
+            and, like the artefact, starts from true headings where the recording has them.
         weights: folder of the networks' weights; the shipped ones if None.
         progress: called with (frames done, frames in all).
 
@@ -194,9 +208,13 @@ def run(
     with Recording(recording) as source:
         if not len(source):
             raise InputError(f"{recording}: has no whole frame, expected at least one")
-        methods, why = (BEST, "") if weights else best_methods(source.config)
-        odometry, scans = odometry or methods["odometry"], scans or methods["scans"]
-        pipeline = Pipeline(source.config, scans, odometry, Weights(weights))
+        if settings == "published":
+            chain, why = _published(source, weights, odometry, scans), ""
+            pipeline, odometry, scans = Pipeline(source.config, chain=chain), settings, settings
+        else:
+            methods, why = (BEST, "") if weights else best_methods(source.config)
+            odometry, scans = odometry or methods["odometry"], scans or methods["scans"]
+            pipeline = Pipeline(source.config, scans, odometry, Weights(weights))
         if scans == "elevation-aware" and pipeline.heatmaps.pairs is None:
             raise InputError(
                 f"{recording}: its antennas have no vertical pairs, which scans=elevation-aware needs; use first-echo"
@@ -214,16 +232,35 @@ def run(
     return output
 
 
+def _published(source: Recording, weights: Path | None, odometry: str | None, scans: str | None) -> Chain:
+    """The artefact's chain for a recording."""
+    for name, value in (("odometry", odometry), ("scans", scans)):
+        if value is not None:
+            raise InputError(f"{name} is {value!r}, expected none with settings published, which has its own")
+    if weights is None:
+        raise InputError(
+            "settings is 'published', which comes without weights: train them (`radarize train --settings published`) "
+            "and name their folder with --weights"
+        )
+    headings, stride = None, PublishedMaps.stride(source.config)
+    if source.has("truth/pose"):
+        yaws = planar(source.rows("truth/pose", 0, CHAINS * stride)[::stride])[:, 2]
+        headings = yaws if len(yaws) == CHAINS and np.isfinite(yaws).all() else None
+    return Chain(source.config, weights, headings)
+
+
 def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[str, str]) -> None:
     times, poses = np.concatenate(pipeline.times), np.concatenate(pipeline.poses)
     write_tum(output / "odometry.tum", times, planar_poses(poses))
     slam_times, slam_poses = pipeline.slam.trajectory()
     write_tum(output / "trajectory.tum", slam_times, planar_poses(slam_poses))
     if source.has("truth/pose") and source.has("truth/time"):
-        write_tum(output / "reference.tum", source.read("truth/time"), source.read("truth/pose"))
+        true_times, true_poses = source.read("truth/time"), source.read("truth/pose")
+        known = np.isfinite(true_poses).all(axis=1)  # a tracking camera may have been blind for a while
+        write_tum(output / "reference.tum", true_times[known], true_poses[known])
     pipeline.slam.map().save(output / "map")
     _write_scans(pipeline, source, output / "scans.h5", times)
-    frames = len(times)
+    frames = len(source)
     facts = {
         "recording": source.path.name,
         "recording_attributes": {k: v for k, v in source.attributes.items() if isinstance(v, (str, int, float))},

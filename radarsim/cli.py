@@ -208,14 +208,16 @@ def import_(
 @app.command()
 def export(
     recording: Annotated[Path, typer.Argument(metavar="REC.h5", help="Recording to convert.")],
-    to: Annotated[Literal["dca1000", "tum"], typer.Option(help="Raw samples + .cfg, or the true poses.")],
-    output: Annotated[Path, typer.Option("--output", "-o", help="File to write (.bin or .tum).")],
+    to: Annotated[
+        Literal["dca1000", "rosbag", "tum"], typer.Option(help="Raw samples + .cfg, a ROS 2 bag, or the true poses.")
+    ],
+    output: Annotated[Path, typer.Option("--output", "-o", help="What to write (.bin, a folder, .tum).")],
 ):
-    """Write a recording in another format."""
-    from radarsim.export import export
+    """Write a recording in another format, as `radarize export` does."""
+    from radarize.exporters import export
 
-    with working(f"exporting {recording.name}"):
-        written = export(recording, to, output)
+    with progress("export") as report:
+        written = export(recording, {"dca1000": "bin", "rosbag": "ros2"}.get(to, to), output, progress=report)
     print(written)
 
 

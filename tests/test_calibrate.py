@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
+from benchmarks import transfer
 from radarize.errors import InputError
-from radarize.importers import import_recording
-from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
 from radarsim.calibrate import calibrate
@@ -107,21 +106,7 @@ def test_unusable_recordings_are_refused_in_a_sentence(tmp_path):
 @pytest.fixture
 def captures(recordings, tmp_path):  # noqa: F811
     """The public captures as recordings."""
-    pcap = import_recording(
-        recordings / "iwr1843-pcap" / "test_one_frame.pcap", tmp_path / "pcap.h5",
-        overrides={"samples": 256, "loops": 16, "rx": 1},
-    )  # fmt: skip
-    studio = import_recording(recordings / "iwr6843-studio", tmp_path / "studio.h5")
-    stored = np.load(recordings / "xwr-moving-people" / "doppler_example_1.npy", allow_pickle=False)
-    parts = np.stack([stored.real, stored.imag], axis=-1).astype(np.uint16).view(np.int16)
-    config = RadarConfig(
-        start_frequency=77e9, slope=60.012e12, idle_time=30e-6, adc_start_time=6e-6, ramp_end_time=62e-6, samples=128,
-        sample_rate=2.5e6, loops=128, frame_period=50e-3, tx_order=(0, 2),
-    )  # fmt: skip
-    people = tmp_path / "people.h5"
-    with RecordingWriter(people, config) as writer:
-        writer.append(parts.reshape(1, *config.frame_shape), np.zeros(1))
-    return {"pcap": pcap, "studio": studio, "people": people}
+    return transfer.captures(recordings, tmp_path)
 
 
 def test_real_captures_give_boards_that_sound_like_them(captures, tmp_path):

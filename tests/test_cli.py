@@ -53,8 +53,8 @@ def test_help_is_instant(name):
 @pytest.mark.parametrize(
     "command",
     ["radarize import", "radarize info", "radarize run", "radarize slam", "radarize train", "radarize evaluate",
-     "radarize report", "radarsim simulate", "radarsim dataset", "radarsim calibrate", "radarsim scene",
-     "radarsim scene info", "radarsim scene preview", "radarsim scene import", "radarsim export",
+     "radarize report", "radarize export", "radarsim simulate", "radarsim dataset", "radarsim calibrate",
+     "radarsim scene", "radarsim scene info", "radarsim scene preview", "radarsim scene import", "radarsim export",
      "radarsim emulate", "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
@@ -72,6 +72,8 @@ def test_every_command_explains_itself(capsys, command):
         ("radarize import", ["missing.bin", "-o", "out.h5"], "missing.bin"),
         ("radarize import", ["missing.bin", "-o", "out.h5", "--rx", "a,b"], "--rx is 'a,b', expected a count"),
         ("radarize import", ["missing.bin", "-o", "out.h5", "--config", "bogus"], "bogus: no such radar configuration"),
+        ("radarize export", ["missing.h5", "--format", "tum", "-o", "x"], "missing.h5: no such file"),
+        ("radarize export", ["x.h5", "--format", "wav", "-o", "x"], "export format is 'wav', expected one of bin"),
         ("radarize info", [], "Missing argument"),
         ("radarize info", ["a", "--bogus"], "No such option"),
         ("radarize fly", [], "No such command"),
@@ -111,7 +113,7 @@ def test_errors_of_libraries_are_one_sentence(capsys, monkeypatch, tmp_path, err
     def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr("radarsim.export.export", fail)
+    monkeypatch.setattr("radarize.exporters.export", fail)
     code, _, err = call(capsys, "radarsim export", tmp_path / "a.h5", "--to", "tum", "-o", tmp_path / "b")
     assert code == 2 and expected in err and "Traceback" not in err
     with pytest.raises((type(error), SystemExit)):
@@ -160,7 +162,9 @@ def test_import_hands_over_what_was_typed(capsys, monkeypatch, tmp_path):
         "samples": 256, "loops": 16, "rx": 1, "tx": (0, 2, 1), "iq_order": "qqii", "slope": 80e12, "frame_period": 0.1,
     }  # fmt: skip
     assert seen["config"] is None and seen["poses"] is None
-    call(capsys, "radarize import", "a.bin", "-o", tmp_path / "a.h5", "--config", "radarize")
+    axes = ["--shape", "loop,virtual,sample", "--variable", "adc", "--latency", "0.03"]
+    call(capsys, "radarize import", "a.npz", "-o", tmp_path / "a.h5", "--config", "radarize", *axes)
+    assert (seen["shape"], seen["variable"], seen["latency"]) == ("loop,virtual,sample", "adc", 0.03)
     assert seen["config"] == PRESETS["radarize"] and "profileCfg" in seen["cfg_text"]
 
 

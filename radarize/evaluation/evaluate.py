@@ -6,9 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError
-from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints, scan_errors, velocity_errors
+from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
+from radarize.evaluation.motion import velocity_errors
 from radarize.evaluation.runfiles import read_map, read_scans, write_whole
+from radarize.evaluation.scans import scan_errors, true_ranges
 from radarize.evaluation.trajectory import load, matched, trajectory, yaws
 
 #: Trajectories of a run by what the metrics call them, the best last.
@@ -59,8 +61,8 @@ def evaluate(run: Path, reference: Path | None = None) -> dict[str, object]:
         reference: TUM file of the truth; by default the run's ``reference.tum``.
 
     Returns:
-        ``slam`` and ``odometry``: `TrajectoryErrors.summary`. Where the run knows the truth about them: ``map``,
-        ``scans``, ``velocity``, see `radarize.evaluation.mapping`. Numbers that do not exist are None.
+        ``slam`` and ``odometry``: `TrajectoryErrors.summary`. Where the run knows the truth about them, ``map``:
+        `map_errors`, ``scans``: `scan_errors`, ``velocity``: `velocity_errors`. Numbers that do not exist are None.
 
     Raises:
         InputError: not a run, no truth, or nothing that matches.
@@ -72,9 +74,12 @@ def evaluate(run: Path, reference: Path | None = None) -> dict[str, object]:
     if (run / "scans.h5").is_file():
         scans = read_scans(run / "scans.h5")
         if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
-            metrics["scans"] = scan_errors(scans)
+            there = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
+            metrics["scans"] = scan_errors(scans["ranges"], there)
         if {"velocity", "truth/velocity"} <= scans.keys():
-            metrics["velocity"] = velocity_errors(scans)
+            metrics["velocity"] = velocity_errors(
+                scans["velocity"][:, :2], scans["truth/velocity"][:, :2], scans.get("velocity_covariance")
+            )
         if "truth/floor_plan" in scans and (run / "map.yaml").is_file():
             best = errors["slam"]
             true, grid = true_scans(scans, best), read_map(run / "map.yaml")
@@ -138,6 +143,7 @@ SCAN_WORDS = {
     "short": ("too near by more", "%", 100),
     "beyond": ("too far by more", "%", 100),
     "returned": ("bearings in reach that return anything", "%", 100),
+    "through": ("bearings in reach that carve through a surface", "%", 100),
     "median": ("median range error", "m", 1),
 }
 VELOCITY_WORDS = {
@@ -146,5 +152,7 @@ VELOCITY_WORDS = {
     "forward": ("forward, rms", "m/s", 1),
     "left": ("left, rms", "m/s", 1),
     "missing": ("frames without an estimate", "%", 100),
-    "nees": ("median squared error over covariance (1.39 if it is honest)", "", 1),
+    "bias": ("mean along the motion", "m/s", 1),
+    "nees": ("mean squared error over covariance (1 if it is honest)", "", 1),
+    "nees_median": ("its median over that of honest ones", "", 1),
 }

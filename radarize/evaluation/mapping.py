@@ -1,11 +1,10 @@
-"""Maps against the floor plan, scans against true scans, velocities against true ones."""
+"""Maps against the floor plan."""
 
 import numpy as np
 import shapely
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from radarize.evaluation.metrics import Statistics
 from radarize.evaluation.runfiles import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid
@@ -140,65 +139,3 @@ def free_space_iou(
     inside = (at >= 0).all(axis=1) & (at[:, 0] < columns) & (at[:, 1] < rows)
     both = grid.free[rows - 1 - at[inside, 1], at[inside, 0]].sum()
     return float(both / (len(points) + grid.free.sum() - both))
-
-
-def scan_errors(scans: dict[str, np.ndarray]) -> dict[str, float]:
-    """Measured against true scans, bearing by bearing.
-
-    Args:
-        scans: `radarize.evaluation.runfiles.read_scans`, with ``truth/scan`` and ``truth/scan_azimuths``.
-
-    Returns:
-        ``within_10cm``: share of returned bearings within 10 cm of the true range there. ``returned``: share of
-        bearings with something true in reach that return anything. ``median``: of the absolute errors, m.
-        ``beyond``, ``short``: shares of returned bearings more than 10 cm too far and too near.
-    """
-    measured = scans["ranges"]
-    nearest = np.abs(scans["truth/scan_azimuths"][None] - scans["azimuths"][:, None]).argmin(axis=1)
-    true = scans["truth/scan"][:, nearest]
-    hit = np.isfinite(measured) & (measured > 0)
-    # Whatever is measured where nothing true is in reach is too short.
-    difference = np.where(np.isfinite(true), measured - np.where(np.isfinite(true), true, 0), -np.inf)[hit]
-    if not len(difference):
-        return {"within_10cm": np.nan, "returned": 0.0, "median": np.nan, "beyond": np.nan, "short": np.nan}
-    return {
-        "within_10cm": float(np.mean(np.abs(difference) <= TOLERANCE)),
-        "returned": float(hit[np.isfinite(true)].mean()) if np.isfinite(true).any() else np.nan,
-        "median": float(np.median(np.abs(difference))),
-        "beyond": float(np.mean(difference > TOLERANCE)),
-        "short": float(np.mean(difference < -TOLERANCE)),
-    }
-
-
-def velocity_errors(scans: dict[str, np.ndarray]) -> dict[str, object]:
-    """Estimated against true velocity in the body frame, forward and left.
-
-    Returns:
-        ``error``: `Statistics` of the difference's length, m/s. ``forward``, ``left``: root mean squares, m/s.
-        ``median``, ``p90``: of the difference's length, m/s. ``missing``: share of scans without an estimate.
-        ``nees``: median of the squared error in units of its covariance (1.39 if the covariance is right), if
-        there is one.
-    """
-    estimate, true = scans["velocity"][:, :2], scans["truth/velocity"][:, :2]
-    known = np.isfinite(estimate).all(axis=1) & np.isfinite(true).all(axis=1)
-    difference = (estimate - true)[known]
-    length = np.linalg.norm(difference, axis=1)
-    statistics = Statistics.of(length)
-    result: dict[str, object] = {
-        "mean": statistics.mean,
-        "rmse": statistics.rmse,
-        "max": statistics.max,
-        "median": float(np.median(length)) if len(length) else np.nan,
-        "p90": float(np.percentile(length, 90)) if len(length) else np.nan,
-        "forward": Statistics.of(difference[:, 0]).rmse,
-        "left": Statistics.of(difference[:, 1]).rmse,
-        "missing": float(1 - known.mean()) if len(known) else np.nan,
-    }
-    if "velocity_covariance" in scans and len(length):
-        covariance = scans["velocity_covariance"][known]
-        try:
-            whitened = np.linalg.solve(covariance, difference[..., None])[..., 0]
-            result["nees"] = float(np.median((difference * whitened).sum(axis=1)))
-        except np.linalg.LinAlgError:
-            result["nees"] = np.nan
-    return result

@@ -1,5 +1,6 @@
 """Reports: a run against the truth, or whatever a recording holds, as one HTML page that opens without a network."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -7,6 +8,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from radarize.errors import InputError
+from radarize.evaluation import comparison
 from radarize.evaluation.drawings import canvas, draw_doppler, draw_fan, draw_scan
 from radarize.evaluation.evaluate import MAP_WORDS, SCAN_WORDS, VELOCITY_WORDS, evaluate, trajectory_errors
 from radarize.evaluation.metrics import TrajectoryErrors
@@ -22,12 +24,13 @@ _FRAMES = 4
 _NAMES = {"slam": "SLAM", "odometry": "odometry"}
 
 
-def report_run(run: Path, output: Path | None = None) -> Path:
+def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = ()) -> Path:
     """Draw a run as ``report.html``; it is evaluated first where it knows the truth.
 
     Args:
         run: folder of a run.
         output: file to write; by default ``report.html`` in the folder.
+        beside: other runs of the same recording, to compare with.
 
     Returns:
         The page's path.
@@ -46,7 +49,11 @@ def report_run(run: Path, output: Path | None = None) -> Path:
     page = Page(f"Run {run.resolve().name}", _about(facts, errors))
     if errors:
         _figures(page, metrics, errors)
-    _plan(page, run, scans, errors)
+    if errors and beside:
+        page.section("Beside other methods", "The same recording; odometry and SLAM against the truth.")
+        heads = ("method", *(name for name, *_ in comparison.COLUMNS))
+        page.table(heads, comparison.compare([run, *beside]), numbers=tuple(range(1, len(heads))))
+    _plan(page, run, scans, errors, beside)
     if errors:
         _over_time(page, errors)
     if "velocity" in scans:
@@ -113,7 +120,7 @@ def _words(page: Page, title: str, content: dict, words: dict) -> None:
     page.table((title, ""), rows, numbers=(1,))
 
 
-def _plan(page: Page, run: Path, scans: dict, errors: dict[str, TrajectoryErrors]) -> None:
+def _plan(page: Page, run: Path, scans: dict, errors: dict[str, TrajectoryErrors], beside: Sequence[Path] = ()) -> None:
     """Trajectories, map and floor plan from above, in the truth's frame if there is one."""
     page.section(
         "Trajectory and map",
@@ -136,6 +143,9 @@ def _plan(page: Page, run: Path, scans: dict, errors: dict[str, TrajectoryErrors
     if errors:
         for name, item in errors.items():
             _line(figure, item.estimate.positions_xyz, _NAMES[name], COLORS[name])
+        for other in beside:
+            path = trajectory_errors(other)["odometry"].estimate.positions_xyz
+            _line(figure, path, f"odometry {comparison.methods(other)}", INK, dash="dash")
         _line(figure, errors["slam"].reference.positions_xyz, "truth", "#22a06b", dash="dot")
     else:
         for name, file in {"odometry": "odometry.tum", "slam": "trajectory.tum"}.items():

@@ -1,7 +1,7 @@
 """Recordings from foreign files, one module per format.
 
-A format opens its files as a `Capture`: words as the radar sent them, in batches of whole frames. What follows is the
-same for all: sort the samples, stamp the frames, write the recording.
+A format opens its files as a `Capture`: samples in batches of whole frames, with whatever came along. What follows is
+the same for all: settle the order of I and Q, stamp the frames, write the recording.
 """
 
 from collections.abc import Callable
@@ -12,18 +12,28 @@ import numpy as np
 
 from radarize.errors import InputError
 from radarize.importers import bin as bin_format
+from radarize.importers import cube as cube_format
 from radarize.importers import pcap as pcap_format
 from radarize.importers import studio as studio_format
-from radarize.importers.capture import Capture
+from radarize.importers.capture import Batch, Capture
 from radarize.importers.parameters import configure
 from radarize.importers.poses import pose_products
-from radarize.radar import dca1000
 from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import range_balance
 from radarize.recording import RecordingWriter
 
 #: From this many dB on, the samples themselves say which of I and Q comes first.
 _CERTAIN_DB = 10.0
+#: Frames that are asked.
+_ASKED = 8
+_BAGS, _ARRAYS = (".bag", ".mcap", ".db3"), (".npy", ".npz", ".mat")
+_EXPECTED = (
+    "a DCA1000 .bin, a .pcap, a folder of mmWave Studio files, a ROS bag (.bag, .mcap, .db3 or a folder), "
+    "or an array (.npy, .npz, .mat)"
+)
+#: What poses given by hand stand in for.
+_POSES = ("truth/time", "truth/pose", "truth/velocity")
 
 
 def import_recording(
@@ -33,22 +43,29 @@ def import_recording(
     config: RadarConfig | None = None,
     cfg_text: str = "",
     poses: Path | None = None,
+    shape: str | None = None,
+    variable: str | None = None,
+    latency: float = 0.0,
     overrides: dict[str, object] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write a recording (.h5) from a capture.
 
-    Frames are stamped ``start_time + index * frame_period``. What the user should know (a truncated last frame, lost
-    packets, doubtful settings) is joined in the recording's attribute ``warnings``; settings that nobody gave are
-    named in ``assumed``.
+    Frames are stamped as the source says, else ``start_time + index * frame_period``. What the user should know (a
+    truncated last frame, lost packets, doubtful settings) is joined in the recording's attribute ``warnings``; settings
+    that nobody gave are named in ``assumed``; what the samples told of them is in ``found``.
 
     Args:
-        source: a DCA1000 ``.bin`` (its ``.cfg`` of the same name, or mmWave Studio's JSON files, may lie beside it), a
-            ``.pcap`` of its UDP stream, or a folder of mmWave Studio files.
+        source: a DCA1000 ``.bin``, whole or in parts (its ``.cfg`` of the same name, or mmWave Studio's JSON files, may
+            lie beside it), a ``.pcap`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, or an array of
+            samples (``.npy``, ``.npz``, ``.mat``).
         output: recording to write.
         config: radar configuration; by default what lies beside the source.
         cfg_text: text that `config` was read from, kept in the recording.
         poses: TUM file of the sensor's true poses on the recording's clock.
+        shape: axes of an array: names in order, such as ``frame,loop,tx,rx,sample``, or five or six lengths.
+        variable: which array of an ``.npz`` or ``.mat``.
+        latency: from a frame's start to its receipt in a ROS bag, s.
         overrides: fields of `RadarConfig` that replace or stand in for the configuration's; ``rx`` and ``tx`` may be
             counts; ``start_time`` is the first frame's stamp, s.
         progress: called with frames done and (estimated) frames in all.
@@ -61,92 +78,136 @@ def import_recording(
     """
     source, output = Path(source), Path(output)
     overrides = dict(overrides or {})
-    start_time = float(overrides.pop("start_time", 0.0))
+    given_start = overrides.pop("start_time", None)
+    start_time = float(given_start or 0.0)
     if source.resolve() == output.resolve():
         raise InputError(f"{output}: is the source itself, expected another output file")
     products = pose_products(Path(poses)) if poses else {}
 
-    capture = _open(source, config, cfg_text, overrides)
+    capture = _open(source, output, config, cfg_text, overrides, shape, variable, latency)
     batches = iter(capture.batches)
     first = next(batches)
-    radar = _settle_iq_order(capture, first[0], "iq_order" in overrides)
+    if given_start is not None and first.times is not None:
+        raise InputError(f"{source}: has stamps of its own, but start_time is {given_start}, expected none")
+    radar, swapped = _settle_iq_order(capture, first, "iq_order" in overrides)
+    streams = {name: stream for name, stream in capture.streams.items() if not poses or not name.startswith(_POSES)}
     writer = RecordingWriter(
         output,
         radar,
         cfg_text=capture.cfg_text,
         attributes={"source": source.name, **capture.attributes},
-        products=products,
+        streams=streams,
+        products={**capture.products, **products},
     )
-    done = 0
+    done, last = 0, start_time
     with writer:
-        for words, valid in chain([first], batches):
-            stamps = start_time + radar.frame_period * np.arange(done, done + len(valid))
-            writer.append(dca1000.decode(words, radar), stamps, valid)
-            done += len(valid)
+        for batch in chain([first], batches):
+            stamps = batch.times
+            if stamps is None:
+                stamps = start_time + radar.frame_period * np.arange(done, done + len(batch.valid))
+            frames = batch.frames[..., ::-1] if swapped else batch.frames
+            writer.append(frames, stamps, batch.valid, rows={name: batch.rows[name] for name in streams})
+            start_time = stamps[0] if not done else start_time
+            done, last = done + len(batch.valid), stamps[-1]
             if progress:
                 progress(done, max(done, capture.expected_frames))
         if products:
-            capture.warnings += _apart(products["truth/time"].data, start_time, done * radar.frame_period, Path(poses))
+            end = last + radar.frame_period
+            capture.warnings += _apart(products["truth/time"].data, start_time, end, Path(poses))
         capture.warnings += writer.losses.warnings()
         writer.annotate(warnings="; ".join(capture.warnings), assumed=", ".join(capture.assumed))
     return output
 
 
-def _apart(times: np.ndarray, start: float, duration: float, poses: Path) -> list[str]:
+def _apart(times: np.ndarray, start: float, end: float, poses: Path) -> list[str]:
     """A warning if no pose falls into the recording: two clocks, most likely."""
-    if times[-1] >= start and times[0] <= start + duration:
+    if times[-1] >= start and times[0] <= end:
         return []
     return [
-        f"{poses} covers {times[0]:.3f} to {times[-1]:.3f} s, but the frames {start:.3f} to {start + duration:.3f} s: "
+        f"{poses} covers {times[0]:.3f} to {times[-1]:.3f} s, but the frames {start:.3f} to {end:.3f} s: "
         "give start_time to bring both to one clock"
     ]
 
 
-def _open(source: Path, config: RadarConfig | None, cfg_text: str, overrides: dict[str, object]) -> Capture:
+def _open(
+    source: Path,
+    output: Path,
+    config: RadarConfig | None,
+    cfg_text: str,
+    overrides: dict[str, object],
+    shape: str | None,
+    variable: str | None,
+    latency: float,
+) -> Capture:
     """Choose the format and the configuration."""
     if not source.exists():
-        raise InputError(f"{source}: no such file or folder, expected a .bin, a .pcap or a mmWave Studio folder")
+        raise InputError(f"{source}: no such file or folder, expected {_EXPECTED}")
     kind = _kind(source)
+    if (shape or variable) and kind != "cube":
+        raise InputError(f"{source}: is no array, but shape or variable is given, expected {', '.join(_ARRAYS)}")
+    if latency and kind != "bag":
+        raise InputError(f"{source}: is no ROS bag, but latency is {latency:g} s, expected none")
     if kind == "studio":
         studio = studio_format.find(source)
         if config is None:
             config, cfg_text = studio.config, studio.text
         config, _ = configure(config, overrides, str(studio.settings))
         return bin_format.open_bin(studio.files, config, cfg_text, warnings=studio.warnings)
-    beside = source.with_suffix(".cfg")
+    beside = bin_format.whole_name(source).with_suffix(".cfg")
     if config is None and beside.is_file():
         config, cfg_text = load_config(beside)
+    if kind == "bag":
+        from radarize.importers.bag import open_bag
+
+        return open_bag(source, config, cfg_text, overrides, latency=latency)
+    if kind == "cube":
+        return cube_format.open_cube(
+            source, config, cfg_text, overrides, shape=shape, variable=variable, folder=output.parent
+        )
     config, assumed = configure(config, overrides, str(source))
     if kind == "pcap":
         return pcap_format.open_pcap(source, config, cfg_text, assumed)
-    return bin_format.open_bin((source,), config, cfg_text, assumed)
+    return bin_format.open_bin(bin_format.parts(source), config, cfg_text, assumed)
 
 
 def _kind(source: Path) -> str:
     if source.is_dir():
-        return "studio"
+        return "bag" if (source / "metadata.yaml").is_file() else "studio"
+    suffix = source.suffix.lower()
+    if suffix in _BAGS:
+        return "bag"
+    if suffix in _ARRAYS:
+        return "cube"
     try:
         with source.open("rb") as file:
             magic = file.read(4)
     except OSError as error:
         raise InputError(f"{source}: cannot be read ({error.strerror})") from error
-    if magic in pcap_format.MAGIC or source.suffix.lower() in (".pcap", ".pcapng"):
+    if magic in pcap_format.MAGIC or suffix in (".pcap", ".pcapng"):
         return "pcap"
-    if source.suffix.lower() == ".bin":
-        return "studio" if not source.with_suffix(".cfg").is_file() and studio_format.beside(source) else "bin"
-    raise InputError(f"{source}: unknown format, expected a DCA1000 .bin, a .pcap or a folder of mmWave Studio files")
+    if suffix == ".bin":
+        configured = bin_format.whole_name(source).with_suffix(".cfg").is_file()
+        return "studio" if not configured and studio_format.beside(source) else "bin"
+    raise InputError(f"{source}: unknown format, expected {_EXPECTED}")
 
 
-def _settle_iq_order(capture: Capture, words: np.ndarray, given: bool) -> RadarConfig:
-    """The configuration with the I/Q order found from the samples if it is assumed; a warning if they contradict it."""
+def _settle_iq_order(capture: Capture, batch: Batch, given: bool) -> tuple[RadarConfig, bool]:
+    """The configuration with the I/Q order that the samples show if it is assumed, and whether to swap them.
+
+    Where the configuration says and they contradict it, there is a warning.
+    """
     config = capture.config
-    found, decibels = dca1000.detect_iq_order(words[: 8 * config.frame_bytes // 2], config)
-    if decibels < _CERTAIN_DB or found == config.iq_order or given:
-        return config
+    decibels = range_balance(batch.frames[:_ASKED])
+    other = "iiqq" if config.iq_order == "qqii" else "qqii"
+    if given or abs(decibels) < _CERTAIN_DB:
+        return config, False
     if "iq_order" in capture.assumed:
-        return config.model_copy(update={"iq_order": found})
-    capture.warnings.append(
-        f"iq_order is {config.iq_order} in the configuration, but the samples look like {found} "
-        f"({decibels:.0f} dB more energy at near range)"
-    )
-    return config
+        found = config.iq_order if decibels > 0 else other
+        capture.attributes["found"] = f"iq_order {found} ({abs(decibels):.0f} dB more energy at near range)"
+        return config.model_copy(update={"iq_order": found}), decibels < 0
+    if decibels < 0:
+        capture.warnings.append(
+            f"iq_order is {config.iq_order} in the configuration, but the samples look like {other} "
+            f"({-decibels:.0f} dB more energy at near range)"
+        )
+    return config, False

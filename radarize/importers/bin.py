@@ -1,14 +1,55 @@
-"""Raw ``.bin`` files of a DCA1000: nothing but words, from the first frame's start on."""
+"""Raw ``.bin`` files of a DCA1000: nothing but words, from the first frame's start on.
 
+Long captures come in parts, ``NAME_Raw_0.bin``, ``NAME_Raw_1.bin``, ..., cut anywhere, even within a word.
+"""
+
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Bool, Int16
 
 from radarize.errors import InputError
-from radarize.importers.capture import Capture, batch_frames
+from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import check_layout
+from radarize.radar.dca1000 import check_layout, decode
+
+_PART = re.compile(r"(?P<name>.+)_Raw_(?P<number>\d+)\.bin", re.IGNORECASE)
+
+
+def parts(source: Path) -> tuple[Path, ...]:
+    """All files of the capture that a ``.bin`` belongs to, in order: itself, unless its name says that it is a part.
+
+    Raises:
+        InputError: a part is missing.
+    """
+    if not (match := _PART.fullmatch(source.name)):
+        return (source,)
+    numbered = {}
+    for path in source.parent.iterdir():
+        other = _PART.fullmatch(path.name)
+        if other and other["name"] == match["name"]:
+            numbered[int(other["number"])] = path
+    if missing := sorted(set(range(max(numbered) + 1)) - numbered.keys()):
+        raise InputError(
+            f"{source.parent}: has parts {', '.join(map(str, sorted(numbered)))} of {match['name']}_Raw_*.bin, "
+            f"expected part {missing[0]} too"
+        )
+    return tuple(numbered[number] for number in sorted(numbered))
+
+
+def whole_name(source: Path) -> Path:
+    """The name of a capture without the number of its part, where its settings may lie: ``NAME.cfg``."""
+    match = _PART.fullmatch(source.name)
+    return source.with_name(match["name"] + ".bin") if match else source
+
+
+def all_zero(words: Int16[np.ndarray, "word"], config: RadarConfig) -> Bool[np.ndarray, "frame loop tx"]:
+    """Chirps (physical order) of nothing but zeros: capture programs put them where packets were lost."""
+    loops, tx = config.frame_shape[:2]
+    fired = words.reshape(-1, loops, tx, 2 * config.samples * len(config.rx)).any(axis=3)
+    return ~fired[:, :, list(config.slot)]
 
 
 def open_bin(
@@ -52,14 +93,12 @@ def open_bin(
     return Capture(config, cfg_text, _batches(files, config), whole, assumed, warnings)
 
 
-def _batches(files: Sequence[Path], config: RadarConfig) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    loops, tx = config.frame_shape[:2]
+def _batches(files: Sequence[Path], config: RadarConfig) -> Iterator[Batch]:
     for data in _blocks(files, batch_frames(config) * config.frame_bytes):
         words = np.frombuffer(data, "<i2", len(data) // config.frame_bytes * config.frame_bytes // 2)
         words = words.astype(np.int16, copy=False)
         if words.size:
-            fired = words.reshape(-1, loops, tx, 2 * config.samples * len(config.rx)).any(axis=3)
-            yield words, fired[:, :, list(config.slot)]
+            yield Batch(decode(words, config), ~all_zero(words, config))
 
 
 def _blocks(files: Sequence[Path], size: int) -> Iterator[bytes]:

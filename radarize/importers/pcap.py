@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError
-from radarize.importers.capture import Capture, batch_frames
+from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import DATA_PORT, FrameAssembler
+from radarize.radar.dca1000 import DATA_PORT, FrameAssembler, decode
 
 #: Magic number -> byte order and ticks per second of the time stamps.
 MAGIC = {
@@ -40,7 +40,7 @@ def open_pcap(path: Path, config: RadarConfig, cfg_text: str = "", assumed: tupl
     return capture
 
 
-def _batches(path: Path, capture: Capture) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+def _batches(path: Path, capture: Capture) -> Iterator[Batch]:
     assembler = FrameAssembler(capture.config)
     size = batch_frames(capture.config)
     frames: list[tuple[np.ndarray, np.ndarray]] = []
@@ -50,7 +50,7 @@ def _batches(path: Path, capture: Capture) -> Iterator[tuple[np.ndarray, np.ndar
         frames += assembler.take(payload)
         if len(frames) >= size:
             yielded += len(frames)
-            yield _stack(frames)
+            yield _stack(frames, capture.config)
             frames.clear()
     frames += assembler.finish()
     if not yielded and not frames:
@@ -60,12 +60,12 @@ def _batches(path: Path, capture: Capture) -> Iterator[tuple[np.ndarray, np.ndar
         )
     capture.warnings += assembler.counts.warnings()
     if frames:
-        yield _stack(frames)
+        yield _stack(frames, capture.config)
 
 
-def _stack(frames: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def _stack(frames: list[tuple[np.ndarray, np.ndarray]], config: RadarConfig) -> Batch:
     words, valid = zip(*frames, strict=True)
-    return np.concatenate(words), np.stack(valid)
+    return Batch(decode(np.concatenate(words), config), np.stack(valid))
 
 
 def _read_header(file, path: Path) -> tuple[str, int]:

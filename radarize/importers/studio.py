@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
 from radarize.errors import InputError
+from radarize.importers.bin import parts
 from radarize.radar.config import RadarConfig
 from radarize.radar.studio import load_json, load_studio
 
@@ -39,9 +40,10 @@ def find(source: Path) -> StudioCapture:
     config, text = load_studio(settings, setups[0] if setups else None)
     files, filled = _captured(setup, folder)
     if not source.is_dir():
-        files = [source]
+        files = parts(source)
     elif not files:
-        files = [_one(folder, "*.bin")]
+        captures = {parts(path) for path in folder.glob("*.bin")}
+        files = captures.pop() if len(captures) == 1 else [_one(folder, "*.bin")]
     warnings = (f"{filled} bytes were lost on capture and filled with zeros",) if filled else ()
     return StudioCapture(tuple(files), settings, config, text, warnings)
 

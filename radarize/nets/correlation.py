@@ -22,31 +22,29 @@ class Correlation(nn.Module):
         maps: of a frame.
         columns: of a map.
         features: per cell.
-        turns: columns of features (two of azimuth each) by which frames are shifted against each other, to either
-            side at most.
+        turns: columns of azimuth by which frames are shifted against each other, to either side at most.
         steps: rows of features (four range bins each) likewise.
 
     Attributes:
         channels: of the image, for every frame but the newest.
     """
 
-    def __init__(self, maps: int, columns: int, features: int = 8, turns: int = 13, steps: int = 2):
+    def __init__(self, maps: int, columns: int, features: int = 8, turns: int = 25, steps: int = 1):
         super().__init__()
         self.steps, self.channels = steps, 2 * steps + 1
         self.features = nn.Sequential(
             nn.Conv2d(maps, features, 5, (2, 1), 2, bias=False),
             nn.BatchNorm2d(features),
             nn.ReLU(),
-            nn.Conv2d(features, features, 5, (2, 2), 2),
+            nn.Conv2d(features, features, 5, (2, 1), 2),
         )
         # Correlation over azimuth as a product of spectra; by matrices, which are small and known to all run times.
-        wide = (columns + 1) // 2
-        waves = torch.arange(wide + 1) * (math.pi / wide)  # as many as columns twice as wide have: shifts do not wrap
-        for name, places in (("spectrum", torch.arange(wide)), ("shift", torch.arange(-turns, turns + 1))):
+        waves = torch.arange(columns + 1) * (math.pi / columns)  # of maps twice as wide: shifts do not wrap
+        for name, places in (("spectrum", torch.arange(columns)), ("shift", torch.arange(-turns, turns + 1))):
             angles = waves[:, None] * places
             self.register_buffer(name, torch.stack([angles.cos(), -angles.sin()]), persistent=False)
-        both = torch.full((wide + 1, 1), 2.0).index_fill(0, torch.tensor([0, wide]), 1.0)  # negative frequencies too
-        self.shift *= both / (2 * wide) / wide**0.5
+        both = torch.full((columns + 1, 1), 2.0).index_fill(0, torch.tensor([0, columns]), 1.0)  # signs of frequency
+        self.shift *= both / (2 * columns) / columns**0.5
 
     def forward(self, maps: Maps) -> Float[Tensor, "twice channel row shift"]:
         """Correlation by step in range (channel), range (row, of four bins) and shift in azimuth, of all windows, then

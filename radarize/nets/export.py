@@ -19,13 +19,13 @@ class Estimate(nn.Module):
         super().__init__()
         self.net = net
 
-    def forward(self, maps: torch.Tensor):
-        return self.net.estimate(maps)
+    def forward(self, *inputs: torch.Tensor):
+        return self.net.estimate(*inputs)
 
 
 def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
     """Write a network's `estimate` as one ONNX file: input ``maps`` (item, frame, map, row, azimuth) in dB, any number
-    of items; outputs ``estimate`` and ``covariance``, or ``probability``.
+    of items, and for turns ``travel`` (item, 2); outputs ``estimate`` and ``covariance``, or ``probability``.
 
     Raises:
         InputError: the packages for it are missing, or the file cannot be written.
@@ -38,11 +38,12 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
     logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
     # Not "mean", which is what torch calls the average over an image.
     outputs = ["probability"] if header.kind == "segmentation" else ["estimate", "covariance"]
+    inputs, item = example(header), torch.export.Dim("item")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         program = torch.onnx.export(
-            Estimate(net).eval().cpu(), (example(header),), input_names=["maps"], output_names=outputs,
-            dynamic_shapes=({0: torch.export.Dim("item")},), dynamo=True, verbose=False,
+            Estimate(net).eval().cpu(), inputs, input_names=["maps", "travel"][: len(inputs)], output_names=outputs,
+            dynamic_shapes=(tuple({0: item} for _ in inputs),), dynamo=True, verbose=False,
         )  # fmt: skip
     program.model.metadata_props["radarize"] = header.model_dump_json()
     with replacing(path) as part:

@@ -15,6 +15,7 @@ from torch import Tensor, nn
 from radarize.nets.correlation import Correlation
 from radarize.nets.gaussian import Gaussian
 from radarize.nets.maps import Maps, coordinates, level
+from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
 from radarize.training.maps import AZIMUTHS
 
@@ -40,19 +41,6 @@ class MotionNet(nn.Module):
         self.resnet = ResNet18(channels + 2, Gaussian.numbers(self.dimensions), width, self.stride, pool=False)
         self.register_buffer("spread", torch.zeros(()))
 
-    def image(self, maps: Maps) -> Float[Tensor, "item channel row column"]:
-        """What the ResNet looks at."""
-        raise NotImplementedError
-
-    def forward(self, maps: Maps) -> Gaussian:
-        image = self.image(maps)
-        return Gaussian.of(self.resnet(torch.cat([image, coordinates(image)], dim=1)), self.dimensions)
-
-    def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item dimension"], Float[Tensor, "item dimension dimension"]]:
-        """Mean and covariance."""
-        found = self(maps)
-        return found.mean, found.covariance * (2 * self.spread).exp()
-
 
 class TranslationNet(MotionNet):
     """Doppler-azimuth maps to the sensor's velocity (forward, left), m/s, in the middle of the newest frame's burst.
@@ -69,6 +57,8 @@ class TranslationNet(MotionNet):
     """
 
     kind, dimensions, stride = "translation", 2, (1, 2)
+    #: m/s; nobody walks faster.
+    fastest = 4.0
     #: Rows that the second look sees above and below the ridge.
     near = 6
 
@@ -78,14 +68,11 @@ class TranslationNet(MotionNet):
         self.second = ResNet18(frames * len(maps) + 2, Gaussian.numbers(2), width, self.stride, pool=False)
         self.register_buffer("directions", torch.tensor(_directions(), dtype=torch.float32), persistent=False)
 
-    def image(self, maps: Maps) -> Tensor:
-        return level(maps).flatten(1, 2)
-
     def forward(self, maps: Maps) -> Gaussian:
         """Velocities by the first look at all windows, then by the second: twice as many."""
-        image = self.image(maps)
+        image = level(maps).flatten(1, 2)
         first = self.resnet(torch.cat([image, coordinates(image)], dim=1))
-        velocity = first[:, :2].detach()
+        velocity = first[:, :2].detach().clamp(-self.fastest, self.fastest)
         flat = self._rolled(image, velocity)
         second = self.second(torch.cat([flat, coordinates(flat)], dim=1))
         second = torch.cat([second[:, :2] * self.step + velocity, second[:, 2:]], dim=1)
@@ -103,10 +90,10 @@ class TranslationNet(MotionNet):
         upper = (lower + 1) % rows
         return image.gather(2, lower) * (1 - fraction) + image.gather(2, upper) * fraction
 
-    def estimate(self, maps: Maps) -> tuple[Tensor, Tensor]:
+    def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item 2"], Float[Tensor, "item 2 2"]]:
         """Mean and covariance, by the second look."""
-        mean, covariance = super().estimate(maps)
-        return mean[len(maps) :], covariance[len(maps) :]
+        found, count = self(maps), maps.shape[0]
+        return found.mean[count:], found.covariance[count:] * (2 * self.spread).exp()
 
 
 def _directions() -> list[list[float]]:
@@ -119,29 +106,44 @@ class RotationNet(MotionNet):
     left.
 
     The paper's network sees the two maps as channels of one image and has to find out by itself that a turn shifts the
-    one against the other. Here their correlation (`Correlation`) is the image, in which a turn is a place: the network
-    learns from a few hours what else it takes, such as telling a turn from a step to the side.
+    one against the other, that a step to the side does nearly the same, and how the two differ. Here the step is known
+    from the velocities: both maps are first moved to half way between them (`Moved`), after which a turn shifts all
+    ranges alike. Their correlation (`Correlation`) is the image, in which a turn is a place.
 
-    Args: as of `TranslationNet`.
+    Args:
+        frames, maps, width: as of `TranslationNet`.
+        step: m from row to row.
     """
 
-    kind, dimensions, stride = "rotation", 1, (1, 1)
+    kind, dimensions, stride = "rotation", 1, (1, 2)
 
-    def __init__(self, frames: int, maps: Sequence[str], width: int = 16):
+    def __init__(self, frames: int, maps: Sequence[str], width: int = 16, step: float = 0.0446):
         correlation = Correlation(len(maps), len(AZIMUTHS))
-        super().__init__((frames - 1) * correlation.channels, width)
-        self.frames, self.maps, self.width, self.correlation = frames, tuple(maps), width, correlation
+        super().__init__((frames - 1) * correlation.channels + 2, width)
+        self.frames, self.maps, self.width = frames, tuple(maps), width
+        self.moved, self.correlation = Moved(step), correlation
 
-    def image(self, maps: Maps) -> Tensor:
-        return self.correlation(level(maps))
+    def forward(self, maps: Maps, travel: Float[Tensor, "item 2"]) -> Gaussian:
+        """Turns of all windows, then of all windows reversed: twice as many.
 
-    def forward(self, maps: Maps) -> Gaussian:
-        """Turns of all windows, then of all windows reversed: twice as many."""
-        return super().forward(maps)
+        Args:
+            maps: in dB.
+            travel: mean of the sensor's velocities at the window's ends times its duration, m (forward, left).
+        """
+        # Frames before the newest lie evenly on the way to it.
+        ago = torch.linspace(0.5, -0.5, self.frames, device=maps.device)
+        steps = (travel[:, None] * ago[:, None]).flatten(0, 1)
+        moved = self.moved(level(maps).flatten(0, 1), steps).unflatten(0, maps.shape[:2])
+        shifts = self.correlation(moved)
+        told = torch.cat([travel, -travel])[:, :, None, None].expand(-1, -1, *shifts.shape[2:])
+        image = torch.cat([shifts, told, coordinates(shifts)], dim=1)
+        return Gaussian.of(self.resnet(image), self.dimensions)
 
-    def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item 1"], Float[Tensor, "item 1 1"]]:
+    def estimate(
+        self, maps: Maps, travel: Float[Tensor, "item 2"]
+    ) -> tuple[Float[Tensor, "item 1"], Float[Tensor, "item 1 1"]]:
         """Mean and covariance of the turn, averaged over the window and its reverse (paper, section 4.3)."""
-        both, count = self(maps), maps.shape[0]
+        both, count = self(maps, travel), maps.shape[0]
         forth, back = both.mean[:count], both.mean[count:]
         # Both see the same noise: the average is not taken to be better than either.
         return (forth - back) / 2, (both.covariance[:count] + both.covariance[count:]) / 2 * (2 * self.spread).exp()

@@ -14,10 +14,9 @@ from torch import Tensor, nn
 
 from radarize import __version__
 from radarize.errors import InputError
-from radarize.nets import NETS
 from radarize.radar.config import RadarConfig
 from radarize.replacing import replacing
-from radarize.training.maps import AZIMUTHS
+from radarize.settings import SETTINGS
 
 #: Steps of range or speed that differ by less read as the same grid.
 _TOLERANCE = 0.01
@@ -43,15 +42,16 @@ class Grid(BaseModel):
     frame_period: float
 
     @classmethod
-    def of(cls, config: RadarConfig, name: str) -> "Grid":
+    def of(cls, config: RadarConfig, name: str, setting: str = "corrected") -> "Grid":
         """The grid of a radar's map."""
-        doppler = name.startswith("doppler")
+        maker = SETTINGS[setting].maker
+        axes = maker.axes(config, name)
         return cls(
-            rows=config.loops if doppler else config.samples,
-            step=config.velocity_resolution if doppler else config.range_resolution,
-            azimuths=len(AZIMUTHS),
-            field=float(AZIMUTHS[-1] - AZIMUTHS[0]),
-            frame_period=config.frame_period,
+            rows=axes.rows,
+            step=axes.step,
+            azimuths=len(axes.azimuths),
+            field=float(axes.azimuths[-1] - axes.azimuths[0]),
+            frame_period=config.frame_period * maker.stride(config),
         )
 
     def difference(self, other: "Grid", ignore: tuple[str, ...] = ()) -> str | None:
@@ -66,7 +66,8 @@ class Header(BaseModel):
     """What the file says of itself.
 
     Attributes:
-        kind: key of `radarize.nets.NETS`.
+        kind: of the network.
+        setting: key of `radarize.settings.SETTINGS`.
         frames, maps, width: what the network is built with.
         grid: of its maps.
         spacings: frames from one of the window to the next, as trained.
@@ -79,6 +80,7 @@ class Header(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: str
+    setting: str = "corrected"
     frames: int
     maps: tuple[str, ...]
     width: int
@@ -105,15 +107,15 @@ class Header(BaseModel):
         return round(ratio)
 
 
-def make(kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid) -> nn.Module:
+def make(kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid, setting: str = "corrected") -> nn.Module:
     """An untrained network for maps of a grid."""
-    scale = {"step": grid.step} if kind == "translation" else {}
-    return NETS[kind](frames, maps, width, **scale)
+    scale = {} if kind == "segmentation" else {"step": grid.step}
+    return SETTINGS[setting].nets[kind](frames, maps, width, **scale)
 
 
 def build(header: Header) -> nn.Module:
     """The network of a header, untrained."""
-    return make(header.kind, header.frames, header.maps, header.width, header.grid)
+    return make(header.kind, header.frames, header.maps, header.width, header.grid, header.setting)
 
 
 def save(net: nn.Module, header: Header, path: Path) -> Path:
@@ -144,15 +146,16 @@ def load(path: Path, config: RadarConfig | None = None) -> tuple[nn.Module, Head
     tensors, about = read(path)
     try:
         header = Header.model_validate(about)
-        if header.kind not in NETS:
-            raise InputError(f"{path}: is a network for {header.kind!r}, expected one of: {', '.join(NETS)}")
+        for value, known in ((header.setting, SETTINGS), (header.kind, SETTINGS["corrected"].nets)):
+            if value not in known:
+                raise InputError(f"{path}: is a network for {value!r}, expected one of: {', '.join(known)}")
         net = build(header)
         net.load_state_dict(tensors)
     except (ValidationError, ValueError, RuntimeError) as error:
         reason = str(error).splitlines()[0].rstrip(":")
         raise InputError(f"{path}: its weights do not fit its header ({reason})") from error
     if config is not None:
-        difference = header.grid.difference(Grid.of(config, header.maps[0]), ignore=("frame_period",))
+        difference = header.grid.difference(Grid.of(config, header.maps[0], header.setting), ignore=("frame_period",))
         try:
             header.stride(config)
         except ValueError as error:
@@ -198,7 +201,10 @@ def read(path: Path) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
         raise InputError(f"{path}: is no file of weights of this project ({reason})") from error
 
 
-def example(header: Header) -> Float[Tensor, "2 frame map row azimuth"]:
-    """Maps of noise in the shape that a network reads."""
+def example(header: Header) -> tuple[Tensor, ...]:
+    """What a network reads, twice: maps of noise, and for turns of setting `corrected` a travel."""
     noise = torch.Generator().manual_seed(0)
-    return 10 * torch.randn(2, header.frames, len(header.maps), header.grid.rows, header.grid.azimuths, generator=noise)
+    shape = (2, header.frames, len(header.maps), header.grid.rows, header.grid.azimuths)
+    maps = 10 * torch.randn(shape, generator=noise)
+    told = header.kind == "rotation" and header.setting == "corrected"
+    return (maps, 0.1 * torch.randn((2, 2), generator=noise)) if told else (maps,)

@@ -81,6 +81,7 @@ class LearnedRotation:
         weights: file; the shipped ones if None.
         spacings: of the network's frames, over which turns are measured; some of those it was trained on.
         jerk: rad/s, standard deviation of the change of turning rate from frame to frame.
+        fastest: rad/s, standard deviation of the turning rate before anything is known.
     """
 
     def __init__(
@@ -89,30 +90,33 @@ class LearnedRotation:
         weights: Path | None = None,
         spacings: Sequence[int] = (1, 2, 4),
         jerk: float = np.radians(12.0),
+        fastest: float = np.radians(60.0),
     ):
         self._windows = Windows(maker, "rotation", weights)
         known = self._windows.header.spacings
         self.spacings, self.jerk = [s for s in spacings if s in known] or list(known), jerk
+        self.fastest = fastest
         size = max(self.spacings) * self._windows.stride + 1
+        self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
         self._yaws, self._covariance = np.zeros(size), np.zeros((size, size))  # oldest first
-        self._seen, self._time = 0, 0.0
+        self._seen = 0
 
     @torch.inference_mode()
     def estimate(
         self,
         spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
         times: Float[np.ndarray, "frame"],
-        velocities: Velocities | None = None,
+        velocities: Velocities,
     ) -> Rotations:
         """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
         windows = self._windows.push(spectrum, self.spacings)
-        mean, variance = self._windows.net.estimate(torch.cat(windows))
-        turns = np.stack([mean[:, 0].double().numpy(), variance[:, 0, 0].double().numpy()], axis=-1)
-        turns = turns.reshape(len(windows), len(times), 2)
+        travel = self._travel(np.asarray(times, float), velocities.velocity)
+        mean, variance = self._windows.net.estimate(torch.cat(windows), torch.from_numpy(travel).float())
+        turns = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)
         yaw, growth = np.zeros(len(times)), np.zeros(len(times))
-        for i, time in enumerate(times):
+        for i in range(len(times)):
             before, known = self._yaws[-1], self._covariance[-1, -1]
-            self._predict(float(time))
+            self._predict(self._times[len(self._times) - len(times) + i - 1 :][:2])
             for spacing, (turn, noise) in zip(self.spacings, turns[:, i], strict=True):
                 if (back := spacing * self._windows.stride) < self._seen:
                     self._tie(back, turn, noise)
@@ -120,20 +124,34 @@ class LearnedRotation:
             growth[i] = max(self._covariance[-1, -1] - known, 1e-8)
         return Rotations(yaw, growth, np.zeros(len(times)))
 
-    def _predict(self, time: float) -> None:
-        """The next yaw goes on at the last rate, more or less."""
-        if self._seen == 0:
-            move, noise = np.eye(len(self._yaws)), 0.0
-        else:
-            move = np.eye(len(self._yaws), k=1)
-            move[-1, -1] = 1.0
-            if self._seen > 1:
-                move[-1, -2:] = -1.0, 2.0
-            noise = (self.jerk * (time - self._time)) ** 2 if self._seen > 1 else 0.1
+    def _travel(self, times: np.ndarray, velocities: np.ndarray) -> Float[np.ndarray, "window 2"]:
+        """What `RotationNet` wants to be told of the windows, spacing by spacing."""
+        new, size = len(times), len(self._yaws)
+        self._times = np.concatenate([self._times[1 - size :], times])
+        self._velocities = np.concatenate([self._velocities[1 - size :], velocities])
+        newest = np.arange(len(self._times) - new, len(self._times))
+        first = [np.maximum(newest - spacing * self._windows.stride, 0) for spacing in self.spacings]
+        lasting = [self._times[newest] - self._times[start] for start in first]
+        mean = [(self._velocities[newest] + self._velocities[start]) / 2 for start in first]
+        return np.concatenate(lasting)[:, None] * np.concatenate(mean)
+
+    def _predict(self, last_two: np.ndarray) -> None:
+        """The next yaw goes on at the last rate, more or less.
+
+        Args:
+            last_two: times of the frame before and of this one, s.
+        """
+        move, noise = np.eye(len(self._yaws), k=1), 0.0
+        move[-1, -1] = 1.0
+        if self._seen == 1:
+            noise = (self.fastest * float(np.diff(last_two)[0])) ** 2
+        elif self._seen > 1:
+            move[-1, -2:] = -1.0, 2.0
+            noise = (self.jerk * float(np.diff(last_two)[0])) ** 2
         self._yaws = move @ self._yaws
         self._covariance = move @ self._covariance @ move.T
         self._covariance[-1, -1] += noise
-        self._seen, self._time = min(self._seen + 1, len(self._yaws)), time
+        self._seen = min(self._seen + 1, len(self._yaws))
 
     def _tie(self, back: int, turn: float, noise: float) -> None:
         """Kalman update by a turn from `back` frames ago to now."""

@@ -75,29 +75,19 @@ def encode(frames: Int16[np.ndarray, "frame loop tx rx sample 2"], config: Radar
     return np.ascontiguousarray(groups, dtype=np.int16).reshape(-1)
 
 
-def detect_iq_order(raw: Int16[np.ndarray, "word"], config: RadarConfig) -> tuple[str, float]:
-    """Find out whether I or Q comes first: the wrong order mirrors range.
+def range_balance(frames: Int16[np.ndarray, "frame loop tx rx sample 2"]) -> float:
+    """Energy of the beat spectrum's lower half against the upper one, dB: negative where I and Q are swapped.
 
-    Echoes are near, with leakage nearest of all, so the lower half of the beat spectrum holds more energy than the
-    upper one when the order is right (+14 to +36 dB on real captures).
-
-    Args:
-        raw: words of whole frames; the first few are enough.
-        config: its `iq_order` is ignored.
-
-    Returns:
-        ``"iiqq"`` or ``"qqii"``, and by how many dB the halves differ: small values mean undecided.
+    Echoes are near, with leakage nearest of all, so the lower half holds more energy (+14 to +36 dB on real captures);
+    swapping I and Q mirrors range. Small values mean undecided; 0 is silence.
     """
-    frames = decode(raw, config.model_copy(update={"iq_order": "iiqq"})).astype(np.float32)
-    signal = (frames[..., 0] + 1j * frames[..., 1]).reshape(-1, config.samples)
-    signal -= signal.mean(axis=1, keepdims=True)
-    power = (np.abs(np.fft.fft(signal * np.hanning(config.samples), axis=1)) ** 2).sum(axis=0)
-    half, skip = config.samples // 2, 2  # the window smears the offset into two bins
-    near, far = power[skip:half].sum(), power[half + 1 : config.samples - skip + 1].sum()
-    if not (near > 0 and far > 0):
-        return config.iq_order, 0.0
-    decibels = float(10 * np.log10(near / far))
-    return ("iiqq" if decibels >= 0 else "qqii"), abs(decibels)
+    samples = frames.shape[-2]
+    signal = np.ascontiguousarray(frames, np.float32).view(np.complex64).reshape(-1, samples)
+    signal = signal - signal.mean(axis=1, keepdims=True)
+    power = (np.abs(np.fft.fft(signal * np.hanning(samples), axis=1)) ** 2).sum(axis=0)
+    half, skip = samples // 2, 2  # the window smears the offset into two bins
+    near, far = power[skip:half].sum(), power[half + 1 : samples - skip + 1].sum()
+    return float(10 * np.log10(near / far)) if near > 0 and far > 0 else 0.0
 
 
 # --- packets ----------------------------------------------------------------------------------------------------------

@@ -13,11 +13,15 @@ flash would drown the ridge on which the whole static world lies. Decibels are o
 quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of its size.
 """
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float16, Int16
+from jaxtyping import Bool, Float, Float16, Int16
 
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
@@ -41,44 +45,117 @@ _LARGE = ("truth/adc_by_cause",)
 _BATCH = 32
 
 
-class MapMaker:
-    """Makes the maps of one radar configuration.
-
-    Args:
-        config: radar configuration.
-        device: torch device for the arithmetic.
+@dataclass(frozen=True)
+class Axes:
+    """Cells of a map.
 
     Attributes:
-        names: maps that the array can make; without antennas of two heights, only those of the row.
+        rows: range bins, or Doppler bins.
+        step: m, or m/s, from row to row.
+        azimuths: of columns, rad, ascending to the left.
     """
 
-    def __init__(self, config: RadarConfig, device: str = "cpu"):
-        self.heatmaps = Heatmaps(config, AZIMUTHS, device=device)
-        self.names = tuple(n for n in MAPS if self.heatmaps.pairs is not None or "elevation" not in n)
-        self._spectrum: torch.Tensor | None = None
-        self._made: dict[str, np.ndarray] = {}
+    rows: int
+    step: float
+    azimuths: Float[np.ndarray, "azimuth"]
 
-    def shape(self, name: str) -> tuple[int, int]:
+
+class Maker(Protocol):
+    """Makes the maps that a setting's networks see (see `radarize.settings`), of one radar configuration.
+
+    Attributes:
+        maps: by name, what they are.
+        names: of those that the array can make.
+        history: frames before its own that a map needs.
+    """
+
+    maps: dict[str, str]
+    names: tuple[str, ...]
+    history: int
+
+    @staticmethod
+    def stride(config: RadarConfig) -> int:
+        """Frames from one that networks see to the next."""
+        ...
+
+    @staticmethod
+    def axes(config: RadarConfig, name: str) -> Axes:
         """Rows and columns of a map."""
-        config = self.heatmaps.config
-        return (config.loops if name.startswith("doppler") else config.samples), len(AZIMUTHS)
+        ...
 
     def __call__(
         self,
         adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
         names: tuple[str, ...] | None = None,
+        frames: slice = slice(None),
+    ) -> dict[str, Float16[np.ndarray, "map row azimuth"]]:
+        """Maps of those of consecutive frames that `frames` picks."""
+        ...
+
+
+class MapMaker:
+    """Makes the maps of one radar configuration.
+
+    Args:
+        config: radar configuration.
+        device: torch device for the arithmetic.
+        stage: entered with ``"maps"`` whenever maps are made, to time it.
+
+    Attributes:
+        names: maps that the array can make; without antennas of two heights, only those of the row.
+    """
+
+    maps = MAPS
+    history = 0
+
+    def __init__(
+        self,
+        config: RadarConfig,
+        device: str = "cpu",
+        stage: Callable[[str], AbstractContextManager] = nullcontext,
+    ):
+        self._stage = stage
+        self.heatmaps = Heatmaps(config, AZIMUTHS, device=device)
+        self.names = tuple(n for n in MAPS if self.heatmaps.pairs is not None or "elevation" not in n)
+        self._spectrum: torch.Tensor | None = None
+        self._made: dict[str, np.ndarray] = {}
+
+    @staticmethod
+    def stride(config: RadarConfig) -> int:
+        """Networks see every frame."""
+        return 1
+
+    @staticmethod
+    def axes(config: RadarConfig, name: str) -> Axes:
+        """Rows and columns of a map."""
+        if name.startswith("doppler"):
+            return Axes(config.loops, config.velocity_resolution, AZIMUTHS)
+        return Axes(config.samples, config.range_resolution, AZIMUTHS)
+
+    def shape(self, name: str) -> tuple[int, int]:
+        """Rows and columns of a map."""
+        axes = self.axes(self.heatmaps.config, name)
+        return axes.rows, len(axes.azimuths)
+
+    def __call__(
+        self,
+        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+        names: tuple[str, ...] | None = None,
+        frames: slice = slice(None),
     ) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
         """Maps of frames, dB.
 
         Args:
             adc, valid: see `Heatmaps.spectrum`.
             names: of `self.names`; all if None.
+            frames: whose maps are wanted.
 
         Raises:
             InputError: samples that do not fit the configuration.
         """
-        return self.of(self.heatmaps.spectrum(adc, valid), names)
+        return self.of(self.heatmaps.spectrum(adc[frames], None if valid is None else valid[frames]), names)
 
     def of(self, spectrum: torch.Tensor, names: tuple[str, ...] | None = None) -> dict[str, np.ndarray]:
         """Maps of a spectrum at hand; those of the last one are remembered, for several networks ask for the same."""
@@ -86,16 +163,20 @@ class MapMaker:
             self._spectrum, self._made = spectrum, {}
         names = names or self.names
         wanted = [name for name in names if name not in self._made]
+        with self._stage("maps"):
+            self._made |= self._make(spectrum, wanted)
+        return {name: self._made[name] for name in names}
+
+    def _make(self, spectrum: torch.Tensor, names: list[str]) -> dict[str, np.ndarray]:
         heatmaps = self.heatmaps
-        limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in wanted) else None
+        limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else None
         makers = {
             "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
             "elevation_aware": lambda: heatmaps.elevation_aware_of(spectrum),
             "doppler_azimuth": lambda: heatmaps.doppler_azimuth_of(limited, "capon"),
             "doppler_elevation_aware": lambda: heatmaps.doppler_azimuth_of(limited, elevation_aware=True),
         }
-        self._made |= {name: _decibels(makers[name]()) for name in wanted}
-        return {name: self._made[name] for name in names}
+        return {name: _decibels(makers[name]()) for name in names}
 
 
 def _decibels(power: torch.Tensor) -> np.ndarray:
@@ -141,8 +222,8 @@ def keep_maps(source: Path, output: Path) -> Path:
     return output
 
 
-def maps_of(recording: Recording, start: int, stop: int, names: tuple[str, ...], maker: MapMaker) -> dict:
-    """Maps of frames start...stop-1: as stored, or made from the samples, which gives the same.
+def maps_of(recording: Recording, start: int, stop: int, names: tuple[str, ...], maker: Maker, stride: int = 1) -> dict:
+    """Maps of every so manieth of frames start...stop-1: as stored, or made from the samples, which gives the same.
 
     Raises:
         InputError: a map that the recording neither holds nor can make.
@@ -150,6 +231,7 @@ def maps_of(recording: Recording, start: int, stop: int, names: tuple[str, ...],
     for name in names:
         if name not in maker.names:
             raise InputError(f"{recording.path}: has no map {name}; its array makes {', '.join(maker.names)}")
-    if recording.has("maps"):
-        return {name: recording.rows(f"maps/{name}", start, stop) for name in names}
-    return maker(recording.adc(start, stop), recording.valid(start, stop), names)
+    if all(recording.has(f"maps/{name}") for name in names):
+        return {name: recording.rows(f"maps/{name}", start, stop)[::stride] for name in names}
+    first = max(0, start - maker.history)
+    return maker(recording.adc(first, stop), recording.valid(first, stop), names, slice(start - first, None, stride))

@@ -13,15 +13,19 @@ from torch import Tensor
 
 from radarize.errors import InputError
 from radarize.nets.weights import Grid
+from radarize.published import labels
 from radarize.recording import Recording
-from radarize.training.maps import MapMaker, maps_of
+from radarize.settings import SETTINGS
+from radarize.training.maps import maps_of
 from radarize.tum import planar
 
-#: What labels are made of, by name: path in the recording, and what is kept of a recording's rows of it.
-TRUTH: dict[str, tuple[str, Callable[[np.ndarray], np.ndarray]]] = {
-    "velocity": ("truth/velocity", lambda rows: rows[:, :2].astype(np.float32)),
-    "yaw": ("truth/pose", lambda rows: planar(rows)[:, 2:].astype(np.float32)),
-    "occupancy": ("truth/occupancy", lambda rows: rows),
+#: What labels are made of, by name: path in the recording, and what is made of some of a recording's frames there.
+TRUTH: dict[str, tuple[str, Callable[[Recording, slice], np.ndarray]]] = {
+    "velocity": ("truth/velocity", lambda r, f: r.read("truth/velocity")[f, :2].astype(np.float32)),
+    "yaw": ("truth/pose", lambda r, f: planar(r.read("truth/pose")[f])[:, 2:].astype(np.float32)),
+    "occupancy": ("truth/occupancy", lambda r, f: r.read("truth/occupancy")[f]),
+    "published_velocity": ("truth/pose", labels.velocity),
+    "published_occupancy": ("truth/depth", labels.occupancy),
 }
 _BATCH = 32
 
@@ -47,6 +51,7 @@ class Table:
         truth: Sequence[str],
         workers: int = 1,
         progress: Callable[..., None] = lambda *where: None,
+        setting: str = "corrected",
     ) -> "Table":
         """Read recordings of maps, or make the maps of recordings of samples.
 
@@ -55,16 +60,17 @@ class Table:
             maps, truth: what to read.
             workers: processes that read; more than one pays where maps have to be made.
             progress: called with (stage, recordings done, recordings in all).
+            setting: key of `radarize.settings.SETTINGS`, which says which maps there are.
 
         Raises:
             InputError: a recording lacks something, differs from the others in its maps' grid, has truth that is no
                 number, or memory does not suffice.
         """
-        lengths, grids = zip(*(_open(path, maps[0]) for path in paths), strict=True)
+        lengths, grids = zip(*(_open(path, maps[0], setting) for path in paths), strict=True)
         for path, grid in zip(paths, grids, strict=True):
             if difference := grids[0].difference(grid):
                 raise InputError(f"{path}: has maps of {difference} as in {paths[0].name}, expected one radar's")
-        shapes = _shapes(paths[0], maps)
+        shapes = _shapes(paths[0], maps, setting)
         size = 2 * sum(lengths) * sum(rows * columns for rows, columns in shapes.values())
         if size > (free := psutil.virtual_memory().available):
             raise InputError(
@@ -72,7 +78,7 @@ class Table:
             )
         joined = {name: np.empty((sum(lengths), *shape), np.float16) for name, shape in shapes.items()}
         labels: dict[str, list[np.ndarray]] = {name: [] for name in truth}
-        arguments = [(path, tuple(maps), tuple(truth)) for path in paths]
+        arguments = [(path, tuple(maps), tuple(truth), setting) for path in paths]
         pool = ProcessPoolExecutor(workers, get_context("spawn")) if workers > 1 and len(paths) > 1 else None
         try:
             first = 0
@@ -117,32 +123,35 @@ class Table:
         return torch.stack([values[frames] for values in self.maps.values()], dim=2).float()
 
 
-def _shapes(path: Path, maps: Sequence[str]) -> dict[str, tuple[int, int]]:
+def _shapes(path: Path, maps: Sequence[str], setting: str) -> dict[str, tuple[int, int]]:
     with Recording(path) as recording:
-        maker = MapMaker(recording.config)
-        return {name: maker.shape(name) for name in maps}
+        axes = {name: SETTINGS[setting].maker.axes(recording.config, name) for name in maps}
+    return {name: (own.rows, len(own.azimuths)) for name, own in axes.items()}
 
 
-def _open(path: Path, name: str) -> tuple[int, Grid]:
+def _open(path: Path, name: str, setting: str) -> tuple[int, Grid]:
+    """Frames that networks see, and their grid."""
     with Recording(path) as recording:
-        return len(recording), Grid.of(recording.config, name)
+        stride = SETTINGS[setting].maker.stride(recording.config)
+        return -(-len(recording) // stride), Grid.of(recording.config, name, setting)
 
 
-def _read(arguments: tuple[Path, tuple[str, ...], tuple[str, ...]]) -> tuple[dict, dict]:
+def _read(arguments: tuple[Path, tuple[str, ...], tuple[str, ...], str]) -> tuple[dict, dict]:
     """Maps and labels of one recording."""
-    path, maps, truth = arguments
+    path, maps, truth, setting = arguments
     with Recording(path) as recording:
-        maker, count = MapMaker(recording.config), len(recording)
+        maker, count = SETTINGS[setting].maker(recording.config), len(recording)
+        stride = maker.stride(recording.config)
+        size = _BATCH * stride
         parts = [
-            maps_of(recording, start, min(start + _BATCH, count), maps, maker) for start in range(0, count, _BATCH)
+            maps_of(recording, start, min(start + size, count), maps, maker, stride) for start in range(0, count, size)
         ]
-        labels = {}
+        found, frames = {}, slice(0, count, stride)
         for name in truth:
             where, of = TRUTH[name]
-            rows = recording.rows(where, 0, count)
-            if len(rows) < count or not np.isfinite(rows).all():
+            found[name] = of(recording, frames)
+            if len(found[name]) < -(-count // stride) or not np.isfinite(found[name]).all():
                 raise InputError(
                     f"{path}: /{where} lacks values or has some that are no numbers, expected {count} frames"
                 )
-            labels[name] = of(rows)
-        return {name: np.concatenate([part[name] for part in parts]) for name in maps}, labels
+        return {name: np.concatenate([part[name] for part in parts]) for name in maps}, found

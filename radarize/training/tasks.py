@@ -50,22 +50,29 @@ class Task(ABC):
 
     Attributes:
         kind: key of `radarize.nets.NETS`.
+        setting: key of `radarize.settings.SETTINGS`.
         maps: that its network reads.
-        truth: that its labels are made of, a key of `radarize.training.table.TRUTH`.
+        truth: that its labels are made of, keys of `radarize.training.table.TRUTH`.
         reach: s, from one frame of a window to the next, at most; None: the very next. Drawn for every item; the
             farthest is what is validated.
+        optimiser: algorithm.
+        steepest: norm of the gradient from which it is cut; most are about as large. A likelihood has no bounds: a
+            single item that a network is wrongly sure of would undo many steps.
         defaults: settings.
     """
 
     kind: str
+    setting: str = "corrected"
     maps: tuple[str, ...]
-    truth: str
+    truth: tuple[str, ...]
     reach: float | None = None
+    optimiser: type[torch.optim.Optimizer] = torch.optim.Adam
+    steepest: float = 1.0
     defaults: Settings
 
     def net(self, settings: Settings, grid: Grid) -> nn.Module:
         """A network for maps of a grid, with random weights from torch's generator."""
-        return make(self.kind, settings.frames, self.maps, settings.width, grid)
+        return make(self.kind, settings.frames, self.maps, settings.width, grid, self.setting)
 
     def spacings(self, frame_period: float) -> Sequence[int]:
         """Frames from one of a window to the next, for frames that come every `frame_period` (s)."""
@@ -79,7 +86,7 @@ class Task(ABC):
 
     def label(self, table: Table, frames: Int[Tensor, "item frame"]) -> Tensor:
         """What the network should say of windows."""
-        return table.truth[self.truth][frames[:, -1]]
+        return table.truth[self.truth[0]][frames[:, -1]]
 
     @abstractmethod
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
@@ -102,7 +109,7 @@ class Task(ABC):
         """Make a trained network's uncertainty honest on validation data, which is gone through once."""
 
 
-class _Motion(Task):
+class Motion(Task):
     """Velocity or turn.
 
     Attributes:
@@ -113,7 +120,9 @@ class _Motion(Task):
     size: str
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
-        mean, covariance = net.estimate(maps)
+        return self._judged(*net.estimate(maps), label)
+
+    def _judged(self, mean: Tensor, covariance: Tensor, label: Tensor) -> Tensor:
         found = Gaussian(mean, torch.linalg.cholesky(covariance))
         squared = (mean - label).square().sum(dim=1)
         trivial = label.square().sum(dim=1)
@@ -135,10 +144,10 @@ class _Motion(Task):
         net.spread.fill_(0.5 * normalised.mean().log())
 
 
-class Translation(_Motion):
+class Translation(Motion):
     """Velocity, m/s."""
 
-    kind, truth = "translation", "velocity"
+    kind, truth = "translation", ("velocity",)
     error, size = "rmse_m_s", "rms_speed_m_s"
     maps = ("doppler_azimuth", "doppler_elevation_aware")
     defaults = Settings(frames=2)
@@ -156,33 +165,45 @@ class Translation(_Motion):
         return losses.likelihood(net(maps), label.repeat(2, 1)).unflatten(0, (2, -1)).mean(dim=0)
 
 
-class Rotation(_Motion):
-    """Turn, rad, over up to 0.27 s: the paper's 4 frames of 15 Hz."""
+class Rotation(Motion):
+    """Turn, rad, over up to 0.27 s: the paper's 4 frames of 15 Hz.
 
-    kind, truth = "rotation", "yaw"
+    Labels are turn and travel; the latter is what the network is told, off by as much as velocities are in use.
+    """
+
+    kind, truth = "rotation", ("yaw", "velocity")
     error, size = "rmse_rad", "rms_turn_rad"
     maps = ("range_azimuth",)
     reach = 4 / 15
     defaults = Settings()
+    #: m, standard deviation of the travel that is told.
+    doubt = 0.01
 
-    def label(self, table: Table, frames: Tensor) -> Tensor:
-        yaw = table.truth[self.truth]
-        turn = yaw[frames[:, -1]] - yaw[frames[:, 0]]
-        return torch.remainder(turn + torch.pi, 2 * torch.pi) - torch.pi
+    def label(self, table: Table, frames: Tensor) -> Float[Tensor, "item 3"]:
+        """Turn (rad) and travel (m): the mean of the velocities at the window's ends times its duration."""
+        velocity, first, last = table.truth["velocity"], frames[:, 0], frames[:, -1]
+        duration = (last - first)[:, None] * table.grid.frame_period
+        return torch.cat([turns(table, frames), duration * (velocity[first] + velocity[last]) / 2], dim=1)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         left = augment.chosen(maps, generator)
         maps = torch.where(left, augment.mirrored(maps), maps)
-        return augment.other_radar(maps, generator, doppler=False), torch.where(left.flatten(1), -label, label)
+        label = torch.where(left.flatten(1), label * label.new_tensor([-1.0, 1.0, -1.0]), label)
+        off = torch.randn((len(label), 2), generator=generator, device=label.device)
+        label = torch.cat([label[:, :1], label[:, 1:] + self.doubt * off], dim=1)
+        return augment.other_radar(maps, generator, doppler=False), label
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
-        return losses.cyclic(net(maps), label)
+        return losses.cyclic(net(maps, label[:, 1:]), label[:, :1])
+
+    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
+        return self._judged(*net.estimate(maps, label[:, 1:]), label[:, :1])
 
 
 class Segmentation(Task):
     """Occupancy."""
 
-    kind, truth = "segmentation", "occupancy"
+    kind, truth = "segmentation", ("occupancy",)
     maps = ("range_azimuth", "elevation_aware")
     defaults = Settings(frames=1, epochs=5, batch=48, rate=1e-4, betas=(0.8, 0.9))
     #: Cells of range by which a first surface may be off to count as found: 9 cm.
@@ -199,7 +220,7 @@ class Segmentation(Task):
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         logits = net(maps)
-        found, truth = _first(logits > 0), _first(label == losses.SURFACE)
+        found, truth = first_cell(logits > 0), first_cell(label == losses.SURFACE)
         there = truth < label.shape[1]
         near = ((found - truth).abs() <= self.near) & there
         return torch.stack([losses.surfaces(logits, label), near.sum(dim=1), there.sum(dim=1)], dim=1)
@@ -229,7 +250,13 @@ class Segmentation(Task):
         net.offset.copy_(fit[1].detach())
 
 
-def _first(cells: Tensor) -> Int[Tensor, "item bearing"]:
+def turns(table: Table, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item 1"]:
+    """Change of yaw from the first frame of windows to the last, rad."""
+    yaw = table.truth["yaw"]
+    return torch.remainder(yaw[frames[:, -1]] - yaw[frames[:, 0]] + torch.pi, 2 * torch.pi) - torch.pi
+
+
+def first_cell(cells: Tensor) -> Int[Tensor, "item bearing"]:
     """Range bin of the first true cell per bearing; the number of bins where there is none."""
     return torch.where(cells.any(dim=1), cells.int().argmax(dim=1), cells.shape[1])
 

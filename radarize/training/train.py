@@ -10,13 +10,16 @@ import numpy as np
 
 from radarize.errors import InputError
 from radarize.nets.weights import Header, save
+from radarize.published.tasks import PUBLISHED_TASKS
 from radarize.replacing import replacing
 from radarize.training.dataset import recordings
 from radarize.training.table import Table
-from radarize.training.tasks import TASKS, Settings
+from radarize.training.tasks import TASKS, Settings, Task
 from radarize.training.team import team
 from radarize.training.trainer import Trainer
 
+#: Trainings by setting (see `radarize.settings`) and name.
+TRAININGS = {"corrected": TASKS, "published": PUBLISHED_TASKS}
 #: Without a split, every so manieth recording validates.
 _TENTH = 10
 
@@ -32,6 +35,7 @@ def train(
     workers: int = 1,
     resume: bool = False,
     onnx: bool = False,
+    setting: str = "corrected",
     progress: Callable[..., None] = lambda *where: None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Path:
@@ -48,6 +52,7 @@ def train(
         workers: processes that read.
         resume: go on from the checkpoint, if there is one.
         onnx: write the network as ONNX as well.
+        setting: reading of the paper, a key of `TRAININGS`.
         progress: called with (stage, done, in all).
         say: takes a line for every epoch.
 
@@ -58,9 +63,7 @@ def train(
         InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
             is no number.
     """
-    if kind not in TASKS:
-        raise InputError(f"task is {kind!r}, expected one of: {', '.join(TASKS)}")
-    task, output, data = TASKS[kind], Path(output), Path(data)
+    task, output, data = find_task(kind, setting), Path(output), Path(data)
     settings = settings or task.defaults
     _check(kind, settings, output)
     checkpoint = output.with_suffix(".checkpoint")
@@ -69,9 +72,22 @@ def train(
     with team(device) as crew:
         lead = crew.rank == 0
         report, note = (progress, say) if lead else (_nothing, _nothing)
-        parts = _read(kind, data, split, settings.seed, workers, report)
+        parts = _read(task, data, split, settings.seed, workers, report)
         _fit(kind, Trainer(task, settings, *parts, crew), output, data, split, resume, onnx, report, note)
     return output
+
+
+def find_task(kind: str, setting: str = "corrected") -> Task:
+    """A training by name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if setting not in TRAININGS:
+        raise InputError(f"settings is {setting!r}, expected one of: {', '.join(TRAININGS)}")
+    if kind not in TRAININGS[setting]:
+        raise InputError(f"task is {kind!r}, expected one of: {', '.join(TRAININGS[setting])}")
+    return TRAININGS[setting][kind]
 
 
 def _fit(
@@ -86,7 +102,7 @@ def _fit(
     say: Callable[[str], None],
 ) -> None:
     checkpoint, log = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
-    about = {"kind": kind, "data": data.resolve().name, "split": split}
+    about = {"kind": kind, "setting": trainer.task.setting, "data": data.resolve().name, "split": split}
     lead, settings = trainer.team.rank == 0, trainer.settings
     if resume and checkpoint.exists():
         trainer.restore(checkpoint, about)
@@ -124,7 +140,7 @@ def _nothing(*where) -> None:
 
 
 def _read(
-    kind: str, data: Path, split: str | None, seed: int, workers: int, progress: Callable[..., None]
+    task: Task, data: Path, split: str | None, seed: int, workers: int, progress: Callable[..., None]
 ) -> tuple[Table, Table]:
     """Training and validation data."""
     if split is None:
@@ -135,7 +151,7 @@ def _read(
         parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
     else:
         parts = [recordings(data, split, part) for part in ("train", "validation")]
-    table = Table.read(parts[0] + parts[1], TASKS[kind].maps, (TASKS[kind].truth,), workers, progress)
+    table = Table.read(parts[0] + parts[1], task.maps, task.truth, workers, progress, task.setting)
     return table.divide(len(parts[0]))
 
 

@@ -63,7 +63,7 @@ class Trainer:
             if hasattr(module, "coarse"):
                 module.coarse = settings.precision == "bfloat16"
         self._shared = team.share(self.net)
-        self._optimiser = torch.optim.Adam(self.net.parameters(), settings.rate, settings.betas)
+        self._optimiser = task.optimiser(self.net.parameters(), settings.rate, settings.betas)
         self._schedule = ReduceLROnPlateau(self._optimiser, factor=0.5, patience=settings.plateau)
         self.history: list[dict[str, float]] = []
         self.best: tuple[float, dict[str, Tensor]] = (math.inf, {})
@@ -108,6 +108,7 @@ class Trainer:
                 )
             self._optimiser.zero_grad()
             loss.backward()
+            torch.nn.utils.clip_grad_norm_(self.net.parameters(), self.task.steepest)
             self._optimiser.step()
             total += loss.detach().cpu()
             progress(epoch * self.steps + step + 1, settings.epochs * self.steps)

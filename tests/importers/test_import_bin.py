@@ -1,16 +1,17 @@
 import itertools
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from radarize.errors import InputError
+from radarize.exporters import export
 from radarize.importers import capture, import_recording
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
 from radarize.recording import Recording, RecordingWriter
-from radarsim.export import export
 
 CONFIG = RadarConfig(
     start_frequency=77e9,
@@ -53,7 +54,7 @@ def test_import_of_an_export_is_the_recording(tmp_path, order, iq_order):
     frames = room(config, 3)
     with RecordingWriter(tmp_path / "a.h5", config) as writer:
         writer.append(frames, config.frame_period * np.arange(3))
-    export(tmp_path / "a.h5", "dca1000", tmp_path / "out.bin")
+    export(tmp_path / "a.h5", "bin", tmp_path / "out.bin")
     import_recording(tmp_path / "out.bin", tmp_path / "b.h5")
     with Recording(tmp_path / "b.h5") as recording:
         assert recording.config == config
@@ -234,3 +235,34 @@ def test_bad_poses_are_refused_before_anything_is_written(tmp_path, text, messag
     with pytest.raises(InputError, match=message):
         import_recording(source, tmp_path / "a.h5", config=CONFIG, poses=tmp_path / "p.tum")
     assert not list(tmp_path.glob("*.h5*"))
+
+
+# --- parts -----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("part", [0, 1, 2])
+def test_parts_of_a_capture_are_joined(tmp_path, part):
+    """Cut within a word; eleven of them, so that 10 does not come after 1."""
+    frames = room(CONFIG, 6)
+    data = encode(frames, CONFIG).tobytes()
+    cuts = np.linspace(0, len(data), 12).astype(int) | 1
+    cuts[0], cuts[-1] = 0, len(data)
+    for k, (start, stop) in enumerate(itertools.pairwise(cuts)):
+        (tmp_path / f"adc_Raw_{k}.bin").write_bytes(data[start:stop])
+    (tmp_path / "adc.cfg").write_text(write_cfg(CONFIG))
+    import_recording(tmp_path / f"adc_Raw_{part}.bin", tmp_path / "a.h5")
+    with Recording(tmp_path / "a.h5") as recording:
+        assert np.array_equal(recording.adc(0, 6), frames)
+    (tmp_path / "adc_Raw_4.bin").unlink()
+    with pytest.raises(InputError, match="expected part 4 too"):
+        import_recording(tmp_path / "adc_Raw_0.bin", tmp_path / "a.h5")
+
+
+def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
+    monkeypatch.setattr(capture, "BATCH_BYTES", 64 * CONFIG.frame_bytes)
+    peaks = []
+    for count in (512, 2048):
+        source = write_bin(tmp_path / "a.bin", np.tile(room(CONFIG, 4), (count // 4, 1, 1, 1, 1, 1)), CONFIG)
+        tracemalloc.start()
+        import_recording(source, tmp_path / "a.h5", config=CONFIG)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.1 * peaks[0]

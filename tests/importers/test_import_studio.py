@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
+from radarize.exporters import export
 from radarize.importers import import_recording
 from radarize.recording import Recording
-from radarsim.export import export
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def test_a_wrong_sample_count_is_refused(recordings, tmp_path, samples):
 def test_export_gives_the_captured_file_back(recordings, tmp_path):
     source = recordings / "iwr6843-studio"
     import_recording(source, tmp_path / "a.h5")
-    binary = export(tmp_path / "a.h5", "dca1000", tmp_path / "b")
+    binary = export(tmp_path / "a.h5", "bin", tmp_path / "b")
     assert binary == tmp_path / "b.bin"
     assert binary.read_bytes() == (source / "adc_data.bin").read_bytes()
     import_recording(binary, tmp_path / "c.h5")
@@ -86,4 +86,4 @@ def test_several_captured_files_are_joined(folder, tmp_path):
     with Recording(tmp_path / "a.h5") as recording:
         assert len(recording) == 1
         assert "12 bytes were lost" in recording.attributes["warnings"]
-    assert export(tmp_path / "a.h5", "dca1000", tmp_path / "b").read_bytes() == data
+    assert export(tmp_path / "a.h5", "bin", tmp_path / "b").read_bytes() == data

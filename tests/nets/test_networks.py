@@ -6,7 +6,9 @@ import torch
 
 from radarize.mapping.scans import BEARINGS
 from radarize.nets import NETS, RotationNet, SegmentationNet, TranslationNet
+from radarize.nets.correlation import Correlation
 from radarize.nets.gaussian import Gaussian
+from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
 from radarize.nets.unet import UNet
 from radarize.training.maps import AZIMUTHS
@@ -35,8 +37,8 @@ def test_resnet_of_the_paper_has_11_million_parameters():
     assert parameters(ResNet18(3, 1000, 64)) == 11_689_512
     assert parameters(ResNet18(3, 1000, 64)) - 513_000 == 11_176_512
     wide = TranslationNet(1, ("doppler_azimuth",), 64)
-    assert parameters(wide) == resnet_parameters(3, 5, 64)
-    assert parameters(TranslationNet(3, ("a", "b"), 16)) < 720_000  # 1.4 MB in float16
+    assert parameters(wide) == 2 * resnet_parameters(3, 5, 64)  # two looks
+    assert parameters(TranslationNet(3, ("a", "b"), 16)) < 1_440_000  # 2.9 MB in float16
 
 
 def test_unet_is_the_textbooks():
@@ -95,23 +97,76 @@ def test_squared_errors_of_an_honest_distribution():
 def test_gain_does_not_matter(kind):
     torch.manual_seed(0)
     net = NETS[kind](2, ("a", "b"), 4).eval()
-    maps = 10 * torch.randn(3, 2, 2, 32, 40)
-    for a, b in zip(net.estimate(maps), net.estimate(maps + 17), strict=True):
+    maps = 10 * torch.randn(3, 2, 2, 32, 80)
+    told = (torch.zeros(3, 2),) if kind == "rotation" else ()
+    for a, b in zip(net.estimate(maps, *told), net.estimate(maps + 17, *told), strict=True):
         assert torch.allclose(a, b, atol=1e-4)
 
 
 def test_a_turn_back_is_the_turn_negated():
     torch.manual_seed(0)
     net = RotationNet(2, ("range_azimuth",), 4).eval()
-    maps = 10 * torch.randn(3, 2, 1, 96, 40)
-    (there, one), (back, other) = net.estimate(maps), net.estimate(maps.flip(1))
+    maps = 10 * torch.randn(3, 2, 1, 96, 80)
+    travel = torch.tensor([[0.2, 0.0], [0.1, -0.1], [0.0, 0.3]])
+    (there, one), (back, other) = net.estimate(maps, travel), net.estimate(maps.flip(1), -travel)
     assert torch.allclose(there, -back, atol=1e-6) and torch.allclose(one, other)
     assert there.shape == (3, 1) and one.shape == (3, 1, 1) and (one > 0).all()
+
+
+def test_the_second_look_sees_the_ridge_flat_and_in_the_middle():
+    """Also of a velocity at which part of the ridge aliases."""
+    step, rows = 0.1146, 32
+    net = TranslationNet(1, ("doppler_azimuth",), 4, step)
+    for forward, left in ((0.7, -0.3), (1.75, 0.9), (-1.2, 0.0)):
+        closing = forward * np.cos(AZIMUTHS) + left * np.sin(AZIMUTHS)
+        off = (np.arange(rows)[:, None] - rows // 2 - closing / step + rows / 2) % rows - rows / 2
+        image = torch.tensor(np.exp(-0.5 * (off / 1.5) ** 2), dtype=torch.float32)[None, None]
+        flat = net._rolled(image, torch.tensor([[forward, left]]))[0, 0]
+        expected = np.exp(-0.5 * (np.arange(-net.near, net.near + 1) / 1.5) ** 2)
+        assert np.abs(flat.numpy() - expected[:, None]).max() < 0.06  # linear interpolation at the crest
+        shifted = net._rolled(image, torch.tensor([[forward - step, left]]))[0, 0, :, 40]
+        assert shifted.argmax() == net.near + 1
+
+
+def test_maps_from_a_step_away():
+    """A pole stands where it stands: against its place seen from there."""
+    ranges = np.arange(96)[:, None] * 0.0446
+
+    def pole(ahead: float, left: float) -> torch.Tensor:
+        off = (ranges - np.hypot(ahead, left)) / 0.15, (AZIMUTHS - np.arctan2(left, ahead)) / 0.1
+        return torch.tensor(np.exp(-0.5 * off[0] ** 2 - 0.5 * off[1] ** 2), dtype=torch.float32)[None, None]
+
+    for forward, left in ((0.3, -0.2), (-0.2, 0.1), (0.0, 0.3)):
+        seen = Moved(0.0446)(pole(2.0, 0.5), torch.tensor([[forward, left]]))
+        expected = pole(2.0 - forward, 0.5 - left)
+        at, there = (np.unravel_index(int(maps.argmax()), (96, 80)) for maps in (seen, expected))
+        assert np.abs(np.subtract(at, there)).max() <= 1
+        assert (seen - expected).abs().max() < 0.2  # its polar width changes with its distance
+
+
+def test_correlation_is_the_sum_of_products():
+    """Against loops over steps, shifts and cells; what is shifted out of the map counts for nothing."""
+    torch.manual_seed(0)
+    layer = Correlation(1, 10, features=1, turns=3, steps=1)
+    layer.features = torch.nn.Identity()
+    maps = torch.randn(1, 2, 1, 5, 10)
+    found = layer(maps)
+    assert found.shape == (2, 3, 5, 7)
+    for half, (newest, other) in enumerate(((1, 0), (0, 1))):
+        centred = maps - maps.mean(dim=4, keepdim=True)
+        a, b = (torch.nn.functional.normalize(centred[0, k], dim=0, eps=0.1)[0] for k in (newest, other))
+        for step in (-1, 0, 1):
+            for row in range(5):
+                for turn in range(-3, 4):
+                    cells = [(row + step, c + turn, c) for c in range(10)]
+                    inside = [(r, c, d) for r, c, d in cells if 0 <= r < 5 and 0 <= c < 10]
+                    total = sum(float(a[r, c] * b[row, d]) for r, c, d in inside) / 10**0.5
+                    assert float(found[half, step + 1, row, turn + 3]) == pytest.approx(total, abs=1e-5)
 
 
 def test_segmentation_sees_the_columns_of_its_bearings():
     net = SegmentationNet(1, ("range_azimuth",), 4).eval()
     shown = torch.tensor(AZIMUTHS, dtype=torch.float32) @ net.resampling
     assert np.allclose(shown, BEARINGS, atol=1e-6)
-    found = net.estimate(torch.zeros(2, 1, 1, 96, 40))
+    found = net.estimate(torch.zeros(2, 1, 1, 96, 80))
     assert found.shape == (2, 96, 88) and ((found > 0) & (found < 1)).all()

@@ -27,7 +27,7 @@ def network(kind: str, width: int = 4):
     )  # fmt: skip
     torch.manual_seed(0)
     net = build(header)
-    net(example(header))  # moves the batch normalisation's statistics
+    net(*example(header))  # moves the batch normalisation's statistics
     return net.eval(), header
 
 
@@ -37,7 +37,7 @@ def test_round_trip(kind, tmp_path):
     path = save(net, header, tmp_path / "net.safetensors")
     again, read = load(path, CONFIG)
     assert read == header and not again.training
-    for a, b in zip(net.estimate(example(header)), again.estimate(example(header)), strict=True):
+    for a, b in zip(net.estimate(*example(header)), again.estimate(*example(header)), strict=True):
         assert torch.allclose(a, b, rtol=0.05, atol=0.02)
     with safe_open(path, "pt") as file:
         assert json.loads(file.metadata()["radarize"])["kind"] == kind
@@ -80,8 +80,10 @@ def test_onnx_says_the_same(kind, tmp_path):
     path = export_onnx(net, header, tmp_path / "net.onnx")
     session = runtime.InferenceSession(path)
     assert Header.model_validate_json(session.get_modelmeta().custom_metadata_map["radarize"]) == header
-    for maps in (example(header), example(header)[:1].repeat(3, 1, 1, 1, 1)):
-        expected = net.estimate(maps)
+    two = example(header)
+    for inputs in (two, [torch.cat([each, each[:1]]) for each in two]):
+        expected = net.estimate(*inputs)
         expected = expected if isinstance(expected, tuple) else (expected,)
-        for found, values in zip(session.run(None, {"maps": maps.numpy()}), expected, strict=True):
+        named = dict(zip(("maps", "travel"), (each.numpy() for each in inputs), strict=False))
+        for found, values in zip(session.run(None, named), expected, strict=True):
             assert np.allclose(found, values.detach(), atol=1e-4)

@@ -46,7 +46,7 @@ def test_windows(folder):
     with Recording(folder / "b.h5") as recording:
         times = recording.times
     assert np.allclose(Frames(folder, fields=("time",), window=3, spacing=2, stride=4)[3]["time"], times[[4, 6, 8]])
-    assert item["range_azimuth"].shape == (3, 96, 40) and item["doppler_azimuth"].shape == (3, CONFIG.loops, 40)
+    assert item["range_azimuth"].shape == (3, 96, 80) and item["doppler_azimuth"].shape == (3, CONFIG.loops, 80)
     assert all(item[name].dtype == torch.float32 for name in DEFAULT)
     assert torch.allclose(item["velocity"], torch.tensor(VELOCITY).expand(3, 3))
     assert torch.allclose(item["turn"], torch.full((2,), 2 * TURN), atol=1e-5)  # also where yaw passes pi
@@ -111,7 +111,7 @@ def test_folders_that_are_no_data_set(folder, maps_folder, tmp_path):
     walk(tmp_path / "real.h5", truth=False)
     with pytest.raises(InputError, match="real.h5: has no /truth/velocity"):
         Frames(tmp_path)
-    assert Frames(tmp_path, fields=("range_azimuth",))[0]["range_azimuth"].shape == (2, 96, 40)
+    assert Frames(tmp_path, fields=("range_azimuth",))[0]["range_azimuth"].shape == (2, 96, 80)
     with pytest.raises(InputError, match="dataset.json: is no readable data set"):
         Frames(tmp_path, "random-0")
     splits = {"random-0": {"train": ["real", "x", "y"]}}

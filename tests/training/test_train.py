@@ -30,7 +30,7 @@ QUICK = {
     "segmentation": replace(TASKS["segmentation"].defaults, width=4, epochs=3, batch=16, rate=3e-3),
 }
 TINY = replace(QUICK["translation"], width=2, epochs=4, batch=32)
-LAWS = {kind: task.truth for kind, task in TASKS.items()}
+LAWS = {kind: task.truth[0] for kind, task in TASKS.items()}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -51,7 +51,7 @@ def judged(kind: str, weights: Path, recording: Path) -> dict[str, float]:
     """Metrics of a network on a recording it has not seen."""
     net, header = load(weights, CONFIG)
     task = TASKS[kind]
-    table = Table.read([recording], header.maps, (task.truth,))
+    table = Table.read([recording], header.maps, task.truth)
     starts = table.starts((header.frames - 1) * max(header.spacings) + 1)
     frames = task.frames(starts, torch.full_like(starts, header.spacings[-1]), header.frames)
     with torch.no_grad():

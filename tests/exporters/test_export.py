@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
+from radarize.exporters import export
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
-from radarsim.export import export
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 2})
 
@@ -18,12 +18,12 @@ def recording(tmp_path):
 
 @pytest.mark.parametrize("name", ["out", "out.bin", "out.cfg"])
 def test_names(recording, tmp_path, name):
-    assert export(recording, "dca1000", tmp_path / "new" / name) == tmp_path / "new" / "out.bin"
+    assert export(recording, "bin", tmp_path / "new" / name) == tmp_path / "new" / "out.bin"
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == ["out.bin", "out.cfg"]
 
 
 def test_refusals(recording, tmp_path):
-    with pytest.raises(InputError, match="export format is 'wav', expected one of dca1000, tum"):
+    with pytest.raises(InputError, match="export format is 'wav', expected one of bin, ros2, tum, map"):
         export(recording, "wav", tmp_path / "out")
     with pytest.raises(InputError, match="has no true poses"):
         export(recording, "tum", tmp_path / "out.tum")
@@ -31,5 +31,5 @@ def test_refusals(recording, tmp_path):
         export(tmp_path / "b.h5", "tum", tmp_path / "out.tum")
     (tmp_path / "file").touch()
     with pytest.raises(InputError, match="cannot be written"):
-        export(recording, "dca1000", tmp_path / "file" / "out.bin")
+        export(recording, "bin", tmp_path / "file" / "out.bin")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["a.h5", "file"]

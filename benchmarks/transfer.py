@@ -1,0 +1,218 @@
+"""Whether real captures look to the networks like simulated ones, before and after `radarsim calibrate`.
+
+The public captures have chirps of their own, so each is compared with simulated frames of the same chirps, from a radar
+that stands at many places, first with the default board's front end, then with the one fitted to the capture. Levels
+are about each map's mean, as the networks see them.
+"""
+
+import argparse
+import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from benchmarks.results import FOLDER, publish
+from radarize.console import progress
+from radarize.errors import InputError
+from radarize.evaluation.likeness import frechet_distance, patch_statistics
+from radarize.importers import import_recording
+from radarize.pipeline import best_methods, run
+from radarize.radar.config import RadarConfig
+from radarize.recording import Recording
+from radarize.training.dataset import recordings
+from radarize.training.maps import MapMaker, maps_of
+from radarsim.calibrate import calibrate
+from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.planner import plan_motion
+from radarsim.scene.scene import Scene
+from radarsim.simulate import Simulator
+
+CAPTURES = Path(__file__).parents[2] / "shared" / "recordings"
+SCENES = ("office", "visitors", "buildings/b")
+#: s that the radar stands at a place.
+STAY = 1.0
+
+
+def captures(source: Path, folder: Path) -> dict[str, Path]:
+    """The public captures (see their README) as recordings, by name: one frame each, of a radar at rest.
+
+    Args:
+        source: folder of the captures.
+        folder: where recordings are written.
+    """
+    pcap = source / "iwr1843-pcap" / "test_one_frame.pcap"
+    people = source / "xwr-moving-people" / "doppler_example_1.npy"
+    chirps = {"tx": (0, 2), "start_frequency": 77e9, "slope": 60.012e12, "sample_rate": 2.5e6, "idle_time": 30e-6,
+              "ramp_end_time": 62e-6, "adc_start_time": 6e-6}  # fmt: skip
+    return {
+        "pcap": import_recording(pcap, folder / "pcap.h5", overrides={"samples": 256, "loops": 16, "rx": 1}),
+        "studio": import_recording(source / "iwr6843-studio", folder / "studio.h5"),
+        "people": import_recording(people, folder / "people.h5", shape="loop,virtual,sample", overrides=chirps),
+    }
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A motion (see `radarsim.motion.Motion`) that stands at one place after the other, `STAY` at each.
+
+    Attributes:
+        places: (place, 3) m.
+        attitudes: one per place.
+    """
+
+    places: np.ndarray
+    attitudes: Rotation
+
+    @classmethod
+    def along(cls, scene: Scene, count: int, rng: np.random.Generator) -> "Standing":
+        """Places of a walk."""
+        motion = plan_motion(scene, "handheld", 60.0, rng)
+        times = np.linspace(0, motion.duration, count + 2)[1:-1]
+        return cls(motion.position(times), motion.rotation(times))
+
+    def _place(self, t: np.ndarray) -> np.ndarray:
+        return np.clip(np.asarray(t) // STAY, 0, len(self.places) - 1).astype(int)
+
+    def position(self, t: np.ndarray) -> np.ndarray:
+        return self.places[self._place(t)]
+
+    def rotation(self, t: np.ndarray) -> Rotation:
+        return self.attitudes[self._place(t)]
+
+    def velocity(self, t: np.ndarray) -> np.ndarray:
+        return np.zeros((len(np.atleast_1d(t)), 3))
+
+    angular_velocity = acceleration = velocity
+
+
+def simulated(
+    config: RadarConfig, board: FrontEndConfig | None, scenes: dict[str, tuple[Scene, Standing]], seed: int
+) -> dict[str, np.ndarray]:
+    """Maps of a frame at every place, (frame, row, azimuth), by name; the same worlds whatever the board."""
+    maker, parts = MapMaker(config), []
+    for number, (scene, standing) in enumerate(scenes.values()):
+        simulator = Simulator(scene, standing, config, np.random.default_rng([seed, number]), front_end=board)
+        for k in range(len(standing.places)):
+            parts.append(maker(simulator.frames(np.array([(k + 0.25) * STAY]))[0]))
+    return {name: np.concatenate([part[name] for part in parts]) for name in maker.names}
+
+
+def spread(folder: Path, count: int) -> Iterator[dict[str, np.ndarray]]:
+    """Maps of frames spread over the recordings of a data set."""
+    for path in recordings(folder)[:: max(1, len(recordings(folder)) // count)][:count]:
+        with Recording(path) as recording:
+            maker, middle = MapMaker(recording.config), len(recording) // 2
+            yield maps_of(recording, middle, middle + 1, maker.names, maker)
+
+
+def distances(maps: np.ndarray, real: np.ndarray) -> tuple[float, np.ndarray]:
+    """Of a real frame from simulated ones, and of every simulated frame from the others, dB."""
+    statistics, one = patch_statistics(maps), patch_statistics(real)
+    every = [
+        frechet_distance(frame, np.concatenate(np.delete(statistics, k, axis=0))) for k, frame in enumerate(statistics)
+    ]
+    return frechet_distance(one[0], np.concatenate(statistics)), np.array(every)
+
+
+def refusal(path: Path) -> str:
+    """What the networks say to a capture, and what the pipeline makes of it without them."""
+    with Recording(path) as recording:
+        methods, why = best_methods(recording.config)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            run(path, Path(folder) / "run")
+        ran = f"radarize run takes {methods['odometry']} and {methods['scans']} and goes through"
+    except InputError as error:
+        ran = f"radarize run ends in a sentence: {_nameless(str(error))}"
+    return f"{'networks: ' + _nameless(why) if why else 'the networks fit'}; {ran}."
+
+
+def _nameless(sentence: str) -> str:
+    """Without the machine's folders."""
+    return " ".join(Path(word).name if word.startswith("/") else word for word in sentence.split())
+
+
+def draw(shown: dict[str, dict[str, dict[str, np.ndarray]]], path: Path) -> None:
+    """Histograms of cell values about their map's mean, by capture and map."""
+    from matplotlib.figure import Figure
+
+    names = ("range_azimuth", "doppler_azimuth")
+    figure = Figure(figsize=(3.2 * len(shown), 4.6), layout="constrained")
+    axes = figure.subplots(len(names), len(shown), squeeze=False)
+    bins = np.arange(-30, 50.5, 1.0)
+    for column, (capture, sources) in enumerate(shown.items()):
+        for row, name in enumerate(names):
+            axis = axes[row, column]
+            for source, maps in sources.items():
+                level = maps[name].astype(float)
+                level = level - level.mean(axis=(1, 2), keepdims=True)
+                style = {"color": "k", "lw": 1.6} if source == "real" else {"lw": 1.0}
+                axis.hist(level.ravel(), bins, density=True, histtype="step", label=source, **style)
+            axis.set(title=f"{capture}: {name}", yticks=[], xlabel="dB about the mean")
+    axes[0, 0].legend(frameon=False)
+    figure.savefig(path, dpi=80)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--captures", type=Path, default=CAPTURES, help="folder of the public captures")
+    parser.add_argument("--data", type=Path, help="a data set that networks were trained on, to compare with as well")
+    parser.add_argument("--places", type=int, default=8, help="in each scene")
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    rows, notes, shown = [], [], {}
+    with tempfile.TemporaryDirectory() as temporary, progress("captures") as report:
+        found = captures(options.captures, Path(temporary))
+        loaded = {name: Scene.load(name) for name in SCENES}
+        rng = np.random.default_rng(options.seed)
+        scenes = {name: (scene, Standing.along(scene, options.places, rng)) for name, scene in loaded.items()}
+        trained = list(spread(options.data, 24)) if options.data else []
+        for done, (capture, path) in enumerate(found.items()):
+            report(2 * done, 2 * len(found))
+            with Recording(path) as recording:
+                config = recording.config
+                real = MapMaker(config)(recording.adc(0, 1))
+            board = calibrate(path, Path(temporary) / f"{capture}.yaml").settings
+            before = simulated(config, None, scenes, options.seed)
+            report(2 * done + 1, 2 * len(found))
+            after = simulated(config, board, scenes, options.seed)
+            shown[capture] = {"real": real, "default board": before, "calibrated": after}
+            for name, maps in real.items():
+                first, _ = distances(before[name], maps)
+                second, among = distances(after[name], maps)
+                row = {
+                    "capture": capture,
+                    "map": name,
+                    "before dB": first,
+                    "after dB": second,
+                    "simulated frames: median, 95 % dB": f"{np.median(among):.2f}, {np.quantile(among, 0.95):.2f}",
+                    "inside": "yes" if second <= np.quantile(among, 0.95) else "no",
+                }
+                if trained:
+                    row["from training data dB"] = distances(np.concatenate([t[name] for t in trained]), maps)[0]
+                rows.append(row)
+            notes.append(f"{capture}: {refusal(path)}")
+        report(2 * len(found), 2 * len(found))
+    draw(shown, FOLDER / "transfer.png")
+    publish(
+        "transfer",
+        "Real captures beside simulated frames, as the networks see them",
+        rows,
+        seed=options.seed,
+        notes=[
+            "Fréchet distance of patch statistics (8 x 8 cells: quantiles of levels about the map's mean, steps "
+            f"along rows and columns) of the real frame from {len(SCENES) * options.places} simulated ones of the same "
+            f"chirps, in {', '.join(SCENES)}; before: default board, after: the board that `radarsim calibrate` fits "
+            "to the capture. Inside: not farther than 95 % of simulated frames are from the others.",
+            "Each capture is a single frame of a room that nobody described: a part of the distance is the room's.",
+            *notes,
+            "![Histograms](transfer.png)",
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()

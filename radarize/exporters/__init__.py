@@ -1,0 +1,49 @@
+"""Recordings and runs as files for other programs, one module per format."""
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+from radarize.errors import InputError
+
+#: Formats by name: module of this package and function; loaded when asked for, since a bag needs the whole pipeline.
+FORMATS = {
+    "bin": ("bin", "export_bin"),
+    "ros2": ("ros2", "export_ros2"),
+    "tum": ("plain", "export_tum"),
+    "map": ("plain", "export_map"),
+}
+
+
+def export(
+    source: Path,
+    format: str,
+    output: Path,
+    *,
+    run: Path | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Path:
+    """Write a recording or a run in another format.
+
+    Args:
+        source: a recording (``.h5``), or the folder of a run.
+        format: ``bin``: raw samples and ``.cfg`` of a recording, as an IWR1843 with a DCA1000 leaves them; ``ros2``: a
+            ROS 2 bag, see `radarize.exporters.ros2`; ``tum``: the trajectory of a run, or a recording's true poses;
+            ``map``: a run's map for ROS's map_server.
+        output: file or, for ``ros2``, folder to write.
+        run: folder of the run that `source`, a recording, was put through; its scans and odometry go into the bag.
+        progress: called with frames done and in all.
+
+    Returns:
+        What was written.
+
+    Raises:
+        InputError: unknown format, the source lacks what is asked for, or the output cannot be written.
+    """
+    if format not in FORMATS:
+        raise InputError(f"export format is {format!r}, expected one of {', '.join(FORMATS)}")
+    if run is not None and format != "ros2":
+        raise InputError(f"export format is {format}, but a run is given beside the source, expected that of ros2 only")
+    module, function = FORMATS[format]
+    writer = getattr(import_module(f"radarize.exporters.{module}"), function)
+    return writer(Path(source), Path(output), run=run, progress=progress)

@@ -1,0 +1,43 @@
+"""Raw samples as an IWR1843 with a DCA1000 leaves them: ``NAME.bin`` and ``NAME.cfg``."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from radarize.errors import InputError
+from radarize.radar.cfg import parse_cfg, write_cfg
+from radarize.radar.dca1000 import encode
+from radarize.recording import Recording
+from radarize.replacing import replacing
+
+_BATCH_BYTES = 16 << 20
+
+
+def export_bin(source: Path, output: Path, *, run: None, progress: Callable[[int, int], None]) -> Path:
+    """Write a recording's samples; ``.bin`` and ``.cfg`` are put in place of either suffix of `output`.
+
+    Raises:
+        InputError: no recording, or a file cannot be written.
+    """
+    with Recording(source) as recording:
+        config = recording.config
+        # A suffix such as .v2 belongs to the name.
+        stem = output.with_suffix("") if output.suffix in (".bin", ".cfg") else output
+        binary, settings = stem.with_name(stem.name + ".bin"), stem.with_name(stem.name + ".cfg")
+        text = write_cfg(config)
+        if recording.cfg_text and _says_the_same(recording.cfg_text, config):
+            text = recording.cfg_text
+
+        with replacing(settings) as part:
+            part.write_bytes(text.encode())
+        with replacing(binary) as part, part.open("wb") as file:
+            for frames, adc in recording.batches(max(1, _BATCH_BYTES // config.frame_bytes)):
+                file.write(encode(adc, config).astype("<i2", copy=False).data)
+                progress(frames.stop, len(recording))
+    return binary
+
+
+def _says_the_same(text: str, config: object) -> bool:
+    try:
+        return parse_cfg(text) == config
+    except InputError:
+        return False

@@ -37,7 +37,7 @@ class FrameRing:
         self.slots = slots
         self._memory = CONTEXT.RawArray("b", slots * self.dtype.itemsize)
         self._free, self._filled = CONTEXT.Semaphore(slots), CONTEXT.Semaphore(0)
-        self._at = 0  # the writer's or the reader's next slot: each process has its own copy
+        self._written = self._taken = 0  # each counted by one of the two processes, in its own copy
 
     def put(self, number: int, time: float, adc: np.ndarray, valid: np.ndarray) -> bool:
         """Add a frame; False if there was no room for it."""
@@ -54,9 +54,9 @@ class FrameRing:
         return True
 
     def _write(self, number: int, time: float, adc: np.ndarray | int, valid: np.ndarray | bool) -> None:
-        slot = self._slots[self._at % self.slots]
+        slot = self._slots[self._written % self.slots]
         slot["number"], slot["time"], slot["valid"], slot["adc"] = number, time, valid, adc
-        self._at += 1
+        self._written += 1
         self._filled.release()
 
     def get(self, most: int, patience: float) -> np.ndarray | None:
@@ -71,7 +71,7 @@ class FrameRing:
         """
         found, count = np.empty(most, self.dtype), 0
         while count < most and self._filled.acquire(timeout=0 if count else patience):
-            slot = self._slots[self._at % self.slots]
+            slot = self._slots[self._taken % self.slots]
             if slot["number"] == _END:
                 self._filled.release()  # the end stays the end
                 if not count:
@@ -79,7 +79,7 @@ class FrameRing:
                 break
             found[count] = slot
             count += 1
-            self._at += 1
+            self._taken += 1
             self._free.release()
         return found[:count]
 

@@ -187,10 +187,11 @@ def follow(
     patience += 2 * stream.config.frame_period
     while (found := stream.frames(most)) is not None:
         if len(found):
-            last, number = time.monotonic(), int(found["number"][-1])
+            number = int(found["number"][-1])
             wanted = found if frames is None else found[found["number"] < frames]
             if len(wanted):
                 yield wanted
+            last = time.monotonic()  # after what the reader did, however long that took
         silent = time.monotonic() - last > patience
         enough = frames is not None and number >= frames - 1
         if not stopped and (stopping.is_set() or enough or silent):

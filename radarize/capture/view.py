@@ -101,9 +101,10 @@ class View:
         """Map and path after the last loop closure."""
         slam = self._pipeline.slam
         grid = slam.map()
-        shade = grid.image()
-        colors = np.stack([shade, shade, shade, np.where(shade == 205, 0, 255).astype(np.uint8)], axis=-1)
-        rows, columns = shade.shape
+        chance = np.rint(255 * grid.probability[::-1] * grid.unit).astype(np.uint8)
+        shade = 255 - chance
+        colors = np.stack([shade, shade, shade, np.where(chance > 0, 255, 0).astype(np.uint8)], axis=-1)
+        rows, columns = chance.shape
         return {
             "picture": png(colors),
             "origin": [float(value) for value in grid.origin],

@@ -1,0 +1,44 @@
+"""Sources for streams in tests; they run in processes of their own, which import this module."""
+
+import os
+import time
+
+import numpy as np
+
+from radarize.capture.stream import Outlet
+from radarize.errors import InputError
+from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import PacketCounts
+
+
+def frame(config: RadarConfig, number: int) -> np.ndarray:
+    """Samples by which a frame is known again."""
+    return np.full(config.frame_shape, number, np.int16)
+
+
+def count(outlet: Outlet, config: RadarConfig, frames: int, pause: float = 0.0) -> None:
+    """Frames one after another."""
+    outlet.ready()
+    for number in range(frames):
+        outlet.put(number * config.frame_period, frame(config, number), np.ones(config.frame_shape[:2], bool))
+        outlet.publish(PacketCounts(received=number + 1))
+        time.sleep(pause)
+
+
+def fail(outlet: Outlet) -> None:
+    """A source with a reason."""
+    outlet.ready()
+    raise InputError("the file is damaged")
+
+
+def die(outlet: Outlet) -> None:
+    """A source that is killed."""
+    outlet.ready()
+    os._exit(9)
+
+
+def wait(outlet: Outlet) -> None:
+    """A source that nothing comes from."""
+    outlet.ready()
+    while not outlet.stopped:
+        time.sleep(0.01)

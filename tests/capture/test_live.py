@@ -1,0 +1,136 @@
+"""The pipeline on a stream: the same result as from the file, shown in a real browser while it runs."""
+
+import json
+import threading
+import urllib.request
+
+import numpy as np
+import pytest
+from browser import CHROMIUM, Browser
+
+from radarize.capture.live import Live, prepare
+from radarize.capture.page import Page
+from radarize.capture.replay import Replay
+from radarize.errors import InputError
+from radarize.pipeline import Pipeline
+from radarize.radar.presets import PRESETS
+from radarize.recording import Recording, RecordingWriter
+
+FRAMES = 60
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory):
+    """Echoes on every side that close as the sensor moves ahead; the last frame but one is lost."""
+    config, rng = PRESETS["radarize"], np.random.default_rng(0)
+    bins, azimuths = rng.uniform(12, 80, 12), rng.uniform(-0.7, 0.7, 12)
+    antenna = np.arange(3)[:, None] * 4 + np.arange(4)
+    slot = np.arange(config.loops)[:, None] * 3 + np.array(config.slot)
+    adc = np.zeros((FRAMES, *config.frame_shape))
+    for k in range(FRAMES):
+        time = k * config.frame_period + slot * config.chirp_time
+        signal = np.zeros(config.frame_shape[:-1], complex)
+        for at, azimuth in zip(bins, azimuths, strict=True):
+            doppler = np.exp(-4j * np.pi / config.wavelength * 0.5 * np.cos(azimuth) * time)
+            angle = np.exp(-1j * np.pi * antenna * np.sin(azimuth))
+            beat = np.exp(2j * np.pi * at * np.arange(config.samples) / config.samples)
+            signal += 200 * doppler[:, :, None, None] * angle[:, :, None] * beat
+        adc[k] = np.stack([signal.real, signal.imag], axis=-1)
+    adc = np.rint(adc + rng.normal(0, 10, adc.shape)).astype(np.int16)
+    valid = np.ones(adc.shape[:3], bool)
+    valid[FRAMES - 2], adc[FRAMES - 2] = False, 0
+    path = tmp_path_factory.mktemp("walk") / "walk.h5"
+    with RecordingWriter(path, config) as writer:
+        writer.append(adc, np.arange(FRAMES) * config.frame_period, valid)
+    return path
+
+
+def make(path):
+    with Recording(path) as recording:
+        return Pipeline(recording.config)
+
+
+def test_a_replay_gives_what_the_file_gives(walk, tmp_path):
+    with Page("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
+        live = Live(make(walk), page)
+        with RecordingWriter(tmp_path / "again.h5", stream.config) as writer:
+            live.run(stream, threading.Event(), writer=writer)
+    offline = make(walk)
+    with Recording(walk) as one, Recording(tmp_path / "again.h5") as other:
+        offline.push(one.adc(0, FRAMES), one.times, one.valid(0, FRAMES))
+        assert np.array_equal(one.adc(0, FRAMES), other.adc(0, FRAMES))
+        assert np.array_equal(one.valid(0, FRAMES), other.valid(0, FRAMES)) and np.array_equal(one.times, other.times)
+    assert np.concatenate(live.pipeline.poses) == pytest.approx(np.concatenate(offline.poses), abs=1e-6)
+    assert live.losses.lost_frames == 1 and live.pipeline.pushed == FRAMES and stream.counts.dropped == 0
+
+
+def test_too_slow_means_dropped_frames_not_delay(walk):
+    """Ten times real time, and room for four frames: what is processed is whole, and the rest is counted."""
+    with Page("127.0.0.1:0") as page, Replay(walk, speed=1e4, slots=4) as stream:
+        live = Live(make(walk), page)
+        while stream.counts.frames < FRAMES:
+            pass
+        live.run(stream, threading.Event())
+        assert live.losses.frames + stream.counts.dropped == FRAMES
+        assert stream.counts.dropped >= FRAMES - 8
+        assert f"{stream.counts.dropped} of {FRAMES} frames were dropped" in stream.troubles()[0]
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed (apt-get install chromium)")
+def test_a_browser_shows_it_while_it_runs(walk, tmp_path):
+    pipeline = prepare(PRESETS["radarize"], lambda: make(walk))
+    with Page("127.0.0.1:0") as page, Browser(page.url, tmp_path / "profile") as browser:
+        browser.wait("document.getElementById('state').textContent == 'waiting for frames'")
+        browser.wait("events.readyState == 1")
+        shown = threading.Event()
+
+        def run() -> None:
+            with Replay(walk, speed=0.5, slots=FRAMES) as stream:
+                Live(pipeline, page).run(stream, shown)
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        text = "document.getElementById('{}').textContent".format
+        browser.wait(f"{text('state')} == 'live'")
+        browser.wait("document.getElementById('fan').naturalWidth == 260 && picture != null && pose != null")
+        assert browser.evaluate("document.getElementById('doppler').naturalWidth") == 121
+        assert browser.evaluate("document.getElementById('bar').children.length") >= 6
+        assert "of 33.3 ms a frame" in browser.evaluate(text("stages")) and browser.evaluate(text("dropped")) == "0"
+        drawn = "new Set(at('map').getContext('2d').getImageData(0, 0, at('map').width, at('map').height).data).size"
+        assert browser.evaluate(drawn) > 4
+        browser.screenshot(tmp_path / "live.png")
+        browser.wait(f"{text('state')} == 'ended'")
+        thread.join()
+        assert browser.evaluate("pose[0]") > 0.05  # ahead
+        assert browser.evaluate("performance.getEntriesByType('resource').map(r => r.name)") == [page.url + "events"]
+        assert browser.errors == []
+
+
+def test_the_page_gives_latecomers_the_newest_and_ends():
+    with Page("127.0.0.1:0") as page:
+        for number in range(3):
+            page.send("frame", {"number": number})
+        page.send("end", {})
+        assert urllib.request.urlopen(page.url).read().startswith(b"<!doctype html>")
+        with pytest.raises(urllib.error.HTTPError, match="404"):
+            urllib.request.urlopen(page.url + "other")
+        events = urllib.request.urlopen(page.url + "events")
+        got = [events.readline().decode().strip() for _ in range(5)]
+        assert got[0] == "event: frame" and json.loads(got[1].removeprefix("data: ")) == {"number": 2}
+        assert got[3] == "event: end" and page.watched
+    assert b"frame" not in events.read()
+
+
+def test_addresses_that_are_taken_or_none():
+    with Page("127.0.0.1:0") as page:
+        taken = page.url.removeprefix("http://").strip("/")
+        for address, words in ((taken, "in use"), ("127.0.0.1", "no port number"), ("192.0.2.1:80", "assign")):
+            with pytest.raises(InputError, match=f"--address {address}: .*{words}.*, expected HOST:PORT"):
+                Page(address)
+
+
+def test_a_recording_that_cannot_be_played(tmp_path):
+    with RecordingWriter(tmp_path / "empty.h5", PRESETS["radarize"]):
+        pass
+    with pytest.raises(InputError, match="has no whole frame"):
+        Replay(tmp_path / "empty.h5")

@@ -17,7 +17,7 @@ from radarize.published.tasks import pooled_dice
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarize.training.losses import SURFACE, surfaces
-from radarize.training.table import Table
+from radarize.training.maps import MapMaker, maps_of
 from radarize.training.tasks import first_cell
 from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
@@ -267,30 +267,29 @@ def levelled(scene: Scene, duration: float, seed: int) -> dict:
     return row("levelled labels", "first surfaces off by more than 10 cm", "share", float(wrong.mean()), 0.0)
 
 
-def balanced(source: Path, steps: int, seed: int) -> dict:
+def balanced(source: Recording, steps: int, seed: int) -> dict:
     """Share of bearings whose first surface the same small network finds after the same training, by both losses."""
-    table = Table.read([source], ("range_azimuth", "elevation_aware"), ("occupancy",))
-    count = len(table.truth["occupancy"])
-    training, test = np.arange(0, int(0.7 * count)), np.arange(int(0.75 * count), count, 2)
+    names, maker = ("range_azimuth", "elevation_aware"), MapMaker(source.config)
+    picked = np.linspace(0, len(source) - 1, 300).astype(int)
+    made = [maps_of(source, k, k + 1, names, maker) for k in picked]
+    maps = torch.from_numpy(np.stack([[one[name][0] for name in names] for one in made])).float()[:, None]
+    truth, test = torch.from_numpy(source.read("truth/occupancy")[picked]), torch.arange(225, 300)
     shares = []
     for balance in (False, True):
         torch.manual_seed(seed)
-        net, rng = SegmentationNet(1, ("range_azimuth", "elevation_aware"), 4), np.random.default_rng(seed)
+        net, rng = SegmentationNet(1, names, 4), np.random.default_rng(seed)
         optimiser = torch.optim.Adam(net.parameters(), 3e-3)
         for _ in range(steps):
-            chosen = torch.from_numpy(rng.choice(training, 16))
-            logits, label = net(table.window(chosen[:, None])), table.truth["occupancy"][chosen]
+            chosen = torch.from_numpy(rng.choice(210, 16))
+            logits, label = net(maps[chosen]), truth[chosen]
             two = torch.stack([torch.zeros_like(logits), logits], dim=1)
             loss = surfaces(logits, label).mean() if balance else pooled_dice(two, (label == SURFACE).to(torch.uint8))
             optimiser.zero_grad(), loss.backward(), optimiser.step()
         net.eval()
         with torch.no_grad():
-            found = torch.cat(
-                [first_cell(net(table.window(part[:, None])) > 0) for part in torch.from_numpy(test).split(32)]
-            )
-        truth = first_cell(table.truth["occupancy"][test] == SURFACE)
-        there = truth < 96
-        shares.append(float(((found - truth).abs() <= 2)[there].float().mean()))
+            found, surface = first_cell(net(maps[test]) > 0), first_cell(truth[test] == SURFACE)
+        there = surface < maps.shape[3]
+        shares.append(float(((found - surface).abs() <= 2)[there].float().mean()))
     return row("class-balanced loss", f"first surfaces found within 9 cm after {steps} steps", "share", *shares)
 
 
@@ -302,23 +301,22 @@ def row(correction: str, measure: str, unit: str, without, with_) -> dict:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("recording", nargs="?", type=Path, help="a handheld walk with occupancy; else one is simulated")
     parser.add_argument("--duration", type=float, default=15.0, help="of the simulated walk, s")
-    parser.add_argument("--steps", type=int, default=150, help="of the small segmentation trainings")
+    parser.add_argument("--steps", type=int, default=60, help="of the small segmentation trainings")
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     rng = np.random.default_rng(options.seed)
     with tempfile.TemporaryDirectory() as folder:
-        path = simulate(
+        path = options.recording or simulate(
             SCENE, Path(folder) / "walk.h5", platform=PLATFORM, duration=options.duration, seed=options.seed,
             sensors=("occupancy",),
         )  # fmt: skip
         rows = [calibration(rng), tdm_phase(), aperture(), *pauses(rng), *windows_and_loading(rng)]
         with Recording(path) as source:
             rows += [*ego_velocity(source), *centred(source), *grids(source)]
-        rows += [
-            levelled(Scene.load(SCENE), options.duration, options.seed),
-            balanced(path, options.steps, options.seed),
-        ]
+            rows.append(balanced(source, options.steps, options.seed))
+        rows.append(levelled(Scene.load(SCENE), options.duration, options.seed))
     publish(
         "corrections",
         "What each correction of the published pipeline is worth",
@@ -327,8 +325,11 @@ def main() -> None:
         notes=[
             "Each line is the default pipeline without and with one correction. Errors are root mean squares unless "
             "said otherwise; point targets are at 2.5 m, 20 counts of noise under 1000 of signal.",
-            f"Walk: {SCENE}, {PLATFORM}, {options.duration:g} s; ego-velocity on its first 4 s.",
+            f"Walk: {path.stem}, ego-velocity on its first 4 s; levels: {SCENE}, {PLATFORM}, {options.duration:g} s.",
             "Zero where the correction takes the truth itself.",
+            "The Doppler least squares' thresholds were chosen with windows; without, sidelobes pass for echoes.",
+            "Loss: U-Net of width 4 on 210 frames, the published one counting cells behind surfaces as free; so short "
+            "a training says how fast, not how far, each learns.",
         ],
     )
 

@@ -1,4 +1,4 @@
-"""Scans by the segmentation network: occupancy of every cell, of which each bearing's first is the surface."""
+"""Scans by the segmentation network: where each bearing's first surface is, if it can be told."""
 
 from pathlib import Path
 
@@ -6,12 +6,13 @@ import numpy as np
 import torch
 from jaxtyping import Complex64, Float
 
-from radarize.mapping import echoes
 from radarize.odometry.learned import Windows
 from radarize.training.maps import MapMaker
 
-#: Least probability of a cell that counts as occupied.
+#: Least probability that a returned range is right.
 LEAST = 0.5
+#: Cells to either side that count as right: 9 cm of the preset's.
+NEAR = 2
 
 
 class Segmentation:
@@ -20,7 +21,8 @@ class Segmentation:
     Args:
         maker: of the maps; shared with the odometry's networks, so that maps are made once.
         weights: file; the shipped ones if None.
-        least: probability from which a cell is occupied: higher leaves fewer ghosts and fewer bearings.
+        least: least probability that a range is right within `NEAR` cells: higher leaves fewer ghosts and fewer
+            bearings.
 
     Raises:
         InputError: no such weights, or they are for another radar.
@@ -41,6 +43,29 @@ class Segmentation:
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
     ) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen."""
-        likely = self.occupancy(spectrum)
-        bins = echoes.first(likely >= self.least, likely)
+        bins = first_surface(self.occupancy(spectrum), self.least)
         return np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
+
+
+def first_surface(
+    occupancy: Float[np.ndarray, "frame range bearing"], least: float
+) -> Float[np.ndarray, "frame bearing"]:
+    """Fractional range bin of every bearing's first surface, inf where none is likely enough.
+
+    With h the probability of a cell if nothing is before it, the first surface is in a cell with probability
+    h * product over nearer cells of (1 - h): behind a surface hardly anything is left for ghosts, which is the
+    first-echo rule in terms of probability. The answer is the mean over the likeliest 2 `NEAR` + 1 cells in a row.
+    """
+    free = np.cumprod(1 - occupancy, axis=1)
+    here = occupancy * np.concatenate([np.ones_like(free[:, :1]), free[:, :-1]], axis=1)
+    place = here * np.arange(here.shape[1])[:, None]
+    mass, moment = (_stretches(values) for values in (here, place))
+    best = mass.argmax(axis=1)[:, None]
+    mass, moment = (np.take_along_axis(values, best, axis=1)[:, 0] for values in (mass, moment))
+    return np.where(mass >= least, moment / np.maximum(mass, 1e-12), np.inf)
+
+
+def _stretches(values: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame range bearing"]:
+    """Sums over each cell and its `NEAR` neighbours to either side."""
+    total = np.cumsum(np.pad(values, ((0, 0), (NEAR + 1, NEAR), (0, 0))), axis=1)
+    return total[:, 2 * NEAR + 1 :] - total[:, : -2 * NEAR - 1]

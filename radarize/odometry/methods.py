@@ -3,13 +3,15 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from radarize.errors import InputError
 from radarize.nets.weights import shipped
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.odometry.fused import FusedVelocity
 from radarize.odometry.integration import Odometry
 from radarize.odometry.learned import LearnedRotation, LearnedVelocity
-from radarize.odometry.rotation import MapRotation
+from radarize.odometry.rotation import MapRotation, RotationSettings
 from radarize.radar.config import RadarConfig
 from radarize.training.maps import MapMaker
 
@@ -44,7 +46,9 @@ def fused(config: RadarConfig, maker: MapMaker, weights: Weights) -> Odometry:
     """Both: velocities by their covariances, and the map matched from where the network says that it has turned to."""
     learned = LearnedVelocity(maker, weights.of("translation"))
     velocity = FusedVelocity(learned, DopplerVelocity(maker.heatmaps))
-    rotation = MapRotation(maker.heatmaps, prior=LearnedRotation(maker, weights.of("rotation")))
+    # A map that lags in a turn misleads many matches alike: beside the network each must claim more than its own noise.
+    settings = RotationSettings(yaw_noise=np.radians(0.8))
+    rotation = MapRotation(maker.heatmaps, settings, LearnedRotation(maker, weights.of("rotation")))
     return Odometry(config, velocity, rotation)
 
 

@@ -78,7 +78,7 @@ class Pipeline:
         self.heatmaps = self.odometry.heatmaps
         self.scan_config = ScanConfig()
         self.slam = Slam(SlamConfig.preset("radar"))
-        self.pushed = 0
+        self.pushed = self.lost = 0
         self.frames: list[np.ndarray] = []  # numbers of those used, counted as pushed
         self.times: list[np.ndarray] = []
         self.poses: list[np.ndarray] = []
@@ -104,6 +104,7 @@ class Pipeline:
         else:
             used = np.ones(len(times), bool) if valid is None else valid.mean(axis=(1, 2)) >= LEAST_SHARE
             if not used.all():
+                self.lost += int(np.count_nonzero(~used))
                 adc, times, valid = adc[used], times[used], valid[used]
             if not len(times):
                 return
@@ -265,7 +266,7 @@ def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[st
         "recording": source.path.name,
         "recording_attributes": {k: v for k, v in source.attributes.items() if isinstance(v, (str, int, float))},
         "frames": frames,
-        "frames_lost": pipeline.pushed - frames,
+        "frames_lost": pipeline.lost,
         "duration_s": float(times[-1] - times[0] + source.config.frame_period),
         "methods": methods,
         "radar": source.config_json(),

@@ -11,7 +11,7 @@ from radarize.evaluation.evaluate import evaluate
 from radarize.pipeline import Pipeline, run
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording, RecordingWriter
+from radarize.recording import Recording, RecordingWriter, Stream
 from radarize.tum import read_tum
 from radarsim.simulate import simulate
 
@@ -92,6 +92,81 @@ def test_lost_chirps_do_no_harm(walk, tmp_path):
         lossy.push(damaged.adc(0, 120), damaged.times, damaged.valid(0, 120))
     assert np.isfinite(lossy.poses[0]).all()
     assert np.linalg.norm(whole.poses[0][-1, :2] - lossy.poses[0][-1, :2]) < 0.15
+
+
+def spoil(walk, valid):
+    """A pipeline over the walk's first frames with the chirps lost that are not valid."""
+    frames = len(valid)
+    with Recording(walk) as source:
+        pipeline, adc = Pipeline(source.config), source.adc(0, frames)
+        adc[~valid] = 0
+        for at in range(0, frames, 16):
+            part = slice(at, at + 16)
+            pipeline.push(adc[part], source.times[:frames][part], valid[part])
+    pipeline.finish()
+    return pipeline
+
+
+@pytest.fixture(scope="module")
+def unspoilt(walk):
+    return spoil(walk, np.ones((120, 32, 3), bool))
+
+
+@pytest.mark.parametrize(
+    ("lost", "frames", "tolerance"),
+    [
+        (np.s_[50:60], 110, 0.15),  # a third of a second, as a whole
+        (np.s_[:3], 117, 0.05),
+        (np.s_[::4], 90, 0.08),
+        (np.s_[::3, 16:], 120, 0.05),  # the later half of a burst
+        (np.s_[40:80, :, 1], 120, 0.15),  # a transmitter
+        (np.s_[::5, 2:], 96, 0.08),  # too little is left of these
+    ],
+)
+def test_lost_bursts_and_frames_leave_a_gap(walk, unspoilt, lost, frames, tolerance):
+    valid = np.ones((120, 32, 3), bool)
+    valid[lost] = False
+    pipeline = spoil(walk, valid)
+    numbers, poses = np.concatenate(pipeline.frames), np.concatenate(pipeline.poses)
+    assert len(poses) == len(numbers) == frames and pipeline.lost == 120 - frames
+    whole = np.concatenate(unspoilt.poses)
+    away = np.linalg.norm((poses - poses[0] - whole[numbers] + whole[numbers[0]])[:, :2], axis=1)
+    assert away.max() < tolerance
+    covariance = np.concatenate(pipeline.step_covariances)
+    assert np.isfinite(covariance).all() and (np.linalg.eigvalsh(covariance[1:]) > 0).all()
+    # A step across a gap is less certain, by the time that it took.
+    gaps = np.diff(numbers, prepend=numbers[0] - 1)
+    if gaps.max() > 5:
+        assert covariance[gaps.argmax(), 0, 0] > 20 * np.median(covariance[:, 0, 0])
+
+
+def test_everything_lost(walk, tmp_path):
+    """No crash, nothing seen, nothing moved; and a run of such a recording says so."""
+    pipeline = spoil(walk, np.zeros((40, 32, 3), bool))
+    assert pipeline.times == [] and pipeline.lost == 40 and not pipeline.slam.nodes
+    with Recording(walk) as source, RecordingWriter(tmp_path / "lost.h5", source.config) as writer:
+        shape = (20, *source.config.frame_shape)
+        writer.append(np.zeros(shape, np.int16), source.times[:20], np.zeros(shape[:3], bool))
+    with pytest.raises(InputError, match="all its 20 frames are lost"):
+        run(tmp_path / "lost.h5", tmp_path / "run")
+
+
+def test_a_run_over_lost_frames_keeps_rows_and_truth_together(walk, tmp_path):
+    with Recording(walk) as source:
+        streams = {"truth/velocity": Stream((3,), "f8", "m/s", "", "radar/time")}
+        valid = np.ones((60, 32, 3), bool)
+        valid[20:30] = False
+        adc, truth = source.adc(0, 60), source.read("truth/velocity")[:60]
+        adc[~valid] = 0
+        with RecordingWriter(tmp_path / "gap.h5", source.config, streams=streams) as writer:
+            writer.append(adc, source.times[:60], valid, rows={"truth/velocity": truth})
+    out = run(tmp_path / "gap.h5", tmp_path / "run", odometry="doppler", scans="first-echo")
+    facts = json.loads((out / "run.json").read_text())
+    assert facts["frames"] == 60 and facts["frames_lost"] == 10
+    with h5py.File(out / "scans.h5") as file:
+        assert len(file["time"]) == len(file["ranges"]) == len(file["truth/velocity"]) == 50
+        error = np.abs(file["velocity"][:] - file["truth/velocity"][:, :2])
+    assert (np.median(error, axis=0) < 0.05).all()
 
 
 def test_silence_is_survived(tmp_path):

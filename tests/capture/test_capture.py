@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual import SMALL, emulated, network, noise, sensor
+from virtual import SMALL, emulated, network, sensor
 
 from radarize.capture.receiver import buffer_warning
 from radarize.capture.record import record
@@ -20,6 +20,7 @@ from radarize.radar.dca1000 import MAX_PAYLOAD, FrameAssembler, decode, encode, 
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarsim.emulator.disturbance import Disturbance
+from tests.emulator import rig
 
 FRAMES = 100
 
@@ -27,7 +28,7 @@ FRAMES = 100
 @pytest.fixture(scope="module")
 def played(tmp_path_factory):
     path = tmp_path_factory.mktemp("played") / "noise.h5"
-    return path, noise(path, SMALL, FRAMES)
+    return path, rig.record(path, SMALL, FRAMES)
 
 
 def test_every_sample_arrives(played, tmp_path):

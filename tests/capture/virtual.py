@@ -1,21 +1,18 @@
-"""A virtual sensor on free ports, and recordings for it."""
+"""A virtual sensor, and our client of it."""
 
-import socket
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
-
 from radarize.capture.board import Network
 from radarize.capture.sensor import Sensor
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
-from radarize.recording import RecordingWriter
 from radarsim.emulator.disturbance import Disturbance
 from radarsim.emulator.emulator import Emulator
 from radarsim.emulator.source import Playback
+from tests.emulator.rig import BOARD, COMPUTER, free_ports
 
 #: 9,216 bytes a frame, 768 a chirp: neither is a multiple of the packets' 1456.
 SMALL = RadarConfig(
@@ -32,27 +29,9 @@ SMALL = RadarConfig(
 )
 
 
-def noise(path: Path, config: RadarConfig, frames: int) -> np.ndarray:
-    """Write a recording of random samples; returns them."""
-    adc = np.random.default_rng(0).integers(-(2**15), 2**15, (frames, *config.frame_shape), dtype=np.int16)
-    with RecordingWriter(path, config) as writer:
-        writer.append(adc, np.arange(frames) * config.frame_period)
-    return adc
-
-
 def network() -> Network:
     """Addresses on this machine with ports that nobody uses."""
-    ports: list[int] = []
-    while len(ports) < 2:
-        kinds = socket.AF_INET, socket.SOCK_DGRAM
-        with socket.socket(*kinds) as computer, socket.socket(*kinds) as board:
-            computer.bind(("127.0.0.1", 0))
-            try:
-                board.bind(("127.0.0.2", computer.getsockname()[1]))
-            except OSError:
-                continue
-            ports.append(computer.getsockname()[1])
-    return Network("127.0.0.1", "127.0.0.2", *ports)
+    return Network(COMPUTER, BOARD, *free_ports())
 
 
 @contextmanager

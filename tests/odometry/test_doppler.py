@@ -143,3 +143,13 @@ def test_other_configurations(room, preset):
     maps = Heatmaps(config)
     found = DopplerVelocity(maps).estimate(maps.spectrum(burst(room, (0.8, 0.2), config=config)))
     np.testing.assert_allclose(found.velocity[0], (0.8, 0.2), atol=0.08)
+
+
+@pytest.mark.parametrize("direction", [(0.0, 0.0), (0.3, 0.1), (0.94, 0.0), (1.0, 0.0)])
+def test_echoes_from_one_direction_are_no_singularity(direction):
+    """They say nothing of the speed across: it is unknown, not an error."""
+    draws = np.random.default_rng(0).random((50, 2))
+    echoes = np.tile([0.2, *direction, 0.01, 100.0], (6, 1))
+    noise = np.array([0.03, 0.1, 0.03, 0.2, 0.15])
+    velocity, covariance, _ = _fit(echoes, draws, noise, 0.15, 3.8)
+    assert np.isfinite(velocity).all() and np.linalg.eigvalsh(covariance).max() > 1

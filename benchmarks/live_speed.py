@@ -1,0 +1,88 @@
+"""`radarize live` on a replay in real time, somebody looking on: frames dropped, and what a frame costs.
+
+Wall time says whether this machine keeps up with whatever else it does; processor time what it takes of a free one.
+"""
+
+import argparse
+import tempfile
+import threading
+import time
+import urllib.request
+from pathlib import Path
+
+import psutil
+
+from benchmarks.results import publish
+from radarize.capture.live import Live, prepare
+from radarize.capture.page import Page
+from radarize.capture.replay import Replay
+from radarize.pipeline import BEST, CLASSICAL, Pipeline, best_methods
+from radarsim.simulate import simulate
+
+
+def look_on(url: str) -> None:
+    """Take events as a browser does, until they end."""
+    with urllib.request.urlopen(url + "events") as events:
+        while events.read1(1 << 16):
+            pass
+
+
+def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
+    """One replay; a row of the table."""
+    stream = Replay(path)
+    pipeline = prepare(stream.config, lambda: Pipeline(stream.config, **methods))
+    with Page("127.0.0.1:0") as page, stream:
+        viewer = threading.Thread(target=look_on, args=(page.url,), daemon=True)
+        viewer.start()
+        (reader,) = [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
+        live, last = Live(pipeline, page), [0.0]
+
+        def note(done: int, total: int) -> None:
+            if reader.is_running():
+                used = reader.cpu_times()
+                last[0] = used.user + used.system
+
+        start, before = time.process_time(), time.monotonic()
+        note(0, 0)
+        reading = last[0]
+        live.run(stream, threading.Event(), progress=note)
+        used, took = time.process_time() - start, time.monotonic() - before
+    frames, counts = max(live.losses.frames, 1), stream.counts
+    return {
+        "odometry, scans": f"{methods['odometry']}, {methods['scans']}",
+        "frames/s": frames / took,
+        "dropped": f"{counts.dropped} of {counts.frames}",
+        "ms a frame": 1e3 * live.busy / frames,
+        "processor ms a frame": 1e3 * used / frames,
+        "of it the page": 1e3 * pipeline.stage_seconds["page"] / frames,
+        "reading process": 1e3 * (last[0] - reading) / counts.frames,
+        "budget, ms": 1e3 * stream.config.frame_period,
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("recording", nargs="?", type=Path, help="a recording; by default one is simulated")
+    parser.add_argument("--duration", type=float, default=20.0)
+    parser.add_argument("--seed", type=int, default=0)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        path = options.recording or simulate(
+            "office", Path(folder) / "office.h5", duration=options.duration, seed=options.seed
+        )
+        chosen = best_methods(Replay(path).config)[0]
+        rows = [measure(path, methods) for methods in (CLASSICAL, BEST) if methods is CLASSICAL or chosen is BEST]
+    publish(
+        "live_speed",
+        "radarize live on a replay in real time, preset radarize",
+        rows,
+        seed=options.seed,
+        notes=[
+            "A browser's stream of events is read all the time. Dropped frames are whole ones that found no room "
+            "because this machine was too slow for them; processor time is that of the main process.",
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()

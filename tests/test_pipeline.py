@@ -153,7 +153,7 @@ def test_everything_lost(walk, tmp_path):
 
 def test_a_run_over_lost_frames_keeps_rows_and_truth_together(walk, tmp_path):
     with Recording(walk) as source:
-        streams = {"truth/velocity": Stream((3,), "f8", "m/s", "", "radar/time")}
+        streams = {"truth/velocity": Stream((6,), "f8", "m/s", "", "radar/time")}
         valid = np.ones((60, 32, 3), bool)
         valid[20:30] = False
         adc, truth = source.adc(0, 60), source.read("truth/velocity")[:60]

@@ -83,7 +83,17 @@ class Stream:
         source: see `Source`; called with an `Outlet` and `arguments`.
         arguments: picklable.
         slots: frames that may wait before whole ones are dropped.
+
+    Attributes:
+        text: of the configuration.
     """
+
+    text = ""
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """What a recording should say about its origin."""
+        return {}
 
     def __init__(self, config: RadarConfig, source: Source, *arguments: object, slots: int = 64):
         self.config = config

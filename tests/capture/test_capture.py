@@ -44,7 +44,7 @@ def test_every_sample_arrives(played, tmp_path):
     with emulated(source) as (emulator, where):
         for name in ("first.h5", "second.h5"):
             with sensor(emulator, where) as radar:
-                record(radar, tmp_path / name, threading.Event(), text=radar.text, frames=40)
+                record(radar, tmp_path / name, threading.Event(), frames=40)
                 assert radar.version == "2.8" and radar.troubles() == []
             with Recording(tmp_path / name) as recording:
                 assert np.array_equal(recording.adc(0, 99), sent[:40])

@@ -83,7 +83,9 @@ def simulate(
 
 @app.command()
 def dataset(
-    specification: Annotated[Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, or radarize146.")],
+    specification: Annotated[
+        Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, training, evaluation, radarize146.")
+    ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the recordings.")],
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,

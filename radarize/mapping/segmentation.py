@@ -10,7 +10,7 @@ from radarize.odometry.learned import Windows
 from radarize.training.maps import MapMaker
 
 #: Least probability that a returned range is right.
-LEAST = 0.5
+LEAST = 0.7
 #: Cells to either side that count as right: 9 cm of the preset's.
 NEAR = 2
 

@@ -5,12 +5,13 @@ in a local frame that is smooth and drifts, the graph's poses are global and jum
 """
 
 from collections import deque
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
-from radarize.pose import between, compose, interpolate, transform
+from radarize.pose import adjoint, between, compose, interpolate, inverse, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.grid import OccupancyGrid
@@ -232,21 +233,31 @@ class Slam:
         """Begin to search a node in the submaps near it, and take in what was found for earlier ones."""
         c = self.config.loop
         if number % c.every == 0:
-            self._search.ask(self._questions(number, c.candidates, c.distance, c.angle))
+            self._search.ask(self._questions(number, c.candidates))
         jumps = [self._jury.hear(closure) for closure in self._search.answers(number - c.lag)]
         if any(jumps) or number % c.update_every == 0:
             self.graph.update()
 
     def _close_again(self) -> None:
-        """With loops closed, nodes and submaps lie where they overlap: match what was not matched, closely."""
+        """With loops closed, nodes and submaps lie where they overlap: match what was not matched.
+
+        How far to look is what the graph does not know of a node, given the first one: closely where loops are closed,
+        and as widely as ever where one was missed.
+        """
         c, done = self.config.loop, set(self.graph.closures)
+        near = np.diag([8 * self.config.grid.resolution / 3] * 2 + [0.03]) ** 2
+        unknown = self.graph.covariances()
         for number in range(len(self.nodes)):
-            questions = self._questions(number, 2 * c.candidates, 8 * self.config.grid.resolution, 0.1)
-            self._search.ask([q for q in questions if (q.submap.anchor, number) not in done])
+            for question in self._questions(number, 2 * c.candidates):
+                anchor = question.submap.anchor
+                if (anchor, number) not in done:
+                    carry = adjoint(inverse(question.guess))
+                    spread = near + unknown[number] + carry @ unknown[anchor] @ carry.T
+                    self._search.ask([replace(question, spread=spread)])
         for closure in self._search.answers():
             self._jury.hear(closure)
 
-    def _questions(self, number: int, count: int, distance: float, angle: float) -> list[Question]:
+    def _questions(self, number: int, count: int) -> list[Question]:
         """Searches of a node and those before it in the finished submaps near it, nearest first."""
         spacing = self.config.matcher.spacing
         first = max(number - self.config.loop.nodes + 1, 0)
@@ -273,8 +284,6 @@ class Slam:
                 fronts,
                 between(poses[anchors[k]], poses[number]),
                 self._drift.between(anchors[k], number),
-                distance,
-                angle,
             )
             for k in near[np.argsort(away[near], kind="stable")][:count]
         ]

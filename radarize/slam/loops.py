@@ -35,7 +35,6 @@ class Question:
         points, fronts: seen from the node, as in `Node`, m.
         guess: pose of the node in the submap's frame.
         spread: covariance of the guess, in the frame of the node.
-        distance, angle: half-widths of the window to search at most, m and rad.
     """
 
     submap: Submap
@@ -44,8 +43,6 @@ class Question:
     fronts: Float[np.ndarray, "front 2"]
     guess: Float[np.ndarray, "3"]
     spread: Float[np.ndarray, "3 3"]
-    distance: float
-    angle: float
 
 
 @dataclass(frozen=True)
@@ -105,8 +102,8 @@ class LoopSearch:
             self._pyramid(submap),
             points,
             question.guess,
-            distance=min(question.distance, max(3 * place, 4 * submap.grid.resolution)),
-            angle=min(question.angle, max(3 * turn, 0.05)),
+            distance=min(c.distance, max(3 * place, 4 * submap.grid.resolution)),
+            angle=min(c.angle, max(3 * turn, 0.05)),
             min_score=c.min_score,
             penalty=(price / place**2, price / turn**2),
             fronts=question.fronts if c.front else None,

@@ -21,8 +21,8 @@ from radarsim.emulator.link import Link
 from radarsim.emulator.source import NOT_IN_SAMPLES, Source
 from radarsim.emulator.uart import Uart
 
-#: A busy machine holds the radar up now and then: up to this it catches up, as fast as the board's packets may follow
-#: each other, s. Behind a source that is too slow it does not: its clock is set back, and frames come late.
+#: A busy machine holds the radar up now and then: up to this (s) it catches up. Further behind, or behind a source that
+#: is too slow, its clock is set back and frames come late.
 _CATCH_UP = 0.25
 _ON_TIME = 5e-3  # s
 _WAKE_UP = 1e-3  # s: the chirps of so long a time are sent together, since waking up for each would cost too much

@@ -15,7 +15,8 @@ from radarsim.emulator.disturbance import Disturbance
 SILENCE = 2.0  # s
 MEMORY = 256 << 20  # the board's, bytes
 _NEVER = float("inf")
-_JITTER = 1e-3  # s of packets that may follow each other faster, to make up for a late wake-up
+#: Catching up, this many times as fast as time passes, and this much (s) at once: receivers have small buffers.
+_SPEED, _BURST = 4.0, 10e-3
 _SHORTEST = 1e-4  # s, shortest wait worth going to sleep for
 #: Time on the wire, s: 1456 bytes of samples and 52 of headers and gaps at 1 Gbit/s. With it, delays of 5, 10, 25 and
 #: 50 us give 683, 526, 314 and 188 Mbit/s of samples; SPRUIJ4A says 706, 545, 325 and 193 with headers.
@@ -51,6 +52,8 @@ class Link:
         self._clock, self._sleep = clock, sleep
         self._lock = threading.Lock()
         self.recording, self.packets = False, 0
+        self._credit = _BURST  # s that may be made up for at once
+        self._waited = (clock(), clock())  # until when, and since when
         self._clear()
 
     def _clear(self) -> None:
@@ -91,7 +94,7 @@ class Link:
         while True:
             with self._lock:
                 departure = self._departure()
-            if departure > max(until, self._clock()):  # later than `until`, where the caller is behind
+            if departure > until:
                 break
             self._wait(departure)
             with self._lock:
@@ -99,7 +102,14 @@ class Link:
         self._wait(until)
 
     def _wait(self, until: float) -> None:
-        if (left := until - self._clock()) > _SHORTEST:
+        now = self._clock()
+        if until > now:
+            self._credit, left = _BURST, until - now
+        else:  # behind: a busy machine held us up
+            self._credit = min(self._credit + _SPEED * (now - self._waited[1]), _BURST) - (until - self._waited[0])
+            left = -self._credit / _SPEED
+        self._waited = until, now
+        if left > _SHORTEST:
             self._sleep(left)
 
     def _departure(self) -> float:
@@ -113,7 +123,7 @@ class Link:
             return
         if len(self._waiting) >= self._payload:
             self._packet(self._payload)
-            self._free = max(now, self._clock() - _JITTER) + self._spacing
+            self._free = now + self._spacing
         else:
             self._finish()
             self._report(Status.RECORD_COMPLETED)

@@ -390,9 +390,10 @@ def test_our_own_capture_loses_nothing_in_10_s(tmp_path):
         numbers = np.round(recording.times / preset.frame_period).astype(int)
         for first in range(0, len(recording), 30):
             assert np.array_equal(recording.adc(first, first + 30), adc[numbers[first : first + 30] % 30])
-        if len(recording) < 300 and os.getloadavg()[0] > 2 * len(os.sched_getaffinity(0)):
-            pytest.skip(f"this machine is too busy to write 30 frames/s: {recording.attributes['warnings']}")
-        assert len(recording) == 300 and recording.attributes["warnings"] == ""
+        dropped = recording.attributes["warnings"]
+        if dropped and os.getloadavg()[0] > 2 * len(os.sched_getaffinity(0)):
+            pytest.skip(f"this machine is too busy to write 30 frames/s: {dropped}")
+        assert len(recording) == 300 and dropped == ""
 
 
 @pytest.mark.parametrize(

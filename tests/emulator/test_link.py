@@ -86,6 +86,21 @@ def test_packets_disregard_frames_and_count_from_the_start():
     assert len(wire.sent) == 7 and not wire.reports
 
 
+def test_a_busy_machine_delays_packets_and_they_catch_up():
+    """Held up for 100 ms: no burst beyond what a small buffer takes, and on time again after 100 / (4 - 1) ms."""
+    wire = Wire()
+    wire.link.start()
+    for number in range(1, 501):
+        if number == 100:
+            wire.now += 0.1
+        wire.link.take(bytes(1456), number * 1e-3)
+    times = np.array([time for time, _ in wire.sent])
+    behind = times - np.arange(1, 501) * 1e-3
+    assert behind[98] < 1e-4 < 0.09 < behind[99] < 0.11
+    assert 0.05 < behind[140] < 0.08 and behind[240:].max() < 1e-3 and behind.min() > -2e-4
+    assert max(np.sum((times >= t) & (times < t + 1e-3)) for t in times) <= 16
+
+
 def test_more_than_the_packets_can_carry_waits_in_memory_until_that_is_full(monkeypatch):
     monkeypatch.setattr("radarsim.emulator.link.MEMORY", 100 * 1456)
     wire = Wire()

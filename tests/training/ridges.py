@@ -42,7 +42,7 @@ def write(path: Path, law: str, frames: int = 300, seed: int = 0, blank: float =
     rng = np.random.default_rng(seed)
     maker = MapMaker(CONFIG)
     velocity = np.zeros((frames, 6))
-    velocity[:, :2] = rng.uniform(-1, 1, (frames, 2)) * (1.2, 0.8)
+    velocity[:, :2] = rng.uniform(-1, 1, (frames, 2)) * (1.2, 0.8) * (law != "yaw")  # who turns stands still
     yaw = 0.6 * np.sin(np.cumsum(rng.uniform(0, 0.15, frames)))
     zero = np.zeros(frames)
     shown, label = walls(frames, rng)

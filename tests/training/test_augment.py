@@ -56,9 +56,11 @@ def test_signs_of_all_tasks():
 
     maps = torch.zeros(count, 2, 1, 16, 40)
     maps[:, 0, :, 8, 25], maps[:, 1, :, 8, 20] = 60, 60  # the echo moves to the right: the sensor turns to the left
-    found, turn = TASKS["rotation"].augment(maps, torch.full((count, 1), 0.2), generator)
+    found, turn = TASKS["rotation"].augment(maps, torch.tensor([[0.2, 0.3, 0.1]]).repeat(count, 1), generator)
     moved = found[:, 0, 0, 8].argmax(dim=1) - found[:, 1, 0, 8].argmax(dim=1)
-    assert torch.equal(moved.sign(), turn[:, 0].sign().long()) and len(turn.unique()) == 2
+    assert torch.equal(moved.sign(), turn[:, 0].sign().long()) and len(turn[:, 0].unique()) == 2
+    assert torch.allclose(turn[:, 1:].abs(), torch.tensor([0.3, 0.1]), atol=0.05)  # told with some doubt
+    assert torch.equal(turn[:, 2].sign(), turn[:, 0].sign())  # mirrored with the maps
 
     shown, label = walls(count, np.random.default_rng(0))
     label = torch.as_tensor(label)

@@ -35,22 +35,24 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
         viewer = threading.Thread(target=look_on, args=(page.url,), daemon=True)
         viewer.start()
         (reader,) = [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
-        live, last = Live(pipeline, page), [0.0]
+        live, last, instants = Live(pipeline, page), [0.0], []
 
         def note(done: int, total: int) -> None:
+            instants.append((time.monotonic(), done))
             if reader.is_running():
                 used = reader.cpu_times()
                 last[0] = used.user + used.system
 
-        start, before = time.process_time(), time.monotonic()
+        start = time.process_time()
         note(0, 0)
         reading = last[0]
         live.run(stream, threading.Event(), progress=note)
-        used, took = time.process_time() - start, time.monotonic() - before
+        used = time.process_time() - start
+    (began, first), (ended, final) = instants[1], instants[-1]
     frames, counts = max(live.losses.frames, 1), stream.counts
     return {
         "odometry, scans": f"{methods['odometry']}, {methods['scans']}",
-        "frames/s": frames / took,
+        "frames/s": (final - first) / (ended - began),
         "dropped": f"{counts.dropped} of {counts.frames}",
         "ms a frame": 1e3 * live.busy / frames,
         "processor ms a frame": 1e3 * used / frames,

@@ -132,7 +132,7 @@ def capture(
     sensor = _sensor(config, port, baud, host, dca, command_port, data_port)
     most = _frames_within(duration, frames, sensor.config.frame_period)
     with until_interrupted() as stopping, progress("capture") as report, sensor:
-        record(sensor, output, stopping, text=sensor.text, frames=most, attributes=sensor.facts, progress=report)
+        record(sensor, output, stopping, frames=most, progress=report)
     _tell(output)
 
 
@@ -167,6 +167,7 @@ def live(
     stream = Replay(replay) if replay else _sensor(config, port, baud, host, dca, command_port, data_port)
     radar, methods = stream.config, best_methods(stream.config)[0]
     chosen = {"odometry": odometry or methods["odometry"], "scans": scans or methods["scans"]}
+    writer = None
     with until_interrupted() as stopping, ExitStack() as stack:
         with working("warming up"):
             pipeline = prepare(radar, lambda: Pipeline(radar, **chosen))
@@ -174,12 +175,15 @@ def live(
         report = stack.enter_context(progress("live"))
         stack.enter_context(stream)
         print(f"page: {live.page.url}", flush=True)
-        writer = stack.enter_context(RecordingWriter(output, radar, attributes=stream.facts)) if output else None
+        if output:
+            writer = RecordingWriter(output, radar, cfg_text=stream.text, attributes=stream.facts)
+            stack.enter_context(writer)
         most = _frames_within(duration, frames, radar.frame_period)
         live.run(stream, stopping, frames=most, writer=writer, progress=report)
+        warnings = stream.troubles() + live.losses.warnings()
         if writer:
-            writer.annotate(warnings="; ".join(stream.troubles() + writer.losses.warnings()))
-    for words in stream.troubles() + live.losses.warnings():
+            writer.annotate(warnings="; ".join(warnings))
+    for words in warnings:
         typer.echo(f"warning: {words}", err=True)
     print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
 

@@ -173,7 +173,7 @@ def _chromium() -> Finding:
     for name in ("chromium", "chromium-browser", "google-chrome"):
         if path := shutil.which(name):
             return Finding("Chromium", "ok", path)
-    return Finding("Chromium", "optional", "only a test of the reports uses it", "apt-get install chromium")
+    return Finding("Chromium", "optional", "only tests of reports and live page use it", "apt-get install chromium")
 
 
 def _disk() -> Finding:

@@ -18,9 +18,7 @@ def record(
     output: Path,
     stopping: Event,
     *,
-    text: str = "",
     frames: int | None = None,
-    attributes: dict[str, object] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write a stream's frames to a recording until the user stops it, there are enough, or nothing comes any more.
@@ -33,9 +31,7 @@ def record(
         stream: an open one; stopped here.
         output: recording to write; it is there, and whole, if a frame came.
         stopping: set when the user wants to end.
-        text: the configuration's.
         frames: end after so many.
-        attributes: facts to store.
         progress: called with frames done and wanted (0: until stopped).
 
     Returns:
@@ -47,7 +43,7 @@ def record(
     batches = follow(stream, stopping, most=_BATCH, frames=frames)
     if (first := next(batches, None)) is None:
         raise InputError(f"{output}: not written, since no whole frame came before the end")
-    with RecordingWriter(output, stream.config, cfg_text=text, attributes=attributes) as writer:
+    with RecordingWriter(output, stream.config, cfg_text=stream.text, attributes=stream.facts) as writer:
         for batch in chain([first], batches):
             writer.append(batch["adc"], batch["time"], batch["valid"])
             if progress:

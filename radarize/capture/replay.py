@@ -26,6 +26,7 @@ class Replay(Stream):
             if not len(recording):
                 raise InputError(f"{path}: has no whole frame, expected at least one to play")
             recording.adc(0, 1)  # refuses recordings of heat maps
+            self.text = str(recording.file["radar"].attrs.get("cfg", ""))
             super().__init__(recording.config, replay, path, speed, slots=slots)
         self.path = path
 

@@ -117,6 +117,8 @@ class Sensor(Stream):
         where = f"at {network.host}, UDP port {network.data_port}"
         if troubles := self._board.troubles():
             why = troubles[0]
+        elif not at_all:
+            why = "the radar has stopped, or a cable is out"
         elif foreign:
             why = f"{foreign} packets came from elsewhere, expected --dca {network.dca} to be their sender"
         elif self.packets.received:

@@ -17,6 +17,8 @@ from radarize.radar.dca1000 import PacketCounts
 
 #: s, how often a waiting process looks whether it should end.
 GLANCE = 0.2
+#: s without a frame after which a stream is taken to have ended.
+SILENCE = 5.0
 #: s for a process to start: it imports numpy and pydantic, on a machine that may be busy.
 _START_PATIENCE = 60.0
 
@@ -81,7 +83,17 @@ class Stream:
         source: see `Source`; called with an `Outlet` and `arguments`.
         arguments: picklable.
         slots: frames that may wait before whole ones are dropped.
+
+    Attributes:
+        text: of the configuration.
     """
+
+    text = ""
+
+    @property
+    def facts(self) -> dict[str, object]:
+        """What a recording should say about its origin."""
+        return {}
 
     def __init__(self, config: RadarConfig, source: Source, *arguments: object, slots: int = 64):
         self.config = config
@@ -168,9 +180,7 @@ def _fill(source: Source, arguments: tuple, shared: tuple, failure) -> None:
         pass
 
 
-def follow(
-    stream: Stream, stopping: Event, *, most: int, frames: int | None = None, patience: float = 5.0
-) -> Iterator[np.ndarray]:
+def follow(stream: Stream, stopping: Event, *, most: int, frames: int | None = None) -> Iterator[np.ndarray]:
     """Batches of frames of `FrameRing.dtype`, until the stream ends, the user stops it, or there are enough.
 
     Args:
@@ -178,13 +188,12 @@ def follow(
         stopping: set when the user wants to end; what is on its way is still given out.
         most: frames in a batch.
         frames: end before the frame of this number.
-        patience: s without a frame after which the stream is taken to have ended.
 
     Raises:
         InputError: no frame at all came, or the source failed.
     """
     stopped, last, number = False, time.monotonic(), -1
-    patience += 2 * stream.config.frame_period
+    patience = SILENCE + 2 * stream.config.frame_period
     while (found := stream.frames(most)) is not None:
         if len(found):
             number = int(found["number"][-1])

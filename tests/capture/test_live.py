@@ -7,14 +7,19 @@ import urllib.request
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
+from typer.testing import CliRunner
+from virtual import SMALL, emulated
 
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
+from radarize.cli import app
 from radarize.errors import InputError
 from radarize.pipeline import Pipeline
+from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
+from tests.emulator import rig
 
 FRAMES = 60
 
@@ -104,6 +109,35 @@ def test_a_browser_shows_it_while_it_runs(walk, tmp_path):
         assert browser.evaluate("pose[0]") > 0.05  # ahead
         assert browser.evaluate("performance.getEntriesByType('resource').map(r => r.name)") == [page.url + "events"]
         assert browser.errors == []
+
+
+def test_the_command_follows_a_radar_and_records(tmp_path):
+    rig.record(tmp_path / "played.h5", SMALL, 40)
+    (tmp_path / "small.cfg").write_text(write_cfg(SMALL))
+    with emulated(tmp_path / "played.h5") as (emulator, where):
+        options = ["--port", emulator.port, "--host", where.host, "--dca", where.dca, "--address", "127.0.0.1:0"]
+        options += ["--command-port", str(where.command_port), "--data-port", str(where.data_port), "--frames", "30"]
+        files = ["--config", str(tmp_path / "small.cfg"), "-o", str(tmp_path / "live.h5")]
+        done = CliRunner().invoke(app, ["live", *options, *files])
+    assert done.exit_code == 0, done.exception
+    assert "page: http://127.0.0.1:" in done.stdout and "30 frames, " in done.stdout
+    with Recording(tmp_path / "live.h5") as recording, Recording(tmp_path / "played.h5") as played:
+        assert np.array_equal(recording.adc(0, 99), played.adc(0, 30)) and "dropped" not in done.stderr
+        assert recording.attributes["source"] == f"radar at {emulator.port}, DCA1000 at 127.0.0.2"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["live"], "--config is missing"),
+        (["live", "--config", "radarize"], "--port is missing"),
+        (["live", "--replay", "a.h5", "--port", "b"], "--replay a.h5 is given with --config or --port"),
+        (["capture", "--config", "radarize", "--port", "/dev/ttyNONE", "-o", "a.h5"], "no such serial port"),
+    ],
+)
+def test_options_that_do_not_go_together(arguments, words):
+    done = CliRunner().invoke(app, arguments)
+    assert isinstance(done.exception, InputError) and words in str(done.exception)
 
 
 def test_the_page_gives_latecomers_the_newest_and_ends():

@@ -52,6 +52,6 @@ def emulated(path: Path, disturbance: Disturbance | None = None) -> Iterator[tup
         yield emulator, where
 
 
-def sensor(emulator: Emulator, where: Network, config: RadarConfig = SMALL, **more) -> Sensor:
+def sensor(emulator: Emulator, where: Network, config: RadarConfig = SMALL) -> Sensor:
     """Our client of a virtual sensor."""
-    return Sensor(config, write_cfg(config), "test.cfg", emulator.port, network=where, **more)
+    return Sensor(config, write_cfg(config), "test.cfg", emulator.port, network=where, slots=256)

@@ -1,5 +1,6 @@
 """The whole back end: synthetic loops, real lidar, and input that is not as it should be."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ from radarize.errors import InputError
 from radarize.pose import between, compose
 from radarize.slam.backend import Slam
 from radarize.slam.config import PRESETS, SlamConfig
+from radarize.slam.log import Log
+from radarize.tum import planar, read_tum
 from tests.slam.world import align, ate, box, ring, scan, walk
 
 RADISH = Path(__file__).parents[3] / "shared" / "recordings" / "radish"
@@ -131,6 +134,19 @@ def test_real_lidar_log():
     odometry, truth = tum("odometry"), tum("truth")
     slam = run(SlamConfig(), np.arange(count) * 1.0, odometry, azimuths, ranges)
     assert ate(truth, slam.trajectory()[1]) < ate(truth, odometry) / 5
+
+
+@pytest.mark.skipif(not RADISH.is_dir(), reason=f"no real lidar logs at {RADISH}")
+def test_loops_missed_on_the_way_are_found_in_the_end():
+    log = Log.read(RADISH / "csail.scans.npz", RADISH / "csail.odometry.tum")
+    count, rng = len(log.times), np.random.default_rng(7)
+    rng.permutation(count - 1)
+    # A third of the scans lost, and with them, as these draws fall, a loop within the search window.
+    kept = np.sort(rng.permutation(count)[: 2 * count // 3])
+    slam = Slam()
+    replace(log, times=log.times[kept], ranges=log.ranges[kept]).feed(slam)
+    truth = planar(read_tum(RADISH / "csail.truth.tum")[1])[kept]
+    assert ate(truth, slam.trajectory()[1]) < 0.3
 
 
 # --- input that is not as it should be ------------------------------------------------------------

@@ -230,7 +230,7 @@ def run(
             raise InputError(f"{recording}: all its {len(source)} frames are lost or silent, expected one with samples")
         pipeline.finish()
         output.mkdir(parents=True, exist_ok=True)
-        methods = {"odometry": odometry, "scans": scans, "settings": settings, "no_networks": why}
+        methods = {"odometry": odometry, "scans": scans, "settings": settings} | ({"no networks": why} if why else {})
         _write(pipeline, source, output, methods)
     return output
 

@@ -8,12 +8,15 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Complex64, Float
+from jaxtyping import Bool, Complex64, Float
 
 from radarize.nets.weights import load, shipped
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
-from radarize.training.maps import MapMaker
+from radarize.training.maps import FLOOR, MapMaker
+
+#: m/s and rad, standard deviations of what may have happened meanwhile.
+_ANY_VELOCITY, _ANY_TURN = 2.0, 1.0
 
 
 class Windows:
@@ -52,6 +55,11 @@ class Windows:
         return [everything[newest - back * spacing] for spacing in spacings]
 
 
+def silent(windows: Float[torch.Tensor, "frame window map row azimuth"]) -> Bool[torch.Tensor, "frame"]:
+    """Windows of which a frame shows nothing at all: networks were not trained to say that they know nothing."""
+    return (windows <= FLOOR).flatten(2).all(dim=2).any(dim=1)
+
+
 class LearnedVelocity:
     """Velocity estimator by `radarize.nets.TranslationNet`.
 
@@ -66,7 +74,10 @@ class LearnedVelocity:
     @torch.inference_mode()
     def estimate(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Velocities:
         """Velocities of the next frames; no echoes are counted."""
-        mean, covariance = self._windows.net.estimate(self._windows.push(spectrum)[0])
+        shown = self._windows.push(spectrum)[0]
+        mean, covariance = self._windows.net.estimate(shown)
+        lost = silent(shown)
+        mean[lost], covariance[lost] = 0.0, _ANY_VELOCITY**2 * torch.eye(2)
         return Velocities(mean.double().numpy(), covariance.double().numpy(), np.zeros(len(mean), int))
 
 
@@ -111,7 +122,10 @@ class LearnedRotation:
         """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
         windows = self._windows.push(spectrum, self.spacings)
         travel = self._travel(np.asarray(times, float), velocities.velocity)
-        mean, variance = self._windows.net.estimate(torch.cat(windows), torch.from_numpy(travel).float())
+        shown = torch.cat(windows)
+        mean, variance = self._windows.net.estimate(shown, torch.from_numpy(travel).float())
+        lost = silent(shown)
+        mean[lost], variance[lost] = 0.0, _ANY_TURN**2
         turns = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)
         yaw, growth = np.zeros(len(times)), np.zeros(len(times))
         for i in range(len(times)):

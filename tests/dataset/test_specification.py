@@ -141,7 +141,9 @@ def test_mistakes_are_one_sentence(tmp_path, changes, expected):
 
 
 def test_files_that_are_no_specification(tmp_path):
-    with pytest.raises(InputError, match="no specification 'huge', expected .* one of: evaluation, radarize146, small, training"):
+    with pytest.raises(
+        InputError, match="no specification 'huge', expected .* one of: evaluation, radarize146, small, training"
+    ):
         Specification.load("huge")
     path = tmp_path / "x.yaml"
     for text, expected in (("a: [", "malformed YAML"), ("7", "holds int, expected keys")):

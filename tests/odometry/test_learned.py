@@ -74,6 +74,16 @@ def test_batches_do_not_matter(tmp_path):
         assert np.allclose(a, b, atol=1e-4)
 
 
+def test_silence_says_nothing(tmp_path):
+    """A lost frame is no motion of its own: neither network has seen one that should have been believed."""
+    maker, times = MapMaker(CONFIG), np.arange(4) * CONFIG.frame_period
+    nothing = torch.zeros(4, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)
+    found = LearnedVelocity(maker, weights(tmp_path, "translation")).estimate(nothing)
+    assert (found.velocity == 0).all() and np.allclose(found.covariance, 4 * np.eye(2))
+    turns = LearnedRotation(maker, weights(tmp_path, "rotation")).estimate(nothing, times, found)
+    assert np.allclose(turns.yaw, 0)
+
+
 class Oracle:
     """Answers with true turns between the frames it is shown, plus noise that it knows of."""
 
@@ -97,6 +107,7 @@ def test_turns_of_several_spacings_make_one_yaw(tmp_path, monkeypatch):
         rng = np.random.default_rng(seed)
         rotation = LearnedRotation(MapMaker(CONFIG), path)
         rotation._windows.net = Oracle(truth, noise, rng)
+        monkeypatch.setattr("radarize.odometry.learned.silent", lambda shown: torch.zeros(len(shown), dtype=torch.bool))
         at = torch.arange(count)
         shown = [torch.stack([(at - stride * s).clamp_min(0), at], dim=1) for s in rotation.spacings]
         monkeypatch.setattr(rotation._windows, "push", lambda spectrum, spacings, shown=shown: shown)

@@ -46,8 +46,8 @@ _PICTURES = 6
 class Pipeline:
     """Radar SLAM as a stream: push raw frames, then read trajectory and map. Memory grows with the path, not the data.
 
-    Lost chirps weigh nothing. Frames that are lost as a whole, or nearly, leave a gap, over which odometry takes motion
-    to change evenly; `frames` says which ones are left.
+    Lost chirps weigh nothing. Frames that are lost as a whole, or nearly, or silent, leave a gap, over which odometry
+    takes motion to change evenly; `frames` says which ones are left.
 
     Args:
         config: radar configuration.
@@ -102,10 +102,12 @@ class Pipeline:
             used = numbers % self.chain.stride == 0
             track, ranges = self.chain.push(adc, times, self._stage)
         else:
-            used = np.ones(len(times), bool) if valid is None else valid.mean(axis=(1, 2)) >= LEAST_SHARE
-            if not used.all():
-                self.lost += int(np.count_nonzero(~used))
-                adc, times, valid = adc[used], times[used], valid[used]
+            used = adc.reshape(len(adc), -1).any(axis=1)  # networks would see motion in nothing, too
+            if valid is not None:
+                used &= valid.mean(axis=(1, 2)) >= LEAST_SHARE
+                valid = valid[used]
+            self.lost += int(np.count_nonzero(~used))
+            adc, times = adc[used], times[used]
             if not len(times):
                 return
             track, ranges = self._follow(adc, times, valid)
@@ -225,7 +227,7 @@ def run(
             if progress:
                 progress(frames.stop, len(source))
         if not pipeline.times:
-            raise InputError(f"{recording}: all its {len(source)} frames are lost, expected at least one with samples")
+            raise InputError(f"{recording}: all its {len(source)} frames are lost or silent, expected one with samples")
         pipeline.finish()
         output.mkdir(parents=True, exist_ok=True)
         methods = {"odometry": odometry, "scans": scans, "settings": settings} | ({"no networks": why} if why else {})

@@ -147,7 +147,7 @@ def test_everything_lost(walk, tmp_path):
     with Recording(walk) as source, RecordingWriter(tmp_path / "lost.h5", source.config) as writer:
         shape = (20, *source.config.frame_shape)
         writer.append(np.zeros(shape, np.int16), source.times[:20], np.zeros(shape[:3], bool))
-    with pytest.raises(InputError, match="all its 20 frames are lost"):
+    with pytest.raises(InputError, match="all its 20 frames are lost or silent"):
         run(tmp_path / "lost.h5", tmp_path / "run")
 
 
@@ -170,13 +170,17 @@ def test_a_run_over_lost_frames_keeps_rows_and_truth_together(walk, tmp_path):
 
 
 def test_silence_is_survived(tmp_path):
-    """All samples zero (a radar that was never started): no crash, no motion."""
+    """All samples zero (a radar that was never started): no crash, no motion, and a sentence."""
     config = PRESETS["radarize"]
+    silence, times = np.zeros((20, *config.frame_shape), np.int16), np.arange(20) / 30
+    pipeline = Pipeline(config)
+    pipeline.push(silence, times)
+    pipeline.finish()
+    assert pipeline.times == [] and pipeline.lost == 20
     with RecordingWriter(tmp_path / "silent.h5", config) as writer:
-        writer.append(np.zeros((20, *config.frame_shape), np.int16), np.arange(20) / 30)
-    out = run(tmp_path / "silent.h5", tmp_path / "run")
-    _, pose = read_tum(out / "odometry.tum")
-    assert np.allclose(pose[:, :3], 0, atol=1e-6)
+        writer.append(silence, times)
+    with pytest.raises(InputError, match="all its 20 frames are lost or silent"):
+        run(tmp_path / "silent.h5", tmp_path / "run")
 
 
 @pytest.mark.parametrize(

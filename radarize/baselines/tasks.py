@@ -150,7 +150,7 @@ class MilliEgo(Motion):
             net.estimate(*inputs)[0] - torch.cat([label[:, -1, :2], label[:, -1, 5:] / DEGREES], dim=1)
             for inputs, label in batches
         ]
-        net.error.copy_(torch.cat(errors).square().mean(dim=0).clamp_min(1e-8))
+        net.error.copy_(torch.cat(errors).square().mean(dim=0).clamp_min(1e-6))
 
 
 def _milliego_loss(motion: Float[Tensor, "item pair 6"], label: Float[Tensor, "item pair 6"]) -> Float[Tensor, "item"]:

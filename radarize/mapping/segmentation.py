@@ -6,7 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Complex64, Float
 
-from radarize.odometry.learned import Windows
+from radarize.nets.windows import Windows
 from radarize.training.maps import MapMaker
 
 #: Least probability that a returned range is right.

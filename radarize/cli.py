@@ -246,7 +246,9 @@ def run_(
 
 @app.command()
 def train(
-    task: Annotated[str, typer.Argument(metavar="TASK", help="translation, rotation, segmentation, or a baseline: radarhd, milliego, rnin.")],
+    task: Annotated[
+        str, typer.Argument(metavar="TASK", help="translation, rotation, segmentation, radarhd, milliego or rnin.")
+    ],
     data: Annotated[Path, typer.Option(help="Folder of recordings, see `radarsim dataset`.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Weights to write (.safetensors).")],
     split: Annotated[str | None, typer.Option(help="Of the data set; else every tenth recording validates.")] = None,

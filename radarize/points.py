@@ -68,6 +68,14 @@ class PointCloudConfig(BaseModel):
     min_range: float = Field(0.2, ge=0)
 
 
+#: For methods that need many points: thresholds 10 dB lower, at which ego-velocity by RANSAC (`radarize.baselines`)
+#: errs by a third of what it does at the chip's.
+DENSE = PointCloudConfig(
+    range_cfar=Cfar(window=8, guard=4, smallest=True, threshold=5.0),
+    doppler_cfar=Cfar(window=4, guard=2, threshold=5.0),
+)
+
+
 class PointClouds:
     """Makes point clouds for one radar configuration.
 
@@ -199,8 +207,8 @@ class PointClouds:
         Float[np.ndarray, "frame range doppler"],
         Bool[np.ndarray, "frame range doppler"],
     ]:
-        """Level (dB), noise around (dB) and whether it is a detection, per cell of a spectrum; ranges are the chip's unless
-        told."""
+        """Level (dB), noise around (dB) and whether it is a detection, per cell of a spectrum; ranges are the chip's
+        unless told."""
         power = cube.real**2 + cube.imag**2
         level = 10 * np.log10(power + np.float32(1e-9)).mean(axis=2).transpose(0, 2, 1)
         over_range, over_doppler = self.settings.range_cfar, self.settings.doppler_cfar

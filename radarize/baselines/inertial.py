@@ -1,7 +1,7 @@
 """What the inertial baselines see of an IMU: 100 Hz samples, on the radar's axes or on level ones.
 
-Level axes come from the sensor's own angular velocity, integrated, with gravity pulling them upright slowly: no truth and
-no camera has a say. They start where the sensor looks at first and turn only as the gyroscope's bias makes them.
+Level axes come from the sensor's own angular velocity, integrated, with gravity pulling them upright slowly: no truth
+and no camera has a say. They start where the sensor looks at first and turn only as the gyroscope's bias makes them.
 """
 
 import numpy as np
@@ -120,7 +120,7 @@ def displacement(recording: Recording, frames: slice) -> Float[np.ndarray, "fram
     )
     # Level axes differ from the world's by a heading that only the truth can tell.
     yaw = np.interp(ends - LASTS, known, np.unwrap(planar(poses)[:, 2]))
-    off = Rotation.from_euler("z", Imu.of(recording).yaw(ends - LASTS) - yaw)
+    off = Rotation.from_rotvec(np.outer(Imu.of(recording).yaw(ends - LASTS) - yaw, [0, 0, 1]))
     return off.apply(after - before).astype(np.float32)
 
 

@@ -70,6 +70,8 @@ class MilliEgoNet(nn.Module):
         features = channels * rows * columns + 2 * width * SAMPLES
         self.memory = nn.LSTM(features, 8 * width, 2, batch_first=True)
         self.heads = Heads(8 * width, width)
+        #: m/s^2 and rad/s that become 1: gravity alone would fill an LSTM's gates.
+        self.register_buffer("scale", torch.tensor([10.0, 10.0, 10.0, 1.0, 1.0, 1.0]), persistent=False)
         #: Mean squared errors on validation data: x, y (m^2), yaw (rad^2).
         self.register_buffer("error", torch.ones(3))
 
@@ -79,7 +81,7 @@ class MilliEgoNet(nn.Module):
         """Of pairs: two panoramas (0...1), older first, and the IMU's samples between them (m/s^2, rad/s)."""
         x = self.radar(panorama.repeat_interleave(3, dim=1))
         x = x * self.squeeze(x.mean(dim=(2, 3)))[:, :, None, None]
-        y = self.inertial(imu)[0]
+        y = self.inertial(imu / self.scale)[0]
         of_radar, of_inertial = self.of_radar(y[:, -1]), self.of_inertial(x.mean(dim=(2, 3)))
         return torch.cat([(x * of_radar[:, :, None, None]).flatten(1), (y * of_inertial[:, None]).flatten(1)], dim=1)
 

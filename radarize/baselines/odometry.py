@@ -21,7 +21,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.nets.weights import load, shipped
 from radarize.odometry.integration import Track, intervals
 from radarize.odometry.ties import Ties
-from radarize.points import PointClouds
+from radarize.points import DENSE, PointClouds
 from radarize.pose import between, compose, wrap
 from radarize.recording import Recording
 
@@ -88,7 +88,7 @@ class MilliEgoOdometry:
 
     def __init__(self, heatmaps: Heatmaps, recording: Recording, weights: Path | None = None):
         self.config, self._heatmaps, self._imu = heatmaps.config, heatmaps, Imu.of(recording)
-        self._clouds = PointClouds(self.config)
+        self._clouds = PointClouds(self.config, DENSE)
         self.net, header = load(weights or shipped("milliego"))
         period = self.config.frame_period
         self._back = max(1, round(PAIR / period)) * np.arange(header.frames - 1, -1, -1)

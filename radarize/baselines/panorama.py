@@ -5,7 +5,7 @@ from jaxtyping import Float, Int
 
 from radarize.baselines.milliego import COLUMNS, ROWS
 from radarize.heatmaps import Heatmaps
-from radarize.points import PointClouds
+from radarize.points import DENSE, PointClouds
 from radarize.recording import Recording
 
 #: Half the field, rad: to the sides, up and down.
@@ -48,7 +48,7 @@ def seen(recording: Recording, frames: slice) -> Float[np.ndarray, "frame row co
     Raises:
         InputError: it has no samples.
     """
-    heatmaps, clouds = Heatmaps(recording.config), PointClouds(recording.config)
+    heatmaps, clouds = Heatmaps(recording.config), PointClouds(recording.config, DENSE)
     wanted = range(*frames.indices(len(recording)))
     found = []
     for first in range(wanted.start, wanted.stop, _BATCH * wanted.step):

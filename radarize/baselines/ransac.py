@@ -13,7 +13,7 @@ from jaxtyping import Complex64, Float
 
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import Velocities
-from radarize.points import PointClouds
+from radarize.points import DENSE, PointClouds
 
 #: (m/s)^2, of a velocity that the points do not tell.
 _UNKNOWN = 1.0
@@ -57,7 +57,7 @@ class RansacVelocity:
 
     def __init__(self, heatmaps: Heatmaps, settings: RansacSettings | None = None, seed: int = 0):
         self.settings, self._heatmaps = settings or RansacSettings(), heatmaps
-        self._clouds = PointClouds(heatmaps.config)
+        self._clouds = PointClouds(heatmaps.config, DENSE)
         self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 3))
 
     def estimate(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Velocities:

@@ -102,11 +102,11 @@ def pictured(
     return 0.9 * entropy + 0.1 * (1 - (2 * shared + 1) / (total + 1))
 
 
-class MilliEgo(Motion):
+class MilliEgo(Task):
     """Motions between panoramas 0.2 s apart: translation (m) in the older one's axes, and Euler angles (deg)."""
 
     kind, sensed, truth = "milliego", ("panorama", "imu"), ("pose",)
-    error, size = "rmse_m_rad", "rms_m_rad"
+    share = 1 / 5
     defaults = Settings(width=8, frames=6, epochs=201, batch=32, rate=1e-5, schedule="steps", patience=201)
 
     def optimise(self, parameters: Iterable[nn.Parameter], settings: Settings) -> torch.optim.Optimizer:
@@ -139,18 +139,24 @@ class MilliEgo(Motion):
 
     def judge(self, net: nn.Module, inputs: Inputs, label: Tensor) -> Tensor:
         motion = net(*inputs)
-        newest = torch.cat([label[:, -1, :2], label[:, -1, 5:] / DEGREES], dim=1)
-        judged = self._judged(*net.planar(motion[:, -1]), newest)
-        judged[:, 0] = _milliego_loss(motion, label)
-        return judged
+        error, size = net.planar(motion[:, -1])[0] - _planar(label), _planar(label)
+        numbers = [part.square().sum(dim=1) for each in (error, size) for part in each.split([2, 1], dim=1)]
+        return torch.stack([_milliego_loss(motion, label), *numbers], dim=1)
+
+    def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
+        loss, *squares = means.tolist()
+        names = ("rmse_m", "rmse_rad", "rms_step_m", "rms_turn_rad")
+        return {"loss": loss} | {name: value**0.5 for name, value in zip(names, squares, strict=True)}
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Inputs, Tensor]]) -> None:
         """Keep the validation error as everyone's."""
-        errors = [
-            net.estimate(*inputs)[0] - torch.cat([label[:, -1, :2], label[:, -1, 5:] / DEGREES], dim=1)
-            for inputs, label in batches
-        ]
+        errors = [net.estimate(*inputs)[0] - _planar(label) for inputs, label in batches]
         net.error.copy_(torch.cat(errors).square().mean(dim=0).clamp_min(1e-6))
+
+
+def _planar(label: Float[Tensor, "item pair 6"]) -> Float[Tensor, "item 3"]:
+    """x, y (m) and yaw (rad) of the newest motion."""
+    return torch.cat([label[:, -1, :2], label[:, -1, 5:] / DEGREES], dim=1)
 
 
 def _milliego_loss(motion: Float[Tensor, "item pair 6"], label: Float[Tensor, "item pair 6"]) -> Float[Tensor, "item"]:
@@ -163,6 +169,7 @@ class Rnin(Motion):
 
     kind, sensed, truth = "rnin", ("levelled",), ("displacement",)
     error, size = "rmse_m", "rms_displacement_m"
+    share = 1 / 10
     defaults = Settings(frames=10, epochs=100, batch=32, rate=1e-4)
 
     def spacings(self, frame_period: float) -> Sequence[int]:

@@ -25,8 +25,8 @@ class Estimate(nn.Module):
 
 def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
     """Write a network's `estimate` as one ONNX file: input ``maps`` (item, frame, map, row, azimuth) in dB, any number
-    of items, and for turns ``travel`` (item, 2), or what else the network names; outputs ``estimate`` and ``covariance``,
-    or ``probability``.
+    of items, and for turns ``travel`` (item, 2), or what else the network names; outputs ``estimate`` and
+    ``covariance``, or ``probability``.
 
     Raises:
         InputError: the packages for it are missing, or the file cannot be written.

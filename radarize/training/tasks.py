@@ -15,7 +15,6 @@ from radarize.nets.weights import Grid, make
 from radarize.training import augment, losses
 from radarize.training.table import Table
 
-
 #: What a network reads, one tensor or several.
 Inputs = Tensor | tuple[Tensor, ...]
 

@@ -132,8 +132,8 @@ class Trainer:
         return self.history[-1]
 
     def _warm_or_cool(self, step: int) -> None:
-        """The rate at a step of all, by a schedule that knows it beforehand: cosine (Loshchilov and Hutter, "SGDR", 2017,
-        without restarts), or steps."""
+        """The rate at a step of all, by a schedule that knows it beforehand: cosine (Loshchilov and Hutter, "SGDR",
+        2017, without restarts), or steps."""
         if self.settings.schedule == "plateau":
             return
         total = self.settings.epochs * self.steps

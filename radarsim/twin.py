@@ -1,8 +1,8 @@
 """The twin of a recording: what the simulator makes of the same walk, in a model of the same place.
 
-Frame by frame the twin has the recording's stamps, lost chirps, radar configuration and poses; what it has of its own is
-the world: surfaces of the scene in place of the real ones, and other speckle and noise. `radarize.evaluation.twin` tells
-how alike the two are.
+Frame by frame the twin has the recording's stamps, lost chirps, radar configuration and poses; what it has of its own
+is the world: surfaces of the scene in place of the real ones, and other speckle and noise. `radarize.evaluation.twin`
+tells how alike the two are.
 """
 
 from collections.abc import Callable, Sequence
@@ -177,9 +177,7 @@ def _poses(recording: Recording, margin: float) -> tuple[Float[np.ndarray, "pose
         raise InputError(f"{recording.path}: has {len(stamps)} finite poses in /truth/pose, expected at least 4")
     if (np.diff(stamps) <= 0).any():
         raise InputError(f"{recording.path}: the stamps in /truth/time do not ascend, expected ascending ones")
-    (before, first), (last, after) = (
-        _continued(stamps[[a, b]], poses[[a, b]], margin) for a, b in ((1, 0), (-2, -1))
-    )
+    (before, first), (last, after) = (_continued(stamps[[a, b]], poses[[a, b]], margin) for a, b in ((1, 0), (-2, -1)))
     return np.array([before, *stamps, last]), np.array([first, *poses, after])
 
 

@@ -1,9 +1,9 @@
-"""How alike heat maps are: cell by cell, of the same place, by correlation and MS-SSIM; or as sets, whatever places they
-show, by statistics of their patches and Fréchet's distance.
+"""How alike heat maps are: cell by cell, of the same place, by correlation and MS-SSIM; or as sets, whatever places
+they show, by statistics of their patches and Fréchet's distance.
 
-Of sets: as in the single-image form of the Fréchet inception distance (Shaham et al., "SinGAN", ICCV 2019), patches are the
-samples, so that a single frame has a distribution too; their features are not a network's but what a reader of heat
-maps looks at: levels and contrasts, in dB.
+Of sets: as in the single-image form of the Fréchet inception distance (Shaham et al., "SinGAN", ICCV 2019), patches
+are the samples, so that a single frame has a distribution too; their features are not a network's but what a reader of
+heat maps looks at: levels and contrasts, in dB.
 """
 
 import numpy as np
@@ -49,12 +49,15 @@ def similarity(
     if not scales:
         return np.full(len(one), np.nan)
     weights = np.array(SCALES[: scales[-1]])
-    found = ms_ssim(
-        *(torch.as_tensor(np.asarray(maps, np.float32))[:, None] for maps in (one, other)),
-        sigma=1.5, kernel_size=WINDOW, data_range=DEPTH, betas=tuple(weights / weights.sum()), reduction="none",
-        normalize="relu",
-    )  # fmt: skip
-    return found.double().numpy()
+    found = [
+        ms_ssim(
+            *(torch.as_tensor(np.asarray(maps, np.float32))[:, None] for maps in (one[k : k + 64], other[k : k + 64])),
+            sigma=1.5, kernel_size=WINDOW, data_range=DEPTH, betas=tuple(weights / weights.sum()), reduction="none",
+            normalize="relu",
+        ).double().numpy()
+        for k in range(0, len(one), 64)
+    ]  # fmt: skip
+    return np.concatenate(found)
 
 
 def patch_statistics(maps: Float[np.ndarray, "frame row column"]) -> Float[np.ndarray, "frame patch 5"]:

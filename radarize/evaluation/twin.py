@@ -6,7 +6,7 @@ which is a figure of its own, and the noise of empty cells drop out. Velocities 
 single frames (Doppler least squares; Capon's maps, first echo), so that any radar has them.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,29 +16,33 @@ from jaxtyping import Float, Int
 
 from radarize.errors import InputError
 from radarize.evaluation.likeness import correlation, foreground, frechet_distance, patch_statistics, similarity
-from radarize.mapping.scans import BEARINGS, ScanConfig, make_scans
+from radarize.mapping.scans import ScanConfig, make_scans
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.config import RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
 from radarize.recording import Recording
 from radarize.training.maps import MapMaker
 
-#: What is compared of every frame, with unit and meaning. Maps come with their names: `similarity_range_azimuth`.
+#: What is compared of every frame, with unit and meaning. Those of maps end in the map's name.
 FIGURES = {
     "profile_correlation": ("", "correlation of the range profiles in dB"),
     "profile_rms": ("dB", "RMS difference of the range profiles, gain taken out"),
-    "gain": ("dB", "twin's level over the recording's: median over the range profile where it is above the noise"),
-    "noise": ("dB", "twin's noise floor over the recording's"),
-    "correlation": ("", "correlation of the map in dB over its median"),
-    "similarity": ("", "MS-SSIM of the map in dB over its median"),
+    "gain": ("dB", "twin over recording: median over the range profile, where it is well above its floor"),
+    "noise": ("dB", "noise floor, twin over recording"),
+    **{f"correlation_{name}": ("", f"correlation: {about}") for name, about in MapMaker.maps.items()},
+    **{f"similarity_{name}": ("", f"MS-SSIM: {about}") for name, about in MapMaker.maps.items()},
     "velocity": ("m/s", "length of the difference of the velocities"),
+    "velocity_error_recording": ("m/s", "recording's velocity against that of the poses"),
+    "velocity_error_twin": ("m/s", "twin's velocity against that of the poses"),
     "bearings_within_10cm": ("", "share of bearings returned by both whose ranges agree within 10 cm"),
     "bearings_returned": ("", "share of the recording's returned bearings that the twin returns too"),
 }
-#: Shifts of the twin that are tried, each way: frames, azimuth columns, range bins.
-SHIFTS = {"time": 15, "azimuth": 12, "range": 12}
-#: A shift is told if the maps agree so much better with it.
-BETTER = 0.02
+#: Shifts of the twin that are tried, each way: s, rad, m.
+SHIFTS = {"time": 1.5, "azimuth": np.radians(18.0), "range": 0.5}
+#: Frames that shifts are tried on, spread over the recording.
+_TRIED = 200
+#: A shift is told if maps correlate so much better with it, and at least so well.
+BETTER, WELL = 0.03, 0.3
 #: s by which stamps of the same frame may differ.
 _SAME = 1e-4
 #: Loops that noise and velocity are told from, at least.
@@ -83,13 +87,23 @@ class Comparison:
     frechet: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     def misfits(self) -> dict[str, tuple[float, float]]:
-        """Shifts with which the maps agree better than without: the shift (s, rad, m) and the gain in correlation."""
+        """Shifts with which the maps agree better than without: the shift (s, rad, m) and the gain in correlation.
+
+        Time, heading or distances of the poses are then off, or those of the scene. A best shift at the end of those
+        tried says nothing.
+        """
         found = {}
         for name, (shifts, values) in self.alignment.items():
             best, here = int(np.argmax(values)), values[np.argmin(np.abs(shifts))]
-            if values[best] - here > BETTER:
+            if values[best] > max(here + BETTER, WELL) and 0 < best < len(values) - 1:
                 found[name] = (float(shifts[best]), float(values[best] - here))
         return found
+
+    @property
+    def noise_counts(self) -> Float[np.ndarray, "2"]:
+        """Noise of recording and twin, counts; NaN where it cannot be told."""
+        known = self.noise[np.isfinite(self.noise).all(axis=1)]
+        return np.sqrt(np.median(known, axis=0)) if len(known) else np.full(2, np.nan)
 
     def summary(self) -> dict[str, object]:
         """All figures as plain data; not-a-number is None."""
@@ -106,14 +120,10 @@ class Comparison:
         return {
             "frames": len(self.frames),
             "figures": spread,
-            "noise_counts": {
-                who: _plain(np.sqrt(np.median(self.noise[:, k]))) for k, who in enumerate(("recording", "twin"))
-            },
+            "noise_counts": dict(zip(("recording", "twin"), map(_plain, self.noise_counts), strict=True)),
             "frechet_db": {n: {"twin": _plain(a), "own_halves": _plain(b)} for n, (a, b) in self.frechet.items()},
             "misfits": {n: {"shift": _plain(a), "gain": _plain(b)} for n, (a, b) in self.misfits().items()},
-            "alignment": {
-                n: {"shift": _plain(a), "correlation": _plain(b)} for n, (a, b) in self.alignment.items()
-            },
+            "alignment": {n: {"shift": _plain(a), "correlation": _plain(b)} for n, (a, b) in self.alignment.items()},
             "per_frame": {
                 "frame": self.frames[:, 0].tolist(),
                 "time": _plain(self.times),
@@ -160,8 +170,10 @@ def compare(real: Path, twin: Path, progress: Callable[[int, int], None] | None 
     result.profiles = np.stack([part["profile"] for part in seen], axis=1)
     result.noise = np.stack([part["noise"] for part in seen], axis=1)
     if "range_azimuth" in seen[0]:
-        truth = np.broadcast_to(moved, (len(frames), 2))
-        result.velocity = np.stack([seen[0]["velocity"], seen[1]["velocity"], truth], axis=1)
+        result.velocity = np.stack([*(part["velocity"] for part in seen), np.broadcast_to(moved, (len(frames), 2))], 1)
+        for k, name in enumerate(("recording", "twin")):
+            off = np.linalg.norm(result.velocity[:, k] - result.velocity[:, 2], axis=1)
+            result.figures[f"velocity_error_{name}"] = off
         result.scans = np.stack([part["scan"] for part in seen], axis=1)
         result.alignment = _alignment(*(part["range_azimuth"] for part in seen), result)
         result.frechet = {name: _distances(seen[0][name], seen[1][name]) for name in analysis.maps}
@@ -221,7 +233,9 @@ class _Analysis:
         """Noise floors, counts^2; NaN of frames with lost chirps, or of too few to tell."""
         signal = adc.astype(np.float32).view(np.complex64)[..., 0]
         whole = valid.all(axis=(1, 2)) & (self.config.loops >= _LOOPS)
-        return np.array([noise_floor(noise_profile(s[None])) if w else np.nan for s, w in zip(signal, whole, strict=True)])
+        return np.array(
+            [noise_floor(noise_profile(s[None])) if w else np.nan for s, w in zip(signal, whole, strict=True)]
+        )
 
     def _velocities(self, spectrum: torch.Tensor) -> Float[np.ndarray, "frame 2"]:
         if self.config.loops < _LOOPS:
@@ -259,27 +273,39 @@ def _figures(real: dict[str, np.ndarray], twin: dict[str, np.ndarray]) -> dict[s
 
 def _alignment(real: np.ndarray, twin: np.ndarray, result: Comparison) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Mean correlations over shifts of the twin's range-azimuth maps."""
-    period = float(np.median(np.diff(result.times))) if len(result.times) > 1 else 0.0
-    steps = {
-        "time": period,
-        "azimuth": float(result.azimuths[1] - result.azimuths[0]),
-        "range": float(result.ranges[1] - result.ranges[0]),
-    }
+    tried = np.unique(np.linspace(0, len(real) - 1, _TRIED).astype(int))
+    period = float(np.median(np.diff(result.times))) if len(result.times) > 1 else np.inf
     found = {}
-    for axis, (name, step) in enumerate(steps.items()):
-        most = min(SHIFTS[name], (real.shape[axis if axis == 0 else 3 - axis] - 1) // 2)
-        shifts = np.arange(-most, most + 1)
-        values = [np.nanmean(correlation(*_overlap(real, twin, int(s), (0, 2, 1)[axis]))) for s in shifts]
-        if most:
-            found[name] = (shifts * step, np.array(values))
+    for name, step in (
+        ("time", period),
+        ("azimuth", float(result.azimuths[1] - result.azimuths[0])),
+        ("range", float(result.ranges[1] - result.ranges[0])),
+    ):
+        most = min(int(SHIFTS[name] / step), real.shape[("time", "range", "azimuth").index(name)] // 2)
+        if not most:
+            continue
+        shifts, values = np.arange(-most, most + 1), []
+        for shift in shifts:
+            if name == "time":
+                both = tried[(tried - shift >= 0) & (tried - shift < len(real))]
+                pair = real[both], twin[both - shift]
+            else:
+                pair = _overlap(real[tried], twin[tried], int(shift), 2 if name == "azimuth" else 1)
+            values.append(_mean(correlation(*pair)))
+        found[name] = (shifts * step, np.array(values))
     return found
 
 
-def _overlap(real: np.ndarray, twin: np.ndarray, shift: int, axis: int) -> Iterator[np.ndarray]:
+def _overlap(real: np.ndarray, twin: np.ndarray, shift: int, axis: int) -> tuple[np.ndarray, np.ndarray]:
     """What the two have in common once the twin is shifted upward along an axis."""
     length = real.shape[axis]
     kept = np.arange(max(shift, 0), length + min(shift, 0))
     return real.take(kept, axis), twin.take(kept - shift, axis)
+
+
+def _mean(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else 0.0
 
 
 def _distances(real: np.ndarray, twin: np.ndarray) -> tuple[float, float]:

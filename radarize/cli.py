@@ -361,6 +361,21 @@ def report(
     print(written)
 
 
+@app.command()
+def view(
+    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
+    run: Annotated[Path | None, typer.Option(help="Run of the recording, to show with it.")] = None,
+    save: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write a file instead of a window.")] = None,
+):
+    """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and causes on one time line."""
+    from radarize.viewer import view
+
+    with progress("view") as report:
+        written = view(source, run, save, progress=report)
+    if written:
+        print(written)
+
+
 def _print_json(content: dict) -> None:
     import json
 

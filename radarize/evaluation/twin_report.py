@@ -78,7 +78,9 @@ def _headline(figures: dict) -> list[tuple[str, str]]:
         ("bearings_within_10cm", 100.0, "{:.0f} %", "of bearings within 10 cm"),
         ("noise", 1.0, "{:.1f} dB", "noise floor, twin over recording"),
     )
-    return [(form.format(factor * figures[n]["median"] + 0.0), words) for n, factor, form, words in shown if n in figures]
+    return [
+        (form.format(factor * figures[n]["median"] + 0.0), words) for n, factor, form, words in shown if n in figures
+    ]
 
 
 def _doubts(found: Comparison, warnings: str) -> list[str]:

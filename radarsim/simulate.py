@@ -111,6 +111,8 @@ class Simulator:
     def _received(self, times, echoes: list[Echoes]) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Path lengths and amplitudes behind the IF filters, by frame."""
         lengths = [e.lengths(self.config, self.motion, t) for t, e in zip(times, echoes, strict=True)]
+        for each in lengths:
+            each[..., 0] += 2 * self.config.range_bias  # a board's own delay, which the pipeline takes off again
         filtered = [
             e.amplitude * self.front_end.if_response(length[:, 0, 0]) for length, e in zip(lengths, echoes, strict=True)
         ]

@@ -81,7 +81,7 @@ def make_twin(
     if fit:
         frontend = Path(output).with_suffix(".yaml")
         calibrate(recording, frontend)
-    config = walk.config.model_copy(update={"range_bias": 0.0})  # the simulator's cables have no length
+    config = walk.config
     settings = FrontEndConfig.load(frontend) if frontend else _calibrated(config)
     _, physics = np.random.default_rng(seed).spawn(2)  # as `simulate` does, which plans its route with the first
     simulator = Simulator(world, walk.motion, config, physics, front_end=settings)

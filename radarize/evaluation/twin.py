@@ -41,8 +41,8 @@ FIGURES = {
 SHIFTS = {"time": 1.5, "azimuth": np.radians(18.0), "range": 0.5}
 #: Frames that shifts are tried on, spread over the recording.
 _TRIED = 200
-#: A shift is told if maps correlate so much better with it, and at least so well.
-BETTER, WELL = 0.03, 0.3
+#: A shift is told if maps correlate so much better with it, at least so well, and in so many frames.
+BETTER, WELL, FEWEST = 0.03, 0.3, 5
 #: s by which stamps of the same frame may differ.
 _SAME = 1e-4
 #: Loops that noise and velocity are told from, at least.
@@ -90,9 +90,11 @@ class Comparison:
         """Shifts with which the maps agree better than without: the shift (s, rad, m) and the gain in correlation.
 
         Time, heading or distances of the poses are then off, or those of the scene. A best shift at the end of those
-        tried says nothing.
+        tried says nothing, nor does one of a few frames.
         """
         found = {}
+        if len(self.frames) < FEWEST:
+            return found
         for name, (shifts, values) in self.alignment.items():
             best, here = int(np.argmax(values)), values[np.argmin(np.abs(shifts))]
             if values[best] > max(here + BETTER, WELL) and 0 < best < len(values) - 1:
@@ -181,9 +183,8 @@ def compare(real: Path, twin: Path, progress: Callable[[int, int], None] | None 
 
 
 def _require_same(one: Recording, other: Recording) -> None:
-    """Only the bias of ranges, which belongs to a board, may differ."""
     for name, value in one.config:
-        if name != "range_bias" and getattr(other.config, name) != value:
+        if getattr(other.config, name) != value:
             raise InputError(
                 f"{other.path}: {name} is {getattr(other.config, name)}, expected {value} as in {one.path}"
             )

@@ -18,6 +18,7 @@ from radarize.errors import InputError
 from radarize.evaluation.twin import compare
 from radarize.evaluation.twin_report import report_twin
 from radarize.radar.cfg import load_config
+from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
 from radarsim.motion import Mounting
 from radarsim.scene.materials import MATERIALS
@@ -26,12 +27,12 @@ from radarsim.simulate import simulate
 from radarsim.twin import make_twin
 
 
-def room(name: str, things: list[dict]) -> Scene:
-    """A room of 5 x 4 x 2.6 m with things in it."""
+def room(name: str, x: float, y: float, things: list[dict]) -> Scene:
+    """A room of x x y x 2.6 m with things in it."""
     walls = [
-        ("west", [4, 2.6], [-2.5, 0, 1.3], [1, 0, 0]), ("east", [4, 2.6], [2.5, 0, 1.3], [-1, 0, 0]),
-        ("south", [5, 2.6], [0, -2, 1.3], [0, 1, 0]), ("north", [5, 2.6], [0, 2, 1.3], [0, -1, 0]),
-        ("floor", [5, 4], [0, 0, 0], [0, 0, 1]), ("ceiling", [5, 4], [0, 0, 2.6], [0, 0, -1]),
+        ("west", [y, 2.6], [-x / 2, 0, 1.3], [1, 0, 0]), ("east", [y, 2.6], [x / 2, 0, 1.3], [-1, 0, 0]),
+        ("south", [x, 2.6], [0, -y / 2, 1.3], [0, 1, 0]), ("north", [x, 2.6], [0, y / 2, 1.3], [0, -1, 0]),
+        ("floor", [x, y], [0, 0, 0], [0, 0, 1]), ("ceiling", [x, y], [0, 0, 2.6], [0, 0, -1]),
     ]  # fmt: skip
     objects = [
         {"name": n, "shape": "rectangle", "size": s, "position": p, "facing": f, "material": "plasterboard"}
@@ -52,30 +53,30 @@ def box(name: str, size: list[float], x: float, y: float, turn: float, material:
     }
 
 
-PLACE = room("place", [
+PLACE = room("place", 5, 4, [
     box("cabinet", [0.5, 1.0, 1.9], 2.1, 0.9, 0, "metal"), box("desk", [0.7, 1.2, 0.8], 1.4, -1.2, 20, "wood"),
     box("shelf", [0.3, 0.9, 2.0], -0.4, 1.6, 75, "chipboard"), box("pillar", [0.3, 0.3, 2.6], 0.9, 0.3, 30, "concrete"),
 ])  # fmt: skip
-ELSEWHERE = room("elsewhere", [
+ELSEWHERE = room("elsewhere", 6.4, 5.2, [
     box("cabinet", [0.5, 1.0, 1.9], 0.2, -1.1, 60, "metal"), box("desk", [0.7, 1.2, 0.8], -0.5, 1.1, -40, "wood"),
 ])  # fmt: skip
 
 
 @pytest.fixture(scope="module")
 def real(tmp_path_factory):
-    """Five frames a second for four seconds on a curve through the place."""
+    """Five frames a second for three seconds on a curve through the place."""
     folder = tmp_path_factory.mktemp("real")
     _, text = load_config("radarize")
     fields = next(line for line in text.splitlines() if line.startswith("frameCfg")).split()
     slow = " ".join([*fields[:5], "200", *fields[6:]])
     (folder / "slow.cfg").write_text(text.replace(" ".join(fields), slow))
-    t = np.arange(0, 4.6, 0.1)
-    yaw = 0.7 * np.sin(0.9 * t)
-    place = np.stack([-1.8 + 0.45 * t, 0.5 * np.sin(0.8 * t) - 0.4, 1.0 + 0 * t], axis=1)
+    t = np.arange(0, 3.6, 0.1)
+    yaw = 0.7 * np.sin(1.2 * t)
+    place = np.stack([-1.8 + 0.6 * t, 0.5 * np.sin(1.06 * t) - 0.4, 1.0 + 0 * t], axis=1)
     quaternions = Rotation.from_euler("z", yaw[:, None]).as_quat()
     np.savetxt(folder / "poses.tum", np.column_stack([t, place, quaternions]))
     return simulate(
-        PLACE, folder / "real.h5", trajectory=folder / "poses.tum", radar=str(folder / "slow.cfg"), duration=4.0, seed=3
+        PLACE, folder / "real.h5", trajectory=folder / "poses.tum", radar=str(folder / "slow.cfg"), duration=3.0, seed=3
     )
 
 
@@ -118,7 +119,7 @@ def compared(real, tmp_path_factory):
         "other seed": twin("seed"),
         "materials": twin("materials", metal),
         "3 cm": twin("small", recording=altered(real, folder / "a.h5", shaken(0.03, 1))),
-        "20 cm": twin("large", recording=altered(real, folder / "b.h5", shaken(0.2, 8))),
+        "10 cm": twin("large", recording=altered(real, folder / "b.h5", shaken(0.1, 4))),
         "elsewhere": twin("elsewhere", ELSEWHERE),
     }
 
@@ -135,14 +136,14 @@ def test_a_recording_is_like_itself(compared):
 
 def test_every_error_shows(compared):
     """From the best twin to the worst; speckle is the least of errors, and the wrong place the worst."""
-    order = ["itself", "same seed", "other seed", "3 cm", "20 cm", "elsewhere"]
+    order = ["itself", "same seed", "other seed", "3 cm", "10 cm", "elsewhere"]
     for name in ("correlation_range_azimuth", "similarity_range_azimuth", "profile_correlation"):
         values = [medians(compared[which])[name] for which in order]
-        assert np.all(np.diff(values[:-1]) < 0), (name, values)
+        assert np.all(np.diff(values) < 0), (name, values)
         assert values[2] - medians(compared["materials"])[name] > 0.03, name
     correlation = {which: medians(found)["correlation_range_azimuth"] for which, found in compared.items()}
-    assert correlation["other seed"] > 0.75 > correlation["3 cm"]
-    assert correlation["elsewhere"] < 0.3 and correlation["20 cm"] < 0.5
+    assert correlation["other seed"] > 0.85
+    assert correlation["elsewhere"] < 0.3
     distance = {which: found.frechet["range_azimuth"][0] for which, found in compared.items()}
     assert distance["other seed"] < 0.5 * distance["materials"]
 
@@ -150,8 +151,8 @@ def test_every_error_shows(compared):
 def test_velocities_follow_the_poses(compared):
     """Speckle, materials and even the place leave the velocity; poses that are off do not."""
     off = {which: medians(found)["velocity"] for which, found in compared.items()}
-    assert max(off["other seed"], off["elsewhere"]) < 0.05 < off["20 cm"]
-    errors = medians(compared["20 cm"])
+    assert max(off["other seed"], off["elsewhere"]) < 0.05 < off["10 cm"]
+    errors = medians(compared["10 cm"])
     assert errors["velocity_error_twin"] < 0.05 < errors["velocity_error_recording"]
 
 
@@ -181,7 +182,6 @@ def test_the_twin_takes_stamps_and_losses(real, tmp_path):
         assert np.array_equal(third.valid(0, 2), one.valid(0, 4)[::3])
         assert not third.adc(1, 2)[0, 5:9].any() and third.adc(1, 2)[0, 9:].any()
         assert len(third) == 2
-    assert medians(compare(real, real))["gain"] == 0
     assert medians(compare(tmp_path / "real.h5", made))["correlation_range_azimuth"] > 0.8
 
 
@@ -196,7 +196,7 @@ def test_a_wrong_clock_and_a_wrong_heading_are_told(real, tmp_path):
 
     first = make_twin(altered(real, tmp_path / "late.h5", late), PLACE, tmp_path / "t.h5", seed=9)
     with Recording(first) as recording:
-        assert "2 of 20 frames have no pose" in recording.attributes["warnings"]
+        assert "2 of 15 frames have no pose" in recording.attributes["warnings"]
     found = compare(tmp_path / "late.h5", first).misfits()
     assert found["time"][0] == pytest.approx(-0.4) and found["time"][1] > 0.1
     second = make_twin(altered(real, tmp_path / "turned.h5", turned), PLACE, tmp_path / "u.h5", seed=9)
@@ -206,8 +206,8 @@ def test_a_wrong_clock_and_a_wrong_heading_are_told(real, tmp_path):
     text = report_twin(real, second)[0].read_text()
     assert "heading, the mounting or the scene is turned" in text and "<img" in text
     figures = json.loads((tmp_path / "u.json").read_text())
-    assert figures["frames"] == 20 and len(figures["per_frame"]["correlation_range_azimuth"]) == 20
-    assert figures["misfits"]["azimuth"]["gain"] > 0.03
+    assert figures["frames"] == 15 and len(figures["per_frame"]["correlation_range_azimuth"]) == 15
+    assert figures["misfits"]["azimuth"]["gain"] > 0.05
 
 
 def test_poses_of_another_body_in_another_frame(real, tmp_path, compared):
@@ -281,9 +281,11 @@ def test_what_is_missing_is_said_in_a_sentence(real, tmp_path):
     )
     with pytest.raises(InputError, match="has no frame with the stamp of a frame"):
         compare(real, shifted)
-    simulate("physics/wall", tmp_path / "wall.h5", duration=0.1, radar="radarize", seed=1)
+    faster = PRESETS["radarize"]
+    with RecordingWriter(tmp_path / "faster.h5", faster) as writer:
+        writer.append(np.zeros((1, *faster.frame_shape), np.int16), np.zeros(1))
     with pytest.raises(InputError, match="frame_period is 0.0333"):
-        compare(real, tmp_path / "wall.h5")
+        compare(real, tmp_path / "faster.h5")
 
 
 def test_real_captures(recordings, tmp_path):

@@ -18,8 +18,9 @@ QUANTILES = (0.1, 0.5, 0.9)
 #: dB over a map's median that count: what is louder is as loud.
 DEPTH = 45.0
 #: Weights of MS-SSIM's scales from fine to coarse, and side of its Gaussian window of 1.5 cells (Wang, Simoncelli and
-#: Bovik, "Multiscale structural similarity for image quality assessment", Asilomar 2003; there the side is 11).
-SCALES, WINDOW = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333), 7
+#: Bovik, "Multiscale structural similarity for image quality assessment", Asilomar 2003). At the coarsest scale
+#: maps are mirrored at their borders.
+SCALES, WINDOW = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333), 11
 
 
 def foreground(maps: Float[np.ndarray, "frame row column"]) -> Float[np.ndarray, "frame row column"]:
@@ -45,15 +46,15 @@ def similarity(
     from torchmetrics.functional.image import multiscale_structural_similarity_index_measure as ms_ssim
 
     side = min(one.shape[1:])
-    scales = [n for n in range(2, len(SCALES) + 1) if side >= 2**n and side // (n - 1) ** 2 >= WINDOW]
+    scales = [n for n in range(2, len(SCALES) + 1) if side >> (n - 1) > WINDOW // 2]
     if not scales:
         return np.full(len(one), np.nan)
     weights = np.array(SCALES[: scales[-1]])
     found = [
         ms_ssim(
             *(torch.as_tensor(np.asarray(maps, np.float32))[:, None] for maps in (one[k : k + 64], other[k : k + 64])),
-            sigma=1.5, kernel_size=WINDOW, data_range=DEPTH, betas=tuple(weights / weights.sum()), reduction="none",
-            normalize="relu",
+            sigma=1.5, data_range=DEPTH, betas=tuple(weights / weights.sum()), reduction="none", normalize="relu",
+            kernel_size=1,  # of uniform windows; a Gaussian one's follows from sigma
         ).double().numpy()
         for k in range(0, len(one), 64)
     ]  # fmt: skip

@@ -42,7 +42,7 @@ SHIFTS = {"time": 1.5, "azimuth": np.radians(18.0), "range": 0.5}
 #: Frames that shifts are tried on, spread over the recording.
 _TRIED = 200
 #: A shift is told if maps correlate so much better with it, at least so well, and in so many frames.
-BETTER, WELL, FEWEST = 0.03, 0.3, 5
+BETTER, WELL, FEWEST = 0.05, 0.3, 5
 #: s by which stamps of the same frame may differ.
 _SAME = 1e-4
 #: Loops that noise and velocity are told from, at least.

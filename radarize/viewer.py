@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float, Shaped, UInt8
 
 from radarize.errors import InputError
-from radarize.evaluation.drawings import DEPTH, LEAKAGE
+from radarize.evaluation.drawings import LEAKAGE
 from radarize.evaluation.page import COLORS
 from radarize.evaluation.runfiles import read_map, read_scans
 from radarize.evaluation.trajectory import alignment, load, matched, planar
@@ -264,12 +264,12 @@ def _rgb(color: str) -> tuple[int, int, int]:
 def picture(
     levels: Float[np.ndarray, "frame row azimuth"], near: Shaped[np.ndarray, "row"]
 ) -> UInt8[np.ndarray, "frame row azimuth 3"]:
-    """Maps in dB as colours: `drawings.DEPTH` below the strongest cell, of those not `near`, to it; far is up and left
-    is left."""
+    """Maps in dB as colours, from a map's median to its strongest cell of those not `near`; far is up, left is left."""
     from matplotlib import colormaps
 
     top = levels[:, ~near].max(axis=(1, 2), keepdims=True)
-    shade = np.clip(1 + (levels - top) / DEPTH, 0, 1)[:, ::-1, ::-1]
+    low = np.median(levels, axis=(1, 2), keepdims=True)
+    shade = np.clip((levels - low) / np.maximum(top - low, 1e-6), 0, 1)[:, ::-1, ::-1]
     return colormaps["magma"](shade, bytes=True)[..., :3]
 
 
@@ -311,6 +311,6 @@ def _send_map(screen: Screen, found) -> None:
         "world/slam/map",
         rr.GridMap(
             data=found.pixels.tobytes(), format=form, cell_size=found.resolution, translation=[x, y, -0.01],
-            rotation_axis_angle=rr.RotationAxisAngle([0, 0, 1], yaw), opacity=0.8,
+            rotation_axis_angle=rr.RotationAxisAngle([0, 0, 1], yaw), opacity=0.8, colormap="grayscale",
         ),
     )  # fmt: skip

@@ -55,13 +55,13 @@ def open_bag(
     """
     with Bag(path) as bag:
         radar, others, warnings = _topics(bag)
-        first = next(message for _, _, message in bag.messages([radar]))
+        first = _first(bag, radar)
         config, assumed = _configure(path, first, config, overrides)
         config = _calibrated(config, first, warnings)
         companions = {}
         for topic, kind in others.items():
             try:
-                companions[topic] = kind(config, next(message for _, _, message in bag.messages([topic])))
+                companions[topic] = kind(config, _first(bag, topic))
             except InputError as error:
                 warnings.append(f"{topic} is left out: {error}")
         _intrinsics(bag, companions)
@@ -74,6 +74,12 @@ def open_bag(
     capture.attributes["topics"] = ", ".join([radar, *companions])
     capture.batches = _batches(path, radar, companions, capture, latency)
     return capture
+
+
+def _first(bag: Bag, topic: str) -> object:
+    for _, _, message in bag.messages([topic]):
+        return message
+    raise InputError(f"{bag.path}: has no message on {topic}, though its index counts {bag.topics[topic][1]}")
 
 
 def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:

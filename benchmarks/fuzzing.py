@@ -111,8 +111,8 @@ def main() -> None:
             "Valid files after bit flips, cuts, splices and edits of fields, or random bytes, drawn by hypothesis. "
             "None raised anything but a refusal in one sentence, crashed or hung.",
             f"More than {MOST_SECONDS:g} s, or {MOST_MEMORY >> 20} MiB and {MOST_TIMES} times its size in memory, "
-            "would have failed the input. Memory is what was resident beyond the state before; time is that of this machine "
-            "with all it did, making and placing the inputs included.",
+            "would have failed the input. Memory is what was resident beyond the state before; time is that of this "
+            "machine with all it did, making and placing the inputs included.",
         ],
     )
 

@@ -5,8 +5,12 @@ class InputError(Exception):
     """Something the user supplied cannot be used.
 
     Its text is one sentence that names the file or field, the value found and what was expected; the command
-    lines print it and exit with code 2.
+    lines print it and exit with code 2. What a file holds may be part of it: nothing in there reaches a terminal but
+    as printable characters.
     """
+
+    def __str__(self) -> str:
+        return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in super().__str__())
 
 
 def reason(error: Exception) -> str:

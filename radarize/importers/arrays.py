@@ -193,7 +193,7 @@ def _choose(path: Path, variable: str | None, shapes: dict[str, tuple[int, ...]]
     wanted = variable if variable is not None else large[0] if len(large) == 1 else None
     if wanted in shapes:
         return wanted
-    named = [f"{ascii(name)[1:41]} {'x'.join(map(str, shape))}" for name, shape in shapes.items()]
+    named = [f"{ascii(name[:40])[1:-1]} {'x'.join(map(str, shape))}" for name, shape in shapes.items()]
     found = ", ".join([*named[:12], *(["..."] if len(named) > 12 else [])])
     expected = f"one called {variable}" if variable is not None else "one of samples, or its name as variable"
     raise InputError(f"{path}: has arrays {found or '(none)'}, expected {expected}")

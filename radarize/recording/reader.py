@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import EllipsisType
@@ -13,25 +14,7 @@ from jaxtyping import Bool, Float, Int16
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.recording.damage import dataset, reading
-
-
-def _is_growing(path: Path) -> bool:
-    """Whether a writer has the file open, or died with it open: then HDF5 must read in its multiple-reader mode.
-
-    That mode retries without end where a file is cut short, so this is looked at first (superblock version 3: byte 11
-    holds the flags, bytes 28-35 the end of the file).
-
-    Raises:
-        OSError: the file is shorter than its writer left it.
-    """
-    with path.open("rb") as file:
-        head = file.read(48)
-    if len(head) < 48 or head[:8] != b"\x89HDF\r\n\x1a\n" or head[8] != 3 or not head[11] & 0b101:
-        return False
-    size, end = path.stat().st_size, int.from_bytes(head[28:36], "little")
-    if size < end:
-        raise OSError(f"truncated: has {size} bytes of at least {end}")
-    return True
+from radarize.recording.growing import GrowingFile, is_growing
 
 
 @dataclass
@@ -53,16 +36,15 @@ class Recording:
         self.path = Path(self.path)
         if not self.path.is_file():
             raise InputError(f"{self.path}: no such file, expected a recording (.h5)")
-        with reading(f"{self.path}: not a readable HDF5 recording"):
-            self.file = h5py.File(self.path, "r", libver="latest", swmr=_is_growing(self.path))
-        try:
+        with ExitStack() as stack:
+            with reading(f"{self.path}: not a readable HDF5 recording"):
+                source = stack.enter_context(GrowingFile(self.path)) if is_growing(self.path) else self.path
+                self.file = stack.enter_context(h5py.File(source, "r"))
             with reading(f"{self.path}: not a recording of this project"):
-                self._open()
-        except InputError:
-            self.file.close()
-            raise
+                self._look()
+            self._files = stack.pop_all()
 
-    def _open(self) -> None:
+    def _look(self) -> None:
         radar = self.file["radar"]
         self.config = RadarConfig.model_validate_json(radar.attrs["config"])
         self.cfg_text = str(radar.attrs.get("cfg", ""))
@@ -94,7 +76,7 @@ class Recording:
         return self
 
     def __exit__(self, *_) -> None:
-        self.file.close()
+        self._files.close()
 
     @property
     def attributes(self) -> dict[str, object]:

@@ -310,8 +310,8 @@ def _matlab73(path: Path, version: str) -> None:
 
 # --- recordings and bags ----------------------------------------------------------------------------------------------
 @functools.cache
-def _recording() -> bytes:
-    """A recording with streams of every kind."""
+def _recording() -> tuple[bytes, bytes]:
+    """A recording with streams of every kind, finished and growing."""
     ticks = np.arange(0, 0.15, 0.005)
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.h5"
@@ -341,19 +341,21 @@ def _recording() -> bytes:
         plan = {"truth/plan": Product(np.ones((4, 4)), "m", "")}
         with RecordingWriter(path, CONFIG, cfg_text=write_cfg(CONFIG), streams=streams, products=plan) as writer:
             writer.append(FRAMES, CONFIG.frame_period * np.arange(3), rows=rows)
-        return path.read_bytes()
+            writer.flush()
+            growing = writer.part.read_bytes()
+        return path.read_bytes(), growing
 
 
 def recording() -> Reader:
-    """Our HDF5: bytes damaged, or sound HDF5 (with and without checksums) with other content."""
+    """Our HDF5: bytes damaged (finished, without checksums, growing), or sound HDF5 with other content."""
     with tempfile.TemporaryDirectory() as folder:
         new, old = Path(folder) / "new.h5", Path(folder) / "old.h5"
-        new.write_bytes(_recording())
+        new.write_bytes(_recording()[0])
         with h5py.File(new) as source, h5py.File(old, "w", libver="earliest") as target:
             target.attrs.update(source.attrs)
             for name in source:
                 source.copy(name, target)
-        seeds = [new.read_bytes(), old.read_bytes()]
+        seeds = [new.read_bytes(), old.read_bytes(), _recording()[1]]
 
     def place(what: bytes | list[tuple], folder: Path) -> Path:
         path = folder / "a.h5"
@@ -371,7 +373,7 @@ def bags(kind: str) -> Reader:
     """ROS bags: ``bag`` (ROS 1), ``mcap`` or ``db3``."""
     with tempfile.TemporaryDirectory() as name:
         source, path = Path(name) / "a.h5", Path(name) / f"a.{kind}"
-        source.write_bytes(_recording())
+        source.write_bytes(_recording()[0])
         if kind == "bag":
             seeds = [write_published(path, source).read_bytes()]
         else:

@@ -1,16 +1,21 @@
 """The one exception that users meet."""
 
+#: Characters of a sentence that somebody reads.
+_LONGEST = 1000
+
 
 class InputError(Exception):
     """Something the user supplied cannot be used.
 
     Its text is one sentence that names the file or field, the value found and what was expected; the command
-    lines print it and exit with code 2. What a file holds may be part of it: nothing in there reaches a terminal but
-    as printable characters.
+    lines print it and exit with code 2. What a file holds may be part of it: it is shown as printable characters, and
+    not at any length.
     """
 
     def __str__(self) -> str:
-        return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in super().__str__())
+        text = super().__str__()
+        text = text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
+        return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def reason(error: Exception) -> str:

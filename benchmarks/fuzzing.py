@@ -23,7 +23,7 @@ from tests.fuzzing.readers import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, READERS
 
 #: Inputs by reader, at --scale 1: more than 100,000 in all.
 INPUTS = {
-    "SDK .cfg": 15_000,
+    "SDK .cfg": 16_000,
     "mmWave Studio JSON": 10_000,
     "TUM poses": 5_000,
     "UDP packets": 20_000,
@@ -32,10 +32,10 @@ INPUTS = {
     "npy": 6_000,
     "npz": 6_000,
     "mat": 6_000,
-    "HDF5 recording": 10_000,
-    "ROS 1 bag": 3_000,
-    "ROS 2 mcap": 3_000,
-    "ROS 2 db3": 3_000,
+    "HDF5 recording": 12_000,
+    "ROS 1 bag": 2_000,
+    "ROS 2 mcap": 2_000,
+    "ROS 2 db3": 2_000,
 }
 #: Inputs of one seed: hypothesis remembers what it has tried.
 _BATCH = 500
@@ -87,7 +87,7 @@ def main() -> None:
         folder = Path(tempfile.mkdtemp(prefix="fuzzing-"))
         ours, theirs = context.Pipe(duplex=False)
         count = round(options.scale * INPUTS[name])
-        process = context.Process(target=try_all, args=(name, count, options.seed, folder, theirs))
+        process = context.Process(target=try_all, args=(name, count, options.seed, folder, theirs), daemon=True)
         process.start()
         theirs.close()
         try:

@@ -1,6 +1,7 @@
 """`radarize capture` against `radarsim emulate`, each a process of its own: frames lost, and what each side costs."""
 
 import argparse
+import os
 import re
 import signal
 import subprocess
@@ -150,6 +151,11 @@ def main() -> None:
         "and every chirp's mark with what the network's seed says was lost.",
         "Frames are not written if disk or processor are too slow for them; the emulator is late if it gets no time.",
     ]
+    group = Path("/proc/self/autogroup")
+    notes.append(
+        f"Other work on the machine: load average {os.getloadavg()[2]:.1f}; priority of emulator and capture together: "
+        f"{group.read_text().split(maxsplit=1)[1].strip() if group.exists() else 'that of any process'}."
+    )
     notes += [f"{row['configuration']}: {said}." for row, said in zip(rows, heard, strict=True) if said]
     publish("capture_speed", "Capture at the virtual radar", rows, seed=arguments.seed, notes=notes)
 

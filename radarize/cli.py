@@ -164,7 +164,8 @@ def live(
     from radarize.capture.live import Live, prepare
     from radarize.capture.page import Page
     from radarize.capture.replay import Replay
-    from radarize.pipeline import Pipeline, best_methods
+    from radarize.methods import best_methods
+    from radarize.pipeline import Pipeline
     from radarize.recording import RecordingWriter
 
     if replay and (config or port):
@@ -224,7 +225,9 @@ def info(recording: RecordingFile, as_json: AsJson = False):
 def run_(
     recording: RecordingFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
-    odometry: Annotated[str | None, typer.Option(help="Where motion comes from: fused, learned or doppler.")] = None,
+    odometry: Annotated[
+        str | None, typer.Option(help="Where motion comes from: fused, learned, doppler or scan-matching.")
+    ] = None,
     scans: Annotated[
         str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
     ] = None,

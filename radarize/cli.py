@@ -53,7 +53,12 @@ def import_(
         str | None, typer.Option(metavar="AXES", help="Of an array: frame,loop,tx,rx,sample in its order, or lengths.")
     ] = None,
     variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
-    latency: Annotated[float, typer.Option(help="From a frame's start to its receipt in a bag, s.")] = 0.0,
+    latency: Annotated[
+        float | None,
+        typer.Option(
+            help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
+        ),
+    ] = None,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,

@@ -17,6 +17,8 @@ from radarize.recording import Recording
 from radarize.training.maps import MAPS
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
+from radarsim.planner import plan_motion
+from radarsim.scene.scene import Scene
 
 PLAIN = {
     "name": "tiny",
@@ -64,7 +66,7 @@ objects:
   - {name: floor, shape: rectangle, size: [6, 4], position: [3, 2, 0], facing: [0, 0, 1], material: vinyl}
   - {name: wall, shape: rectangle, size: [4, 2.5], position: [6, 2, 1.25], facing: [-1, 0, 0], material: wood}
 levels:
-  - objects: [{name: crate, shape: box, size: [0.5, 0.5, 2], position: [3, 2.95, 1.01], material: metal}]
+  - objects: [{name: crate, shape: box, size: [0.5, 0.5, 2], position: [2.2, 2.9, 1.01], material: metal}]
 """
 
 
@@ -93,10 +95,13 @@ def test_variants_of_a_recording_share_its_walk(tmp_path):
             )  # fmt: skip
     poses = {name: pose for name, (pose, *_) in seen.items()}
     np.testing.assert_array_equal(poses["severe"], poses["mild"])
+    route, places = np.random.default_rng(task.seed).spawn(2)[0], np.array(group["waypoints"])
+    own = plan_motion(Scene.load(f"{tmp_path / 'hall.yaml'}@1"), "cart", 2.0, route, places)
+    assert np.abs(own.position(np.array([1.9])) - poses["mild"][-1, :3]).max() > 0.05
     np.testing.assert_allclose(poses["coarse"], poses["mild"][::3][: len(poses["coarse"])], atol=2e-3)
     np.testing.assert_allclose(poses["high"][:, :2], poses["low"][:, :2], atol=0.02)
     np.testing.assert_allclose(poses["high"][:, 2] - poses["low"][:, 2], 0.6, atol=0.01)
-    assert np.ptp(poses["mild"][:, 0]) > 0.2
+    assert np.ptp(poses["mild"][:, 0]) > 0.1
     assert (seen["severe"][1] != seen["mild"][1]).any()
     assert seen["coarse"][2].samples == 48 and 'noise":false' in seen["coarse"][3]["front_end"]
     facts = seen["severe"][3]

@@ -16,7 +16,8 @@ from benchmarks.results import publish
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
-from radarize.pipeline import BEST, CLASSICAL, Pipeline, best_methods
+from radarize.methods import BEST, CLASSICAL, best_methods
+from radarize.pipeline import Pipeline
 from radarsim.simulate import simulate
 
 

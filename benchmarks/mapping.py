@@ -13,8 +13,8 @@ from benchmarks.results import publish
 from radarize.evaluation.evaluate import evaluate
 from radarize.evaluation.runfiles import read_scans
 from radarize.evaluation.scans import true_ranges, wrong_by_cause
-from radarize.odometry.methods import ODOMETRY
-from radarize.pipeline import BEST, SCANS, run
+from radarize.methods import BEST, ODOMETRY, SCANS
+from radarize.pipeline import run
 from radarize.recording import Recording
 from radarsim.sensors.causes import CAUSES
 

@@ -13,10 +13,9 @@ from benchmarks.results import publish
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
 from radarize.evaluation.motion import turn_errors, velocity_errors
 from radarize.evaluation.trajectory import trajectory
-from radarize.odometry.methods import ODOMETRY, Weights, make_odometry
+from radarize.methods import BEST, ODOMETRY, Inputs, Weights
 from radarize.pipeline import BATCH
 from radarize.recording import Recording
-from radarize.training.maps import MapMaker
 from radarize.tum import planar, planar_poses
 
 #: Frames that the paper's network tells a turn over: 0.27 s.
@@ -50,11 +49,11 @@ class Followed:
 def follow(case: Case, methods: Sequence[str], weights: Path | None) -> dict[str, Followed]:
     """A recording by every method; they share its spectra and maps."""
     with Recording(case.path) as recording:
-        maker = MapMaker(recording.config)
-        odometries = {method: make_odometry(method, maker, Weights(weights)) for method in methods}
+        inputs = Inputs(recording.config, Weights(weights), BEST["scans"], recording)
+        odometries = {method: inputs.odometry(method) for method in methods}
         tracks = {method: [] for method in methods}
         for frames, adc in recording.batches(BATCH):
-            spectrum = maker.heatmaps.spectrum(adc, recording.valid(frames.start, frames.stop))
+            spectrum = inputs.heatmaps.spectrum(adc, recording.valid(frames.start, frames.stop))
             for method, odometry in odometries.items():
                 tracks[method].append(odometry.follow(spectrum, recording.times[frames]))
         poses, velocity = recording.read("truth/pose"), recording.read("truth/velocity")[:, :2]

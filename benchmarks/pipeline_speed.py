@@ -7,8 +7,8 @@ import time
 from pathlib import Path
 
 from benchmarks.results import peak_memory_mb, publish
-from radarize.odometry.methods import Weights
-from radarize.pipeline import BATCH, BEST, CLASSICAL, Pipeline
+from radarize.methods import BEST, CLASSICAL, Weights
+from radarize.pipeline import BATCH, Pipeline
 from radarize.recording import Recording
 from radarsim.simulate import simulate
 

@@ -53,7 +53,12 @@ def import_(
         str | None, typer.Option(metavar="AXES", help="Of an array: frame,loop,tx,rx,sample in its order, or lengths.")
     ] = None,
     variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
-    latency: Annotated[float, typer.Option(help="From a frame's start to its receipt in a bag, s.")] = 0.0,
+    latency: Annotated[
+        float | None,
+        typer.Option(
+            help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
+        ),
+    ] = None,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -159,7 +164,8 @@ def live(
     from radarize.capture.live import Live, prepare
     from radarize.capture.page import Page
     from radarize.capture.replay import Replay
-    from radarize.pipeline import Pipeline, best_methods
+    from radarize.methods import best_methods
+    from radarize.pipeline import Pipeline
     from radarize.recording import RecordingWriter
 
     if replay and (config or port):
@@ -219,7 +225,9 @@ def info(recording: RecordingFile, as_json: AsJson = False):
 def run_(
     recording: RecordingFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
-    odometry: Annotated[str | None, typer.Option(help="Where motion comes from: fused, learned or doppler.")] = None,
+    odometry: Annotated[
+        str | None, typer.Option(help="Where motion comes from: fused, learned, doppler or scan-matching.")
+    ] = None,
     scans: Annotated[
         str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
     ] = None,

@@ -12,7 +12,9 @@ app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as ra
 scene_app = typer.Typer(help="Look at a scene without simulating it.", no_args_is_help=True)
 app.add_typer(scene_app, name="scene")
 
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene of this project (office) or a .yaml file.")]
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A scene of this project (office, stress/corner@2) or a file.")
+]
 
 
 @app.command()
@@ -84,7 +86,7 @@ def simulate(
 @app.command()
 def dataset(
     specification: Annotated[
-        Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, training, evaluation, radarize146.")
+        Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, training, evaluation, stress, ...")
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the recordings.")],
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,

@@ -5,13 +5,16 @@ there, each a function of `Maps` that returns fractional range bins. A network j
 """
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+import torch
+from jaxtyping import Bool, Complex64, Float
 from pydantic import BaseModel, ConfigDict, Field
 
 from radarize.errors import InputError
+from radarize.heatmaps import Heatmaps
 from radarize.mapping import echoes
 
 #: Bearings of a scan: 88 columns of 1 deg, -44...+43 deg, left positive, rad (the paper's field of view).
@@ -154,6 +157,49 @@ def make_scans(
     )
     bins = METHODS[method](maps)
     return np.where(np.isfinite(bins), ranges[0] + bins * (ranges[1] - ranges[0]), np.inf)
+
+
+class HeatmapScans:
+    """Scans of a stream's frames, from heat maps alone.
+
+    Args:
+        heatmaps: make the maps.
+        method: a key of `METHODS`.
+        config: parameters of detection.
+        stage: entered with ``"maps"`` where maps are made, to time it.
+
+    Raises:
+        InputError: the array has no elevation-aware maps, and the method needs them.
+    """
+
+    def __init__(
+        self,
+        heatmaps: Heatmaps,
+        method: str,
+        config: ScanConfig | None = None,
+        stage: Callable[[str], AbstractContextManager] = nullcontext,
+    ):
+        if method == "elevation-aware" and heatmaps.pairs is None:
+            raise InputError(
+                "scans is 'elevation-aware', which needs antennas of two heights; this radar has none, use first-echo"
+            )
+        self.heatmaps, self.method, self.config = heatmaps, method, config or ScanConfig()
+        self._stage = stage
+
+    def scan(
+        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
+    ) -> Float[np.ndarray, "frame bearing"]:
+        """Ranges on `BEARINGS`, m, inf where nothing is seen."""
+        maps, level, reference = self.heatmaps, None, None
+        with self._stage("maps"):
+            # Scans want Capon's sharp beams; the horizon is told from two maps of one beamformer, Bartlett's.
+            sharp = maps.range_azimuth_of(spectrum, "capon").numpy()
+            if self.method == "elevation-aware":
+                level = maps.elevation_aware_of(spectrum).numpy()
+                reference = maps.range_azimuth_of(spectrum).numpy()
+        return make_scans(
+            sharp, maps.ranges, maps.azimuths, level, reference=reference, method=self.method, config=self.config
+        )
 
 
 def _resample(power: np.ndarray, azimuths: np.ndarray) -> np.ndarray:

@@ -145,26 +145,48 @@ def load(path: Path, config: RadarConfig | None = None) -> tuple[nn.Module, Head
     """
     tensors, about = read(path)
     try:
-        header = Header.model_validate(about)
-        for value, known in ((header.setting, SETTINGS), (header.kind, SETTINGS["corrected"].nets)):
-            if value not in known:
-                raise InputError(f"{path}: is a network for {value!r}, expected one of: {', '.join(known)}")
+        header = _header(about, path)
         net = build(header)
         net.load_state_dict(tensors)
-    except (ValidationError, ValueError, RuntimeError) as error:
-        reason = str(error).splitlines()[0].rstrip(":")
-        raise InputError(f"{path}: its weights do not fit its header ({reason})") from error
+    except (ValueError, RuntimeError) as error:
+        raise _misfit(path, error) from error
     if config is not None:
-        difference = header.grid.difference(Grid.of(config, header.maps[0], header.setting), ignore=("frame_period",))
-        try:
-            header.stride(config)
-        except ValueError as error:
-            difference = difference or str(error)
-        if difference:
-            raise InputError(
-                f"{path}: does not fit this radar, whose maps have {difference}; it needs weights of its own"
-            )
+        _check(header, config, path)
     return net.eval(), header
+
+
+def check(path: Path, config: RadarConfig) -> None:
+    """Whether a network reads a radar's maps, by its header alone.
+
+    Raises:
+        InputError: see `load`.
+    """
+    _check(_header(read(path, tensors=False)[1], path), config, path)
+
+
+def _header(about: dict[str, Any], path: Path) -> Header:
+    try:
+        header = Header.model_validate(about)
+    except ValidationError as error:
+        raise _misfit(path, error) from error
+    for value, known in ((header.setting, SETTINGS), (header.kind, SETTINGS["corrected"].nets)):
+        if value not in known:
+            raise InputError(f"{path}: is a network for {value!r}, expected one of: {', '.join(known)}")
+    return header
+
+
+def _misfit(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path}: its weights do not fit its header ({str(error).splitlines()[0].rstrip(':')})")
+
+
+def _check(header: Header, config: RadarConfig, path: Path) -> None:
+    difference = header.grid.difference(Grid.of(config, header.maps[0], header.setting), ignore=("frame_period",))
+    try:
+        header.stride(config)
+    except ValueError as error:
+        difference = difference or str(error)
+    if difference:
+        raise InputError(f"{path}: does not fit this radar, whose maps have {difference}; it needs weights of its own")
 
 
 def shipped(kind: str) -> Path:
@@ -184,8 +206,8 @@ def write(tensors: dict[str, Tensor], about: dict[str, Any], path: Path) -> None
         part.write_bytes(data)  # safetensors' own writer hides the file from other users
 
 
-def read(path: Path) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
-    """What `write` wrote.
+def read(path: Path, tensors: bool = True) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
+    """What `write` wrote, or its header alone.
 
     Raises:
         InputError: no such file, or none of this project.
@@ -195,7 +217,7 @@ def read(path: Path) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
     try:
         with safe_open(path, "pt") as file:
             about = json.loads((file.metadata() or {})["radarize"])
-            return {name: file.get_tensor(name) for name in file.keys()}, about  # noqa: SIM118
+            return {name: file.get_tensor(name) for name in (file.keys() if tensors else ())}, about
     except (OSError, SafetensorError, KeyError, ValueError) as error:
         reason = "has no header of radarize" if isinstance(error, KeyError) else str(error)
         raise InputError(f"{path}: is no file of weights of this project ({reason})") from error

@@ -67,7 +67,6 @@ class LearnedRotation:
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
         self._yaws = Ties(size, jerk, fastest)
 
-    @torch.inference_mode()
     def estimate(
         self,
         spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
@@ -75,13 +74,7 @@ class LearnedRotation:
         velocities: Velocities,
     ) -> Rotations:
         """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
-        windows = self._windows.push(spectrum, self.spacings)
-        travel = self._travel(np.asarray(times, float), velocities.velocity)
-        shown = torch.cat(windows)
-        mean, variance = self._windows.net.estimate(shown, torch.from_numpy(travel).float())
-        lost = silent(shown)
-        mean[lost], variance[lost] = 0.0, _ANY_TURN**2
-        turns = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)
+        turns = self.turns(spectrum, times, velocities)
         yaw, growth = np.zeros(len(times)), np.zeros(len(times))
         for i in range(len(times)):
             before, known = self._yaws.values[-1], self._yaws.covariance[-1, -1]
@@ -92,6 +85,27 @@ class LearnedRotation:
             yaw[i] = self._yaws.values[-1] - before
             growth[i] = max(self._yaws.covariance[-1, -1] - known, 1e-8)
         return Rotations(yaw, growth, np.zeros(len(times)))
+
+    @property
+    def stride(self) -> int:
+        """The radar's frames from one of the network's to the next."""
+        return self._windows.stride
+
+    @torch.inference_mode()
+    def turns(
+        self,
+        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
+        times: Float[np.ndarray, "frame"],
+        velocities: Velocities,
+    ) -> Float[np.ndarray, "spacing frame 2"]:
+        """What the network says of the next frames: turns (rad) over each of `spacings` until them, and variances."""
+        windows = self._windows.push(spectrum, self.spacings)
+        travel = self._travel(np.asarray(times, float), velocities.velocity)
+        shown = torch.cat(windows)
+        mean, variance = self._windows.net.estimate(shown, torch.from_numpy(travel).float())
+        lost = silent(shown)
+        mean[lost], variance[lost] = 0.0, _ANY_TURN**2
+        return torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)
 
     def _travel(self, times: np.ndarray, velocities: np.ndarray) -> Float[np.ndarray, "window 2"]:
         """What `RotationNet` wants to be told of the windows, spacing by spacing."""

@@ -7,8 +7,8 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from radarize.errors import InputError
-from radarize.recording.streams import Product, Stream, reason
+from radarize.errors import InputError, reason
+from radarize.recording.streams import Product, Stream
 from radarize.recording.writer import grow
 from radarize.replacing import replacing
 

@@ -6,8 +6,9 @@ import pytest
 from radarize.odometry.ties import Ties
 
 
-def test_it_is_least_squares_over_everything(rng=np.random.default_rng(0)):
+def test_it_is_least_squares_over_everything():
     """The filter's newest value and variance are those of one normal equation for all frames."""
+    rng = np.random.default_rng(0)
     frames, dt, change, fastest, back, noise = 6, 0.1, 0.5, 2.0, 3, 0.04
     ties = Ties(frames, change, fastest)
     measured = rng.normal(0, 1, frames)

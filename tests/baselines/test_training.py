@@ -25,7 +25,7 @@ ROWS, PERIOD = 16, 1 / 15
 GRID = Grid(rows=ROWS, step=0.2, azimuths=80, field=float(AZIMUTHS[-1] - AZIMUTHS[0]), frame_period=PERIOD)
 QUICK = {
     "radarhd": replace(BASELINE_TASKS["radarhd"].defaults, width=4, frames=3, epochs=6, batch=8, rate=5e-3),
-    "milliego": replace(BASELINE_TASKS["milliego"].defaults, width=4, frames=3, epochs=9, batch=8, rate=1e-3),
+    "milliego": replace(BASELINE_TASKS["milliego"].defaults, width=4, frames=3, epochs=6, batch=8, rate=5e-4),
     "rnin": replace(BASELINE_TASKS["rnin"].defaults, width=4, frames=3, epochs=10, batch=8, rate=3e-3),
 }
 ALONE = Team(0, 1, torch.device("cpu"))
@@ -39,7 +39,7 @@ def _one_thread():
     torch.set_num_threads(before)
 
 
-def table(kind: str, seed: int, frames: int = 240) -> Table:
+def table(kind: str, seed: int, frames: int) -> Table:
     """Frames by a law that the kind's network can learn in seconds."""
     rng = np.random.default_rng(seed)
     tensor = torch.from_numpy
@@ -79,7 +79,7 @@ def test_networks_learn(kind, monkeypatch):
     task = BASELINE_TASKS[kind]
     monkeypatch.setattr(type(task), "spacings", lambda self, period: (3,) if kind == "milliego" else (1,))
     monkeypatch.setattr(type(task), "share", 1.0)
-    trainer = Trainer(task, QUICK[kind], table(kind, 0), table(kind, 1, 120), ALONE)
+    trainer = Trainer(task, QUICK[kind], table(kind, 0, 400 if kind == "milliego" else 240), table(kind, 1, 120), ALONE)
     while not trainer.finished:
         trainer.train_epoch()
     found = trainer.finish()

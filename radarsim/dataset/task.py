@@ -104,7 +104,7 @@ class Task:
             raise Stale(f"{self.name} does not come from a data set")
         made, complete = json.loads(str(made)), True
         for key, wanted in json.loads(self.identity).items():
-            if key == "sensors" and made.get(key) != wanted and _can_follow(made.get(key), wanted):
+            if key == "sensors" and self._replanned and _can_follow(made.get(key), wanted):
                 complete = False
             elif made.get(key) != wanted:
                 raise Stale(f"{self.name} has {key} {_short(made.get(key))}, now {_short(wanted)}")
@@ -173,10 +173,13 @@ class Task:
                 path.unlink(missing_ok=True)
         return str(moved)
 
+    @property
+    def _replanned(self) -> bool:
+        """Whether its walk can be planned anew: a tour of the platform's own."""
+        return self.waypoints is None and self.variant == Variant()
+
     def _late(self, folder: Path) -> list[str]:
         """Sensors that a recording of this task, otherwise finished, has yet to get."""
-        if self.waypoints is not None or self.variant != Variant():
-            return []  # only a tour of the platform's own is planned anew
         try:
             if not self.path(folder).is_file() or self.is_finished(folder):
                 return []

@@ -123,13 +123,14 @@ def simulate(
     *,
     platform: str = "handheld",
     trajectory: Path | None = None,
-    waypoints: Path | None = None,
+    waypoints: Path | Float[np.ndarray, "n 2"] | None = None,
+    planned_in: Scene | None = None,
     mounting: Mounting | None = None,
     duration: float | None = None,
     seed: int = 0,
-    radar: str = "radarize",
+    radar: str | RadarConfig = "radarize",
     device: str = "cpu",
-    frontend: Path | None = None,
+    frontend: Path | FrontEndConfig | None = None,
     provenance: bool = False,
     engine: str = "radarsim",
     sensors: Sequence[str] = (),
@@ -144,13 +145,16 @@ def simulate(
         platform: ``handheld``, ``cart`` or ``robot``: how a planned tour moves.
         trajectory: TUM file of poses to follow instead of a planned tour; of the sensor, or if there is a mounting, of
             the body that carries it.
-        waypoints: file of places to go through on the platform (see `waypoints.read_waypoints`) instead of a tour.
+        waypoints: places to go through on the platform instead of a tour, m, or a file of them
+            (`waypoints.read_waypoints`).
+        planned_in: the scene for which tour or walk is planned, so that scenes which differ can share one; default:
+            the scene itself.
         mounting: of the sensor on the platform; default: the platform's own.
         duration: s; default: 40 s of a tour, or all of a trajectory or walk, which end the recording if shorter.
         seed: of the tour, the scatterers and the noise.
-        radar: preset or configuration file.
+        radar: preset, configuration file or configuration.
         device: ``cpu`` or ``cuda``.
-        frontend: front-end file (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
+        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
         provenance: also write I/Q by cause, before noise and converter, as /truth/adc_by_cause. Such recordings are
             several times as large.
         engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver, for comparison. Its known defects
@@ -181,17 +185,17 @@ def simulate(
     if engine not in ("radarsim", "sionna"):
         raise InputError(f"engine is {engine!r}, expected radarsim or sionna")
     chosen(sensors)
-    settings = FrontEndConfig.load(frontend) if frontend else FrontEndConfig()
+    settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     route, physics = np.random.default_rng(seed).spawn(2)
     if trajectory is not None and waypoints is not None:
         raise InputError("both a trajectory and way-points are given, expected one of them")
     if trajectory is not None:
         motion = motion_from_tum(trajectory, mounting)
-    elif waypoints is not None:
-        motion = plan_motion(world, platform, duration, route, read_waypoints(waypoints), mounting)
     else:
-        motion = plan_motion(world, platform, _TOUR if duration is None else duration, route, mounting=mounting)
+        places = read_waypoints(waypoints) if isinstance(waypoints, (str, Path)) else waypoints
+        length = _TOUR if duration is None and places is None else duration
+        motion = plan_motion(planned_in or world, platform, length, route, places, mounting)
     motion = motion if duration is None else motion.until(duration)
     crossed = crossings(motion, world)
     simulator = Simulator(world, motion, config, physics, device, settings, engine)
@@ -208,7 +212,7 @@ def simulate(
         "engine": engine,
         "front_end": settings.model_dump_json(),
         "motion": motion.statistics(world).json(),
-        "warnings": f"{trajectory or waypoints or 'tour'}: {crossed}" if crossed else "",
+        "warnings": f"{trajectory or 'walk'}: {crossed}" if crossed else "",
     }
     if engine == "radarsim":
         facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}

@@ -190,6 +190,14 @@ class Recording:
         data = self.file[name]
         return {"shape": data.shape, "dtype": str(data.dtype), **{k: data.attrs.get(k, "") for k in ("unit", "about")}}
 
+    def labels(self, name: str) -> tuple[str, ...]:
+        """What the values 0, 1, ... of a data set stand for; empty where they are numbers.
+
+        Raises:
+            InputError: there is no data set of that name.
+        """
+        return tuple(map(str, self._dataset(name).attrs.get("labels", ())))
+
     def config_json(self) -> dict[str, object]:
         """The radar configuration as plain data."""
         return json.loads(self.config.model_dump_json())

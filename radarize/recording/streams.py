@@ -18,6 +18,7 @@ class Stream:
         about: one sentence for the reader.
         clock: data set that says which instant (float, s) or frame (integer) each row belongs to; ``radar/time``: the
             rows are the frames.
+        labels: what the values 0, 1, ... stand for, where they stand for something.
     """
 
     shape: tuple[int, ...]
@@ -25,6 +26,7 @@ class Stream:
     unit: str
     about: str
     clock: str = "radar/time"
+    labels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -105,6 +105,8 @@ class RecordingWriter:
             **packed,
         )
         data.attrs.update({"unit": stream.unit, "about": stream.about, "clock": stream.clock})
+        if stream.labels:
+            data.attrs["labels"] = stream.labels
 
     def append(
         self,

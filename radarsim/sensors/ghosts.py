@@ -51,7 +51,10 @@ class Ghosts(Sensor):
                 (len(Provenance), *shape), "f2", "dB of ADC counts^2",
                 f"range-azimuth power by cause ({names}), not below {DEPTH:g} dB under the noise",
             ),
-            "truth/cause": Stream(shape, "u1", "", f"strongest cause of a range-azimuth cell: {labels}, {NOISE} noise"),
+            "truth/cause": Stream(
+                shape, "u1", "", f"strongest cause of a range-azimuth cell: {labels}, {NOISE} noise",
+                labels=CAUSES,
+            ),
         }  # fmt: skip
         self.products = {
             "truth/cause_ranges": Product(config.ranges - config.range_bias, "m", "range bins of /truth/cause"),

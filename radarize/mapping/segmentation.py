@@ -50,7 +50,15 @@ class Segmentation:
 def first_surface(
     occupancy: Float[np.ndarray, "frame range bearing"], least: float
 ) -> Float[np.ndarray, "frame bearing"]:
-    """Fractional range bin of every bearing's first surface, inf where none is likely enough.
+    """Fractional range bin of every bearing's first surface, inf where none is likely enough."""
+    bins, probability = likeliest(occupancy)
+    return np.where(probability >= least, bins, np.inf)
+
+
+def likeliest(
+    occupancy: Float[np.ndarray, "frame range bearing"],
+) -> tuple[Float[np.ndarray, "frame bearing"], Float[np.ndarray, "frame bearing"]]:
+    """Fractional range bin where every bearing's first surface is likeliest, and how likely it is that near.
 
     With h the probability of a cell if nothing is before it, the first surface is in a cell with probability
     h * product over nearer cells of (1 - h): behind a surface hardly anything is left for ghosts, which is the
@@ -62,7 +70,7 @@ def first_surface(
     mass, moment = (_stretches(values) for values in (here, place))
     best = mass.argmax(axis=1)[:, None]
     mass, moment = (np.take_along_axis(values, best, axis=1)[:, 0] for values in (mass, moment))
-    return np.where(mass >= least, moment / np.maximum(mass, 1e-12), np.inf)
+    return moment / np.maximum(mass, 1e-12), mass
 
 
 def _stretches(values: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame range bearing"]:

@@ -68,7 +68,6 @@ class LearnedRotation:
         self._yaws, self._covariance = np.zeros(size), np.zeros((size, size))  # oldest first
         self._seen = 0
 
-    @torch.inference_mode()
     def estimate(
         self,
         spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
@@ -76,13 +75,7 @@ class LearnedRotation:
         velocities: Velocities,
     ) -> Rotations:
         """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
-        windows = self._windows.push(spectrum, self.spacings)
-        travel = self._travel(np.asarray(times, float), velocities.velocity)
-        shown = torch.cat(windows)
-        mean, variance = self._windows.net.estimate(shown, torch.from_numpy(travel).float())
-        lost = silent(shown)
-        mean[lost], variance[lost] = 0.0, _ANY_TURN**2
-        turns = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)
+        turns = self.turns(spectrum, times, velocities)
         yaw, growth = np.zeros(len(times)), np.zeros(len(times))
         for i in range(len(times)):
             before, known = self._yaws[-1], self._covariance[-1, -1]
@@ -93,6 +86,22 @@ class LearnedRotation:
             yaw[i] = self._yaws[-1] - before
             growth[i] = max(self._covariance[-1, -1] - known, 1e-8)
         return Rotations(yaw, growth, np.zeros(len(times)))
+
+    @torch.inference_mode()
+    def turns(
+        self,
+        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
+        times: Float[np.ndarray, "frame"],
+        velocities: Velocities,
+    ) -> Float[np.ndarray, "spacing frame 2"]:
+        """What the network says of the next frames: turns (rad) over each of `spacings` until them, and variances."""
+        windows = self._windows.push(spectrum, self.spacings)
+        travel = self._travel(np.asarray(times, float), velocities.velocity)
+        shown = torch.cat(windows)
+        mean, variance = self._windows.net.estimate(shown, torch.from_numpy(travel).float())
+        lost = silent(shown)
+        mean[lost], variance[lost] = 0.0, _ANY_TURN**2
+        return torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)
 
     def _travel(self, times: np.ndarray, velocities: np.ndarray) -> Float[np.ndarray, "window 2"]:
         """What `RotationNet` wants to be told of the windows, spacing by spacing."""

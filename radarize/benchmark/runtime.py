@@ -8,7 +8,7 @@ from radarize.pipeline import BATCH
 
 #: Stages as the paper lists them, of ours.
 STAGES = {
-    "preprocess": ("spectra", "maps"),
+    "preprocess": ("spectra", "maps", "points"),
     "translation": ("translation",),
     "rotation": ("rotation",),
     "map": ("scans",),
@@ -20,7 +20,7 @@ PAPER = {
     "AGX Orin": (11.76, 7.57, 14.78, 9.43, 4.68, 31.22),
 }
 NOTES = [
-    "ms per frame. Preprocess: range and Doppler spectra, and the heat maps that networks or thresholds read. Fused "
+    "ms per frame. Preprocess: range and Doppler spectra, and the heat maps or points that methods read. Fused "
     "translation and rotation hold the classical estimators as well. Other: odometry that is not made of these two.",
     "Longest path: preprocessing, the slowest of translation, rotation and map beside each other, and SLAM, as the "
     "paper adds up; here stages run one after the other, so the whole is their sum and the reading.",

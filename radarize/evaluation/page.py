@@ -42,7 +42,9 @@ figcaption { color: var(--soft); font-size: 13.5px; }
 .columns { display: grid; grid-template-columns: repeat(auto-fit, minmax(300px, 1fr)); gap: 8px 32px; }
 .wide { overflow-x: auto; }
 a { color: var(--accent); }
-table.sortable th { cursor: pointer; user-select: none; }
+table.sortable th, table.sortable td { overflow-wrap: normal; padding-right: 18px; }
+table.sortable td { white-space: nowrap; }
+table.sortable th { cursor: pointer; user-select: none; white-space: normal; vertical-align: bottom; }
 table.sortable th:hover { color: var(--ink); }
 table.sortable th[aria-sort="ascending"]::after { content: " ↑"; }
 table.sortable th[aria-sort="descending"]::after { content: " ↓"; }

@@ -66,7 +66,7 @@ def _trajectories(study: Study, page: Page, which: str, names: dict[Pair, str]) 
         {"label": case.name, "method": "restyle", "args": [{"visible": [owner is case for owner in owners]}]}
         for case in cases
     ]
-    figure.update_layout(updatemenus=[{"buttons": buttons, "x": 1, "xanchor": "right", "y": 1.02, "yanchor": "bottom"}])
+    figure.update_layout(updatemenus=[{"buttons": buttons, "x": 1.02, "xanchor": "left", "y": 1, "yanchor": "top"}])
     figure.update_xaxes(title="x, m", constrain="domain")
     figure.update_yaxes(title="y, m", scaleanchor="x")
     page.plot(figure, height=640)

@@ -66,7 +66,7 @@ class Results:
 
     title: str
     tables: Sequence[Table]
-    notes: Sequence[str]
+    notes: list[str]
     command: str
     seed: int | None
     machine: dict[str, str] = field(default_factory=machine)

@@ -27,6 +27,7 @@ def benchmark(
     protocol: str | None = None,
     workers: int = 1,
     command: str = "",
+    title: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
     say: Callable[[str], None] = lambda line: None,
 ) -> dict[str, Results]:
@@ -43,7 +44,7 @@ def benchmark(
         epochs: of these trainings, at most; their defaults if None.
         protocol: a key of `PROTOCOLS`; both if None.
         workers: processes.
-        command: that the results name.
+        command: that the results name; title: of them, by default the benchmark's.
         progress: called with (frames done, frames in all).
         say: takes a line on each benchmark that the data is not fit for.
 
@@ -85,7 +86,7 @@ def benchmark(
     published = {}
     for each, study in studies.items():
         published[each] = Results(
-            study.benchmark.title, study.benchmark.tables(study), _notes(study), command, found.seed
+            title or study.benchmark.title, study.benchmark.tables(study), _notes(study), command, found.seed
         )
         published[each].write(output, each)
         write_page(study, published[each], output / f"{each}.html")
@@ -104,6 +105,6 @@ def _notes(study: Study) -> list[str]:
         )
     else:
         label = next(iter(study.networks.values())).label
-        networks = f"{label} weights, trained on none of these splits"
+        networks = f"{label} weights for all of them (--train makes networks of each split's own)"
     splits = ", ".join(study.splits)
     return [f"Data set {name}: {recordings} recordings test ({splits}); {networks}.", *study.shortfalls]

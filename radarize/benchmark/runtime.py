@@ -19,6 +19,7 @@ PAPER = {
     "RTX 3090": (9.53, 2.23, 6.60, 3.11, 0.93, 17.06),
     "AGX Orin": (11.76, 7.57, 14.78, 9.43, 4.68, 31.22),
 }
+PAPER_STAGES = (*STAGES, "longest path")
 NOTES = [
     "ms per frame. Preprocess: range and Doppler spectra, and the heat maps or points that methods read. Fused "
     "translation and rotation hold the classical estimators as well. Other: odometry that is not made of these two.",
@@ -55,9 +56,8 @@ def tables(study: Study) -> list[Table]:
             rows.append({"odometry": timing.pair.odometry, "scans": timing.pair.scans, **stages(found)})
     columns = ("odometry", "scans", *STAGES, "other", "longest path", "whole, with reading")
     for device, figures in PAPER.items():
-        names = (*STAGES, "longest path")
         paper = dict.fromkeys(columns) | {"odometry": f"paper, {device}", "scans": ""}
-        rows.append(paper | dict(zip(names, figures, strict=True)))
+        rows.append(paper | dict(zip(PAPER_STAGES, figures, strict=True)))
     first = study.timings[0].case
     notes = [f"{min(first.frames, TIMED)} frames of {first.name}, in batches of {BATCH}, with all cores.", *NOTES]
     return [Table("Run time per frame", rows, notes)]

@@ -3,7 +3,7 @@
 from radarize.benchmark.benchmark import Chosen, Study
 from radarize.benchmark.dataset import groups
 from radarize.benchmark.runs import Pair
-from radarize.benchmark.table import Table, mean
+from radarize.benchmark.table import Table, at, mean
 from radarize.evaluation.stress import FIGURES, SOURCES
 
 #: Columns: where the figure stands in `radarize.benchmark.runs.figures`, and its factor.
@@ -27,14 +27,6 @@ def pairs(chosen: Chosen) -> list[Pair]:
     return [Pair(chosen.partner.odometry, scans) for scans in chosen.scans]
 
 
-def at(found: dict, path: tuple[str, ...]) -> float | None:
-    """A figure by its place; None where it is missing."""
-    value: object = found
-    for key in path:
-        value = value.get(key) if isinstance(value, dict) else None
-    return value  # type: ignore[return-value]
-
-
 def tables(study: Study) -> list[Table]:
     """Figures by platform, by building and of all."""
     rows = []
@@ -44,7 +36,7 @@ def tables(study: Study) -> list[Table]:
         for pair in study.pairs:
             found = [study.results[run] for run in runs[pair] if run.case in members]
             figures = {
-                title: factor * mean([at(one, path) for one in found]) for title, (path, factor) in COLUMNS.items()
+                title: factor * mean([at(one, *path) for one in found]) for title, (path, factor) in COLUMNS.items()
             }
             rows.append({"scans": pair.scans, "on": name, "recordings": len(found), **figures})
     notes = [
@@ -57,7 +49,7 @@ def tables(study: Study) -> list[Table]:
         "10 cm; IoU of free space with what they passed through.",
     ]
     for pair in study.pairs:
-        shares = {name: mean([at(study.results[run], ("sources", name)) for run in runs[pair]]) for name in SOURCES}
+        shares = {name: mean([at(study.results[run], "sources", name) for run in runs[pair]]) for name in SOURCES}
         if any(share == share for share in shares.values()):
             parts = ", ".join(f"{FIGURES[name][0]} {100 * share:.1f}" for name, share in shares.items())
             notes.append(f"{pair.scans}: wrong returns, % of all, come from {parts}.")

@@ -6,7 +6,7 @@ from itertools import chain
 
 from radarize.benchmark.benchmark import Study
 from radarize.benchmark.runs import Pair, Run
-from radarize.benchmark.table import mean
+from radarize.benchmark.table import at, mean
 
 
 @dataclass(frozen=True)
@@ -50,16 +50,10 @@ class Protocol:
 def errors(summary: dict | None, relative: Sequence[str]) -> dict[str, float | None]:
     """Columns of a `TrajectoryErrors.summary`: absolute errors, and relative ones over spans."""
 
-    def value(*path: str) -> float | None:
-        found: object = summary
-        for key in path:
-            found = found[key] if isinstance(found, dict) else None
-        return found  # type: ignore[return-value]
-
-    found = {"ATE m": value("ate", "position", "mean"), "ATE rad": value("ate", "rotation", "mean")}
+    found = {"ATE m": at(summary, "ate", "position", "mean"), "ATE rad": at(summary, "ate", "rotation", "mean")}
     for span in relative:
-        found[f"RE {span} m"] = value("re", span, "position", "mean")
-        found[f"RE {span} rad"] = value("re", span, "rotation", "mean")
+        found[f"RE {span} m"] = at(summary, "re", span, "position", "mean")
+        found[f"RE {span} rad"] = at(summary, "re", span, "rotation", "mean")
     return found
 
 

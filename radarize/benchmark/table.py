@@ -51,6 +51,14 @@ def mean(values: Sequence[float | None]) -> float:
     return float(np.mean(known)) if known else float("nan")
 
 
+def at(found: dict | None, *path: str) -> float | None:
+    """A figure by its place in nested ones; None where it is missing."""
+    value: object = found
+    for key in path:
+        value = value.get(key) if isinstance(value, dict) else None
+    return value  # type: ignore[return-value]
+
+
 def ahead(rows: Sequence[dict[str, object]], ours: int, columns: Sequence[str]) -> str:
     """A sentence on whether a row has the least value of all rows in some columns."""
     behind = []

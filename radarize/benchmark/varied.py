@@ -4,9 +4,8 @@ from collections.abc import Sequence
 
 from radarize.benchmark.benchmark import Chosen, Study
 from radarize.benchmark.dataset import DataSet
-from radarize.benchmark.mapping import at
 from radarize.benchmark.runs import Pair
-from radarize.benchmark.table import Table, mean
+from radarize.benchmark.table import Table, at, mean
 from radarize.evaluation.page import Page
 from radarize.evaluation.stress import FIGURES, SOURCES, curves
 from radarize.methods import CLASSICAL, ODOMETRY, SCANS
@@ -83,7 +82,7 @@ def varied(study: Study, panel: str, over: str) -> list[dict[str, object]]:
         for run in study.once(pair):
             about = run.case.attributes
             if panel in about and over in about:
-                figures = {name: at(study.results[run], path) for name, path in PLACES.items()}
+                figures = {name: at(study.results[run], *path) for name, path in PLACES.items()}
                 label = {panel: str(about[panel]), over: about[over], "odometry": pair.odometry, "scans": pair.scans}
                 rows.append({**label, "methods": str(pair), **figures})
     return sorted(rows, key=lambda row: (row[panel], str(type(row[over])), row[over]))

@@ -6,14 +6,13 @@ import json
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from itertools import groupby
 from pathlib import Path
 from typing import Protocol
-
-import torch
 
 from radarize.errors import InputError
 from radarize.evaluation.runfiles import read_json, write_whole
@@ -127,8 +126,11 @@ def _side_by_side(steps: list[Step], output: Path, workers: int) -> Iterator[tup
 
 
 def _begin() -> None:
-    """How a worker starts."""
-    torch.set_num_threads(1)
+    """How a worker starts: one thread each, for processes share no locks."""
+    for name in ("OMP_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ[name] = "1"
+    if "torch" in sys.modules:  # came along with the program
+        sys.modules["torch"].set_num_threads(1)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; the parent ends its workers
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

@@ -1,7 +1,6 @@
 """Comparisons end to end, on recordings that take no simulator."""
 
 import json
-from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -15,51 +14,16 @@ from radarize.benchmark.protocol import PROTOCOLS
 from radarize.benchmark.run import benchmark
 from radarize.benchmark.runs import Pair, Run
 from radarize.errors import InputError
-from radarize.mapping.scans import BEARINGS
-from radarize.methods import ODOMETRY, SCANS, Inputs, Method
-from radarize.odometry.integration import Track
-from radarize.pose import between
+from radarize.methods import SCANS, Method
 from radarize.recording import Recording
-from radarize.tum import planar
+from tests.benchmark import toys as toy_file
 from tests.benchmark.rooms import ROOMS, write_rooms
-
-
-class Scaled:
-    """The true path, a tenth too long: the whole of a new method, with its entries in `toys`."""
-
-    def __init__(self, inputs: Inputs):
-        if inputs.recording is None:
-            raise InputError("odometry is 'scaled', which needs a recording")
-        self.poses = planar(inputs.recording.read("truth/pose")) * [1.1, 1.1, 1]
-        steps = [between(a, b) for a, b in zip(self.poses[:-1], self.poses[1:], strict=True)]
-        self.steps, self.times = np.array([np.zeros(3), *steps]), inputs.recording.times
-        self.config = inputs.config
-
-    def follow(self, spectrum, times, stage=nullcontext) -> Track:
-        rows = np.searchsorted(self.times, times)
-        velocity = self.steps[rows, :2] / self.config.frame_period
-        square = np.tile(np.eye(3) * 1e-4, (len(times), 1, 1))
-        middles = times + self.config.burst_center
-        return Track(middles, self.poses[rows], self.steps[rows], square, velocity, square[:, :2, :2])
-
-
-class Metre:
-    """A wall a metre away wherever one looks."""
-
-    def scan(self, spectrum) -> np.ndarray:
-        return np.ones((len(spectrum), len(BEARINGS)))
+from tests.benchmark.toys import Metre, add
 
 
 @pytest.fixture
-def toys(monkeypatch):
-    """Two methods of one's own, and no others to choose."""
-    monkeypatch.setitem(ODOMETRY, "scaled", Method("a tenth too long", Scaled))
-    monkeypatch.setitem(SCANS, "metre", Method("a metre", lambda inputs: Metre()))
-    chosen = {"odometry": "scaled", "scans": "metre"}
-    monkeypatch.setattr("radarize.benchmark.benchmark.best_methods", lambda config: (chosen, ""))
-    monkeypatch.setattr("radarize.benchmark.runtime.CLASSICAL", chosen)
-    monkeypatch.setattr("radarize.benchmark.varied.CLASSICAL", chosen)
-    return ["scaled", "metre"]
+def toys(monkeypatch) -> list[str]:
+    return add(monkeypatch)
 
 
 @pytest.fixture(scope="module")
@@ -68,7 +32,7 @@ def rooms(tmp_path_factory) -> Path:
 
 
 def test_a_method_of_ones_own_is_in_every_table(rooms, toys, tmp_path):
-    """`Scaled` and `Metre`, under 30 lines with their entries, and nothing else."""
+    assert len(Path(toy_file.__file__).read_text().splitlines()) < 60  # two methods, and imports
     moved = []
     found = benchmark("all", rooms, tmp_path, methods=toys, progress=lambda done, total: moved.append((done, total)))
     assert set(found) == set(BENCHMARKS)

@@ -53,7 +53,12 @@ def import_(
         str | None, typer.Option(metavar="AXES", help="Of an array: frame,loop,tx,rx,sample in its order, or lengths.")
     ] = None,
     variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
-    latency: Annotated[float, typer.Option(help="From a frame's start to its receipt in a bag, s.")] = 0.0,
+    latency: Annotated[
+        float | None,
+        typer.Option(
+            help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
+        ),
+    ] = None,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -409,6 +414,21 @@ def benchmark(
     for each in published:
         print(out / f"{each}.html")
     print(out / "index.html")
+
+
+@app.command()
+def view(
+    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
+    run: Annotated[Path | None, typer.Option(help="Run of the recording, to show with it.")] = None,
+    save: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write a file instead of a window.")] = None,
+):
+    """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and causes on one time line."""
+    from radarize.viewer import view
+
+    with progress("view") as report:
+        written = view(source, run, save, progress=report)
+    if written:
+        print(written)
 
 
 def _print_json(content: dict) -> None:

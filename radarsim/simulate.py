@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int16
+from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
 from radarize.errors import InputError
@@ -111,6 +111,8 @@ class Simulator:
     def _received(self, times, echoes: list[Echoes]) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Path lengths and amplitudes behind the IF filters, by frame."""
         lengths = [e.lengths(self.config, self.motion, t) for t, e in zip(times, echoes, strict=True)]
+        for each in lengths:
+            each[..., 0] += 2 * self.config.range_bias  # a board's own delay, which the pipeline takes off again
         filtered = [
             e.amplitude * self.front_end.if_response(length[:, 0, 0]) for length, e in zip(lengths, echoes, strict=True)
         ]
@@ -217,17 +219,54 @@ def simulate(
     if engine == "radarsim":
         facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}
     suite = Suite(Rig(world, motion, config, simulator.front_end, Sight(world)), sensors, seed, provenance)
+    return record(
+        output, simulator, suite, times, cfg_text=cfg_text, attributes=facts | dict(attributes or {}),
+        by_cause=provenance, progress=progress,
+    )  # fmt: skip
+
+
+def record(
+    output: Path,
+    simulator: Simulator,
+    suite: Suite,
+    times: Float[np.ndarray, "frame"],
+    *,
+    start: float = 0.0,
+    valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+    cfg_text: str = "",
+    attributes: Mapping[str, object],
+    by_cause: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Simulate frames and write them.
+
+    Args:
+        output: recording to write.
+        simulator: of the radar.
+        suite: the sensors beside it.
+        times: of the frames' starts on the clock of the motion, s.
+        start: stamp of that clock's zero, s.
+        valid: False where a chirp is lost; its samples are then zero, as a capture's are.
+        cfg_text: original configuration text.
+        attributes: of the file.
+        by_cause: whether the suite records I/Q by cause.
+        progress: called with (frames done, frames in all).
+
+    Raises:
+        InputError: the recording cannot be written.
+    """
     with RecordingWriter(
-        output,
-        config,
-        cfg_text=cfg_text,
-        attributes=facts | dict(attributes or {}),
-        products=suite.products,
+        output, simulator.config, cfg_text=cfg_text, attributes=attributes, products=suite.products,
         streams=suite.streams,
-    ) as writer:
-        for first in range(0, frames, BATCH):
-            batch = simulator.observe(times[first : first + BATCH], provenance)
-            writer.append(batch.samples, batch.times, rows=suite.observe(batch))
+    ) as writer:  # fmt: skip
+        for first in range(0, len(times), BATCH):
+            batch = simulator.observe(times[first : first + BATCH], by_cause)
+            arrived = None if valid is None else valid[first : first + BATCH]
+            samples = batch.samples if arrived is None else batch.samples * arrived[..., None, None, None]
+            rows = suite.observe(batch)
+            for clock in suite.clocks & set(rows):
+                rows[clock] = rows[clock] + start
+            writer.append(samples, batch.times + start, arrived, rows=rows)
             if progress:
-                progress(first + len(batch), frames)
+                progress(first + len(batch), len(times))
     return Path(output)

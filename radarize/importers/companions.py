@@ -19,13 +19,19 @@ from radarize.radar.config import RadarConfig
 from radarize.recording import Product, Stream
 
 #: s: header stamps that are further from the time of receipt are not of the same clock.
-_SAME_CLOCK = 0.5
+SAME_CLOCK = 0.5
 #: s: between poses further apart nothing is known.
 _LARGEST_GAP = 0.25
 #: Bytes before the picture in a compressedDepth message: an enumeration and two float32 (image_transport_plugins).
 _DEPTH_HEADER = 12
 #: fx fy cx cy of the Radarize data set's depth pictures, which come without a camera_info (pixels).
 STRIP = {(100, 848): (423.993, 423.993, 432.966, 50.938)}
+
+
+def header_time(message: object) -> float:
+    """A message's own stamp, s; minus infinity where it has no header."""
+    header = getattr(message, "header", None)
+    return header.stamp.sec + 1e-9 * header.stamp.nanosec if header is not None else -np.inf
 
 
 class Companion(ABC):
@@ -57,9 +63,9 @@ class Companion(ABC):
             message: as the bag has it.
             received: s; stands in for a header stamp that was not set.
         """
-        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+        stamp = header_time(message)
         if self._own_clock is None:
-            self._own_clock = abs(stamp - received) < _SAME_CLOCK
+            self._own_clock = abs(stamp - received) < SAME_CLOCK
         time = stamp if self._own_clock else received
         if time > self._last:  # what comes again or out of order adds nothing
             self._last = time

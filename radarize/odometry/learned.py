@@ -87,6 +87,11 @@ class LearnedRotation:
             growth[i] = max(self._covariance[-1, -1] - known, 1e-8)
         return Rotations(yaw, growth, np.zeros(len(times)))
 
+    @property
+    def stride(self) -> int:
+        """The radar's frames from one of the network's to the next."""
+        return self._windows.stride
+
     @torch.inference_mode()
     def turns(
         self,

@@ -36,13 +36,3 @@ class Product:
     data: np.ndarray
     unit: str
     about: str
-
-
-def reason(error: Exception) -> str:
-    """What went wrong with a file, in a few words."""
-    text = str(error)
-    if "No space left" in text or "errno = 28" in text:
-        return "no space left on the device"
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    return text.splitlines()[0] if text else type(error).__name__

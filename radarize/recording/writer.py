@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
-from radarize.errors import InputError
+from radarize.errors import InputError, reason
 from radarize.radar.config import RadarConfig
 from radarize.recording.losses import Losses
-from radarize.recording.streams import FORMAT, Product, Stream, reason
+from radarize.recording.streams import FORMAT, Product, Stream
 
 #: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
 #: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.

@@ -63,8 +63,8 @@ class Table:
             setting: key of `radarize.settings.SETTINGS`, which says which maps there are.
 
         Raises:
-            InputError: a recording lacks something, differs from the others in its maps' grid, has truth that is no
-                number, or memory does not suffice.
+            InputError: a recording lacks something, differs from the others in its maps' grid, has truth that is all
+                unknown, or memory does not suffice.
         """
         lengths, grids = zip(*(_open(path, maps[0], setting) for path in paths), strict=True)
         for path, grid in zip(paths, grids, strict=True):
@@ -100,10 +100,15 @@ class Table:
         )
 
     def starts(self, reach: int) -> Int[Tensor, "window"]:
-        """Frames that have `reach` - 1 more after them in their recording."""
+        """Frames that have `reach` - 1 more after them in their recording, all of them with truth that is known."""
         first = np.cumsum([0, *self.lengths[:-1]])
         windows = [np.arange(a, a + max(0, n - reach + 1)) for a, n in zip(first, self.lengths, strict=True)]
-        return torch.from_numpy(np.concatenate(windows))
+        found = torch.from_numpy(np.concatenate(windows))
+        blind = torch.zeros(sum(self.lengths) + 1, dtype=torch.int64)  # unknown ones up to each frame
+        for values in self.truth.values():
+            blind[1:] |= ~values.isfinite().flatten(1).all(dim=1)
+        blind = blind.cumsum(0)
+        return found[blind[found + reach] == blind[found]]
 
     def divide(self, count: int) -> tuple["Table", "Table"]:
         """The first `count` recordings, and the others."""
@@ -150,8 +155,7 @@ def _read(arguments: tuple[Path, tuple[str, ...], tuple[str, ...], str]) -> tupl
         for name in truth:
             where, of = TRUTH[name]
             found[name] = of(recording, frames)
-            if len(found[name]) < -(-count // stride) or not np.isfinite(found[name]).all():
-                raise InputError(
-                    f"{path}: /{where} lacks values or has some that are no numbers, expected {count} frames"
-                )
+            # Some may be unknown: a tracking camera is blind now and then.
+            if len(found[name]) < -(-count // stride) or not np.isfinite(found[name]).any():
+                raise InputError(f"{path}: /{where} lacks values or holds no numbers, expected {count} frames")
         return {name: np.concatenate([part[name] for part in parts]) for name in maps}, found

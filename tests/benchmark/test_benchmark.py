@@ -1,11 +1,13 @@
 """Comparisons end to end, on recordings that take no simulator."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from radarize import cli
 from radarize.benchmark import networks
 from radarize.benchmark.benchmark import Study
 from radarize.benchmark.benchmarks import BENCHMARKS
@@ -13,6 +15,7 @@ from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.protocol import PROTOCOLS
 from radarize.benchmark.run import benchmark
 from radarize.benchmark.runs import Pair, Run
+from radarize.console import run as command_line
 from radarize.errors import InputError
 from radarize.methods import SCANS, Method
 from radarize.recording import Recording
@@ -154,3 +157,32 @@ def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):
         benchmark("ablation", lone, tmp_path)
     with pytest.raises(InputError, match="no split of kind building, expected one to train on"):
         benchmark("buildings", lone, tmp_path, trained=True)
+
+
+def test_the_readmes_method_runs(rooms, tmp_path, monkeypatch):
+    text = (Path(__file__).parents[2] / "README.md").read_text()
+    code = next(block for block in re.findall("```python\n(.*?)```", text, re.S) if "class Wall" in block)
+    monkeypatch.setitem(SCANS, "wall", None)  # so that it is taken out again
+    code = code.replace('"small"', repr(str(rooms))).replace('"tables"', repr(str(tmp_path)))
+    exec(compile(code, "README", "exec"), {})
+    rows = json.loads((tmp_path / "mapping.json").read_text())["tables"][0]["rows"][-2:]
+    assert [row["scans"] for row in rows] == ["wall", "threshold"] and rows[0]["returned %"] == pytest.approx(100)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["odometry", "--out", "x"], "--data is missing, expected a folder"),
+        (["odometry", "--data", "none", "--out", "x"], "none: holds no recordings, expected *.h5"),
+    ],
+)
+def test_the_command_line(capsys, arguments, expected):
+    with pytest.raises(SystemExit) as ended:
+        command_line(cli.app, "radarize", ["benchmark", *arguments])
+    assert ended.value.code == 2 and expected in capsys.readouterr().err
+
+
+def test_the_list_names_all(capsys):
+    with pytest.raises(SystemExit):
+        command_line(cli.app, "radarize", ["benchmark", "list"])
+    assert [line.split()[0] for line in capsys.readouterr().out.splitlines()] == list(BENCHMARKS)

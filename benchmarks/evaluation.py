@@ -48,7 +48,9 @@ def cases(data: Path | None) -> Iterator[list[Case]]:
         yield list(DataSet.load(folder).cases)
 
 
-def compare(name: str, file: str, title: str, options: Namespace, notes: list[str], **choices: Any) -> None:
+def compare(
+    name: str, file: str, title: str, options: Namespace, notes: list[str], script: str = "", **choices: Any
+) -> None:
     """Carry out a benchmark of `radarize.benchmark` on these recordings and publish its tables.
 
     Args:
@@ -57,6 +59,7 @@ def compare(name: str, file: str, title: str, options: Namespace, notes: list[st
         title: of the results.
         options: of the command line; ``out`` is where runs are kept, and found again.
         notes: sentences below the tables.
+        script: that does it; by default the name of its results.
         choices: what else `radarize.benchmark.run.benchmark` takes.
     """
     with TemporaryDirectory() as temporary, recordings(options.data) as data, progress("runs") as report:
@@ -65,7 +68,7 @@ def compare(name: str, file: str, title: str, options: Namespace, notes: list[st
             data,
             options.out or Path(temporary),
             workers=options.processes,
-            command=command(f"python -m benchmarks.{file}"),
+            command=command(f"python -m benchmarks.{script or file}"),
             title=title,
             progress=report,
             **choices,

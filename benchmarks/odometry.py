@@ -33,6 +33,7 @@ def main() -> None:
             f"To reach: ATE {position} m and {rotation} rad, velocity RMSE 0.05 m/s, yaw over 0.27 s 1 deg, NEES 0.8 "
             "to 1.25. The paper's figures are of real recordings of its own buildings."
         ],
+        script="odometry",
         methods=options.methods,
         weights=options.platform_weights or options.weights,
     )

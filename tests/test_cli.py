@@ -54,8 +54,8 @@ def test_help_is_instant(name):
     "command",
     ["radarize import", "radarize info", "radarize run", "radarize slam", "radarize train", "radarize evaluate",
      "radarize report", "radarize benchmark", "radarize export", "radarize view", "radarsim simulate",
-     "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene", "radarsim scene info", "radarsim scene preview",
-     "radarsim scene import", "radarsim export", "radarsim emulate", "radarsim doctor"],
+     "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene", "radarsim scene info",
+     "radarsim scene preview", "radarsim scene import", "radarsim export", "radarsim emulate", "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
     code, out, _ = call(capsys, command, "--help")
@@ -68,7 +68,7 @@ def test_every_command_explains_itself(capsys, command):
         ("radarize info", ["missing.h5"], "missing.h5: no such file"),
         ("radarize run", ["missing.h5", "-o", "out"], "missing.h5: no such file"),
         ("radarize evaluate", ["nowhere"], "has no trajectory.tum"),
-        ("radarize report", "radarize benchmark", ["missing.h5"], "missing.h5: no such file"),
+        ("radarize report", ["missing.h5"], "missing.h5: no such file"),
         ("radarize import", ["missing.bin", "-o", "out.h5"], "missing.bin"),
         ("radarize import", ["missing.bin", "-o", "out.h5", "--rx", "a,b"], "--rx is 'a,b', expected a count"),
         ("radarize import", ["missing.bin", "-o", "out.h5", "--config", "bogus"], "bogus: no such radar configuration"),

@@ -135,11 +135,15 @@ class Study:
     def runs(self) -> list[Run]:
         """All runs, recording by recording, so that each is read from memory after the first time."""
         return [
-            Run(case, pair, self.networks[split])
+            self._run(split, case, pair)
             for split, cases in self.splits.items()
             for case in cases
             for pair in self.pairs
         ]
+
+    def _run(self, split: str, case: Case, pair: Pair) -> Run:
+        """Methods without networks are the same in every split."""
+        return Run(case, pair, self.networks[split] if pair.networks else Networks())
 
     @property
     def timings(self) -> list[Timing]:
@@ -154,9 +158,7 @@ class Study:
 
     def of(self, pair: Pair) -> dict[str, list[Run]]:
         """Runs of a pair that ended well, by split."""
-        runs = {
-            split: [Run(case, pair, self.networks[split]) for case in cases] for split, cases in self.splits.items()
-        }
+        runs = {split: [self._run(split, case, pair) for case in cases] for split, cases in self.splits.items()}
         return {
             split: [run for run in members if isinstance(self.results.get(run), dict)]
             for split, members in runs.items()
@@ -194,7 +196,7 @@ def carry_out(studies: Sequence[Study], workers: int, progress: Callable[[int, i
     """Do what studies need, each step once for all of them, and give them what was found.
 
     Raises:
-        InputError: no study has anything to show.
+        InputError: nothing could be done.
     """
     steps = [step for study in studies for step in study.steps]
     # Networks before runs, and runs before timings, which want quiet cores.
@@ -202,3 +204,6 @@ def carry_out(studies: Sequence[Study], workers: int, progress: Callable[[int, i
     results = perform(steps, studies[0].output, workers, progress)
     for study in studies:
         study.results = results
+    done = [found for step, found in results.items() if not isinstance(step, Training)]
+    if done and all(isinstance(found, str) for found in done):
+        raise InputError(f"nothing could be compared: {done[0]}")

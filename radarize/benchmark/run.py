@@ -101,7 +101,7 @@ def _notes(study: Study) -> list[str]:
     if study.trainings:
         epochs = study.trainings[0].epochs
         networks = "each split's networks were trained on its own training part" + (
-            f", for {epochs} epochs" if epochs else ""
+            f" (epochs: {epochs})" if epochs else ""
         )
     else:
         label = next(iter(study.networks.values())).label

@@ -25,7 +25,9 @@ class Table:
 
     def markdown(self, level: int = 2) -> str:
         """The table as text, with a heading of a level."""
-        columns = list(self.rows[0]) if self.rows else []
+        if not self.rows:
+            return f"{'#' * level} {self.title}\n\nNone of it could run.\n"
+        columns = list(self.rows[0])
         lines = [f"{'#' * level} {self.title}", "", "| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
         lines += ["| " + " | ".join(cell(row[column]) for column in columns) + " |" for row in self.rows]
         return "\n".join([*lines, "", *(f"- {note}" for note in self.notes)]) + "\n"

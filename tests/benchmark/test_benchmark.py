@@ -17,11 +17,11 @@ from radarize.benchmark.run import benchmark
 from radarize.benchmark.runs import Pair, Run
 from radarize.console import run as command_line
 from radarize.errors import InputError
-from radarize.methods import SCANS, Method
+from radarize.methods import SCANS
 from radarize.recording import Recording
 from tests.benchmark import toys as toy_file
 from tests.benchmark.rooms import ROOMS, write_rooms
-from tests.benchmark.toys import Metre, add
+from tests.benchmark.toys import add
 
 
 @pytest.fixture
@@ -94,7 +94,7 @@ def test_runs_are_done_once(rooms, toys, tmp_path, monkeypatch):
     benchmark("mapping", rooms, tmp_path, methods=toys)
 
 
-def test_networks_are_trained_on_each_split(rooms, monkeypatch, tmp_path):
+def test_networks_are_trained_on_each_split(rooms, toys, monkeypatch, tmp_path):
     asked = []
 
     def train(kind, data, output, *, split, settings, resume, say):
@@ -105,9 +105,8 @@ def test_networks_are_trained_on_each_split(rooms, monkeypatch, tmp_path):
         say("epoch 1: loss 1")
 
     monkeypatch.setattr(networks, "train", train)
-    choices = {"methods": ["learned", "metre"], "trained": True, "epochs": 2}
-    monkeypatch.setitem(SCANS, "metre", Method("a metre", lambda inputs: Metre()))
-    monkeypatch.setattr("radarize.benchmark.benchmark.BEST", {"odometry": "learned", "scans": "metre"})
+    choices = {"methods": [*toys, "learned"], "trained": True, "epochs": 2}
+    monkeypatch.setattr("radarize.benchmark.benchmark.BEST", {"odometry": "scaled", "scans": "metre"})
     for _ in range(2):
         found = benchmark("buildings", rooms, tmp_path, **choices)["buildings"]
     kinds = [(kind, split) for split in ("building-A", "building-B") for kind in ("translation", "rotation")]
@@ -116,7 +115,9 @@ def test_networks_are_trained_on_each_split(rooms, monkeypatch, tmp_path):
     assert all(rest == [2, True] for _, _, *rest in asked)
     assert (tmp_path / "weights" / "building-A" / "translation.safetensors").read_text() == "building-A"
     assert any(note.startswith("building-A: rotation could not be trained") for note in found.notes)
-    assert any("@building" not in note and "learned+metre: - on 3 of 3" in note for note in found.notes)
+    assert any("learned+metre: - on 3 of 3" in note for note in found.notes)
+    # What needs no network is run once, whatever the split.
+    assert sorted(path.name for path in (tmp_path / "runs").glob("*/*")) == ["scaled+metre"] * 3
 
 
 def test_slam_of_baselines_is_open_in_the_papers_protocol(rooms, toys, tmp_path):
@@ -157,6 +158,10 @@ def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):
         benchmark("ablation", lone, tmp_path)
     with pytest.raises(InputError, match="no split of kind building, expected one to train on"):
         benchmark("buildings", lone, tmp_path, trained=True)
+    with pytest.raises(
+        InputError, match="nothing could be compared: .*translation.safetensors: does not fit this radar"
+    ):
+        benchmark("odometry", lone, tmp_path, methods=["learned"])
 
 
 def test_the_readmes_method_runs(rooms, tmp_path, monkeypatch):

@@ -251,7 +251,9 @@ def run_(
 
 @app.command()
 def train(
-    task: Annotated[str, typer.Argument(metavar="TASK", help="translation, rotation or segmentation.")],
+    task: Annotated[
+        str, typer.Argument(metavar="TASK", help="translation, rotation, segmentation, radarhd, milliego or rnin.")
+    ],
     data: Annotated[Path, typer.Option(help="Folder of recordings, see `radarsim dataset`.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Weights to write (.safetensors).")],
     split: Annotated[str | None, typer.Option(help="Of the data set; else every tenth recording validates.")] = None,
@@ -260,7 +262,7 @@ def train(
     epochs: Annotated[int | None, typer.Option(help="At most (30, 30, 5).")] = None,
     batch: Annotated[int | None, typer.Option(help="Items of a step (128, 128, 48).")] = None,
     rate: Annotated[float | None, typer.Option(help="Learning rate (1e-3, 1e-3, 1e-4).")] = None,
-    schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, or cosine for few epochs.")] = None,
+    schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, steps, or cosine for few epochs.")] = None,
     patience: Annotated[int | None, typer.Option(help="Epochs without progress before it ends (15).")] = None,
     precision: Annotated[str | None, typer.Option(help="Of convolutions: float32, or bfloat16.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of everything random (0).")] = None,

@@ -14,6 +14,9 @@ import numpy as np
 import torch
 from jaxtyping import Complex64, Float
 
+from radarize.baselines.odometry import MilliEgoOdometry, RninOdometry
+from radarize.baselines.ransac import RansacVelocity
+from radarize.baselines.scans import RadarHdScans
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import HeatmapScans
@@ -115,6 +118,16 @@ class Inputs:
         """
         return _method("odometry", name, ODOMETRY).make(self)
 
+    def imu(self, method: str) -> Recording:
+        """The recording, for a method that needs its IMU.
+
+        Raises:
+            InputError: there is none.
+        """
+        if self.recording is None:
+            raise InputError(f"odometry is {method!r}, which reads a recording's IMU; a live radar has none")
+        return self.recording
+
 
 class _Once:
     """A scanner that remembers what it said of the last spectrum."""
@@ -175,6 +188,26 @@ def scan_matching(inputs: Inputs) -> ScanMatching:
     return ScanMatching(inputs.config, inputs.scanner())
 
 
+def ransac(inputs: Inputs) -> Odometry:
+    """Least squares over a sparse point cloud, in the place of `doppler`'s."""
+    return Odometry(inputs.config, RansacVelocity(inputs.heatmaps), MapRotation(inputs.heatmaps))
+
+
+def milliego(inputs: Inputs) -> MilliEgoOdometry:
+    """A sparse point cloud and an IMU."""
+    return MilliEgoOdometry(inputs.heatmaps, inputs.imu("milliego"), inputs.weights.of("milliego"))
+
+
+def rnin(inputs: Inputs) -> RninOdometry:
+    """An IMU alone."""
+    return RninOdometry(inputs.heatmaps, inputs.imu("rnin"), inputs.weights.of("rnin"))
+
+
+def radarhd(inputs: Inputs) -> RadarHdScans:
+    """Pictures like a lidar's."""
+    return RadarHdScans(inputs.maker, inputs.weights.of("radarhd"))
+
+
 def segmentation(inputs: Inputs) -> Segmentation:
     """The network's first surfaces."""
     return Segmentation(inputs.maker, inputs.weights.of("segmentation"))
@@ -189,10 +222,14 @@ ODOMETRY: dict[str, Method[Follower]] = {
     "fused": Method("networks and Doppler", fused, ("translation", "rotation")),
     "learned": Method("networks", learned, ("translation", "rotation")),
     "doppler": Method("Doppler least squares", doppler),
+    "doppler-ransac": Method("Doppler RANSAC", ransac),
     "scan-matching": Method("scan matching", scan_matching),
+    "milliego": Method("milliEgo", milliego, ("milliego",)),
+    "rnin": Method("RNIN", rnin, ("rnin",)),
 }
 SCANS: dict[str, Method[Scanner]] = {
     "segmentation": Method("segmentation network", segmentation, ("segmentation",)),
+    "radarhd": Method("RadarHD", radarhd, ("radarhd",)),
     "elevation-aware": Method("elevation-aware first echo", partial(of_heatmaps, "elevation-aware")),
     "first-echo": Method("first echo", partial(of_heatmaps, "first-echo")),
     "threshold": Method("threshold", partial(of_heatmaps, "threshold")),

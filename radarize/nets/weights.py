@@ -20,6 +20,8 @@ from radarize.settings import SETTINGS
 
 #: Steps of range or speed that differ by less read as the same grid.
 _TOLERANCE = 0.01
+#: Networks that need to know how far their maps' rows are apart.
+_SCALED = ("translation", "rotation")
 
 
 class Grid(BaseModel):
@@ -68,8 +70,8 @@ class Header(BaseModel):
     Attributes:
         kind: of the network.
         setting: key of `radarize.settings.SETTINGS`.
-        frames, maps, width: what the network is built with.
-        grid: of its maps.
+        frames, maps, width: what the network is built with; maps are names of all that it reads of a frame.
+        grid: of its maps; None if it sees none.
         spacings: frames from one of the window to the next, as trained.
         data: name of the data set; split: of it.
         seed, epochs: of the training.
@@ -84,7 +86,7 @@ class Header(BaseModel):
     frames: int
     maps: tuple[str, ...]
     width: int
-    grid: Grid
+    grid: Grid | None
     spacings: tuple[int, ...] = (1,)
     data: str = ""
     split: str | None = None
@@ -107,9 +109,17 @@ class Header(BaseModel):
         return round(ratio)
 
 
-def make(kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid, setting: str = "corrected") -> nn.Module:
-    """An untrained network for maps of a grid."""
-    scale = {} if kind == "segmentation" else {"step": grid.step}
+def make(
+    kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid | None, setting: str = "corrected"
+) -> nn.Module:
+    """An untrained network for maps of a grid.
+
+    Raises:
+        ValueError: it needs to know the grid.
+    """
+    if kind in _SCALED and grid is None:
+        raise ValueError(f"{kind} without a grid")
+    scale = {"step": grid.step} if kind in _SCALED else {}
     return SETTINGS[setting].nets[kind](frames, maps, width, **scale)
 
 
@@ -180,6 +190,8 @@ def _misfit(path: Path, error: Exception) -> InputError:
 
 
 def _check(header: Header, config: RadarConfig, path: Path) -> None:
+    if header.grid is None:
+        return
     difference = header.grid.difference(Grid.of(config, header.maps[0], header.setting), ignore=("frame_period",))
     try:
         header.stride(config)
@@ -224,8 +236,10 @@ def read(path: Path, tensors: bool = True) -> tuple[dict[str, Float[Tensor, "...
 
 
 def example(header: Header) -> tuple[Tensor, ...]:
-    """What a network reads, twice: maps of noise, and for turns of setting `corrected` a travel."""
+    """What a network reads, twice: maps of noise, and for turns of setting `corrected` a travel; or other readings."""
     noise = torch.Generator().manual_seed(0)
+    if header.grid is None:
+        return tuple(torch.randn((2, *shape), generator=noise) for shape in build(header).shapes)
     shape = (2, header.frames, len(header.maps), header.grid.rows, header.grid.azimuths)
     maps = 10 * torch.randn(shape, generator=noise)
     told = header.kind == "rotation" and header.setting == "corrected"

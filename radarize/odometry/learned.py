@@ -10,6 +10,7 @@ from jaxtyping import Complex64, Float
 from radarize.nets.windows import Windows, silent
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
+from radarize.odometry.ties import Ties
 from radarize.training.maps import MapMaker
 
 #: m/s and rad, standard deviations of what may have happened meanwhile.
@@ -41,7 +42,7 @@ class LearnedRotation:
     """Rotation estimator by `radarize.nets.RotationNet`: turns over several spacings, reconciled by a filter.
 
     The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
-    one Gaussian state: a measured turn ties two of them, and all that are tied to them move along.
+    one Gaussian state (`Ties`).
 
     Args:
         maker: see `Windows`.
@@ -61,12 +62,10 @@ class LearnedRotation:
     ):
         self._windows = Windows(maker, "rotation", weights)
         known = self._windows.header.spacings
-        self.spacings, self.jerk = [s for s in spacings if s in known] or list(known), jerk
-        self.fastest = fastest
+        self.spacings = [s for s in spacings if s in known] or list(known)
         size = max(self.spacings) * self._windows.stride + 1
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
-        self._yaws, self._covariance = np.zeros(size), np.zeros((size, size))  # oldest first
-        self._seen = 0
+        self._yaws = Ties(size, jerk, fastest)
 
     def estimate(
         self,
@@ -78,13 +77,13 @@ class LearnedRotation:
         turns = self.turns(spectrum, times, velocities)
         yaw, growth = np.zeros(len(times)), np.zeros(len(times))
         for i in range(len(times)):
-            before, known = self._yaws[-1], self._covariance[-1, -1]
-            self._predict(self._times[len(self._times) - len(times) + i - 1 :][:2])
+            before, known = self._yaws.values[-1], self._yaws.covariance[-1, -1]
+            now = len(self._times) - len(times) + i
+            self._yaws.predict(float(self._times[now] - self._times[max(now - 1, 0)]))
             for spacing, (turn, noise) in zip(self.spacings, turns[:, i], strict=True):
-                if (back := spacing * self._windows.stride) < self._seen:
-                    self._tie(back, turn, noise)
-            yaw[i] = self._yaws[-1] - before
-            growth[i] = max(self._covariance[-1, -1] - known, 1e-8)
+                self._yaws.tie(spacing * self._windows.stride, turn, noise)
+            yaw[i] = self._yaws.values[-1] - before
+            growth[i] = max(self._yaws.covariance[-1, -1] - known, 1e-8)
         return Rotations(yaw, growth, np.zeros(len(times)))
 
     @property
@@ -110,7 +109,7 @@ class LearnedRotation:
 
     def _travel(self, times: np.ndarray, velocities: np.ndarray) -> Float[np.ndarray, "window 2"]:
         """What `RotationNet` wants to be told of the windows, spacing by spacing."""
-        new, size = len(times), len(self._yaws)
+        new, size = len(times), len(self._yaws.values)
         self._times = np.concatenate([self._times[1 - size :], times])
         self._velocities = np.concatenate([self._velocities[1 - size :], velocities])
         newest = np.arange(len(self._times) - new, len(self._times))
@@ -118,30 +117,3 @@ class LearnedRotation:
         lasting = [self._times[newest] - self._times[start] for start in first]
         mean = [(self._velocities[newest] + self._velocities[start]) / 2 for start in first]
         return np.concatenate(lasting)[:, None] * np.concatenate(mean)
-
-    def _predict(self, last_two: np.ndarray) -> None:
-        """The next yaw goes on at the last rate, more or less.
-
-        Args:
-            last_two: times of the frame before and of this one, s.
-        """
-        move, noise = np.eye(len(self._yaws), k=1), 0.0
-        move[-1, -1] = 1.0
-        if self._seen == 1:
-            noise = (self.fastest * float(np.diff(last_two)[0])) ** 2
-        elif self._seen > 1:
-            move[-1, -2:] = -1.0, 2.0
-            noise = (self.jerk * float(np.diff(last_two)[0])) ** 2
-        self._yaws = move @ self._yaws
-        self._covariance = move @ self._covariance @ move.T
-        self._covariance[-1, -1] += noise
-        self._seen = min(self._seen + 1, len(self._yaws))
-
-    def _tie(self, back: int, turn: float, noise: float) -> None:
-        """Kalman update by a turn from `back` frames ago to now."""
-        row = np.zeros(len(self._yaws))
-        row[-1], row[-1 - back] = 1.0, -1.0
-        spread = self._covariance @ row
-        gain = spread / (row @ spread + noise)
-        self._yaws = self._yaws + gain * (turn - row @ self._yaws)
-        self._covariance = self._covariance - np.outer(gain, spread)

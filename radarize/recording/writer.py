@@ -81,32 +81,15 @@ class RecordingWriter:
         radar.attrs["cfg"] = cfg_text
         loops, tx, rx, samples, _ = self.config.frame_shape
         if self.raw:
-            self._grow("radar/adc", Stream((loops, tx, rx, samples, 2), "i2", "ADC counts", "I/Q, TX1..3 x RX1..4"))
-        self._grow("radar/valid", Stream((loops, tx), "?", "", "False where samples of the chirp were lost"))
-        self._grow("radar/time", Stream((), "f8", "s", "start of the frame's first chirp"))
+            grow(file, "radar/adc", Stream((loops, tx, rx, samples, 2), "i2", "ADC counts", "I/Q, TX1..3 x RX1..4"))
+        grow(file, "radar/valid", Stream((loops, tx), "?", "", "False where samples of the chirp were lost"))
+        grow(file, "radar/time", Stream((), "f8", "s", "start of the frame's first chirp"))
         for name, product in products.items():
             data = file.create_dataset(name, data=product.data)
             data.attrs.update({"unit": product.unit, "about": product.about})
         for name, stream in streams.items():
-            self._grow(name, stream)
+            grow(file, name, stream)
         file.swmr_mode = True
-
-    def _grow(self, name: str, stream: Stream) -> None:
-        per_row = int(np.prod(stream.shape, dtype=int)) * np.dtype(stream.dtype).itemsize
-        rows = int(np.clip(16384 // max(per_row, 1), 1, 1024))
-        packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if per_row >= 1024 else {}
-        data = self._file.create_dataset(
-            name,
-            shape=(0, *stream.shape),
-            maxshape=(None, *stream.shape),
-            dtype=stream.dtype,
-            chunks=(rows, *stream.shape),
-            fillvalue=_unwritten(name, stream),
-            **packed,
-        )
-        data.attrs.update({"unit": stream.unit, "about": stream.about, "clock": stream.clock})
-        if stream.labels:
-            data.attrs["labels"] = stream.labels
 
     def append(
         self,
@@ -212,6 +195,26 @@ class RecordingWriter:
                 self.close(keep_part=True)
             except InputError:
                 pass  # the first error is the one to report
+
+
+def grow(file: h5py.File, name: str, stream: Stream) -> h5py.Dataset:
+    """A stream's data set, without rows yet."""
+    per_row = int(np.prod(stream.shape, dtype=int)) * np.dtype(stream.dtype).itemsize
+    rows = int(np.clip(16384 // max(per_row, 1), 1, 1024))
+    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if per_row >= 1024 else {}
+    data = file.create_dataset(
+        name,
+        shape=(0, *stream.shape),
+        maxshape=(None, *stream.shape),
+        dtype=stream.dtype,
+        chunks=(rows, *stream.shape),
+        fillvalue=_unwritten(name, stream),
+        **packed,
+    )
+    data.attrs.update({"unit": stream.unit, "about": stream.about, "clock": stream.clock})
+    if stream.labels:
+        data.attrs["labels"] = stream.labels
+    return data
 
 
 def _unwritten(name: str, stream: Stream) -> float | int | None:

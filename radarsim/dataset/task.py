@@ -87,7 +87,7 @@ class Task:
         return folder / f"{self.name}.h5"
 
     def is_finished(self, folder: Path) -> bool:
-        """Whether the recording is there and whole.
+        """Whether the recording is there, whole, and with all its sensors.
 
         Raises:
             Stale: it is, but was made with other parameters, or is no recording of a data set.
@@ -102,14 +102,17 @@ class Task:
             return False  # cut short or damaged
         if made is None:
             raise Stale(f"{self.name} does not come from a data set")
-        made = json.loads(str(made))
+        made, complete = json.loads(str(made)), True
         for key, wanted in json.loads(self.identity).items():
-            if made.get(key) != wanted:
+            if key == "sensors" and made.get(key) != wanted and _can_follow(made.get(key), wanted):
+                complete = False
+            elif made.get(key) != wanted:
                 raise Stale(f"{self.name} has {key} {_short(made.get(key))}, now {_short(wanted)}")
-        return frames == self.frames
+        return complete and frames == self.frames
 
     def make(self, folder: Path, threads: int | None = None, progress: Callable[[int, int], None] | None = None) -> str:
-        """Simulate the recording; it appears under its name when it is whole.
+        """Simulate the recording, or what it lacks of sensors beside the radar; it appears under its name when it is
+        whole.
 
         Args:
             folder: where.
@@ -125,43 +128,63 @@ class Task:
         if threads:
             _use_threads(threads)
         from radarize.training.maps import keep_maps
+        from radarsim.accompany import accompany
         from radarsim.scene.scene import Scene
         from radarsim.simulate import simulate
         from radarsim.statistics import Statistics
 
         final = self.path(folder)
+        late = self._late(folder)
         path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
         try:
             scene = Scene.load(self.scene) if isinstance(self.scene, str) else Scene.of(self.scene, self._place)
-            mild = Scene.load(split_level(self.scene)[0]) if self.variant.level else scene
-            simulate(
-                scene,
-                path,
-                platform=self.platform,
-                waypoints=None if self.waypoints is None else np.array(self.waypoints),
-                planned_in=mild,
-                mounting=self.variant.mounted,
-                duration=self.duration,
-                seed=self.seed,
-                radar=self.variant.radar_of(self.radar),
-                frontend=self.variant.frontend_of(self.frontend),
-                sensors=self.sensors,
-                attributes={**self.attributes, ATTRIBUTE: self.identity},
-                progress=progress,
-            )
-            with Recording(path) as recording:
-                moved, frames = Statistics.from_json(str(recording.attributes["motion"])), len(recording)
-            if frames < self.frames:
-                path.unlink()
-                raise InputError(f"the way-points are passed after {frames} of {self.frames} frames, expected more way")
-            if path != final:
-                keep_maps(path, final)
+            walk = {"platform": self.platform, "duration": self.duration, "seed": self.seed, "progress": progress}
+            walk["attributes"] = {**self.attributes, ATTRIBUTE: self.identity}
+            if late:
+                accompany(final, scene, sensors=late, **walk)
+            else:
+                mild = Scene.load(split_level(self.scene)[0]) if self.variant.level else scene
+                simulate(
+                    scene,
+                    path,
+                    waypoints=None if self.waypoints is None else np.array(self.waypoints),
+                    planned_in=mild,
+                    mounting=self.variant.mounted,
+                    radar=self.variant.radar_of(self.radar),
+                    frontend=self.variant.frontend_of(self.frontend),
+                    sensors=self.sensors,
+                    **walk,
+                )
+                with Recording(path) as recording:
+                    frames = len(recording)
+                if frames < self.frames:
+                    path.unlink()
+                    raise InputError(
+                        f"the way-points are passed after {frames} of {self.frames} frames, expected more way"
+                    )
+                if path != final:
+                    keep_maps(path, final)
+            with Recording(final) as recording:
+                moved = Statistics.from_json(str(recording.attributes["motion"]))
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from error
         finally:
             if path != final:
                 path.unlink(missing_ok=True)
         return str(moved)
+
+    def _late(self, folder: Path) -> list[str]:
+        """Sensors that a recording of this task, otherwise finished, has yet to get."""
+        if self.waypoints is not None or self.variant != Variant():
+            return []  # only a tour of the platform's own is planned anew
+        try:
+            if not self.path(folder).is_file() or self.is_finished(folder):
+                return []
+            with Recording(self.path(folder)) as recording:
+                made = json.loads(str(recording.attributes[ATTRIBUTE]))["sensors"]
+                return [name for name in self.sensors if name not in made] if len(recording) == self.frames else []
+        except InputError:
+            return []
 
     def clear(self, folder: Path) -> None:
         """Remove what a killed run left half-written."""
@@ -189,6 +212,13 @@ class Event:
     frames: int = 0
     motion: str | None = None
     error: str | None = None
+
+
+def _can_follow(made: list[str], wanted: list[str]) -> bool:
+    """Whether a recording with some sensors can be given the others without the radar."""
+    from radarsim.sensors.suite import SENSORS
+
+    return set(made) < set(wanted) and not any(SENSORS[name].of_radar for name in set(wanted) - set(made))
 
 
 def _digest(path: Path) -> str:

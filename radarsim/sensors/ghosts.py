@@ -34,6 +34,8 @@ NOISE = 255
 class Ghosts(Sensor):
     """Power by cause on the radar's range bins and the scan's bearings, and the strongest cause of every cell."""
 
+    of_radar = True
+
     def __init__(self, rig: Rig, rng: np.random.Generator):
         config, front_end = rig.config, rig.front_end
         self._front_end, self._maps = front_end, CauseMaps(config)

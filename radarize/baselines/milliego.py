@@ -18,6 +18,8 @@ SAMPLES = 20
 _ENCODER = ((1, 7, 2), (2, 5, 2), (4, 5, 2), (4, 3, 1), (8, 3, 2), (8, 3, 1), (8, 3, 2), (8, 3, 1), (16, 3, 2))
 #: Units of the outputs for a radian: turns are told in degrees.
 DEGREES = 57.29577951308232
+#: deg, a turn that the last layer calls 1: no larger than a step in metres, or it would be learned long after that.
+_TURN = 10.0
 
 
 class Heads(nn.Module):
@@ -33,7 +35,7 @@ class Heads(nn.Module):
         )  # fmt: skip
 
     def forward(self, x: Tensor) -> Float[Tensor, "*batch 6"]:
-        return torch.cat([self.translation(x), self.rotation(x)], dim=-1)
+        return torch.cat([self.translation(x), _TURN * self.rotation(x)], dim=-1)
 
 
 class MilliEgoNet(nn.Module):
@@ -59,7 +61,6 @@ class MilliEgoNet(nn.Module):
         for scale, kernel, stride in _ENCODER:
             layers += [nn.Conv2d(channels, scale * width, kernel, stride, kernel // 2), nn.LeakyReLU(0.1)]
             channels, rows, columns = scale * width, -(-rows // stride), -(-columns // stride)
-            nn.init.kaiming_normal_(layers[-2].weight, a=0.1)
         self.radar = nn.Sequential(*layers)
         self.squeeze = nn.Sequential(
             nn.Linear(channels, channels), nn.ReLU(), nn.Linear(channels, channels), nn.Sigmoid()
@@ -74,6 +75,7 @@ class MilliEgoNet(nn.Module):
         self.register_buffer("scale", torch.tensor([10.0, 10.0, 10.0, 1.0, 1.0, 1.0]), persistent=False)
         #: Mean squared errors on validation data: x, y (m^2), yaw (rad^2).
         self.register_buffer("error", torch.ones(3))
+        _begin(self)
 
     def features(
         self, panorama: Float[Tensor, "item 2 row column"], imu: Float[Tensor, "item sample 6"]
@@ -107,3 +109,22 @@ class MilliEgoNet(nn.Module):
         """What `estimate` makes of motions."""
         mean = torch.cat([motion[:, :2], motion[:, 5:] / DEGREES], dim=1)
         return mean, torch.diag(self.error).expand(motion.shape[0], -1, -1)
+
+
+def _begin(net: nn.Module) -> None:
+    """First weights as large as what goes in (Glorot, He, orthogonal): torch's own are so small for so many layers that
+    what comes out hardly depends on it, and stays so."""
+    for module in net.modules():
+        if isinstance(module, nn.Conv2d):
+            nn.init.kaiming_normal_(module.weight, a=0.1)
+        elif isinstance(module, nn.Linear):
+            nn.init.xavier_uniform_(module.weight)
+        elif isinstance(module, nn.LSTM):
+            for name, values in module.named_parameters():
+                if "bias" in name:
+                    nn.init.zeros_(values)
+                    gates = values.detach().chunk(4)
+                    gates[1].fill_(0.5)  # there are two biases: it remembers, at first
+                    continue
+                for gate in values.detach().chunk(4):
+                    nn.init.orthogonal_(gate) if "_hh_" in name else nn.init.xavier_uniform_(gate)

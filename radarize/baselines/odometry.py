@@ -147,7 +147,7 @@ class RninOdometry:
     def __init__(self, heatmaps: Heatmaps, recording: Recording, weights: Path | None = None):
         self.config, self._imu = heatmaps.config, Imu.of(recording)
         self.net, header = load(weights or shipped("rnin"))
-        self._ago = rnin.LASTS * np.arange(header.frames - 1, -1, -1)
+        self._ago = rnin.LASTS * np.arange(header.frames - 1, -1, -1)  # ends of windows before now
         self._path = _Path(max(1, round(rnin.LASTS / self.config.frame_period)), self.config.frame_period)
 
     @torch.inference_mode()
@@ -161,11 +161,17 @@ class RninOdometry:
         centers = np.asarray(times, float) + self.config.burst_center
         steps = intervals(centers, self._path.time)
         with stage("translation"):
-            ends = (centers[:, None] - self._ago).ravel()
-            windows = self._imu.levelled(ends, rnin.SAMPLES).reshape(len(centers), -1, rnin.SAMPLES, 6)
-            mean, covariance = (each.double().numpy() for each in self.net.estimate(torch.from_numpy(windows).float()))
             yaw = wrap(self._imu.yaw(centers))
-            track = [self._path.next(*each, _DRIFT**2 * each[0])
-                     for each in zip(steps, mean, covariance, yaw, strict=True)]  # fmt: skip
+            track = [
+                self._path.next(dt, *self._displacement(center), heading, _DRIFT**2 * dt)
+                for dt, center, heading in zip(steps, centers, yaw, strict=True)
+            ]
         self._path.time = centers[-1]
         return Track(centers, *(np.stack(each) for each in zip(*track, strict=True)))
+
+    def _displacement(self, instant: float) -> tuple[np.ndarray, np.ndarray]:
+        """Displacement in the last window, and its covariance, from as many windows as there are by now."""
+        there = self._ago <= max(instant - self._imu.time[0], 0.0)
+        windows = self._imu.levelled(instant - self._ago[there], rnin.SAMPLES)
+        mean, covariance = self.net.estimate(torch.from_numpy(windows[None]).float())
+        return mean[0].double().numpy(), covariance[0].double().numpy()

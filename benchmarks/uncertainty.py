@@ -102,7 +102,7 @@ def main() -> None:
         judged = through(partial(judge, weights=options.weights), found, options.processes, "recordings")
     rows = []
     for name, members in groups(found).items():
-        chosen = [judged[i] for i in members]
+        chosen = [judged[case] for case in members]
         row = {"on": name, "recordings": len(members), "velocity": np.mean([one["velocity"]["nees"] for one in chosen])}
         for back in chosen[0]["turns"]:
             row[f"turn over {back * chosen[0]['period']:.2f} s"] = np.mean([one["turns"][back][0] for one in chosen])

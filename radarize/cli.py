@@ -372,6 +372,53 @@ def report(
 
 
 @app.command()
+def benchmark(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="list, all, or a benchmark of the list.")],
+    data: Annotated[Path | None, typer.Option(help="Folder of recordings, see `radarsim dataset`.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder to write; goes on where it was left.")] = None,
+    methods: Annotated[
+        list[str] | None, typer.Option(help="Odometry and scans to compare, all by default: fused,doppler,threshold.")
+    ] = None,
+    weights: Annotated[
+        Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
+    ] = None,
+    train: Annotated[bool, typer.Option("--train", help="Train networks on each split first.")] = False,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Of that training, at most.")] = None,
+    protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; by default one per core.")] = None,
+):
+    """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
+    import os
+
+    from radarize.benchmark.benchmarks import BENCHMARKS
+
+    if name == "list":
+        width = max(map(len, BENCHMARKS))
+        for each, about in BENCHMARKS.items():
+            print(f"{each:<{width}}  {about.about}")
+        return
+    for option, value in (("--data", data), ("--out", out)):
+        if value is None:
+            raise InputError(f"{option} is missing, expected a folder")
+    from radarize.benchmark.results import command
+    from radarize.benchmark.run import benchmark as compare
+
+    chosen = [method for word in methods or () for method in word.split(",")]
+    try:
+        with progress("benchmark") as report:
+            published = compare(
+                name, data, out, methods=chosen, weights=weights, trained=train, epochs=epochs, protocol=protocol,
+                workers=workers or len(os.sched_getaffinity(0)), command=command("radarize"), progress=report,
+                say=lambda line: typer.echo(line, err=True),
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        raise InputError(f"stopped; what has ended is kept in {out}, and the same command goes on after it") from None
+    for each in published:
+        print(out / f"{each}.html")
+    print(out / "index.html")
+
+
+@app.command()
 def view(
     source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
     run: Annotated[Path | None, typer.Option(help="Run of the recording, to show with it.")] = None,

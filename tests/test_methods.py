@@ -44,7 +44,7 @@ def test_scans_are_made_once_a_batch(noise, monkeypatch):
 
 
 def test_unknown_names():
-    with pytest.raises(InputError, match="odometry is 'wheel', expected one of fused, learned, doppler, doppler-ransac"):
+    with pytest.raises(InputError, match="odometry is 'wheel', expected one of fused, learned, doppler"):
         Inputs(CONFIG).odometry("wheel")
     with pytest.raises(InputError, match="scans is 'lidar', expected one of segmentation"):
         Inputs(CONFIG, scans="lidar").scanner()

@@ -30,7 +30,7 @@ FIGURES = {
     "ghosts": ("ghosts", "% of returns", 100),
     "behind": ("seen through a slab", "% of returns", 100),
     "moving": ("ghosts and skirts of what moves", "% of returns", 100),
-    "clutter": ("surfaces beside, above, below", "% of returns", 100),
+    "clutter": ("direct echoes beside, above, below", "% of returns", 100),
     "noise": ("noise and leakage", "% of returns", 100),
     "missed": ("missed surfaces", "% of bearings", 100),
     "map_f1": ("map F1", "%", 100),

@@ -200,12 +200,13 @@ class Slam:
         guess = prior
         if c.presearch_distance > 0:
             weight = np.linalg.inv(covariance) * c.presearch_sigma**2 / len(node.points)
+            distance, angle = self._presearch(covariance)
             found = search(
-                Pyramid.of(submap.grid, 3, c.presearch_distance),
+                Pyramid.of(submap.grid, 3, distance),
                 node.points,
                 prior,
-                distance=c.presearch_distance,
-                angle=c.presearch_angle,
+                distance=distance,
+                angle=angle,
                 min_score=0.1,
                 penalty=(min(weight[0, 0], weight[1, 1]), weight[2, 2]),
             )
@@ -216,6 +217,15 @@ class Slam:
         noise = uncertainty(result, c.translation_floor, c.rotation_floor)
         self.graph.add_match(submap.anchor, len(self.nodes), result.pose, noise)
         return compose(self._local[submap.anchor], result.pose)
+
+    def _presearch(self, covariance: np.ndarray) -> tuple[float, float]:
+        """Half-widths of the correlative search, m and rad: three standard deviations of odometry where that is more
+        than configured, as after a gap, but no more than loops are searched in."""
+        matcher, loop, deviation = self.config.matcher, self.config.loop, 3 * np.sqrt(np.diag(covariance))
+        return (
+            max(matcher.presearch_distance, min(float(deviation[:2].max()), loop.distance)),
+            max(matcher.presearch_angle, min(float(deviation[2]), loop.angle)),
+        )
 
     def _insert(self, number: int, node: Node) -> None:
         """Add a node to the two submaps being built; a new one starts when the older is half full."""
@@ -253,7 +263,7 @@ class Slam:
                 if (anchor, number) not in done:
                     carry = adjoint(inverse(question.guess))
                     spread = near + unknown[number] + carry @ unknown[anchor] @ carry.T
-                    self._search.ask([replace(question, spread=spread)])
+                    self._search.ask([replace(question, spread=spread, min_score=c.final_score)])
         for closure in self._search.answers():
             self._jury.hear(closure)
 
@@ -284,6 +294,7 @@ class Slam:
                 fronts,
                 between(poses[anchors[k]], poses[number]),
                 self._drift.between(anchors[k], number),
+                self.config.loop.min_score,
             )
             for k in near[np.argsort(away[near], kind="stable")][:count]
         ]

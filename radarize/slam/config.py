@@ -84,8 +84,8 @@ class MatcherConfig(_Section):
 
     Attributes:
         enabled: without it nodes follow odometry and submaps serve the loop search only.
-        presearch_distance, presearch_angle: half-widths of the correlative search before refinement, m and rad;
-            0 switches it off.
+        presearch_distance, presearch_angle: least half-widths of the correlative search before refinement, m and rad;
+            three standard deviations of odometry where that is more. A distance of 0 switches the search off.
         presearch_sigma: as `sigma`, for the weight of odometry in that search: far from a match the points, most of
             them on the same few walls, are wrong together.
         sigma: standard deviation of the residual 1 - p of one point, points taken as independent. It sets the weight of
@@ -119,6 +119,7 @@ class LoopConfig(_Section):
         front: so far in front of its points, m, a node must find the submap free: else a wall fits to any other one,
             a corridor's left to its right. 0: not asked, where every view is rich enough.
         min_score: mean probability at the points that a closure needs, and of being free in front of them.
+        final_score: as `min_score`, for the search at the end: the graph then says how far to look, and judges at once.
         levels: halvings of the resolution in the branch-and-bound search.
         sigma: as `MatcherConfig.sigma`, for closures.
         translation_floor, rotation_floor: no closure is believed better than this, m and rad.
@@ -137,6 +138,7 @@ class LoopConfig(_Section):
     nodes: int = Field(1, gt=0)
     front: float = Field(0.0, ge=0)
     min_score: float = Field(0.6, gt=0, lt=1)
+    final_score: float = Field(0.5, gt=0, lt=1)
     levels: int = Field(5, ge=0, le=8)
     sigma: float = Field(0.7, gt=0)
     translation_floor: float = Field(0.02, gt=0)
@@ -206,7 +208,7 @@ PRESETS: dict[str, SlamConfig] = {
         # Cartographer's settings published with Radarize: 0.08 m cells, ranges of 0.3-4.284 m.
         grid=GridConfig(resolution=0.08, hit=0.65, miss=0.45, min_range=0.3, max_range=4.284, free_range=0.0, nodes=16),
         matcher=MatcherConfig(
-            presearch_distance=0.0, presearch_angle=0.0, sigma=3.0, translation_floor=0.03, rotation_floor=0.015
+            presearch_distance=0.0, presearch_angle=0.0, sigma=2.0, translation_floor=0.03, rotation_floor=0.015
         ),
         loop=LoopConfig(
             radius=8.0,
@@ -217,6 +219,7 @@ PRESETS: dict[str, SlamConfig] = {
             nodes=8,
             front=0.25,
             min_score=0.4,
+            final_score=0.4,
             levels=4,
             sigma=1.0,
             translation_floor=0.05,
@@ -234,7 +237,15 @@ PRESETS: dict[str, SlamConfig] = {
         ),
         matcher=MatcherConfig(presearch_distance=0.0, presearch_angle=0.0, iterations=100),
         loop=LoopConfig(
-            radius=15.0, distance=7.0, angle=0.5236, every=3, min_score=0.55, levels=6, update_every=90, support=1
+            radius=15.0,
+            distance=7.0,
+            angle=0.5236,
+            every=3,
+            min_score=0.55,
+            final_score=0.55,
+            levels=6,
+            update_every=90,
+            support=1,
         ),
     ),
 }

@@ -35,6 +35,7 @@ class Question:
         points, fronts: seen from the node, as in `Node`, m.
         guess: pose of the node in the submap's frame.
         spread: covariance of the guess, in the frame of the node.
+        min_score: that an answer needs.
     """
 
     submap: Submap
@@ -43,6 +44,7 @@ class Question:
     fronts: Float[np.ndarray, "front 2"]
     guess: Float[np.ndarray, "3"]
     spread: Float[np.ndarray, "3 3"]
+    min_score: float
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ class LoopSearch:
             question.guess,
             distance=min(c.distance, max(3 * place, 4 * submap.grid.resolution)),
             angle=min(c.angle, max(3 * turn, 0.05)),
-            min_score=c.min_score,
+            min_score=question.min_score,
             penalty=(price / place**2, price / turn**2),
             fronts=question.fronts if c.front else None,
         )

@@ -105,6 +105,7 @@ def _notes(study: Study) -> list[str]:
         )
     else:
         label = next(iter(study.networks.values())).label
-        networks = f"{label} weights for all of them (--train makes networks of each split's own)"
+        own = " (--train makes networks of each split's own)" if study.benchmark.split else ""
+        networks = f"{label} weights for all of them{own}"
     splits = ", ".join(study.splits)
     return [f"Data set {name}: {recordings} recordings test ({splits}); {networks}.", *study.shortfalls]

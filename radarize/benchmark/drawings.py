@@ -8,7 +8,6 @@ import plotly.graph_objects as go
 
 from radarize.benchmark.benchmark import Study
 from radarize.benchmark.runs import Pair, Run
-from radarize.benchmark.trajectories import OURS
 from radarize.evaluation.drawings import canvas
 from radarize.evaluation.evaluate import TRAJECTORIES
 from radarize.evaluation.page import COLORS, INK, Page
@@ -57,10 +56,10 @@ def _trajectories(study: Study, page: Page, which: str, names: dict[Pair, str]) 
         reference = load(study.output / drawn[0][1].place / "reference.tum")
         _line(figure, planar(reference).positions_xyz, "truth", COLORS["good"], case is cases[0], dash="dot")
         owners.append(case)
-        for number, (pair, run) in enumerate(drawn):
+        for pair, run in drawn:
             estimate, truth = map(planar, matched(load(study.output / run.place / TRAJECTORIES[which]), reference))
             path = moved(estimate, *alignment(estimate, truth, in_plane=True)).positions_xyz
-            _line(figure, path, names[pair], _color(pair, number), case is cases[0])
+            _line(figure, path, names[pair], _color(study, pair), case is cases[0])
             owners.append(case)
     buttons = [
         {"label": case.name, "method": "restyle", "args": [{"visible": [owner is case for owner in owners]}]}
@@ -80,11 +79,27 @@ def _line(figure: go.Figure, positions: np.ndarray, name: str, color: str, shown
 
 
 #: Lines of other methods than ours, told apart on light and dark ground.
-_OTHERS = ("#2a7fd4", "#9a6fd0", "#c2881c", "#1f9e9e", "#c04f8a", "#7d8590", "#6d8f2e", "#8a5a3c")
+_OTHERS = (
+    "#2a7fd4",
+    "#9a6fd0",
+    "#c2881c",
+    "#1f9e9e",
+    "#c04f8a",
+    "#7d8590",
+    "#6d8f2e",
+    "#8a5a3c",
+    "#5b6ee1",
+    "#d98fb0",
+    "#4f9d69",
+    "#b5651d",
+    "#3f6f8f",
+    "#a3a33b",
+)
 
 
-def _color(pair: Pair, number: int) -> str:
-    return COLORS["slam"] if pair.odometry == OURS[0] and number == 0 else _OTHERS[number % len(_OTHERS)]
+def _color(study: Study, pair: Pair) -> str:
+    """One and the same in all plots of a page."""
+    return COLORS["slam"] if pair == study.chosen.partner else _OTHERS[study.pairs.index(pair) % len(_OTHERS)]
 
 
 def _distributions(study: Study, page: Page, which: str, names: dict[Pair, str]) -> None:
@@ -95,11 +110,11 @@ def _distributions(study: Study, page: Page, which: str, names: dict[Pair, str])
         "the mean error of each recording (dots).",
     )
     shares, boxes = go.Figure(), go.Figure()
-    for number, (pair, name) in enumerate(names.items()):
+    for pair, name in names.items():
         runs = study.once(pair)
         if not runs:
             continue
-        style = {"color": _color(pair, number), "width": 2}
+        style = {"color": _color(study, pair), "width": 2}
         errors = np.sort(np.concatenate([study.results[run]["quantiles"][which] for run in runs]))
         some = np.linspace(0, len(errors) - 1, min(200, len(errors))).astype(int)
         shares.add_scatter(

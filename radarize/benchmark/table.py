@@ -61,13 +61,12 @@ def at(found: dict | None, *path: str) -> float | None:
     return value  # type: ignore[return-value]
 
 
-def ahead(rows: Sequence[dict[str, object]], ours: int, columns: Sequence[str]) -> str:
-    """A sentence on whether a row has the least value of all rows in some columns."""
+def ahead(rows: Sequence[dict[str, object]], ours: int, name: str, columns: Sequence[str]) -> str:
+    """A sentence on whether a row, called `name`, has the least value of all rows in some columns."""
     behind = []
     for column in columns:
         own, others = rows[ours][column], [row[column] for k, row in enumerate(rows) if k != ours]
         better = [value for value in others if isinstance(value, float) and value < float(own)]  # type: ignore[arg-type]
         if better:
             behind.append(f"{column} ({cell(own)}, best {cell(min(better))})")
-    name = next(iter(rows[ours].values()))
     return f"{name} has the least error in every column." if not behind else f"{name} is behind in {', '.join(behind)}."

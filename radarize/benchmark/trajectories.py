@@ -40,6 +40,13 @@ def trajectory_tables(
         notes = list(protocol.notes)
         ours = [k for k, pair in enumerate(labels) if pair == study.chosen.partner]
         if ours and len(rows) > 1:
-            notes.append(ahead(rows, ours[0], [column for column in rows[0] if column.startswith(("ATE", "RE"))]))
+            notes.append(
+                ahead(
+                    rows,
+                    ours[0],
+                    " + ".join(map(str, list(labels.values())[ours[0]].values())),
+                    [column for column in rows[0] if column.startswith(("ATE", "RE"))],
+                )
+            )
         found.append(Table(f"{about or trajectory.capitalize()}, {protocol.title}", rows, notes))
     return found

@@ -106,8 +106,8 @@ def test_a_table_as_text_and_json(tmp_path):
 
 def test_ahead_or_where_not():
     rows = [{"who": "ours", "x": 1.0, "y": 2.0}, {"who": "b", "x": 3.0, "y": 1.5}, {"who": "c", "x": None, "y": np.nan}]
-    assert ahead(rows, 0, ["x"]) == "ours has the least error in every column."
-    assert ahead(rows, 0, ["x", "y"]) == "ours is behind in y (2, best 1.5)."
+    assert ahead(rows, 0, "ours", ["x"]) == "ours has the least error in every column."
+    assert ahead(rows, 0, "ours", ["x", "y"]) == "ours is behind in y (2, best 1.5)."
     assert mean([1.0, None, 3.0, np.nan]) == 2 and np.isnan(mean([None]))
 
 

@@ -22,6 +22,9 @@ from radarize.slam.odometry import Drift, Odometry, Stillness
 from radarize.slam.posegraph import PoseGraph
 from radarize.slam.submap import Submap
 
+#: Nodes whose last loop searches may wait at a time.
+_AHEAD = 16
+
 
 class Slam:
     """Simultaneous localisation and mapping from scans and odometry.
@@ -112,8 +115,7 @@ class Slam:
         if self._open:
             self._add_node()
         if self.config.loop.enabled:
-            for closure in self._search.answers():
-                self._jury.hear(closure)
+            self._hear()
             self.graph.optimise()
             self._close_again()
         self.graph.optimise()
@@ -200,13 +202,12 @@ class Slam:
         guess = prior
         if c.presearch_distance > 0:
             weight = np.linalg.inv(covariance) * c.presearch_sigma**2 / len(node.points)
-            distance, angle = self._presearch(covariance)
             found = search(
-                Pyramid.of(submap.grid, 3, distance),
+                Pyramid.of(submap.grid, 3, c.presearch_distance),
                 node.points,
                 prior,
-                distance=distance,
-                angle=angle,
+                distance=c.presearch_distance,
+                angle=c.presearch_angle,
                 min_score=0.1,
                 penalty=(min(weight[0, 0], weight[1, 1]), weight[2, 2]),
             )
@@ -217,15 +218,6 @@ class Slam:
         noise = uncertainty(result, c.translation_floor, c.rotation_floor)
         self.graph.add_match(submap.anchor, len(self.nodes), result.pose, noise)
         return compose(self._local[submap.anchor], result.pose)
-
-    def _presearch(self, covariance: np.ndarray) -> tuple[float, float]:
-        """Half-widths of the correlative search, m and rad: three standard deviations of odometry where that is more
-        than configured, as after a gap, but no more than loops are searched in."""
-        matcher, loop, deviation = self.config.matcher, self.config.loop, 3 * np.sqrt(np.diag(covariance))
-        return (
-            max(matcher.presearch_distance, min(float(deviation[:2].max()), loop.distance)),
-            max(matcher.presearch_angle, min(float(deviation[2]), loop.angle)),
-        )
 
     def _insert(self, number: int, node: Node) -> None:
         """Add a node to the two submaps being built; a new one starts when the older is half full."""
@@ -244,9 +236,9 @@ class Slam:
         c = self.config.loop
         if number % c.every == 0:
             self._search.ask(self._questions(number, c.candidates))
-        jumps = [self._jury.hear(closure) for closure in self._search.answers(number - c.lag)]
-        if any(jumps) or number % c.update_every == 0:
-            self.graph.update()
+        jumps = self._hear(number - c.lag)
+        if jumps or number % c.update_every == 0:
+            self.graph.update(steps=2 if jumps else 1)
 
     def _close_again(self) -> None:
         """With loops closed, nodes and submaps lie where they overlap: match what was not matched.
@@ -264,8 +256,12 @@ class Slam:
                     carry = adjoint(inverse(question.guess))
                     spread = near + unknown[number] + carry @ unknown[anchor] @ carry.T
                     self._search.ask([replace(question, spread=spread, min_score=c.final_score)])
-        for closure in self._search.answers():
-            self._jury.hear(closure)
+            self._hear(number - _AHEAD)  # what waits takes memory
+        self._hear()
+
+    def _hear(self, before: int | None = None) -> bool:
+        """Take in what was found for nodes up to `before`, or for all; True if poses should move for it now."""
+        return any([self._jury.hear(closure) for closure in self._search.answers(before)])
 
     def _questions(self, number: int, count: int) -> list[Question]:
         """Searches of a node and those before it in the finished submaps near it, nearest first."""

@@ -84,8 +84,8 @@ class MatcherConfig(_Section):
 
     Attributes:
         enabled: without it nodes follow odometry and submaps serve the loop search only.
-        presearch_distance, presearch_angle: least half-widths of the correlative search before refinement, m and rad;
-            three standard deviations of odometry where that is more. A distance of 0 switches the search off.
+        presearch_distance, presearch_angle: half-widths of the correlative search before refinement, m and rad;
+            0 switches it off.
         presearch_sigma: as `sigma`, for the weight of odometry in that search: far from a match the points, most of
             them on the same few walls, are wrong together.
         sigma: standard deviation of the residual 1 - p of one point, points taken as independent. It sets the weight of

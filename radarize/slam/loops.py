@@ -17,6 +17,7 @@ from scipy.stats import chi2
 from radarize.pose import between, compose
 from radarize.slam.config import LoopConfig
 from radarize.slam.correlation import Pyramid, search
+from radarize.slam.grid import OccupancyGrid
 from radarize.slam.matcher import Match, match
 from radarize.slam.odometry import Drift
 from radarize.slam.posegraph import PoseGraph
@@ -76,10 +77,11 @@ class LoopSearch:
         self.config = config
         self._pool = ThreadPoolExecutor(_WORKERS, thread_name_prefix="loops")
         self._asked: deque[tuple[int, Future]] = deque()
-        self._pyramid = lru_cache(_PYRAMIDS)(self._build)
+        self._unpack = lru_cache(_PYRAMIDS)(self._build)
 
-    def _build(self, submap: Submap) -> Pyramid:
-        return Pyramid.of(submap.grid, self.config.levels, self.config.distance, free=self.config.front > 0)
+    def _build(self, submap: Submap) -> tuple[OccupancyGrid, Pyramid]:
+        grid = submap.grid
+        return grid, Pyramid.of(grid, self.config.levels, self.config.distance, free=self.config.front > 0)
 
     def ask(self, questions: Sequence[Question]) -> None:
         """Begin to search."""
@@ -96,15 +98,16 @@ class LoopSearch:
     def answer(self, question: Question) -> Closure | None:
         """Search around the guess, refine, and check the result again."""
         c, submap, points = self.config, question.submap, question.points
+        grid, pyramid = self._unpack(submap)
         place = float(np.sqrt(np.linalg.eigvalsh(question.spread[:2, :2])[1]))
         turn = float(np.sqrt(question.spread[2, 2]))
         # The mean residual that moves as much as the guess's covariance does.
         price = c.sigma**2 / max(len(points), 1)
         found = search(
-            self._pyramid(submap),
+            pyramid,
             points,
             question.guess,
-            distance=min(c.distance, max(3 * place, 4 * submap.grid.resolution)),
+            distance=min(c.distance, max(3 * place, 4 * grid.resolution)),
             angle=min(c.angle, max(3 * turn, 0.05)),
             min_score=question.min_score,
             penalty=(price / place**2, price / turn**2),
@@ -113,9 +116,9 @@ class LoopSearch:
         if found is None:
             return None
         pose, score = found
-        refined = match(submap.grid, points, pose, sigma=c.sigma)
+        refined = match(grid, points, pose, sigma=c.sigma)
         moved = np.abs(between(pose, refined.pose))
-        if max(moved[0], moved[1]) > 4 * submap.grid.resolution or moved[2] > 0.1:
+        if max(moved[0], moved[1]) > 4 * grid.resolution or moved[2] > 0.1:
             return None  # the peak of the search is no minimum of the refinement: not a place that fits
         covariance = uncertainty(refined, c.translation_floor, c.rotation_floor)
         return Closure(submap.anchor, question.node, refined.pose, covariance, score)

@@ -73,8 +73,12 @@ class PoseGraph:
             self.accepted[closure] = True
             self._news.add(self._uncertain[closure])
 
-    def update(self) -> None:
-        """Move poses to where everything believed agrees, solving anew only what changed."""
+    def update(self, steps: int = 2) -> None:
+        """Move poses to where everything believed agrees, solving anew only what changed.
+
+        Args:
+            steps: of Gauss and Newton; closing a loop is far from linear and wants two.
+        """
         if self._count < 2:
             return
         if self._isam is None:
@@ -84,7 +88,8 @@ class PoseGraph:
         for k in range(self._known, self._count):
             values.insert(k, gtsam.Pose2(*self._poses[k]))
         self._isam.update(self._news, values)
-        self._isam.update()  # a second step: closing a loop is far from linear
+        for _ in range(steps - 1):
+            self._isam.update()
         self._news, self._known = gtsam.NonlinearFactorGraph(), self._count
         self._poses[: self._count] = gtsam.utilities.extractPose2(self._isam.calculateBestEstimate())
 

@@ -45,7 +45,9 @@ def surroundings() -> str:
     """What else the machine does, and at what priority (Linux: of the session) figures are taken: a note."""
     group = Path("/proc/self/autogroup")
     priority = group.read_text().split(maxsplit=1)[1].strip() if group.exists() else "that of any process"
-    return f"Other work on the machine: load average {os.getloadavg()[2]:.1f}; priority of this measurement: {priority}."
+    return (
+        f"Other work on the machine: load average {os.getloadavg()[2]:.1f}; priority of this measurement: {priority}."
+    )
 
 
 def publish(name: str, title: str, rows: list[dict[str, object]], *, seed: int, notes: list[str]) -> None:

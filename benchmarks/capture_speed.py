@@ -1,7 +1,6 @@
 """`radarize capture` against `radarsim emulate`, each a process of its own: frames lost, and what each side costs."""
 
 import argparse
-import os
 import re
 import signal
 import subprocess
@@ -14,7 +13,7 @@ import numpy as np
 import psutil
 from jaxtyping import Bool
 
-from benchmarks.results import publish
+from benchmarks.results import publish, surroundings
 from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import MAX_PAYLOAD
@@ -151,11 +150,7 @@ def main() -> None:
         "and every chirp's mark with what the network's seed says was lost.",
         "Frames are not written if disk or processor are too slow for them; the emulator is late if it gets no time.",
     ]
-    group = Path("/proc/self/autogroup")
-    notes.append(
-        f"Other work on the machine: load average {os.getloadavg()[2]:.1f}; priority of emulator and capture together: "
-        f"{group.read_text().split(maxsplit=1)[1].strip() if group.exists() else 'that of any process'}."
-    )
+    notes.append(surroundings())
     notes += [f"{row['configuration']}: {said}." for row, said in zip(rows, heard, strict=True) if said]
     publish("capture_speed", "Capture at the virtual radar", rows, seed=arguments.seed, notes=notes)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.results import publish
+from benchmarks.results import publish, surroundings
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
@@ -83,6 +83,7 @@ def main() -> None:
         notes=[
             "A browser's stream of events is read all the time. Dropped frames are whole ones that found no room "
             "because this machine was too slow for them; processor time is that of the main process.",
+            surroundings(),
         ],
     )
 

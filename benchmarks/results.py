@@ -1,12 +1,13 @@
 """Where benchmarks put their figures: one JSON and one Markdown table each, with machine, command and seed."""
 
+import os
 import resource
 from pathlib import Path
 
 from radarize.benchmark.results import Results, command, machine
 from radarize.benchmark.table import Table
 
-__all__ = ["FOLDER", "machine", "memory_mb", "peak_memory_mb", "publish"]
+__all__ = ["FOLDER", "machine", "memory_mb", "peak_memory_mb", "publish", "surroundings"]
 
 FOLDER = Path(__file__).parent / "results"
 
@@ -20,6 +21,15 @@ def memory_mb() -> float:
     """Resident size of this process now, MB."""
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * resource.getpagesize() / 1e6
+
+
+def surroundings() -> str:
+    """What else the machine does, and at what priority (Linux: of the session) figures are taken: a note."""
+    group = Path("/proc/self/autogroup")
+    priority = group.read_text().split(maxsplit=1)[1].strip() if group.exists() else "that of any process"
+    return (
+        f"Other work on the machine: load average {os.getloadavg()[2]:.1f}; priority of this measurement: {priority}."
+    )
 
 
 def publish(name: str, title: str, rows: list[dict[str, object]], *, seed: int | None, notes: list[str]) -> None:

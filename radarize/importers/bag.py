@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.errors import InputError, reason
 from radarize.importers.bin import all_zero
 from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.importers.companions import ChipPoints, Companion, Depth, InertialSensor, TrackedPose
@@ -58,7 +58,7 @@ def open_bag(
         radar, others, warnings = _topics(bag)
         received, first = _first(bag, radar)
         config, assumed = _configure(path, first, config, overrides)
-        config = _calibrated(config, first, warnings)
+        config = _calibrated(config, first, str(path), warnings)
         companions = {}
         for topic, kind in others.items():
             try:
@@ -115,9 +115,13 @@ def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
 def _configure(
     path: Path, frame: object, config: RadarConfig | None, overrides: dict[str, object]
 ) -> tuple[RadarConfig, tuple[str, ...]]:
-    shape = tuple(int(length) for length in np.atleast_1d(frame.shape))
-    rx, tx = _antennas(frame.rx), _antennas(frame.tx)
-    loops, rest = divmod(math.prod(shape), max(1, shape[-1] * len(rx) * len(tx)))
+    try:
+        shape = tuple(int(length) for length in np.atleast_1d(frame.shape))
+        rx, tx = _antennas(frame.rx), _antennas(frame.tx)
+        whole = np.asarray(frame.data).dtype.kind in "iu" and min(shape, default=0) > 0
+    except (AttributeError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{path}: has frames without usable shape, rx, tx and data ({reason(error)})") from error
+    loops, rest = divmod(math.prod(shape), max(1, shape[-1] * len(rx) * len(tx))) if whole else (0, 0)
     if rest or not loops:
         raise InputError(
             f"{path}: has frames of shape {shape} with {len(tx)} transmitters and {len(rx)} receivers, expected loops "
@@ -140,16 +144,19 @@ def _antennas(field: object) -> tuple[int, ...]:
     return tuple(k for k, value in enumerate(values) if value)
 
 
-def _calibrated(config: RadarConfig, frame: object, warnings: list[str]) -> RadarConfig:
+def _calibrated(config: RadarConfig, frame: object, name: str, warnings: list[str]) -> RadarConfig:
     """The configuration with the frame's calibration, unless it has one of its own."""
-    pairs = np.asarray(getattr(frame, "rx_phase_bias", ()), float).reshape(-1)
+    try:
+        pairs = np.asarray(getattr(frame, "rx_phase_bias", ()), float).reshape(-1)
+        bias = float(getattr(frame, "range_bias", 0.0))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: has frames without usable range_bias and rx_phase_bias ({reason(error)})") from error
     untouched = config.range_bias == 0 and set(config.channel_calibration) == {(1.0, 0.0)}
     if not untouched or not pairs.any():
         return config
-    if pairs.size != 24 or not np.isfinite(pairs).all():
+    if pairs.size != 24 or not np.isfinite([*pairs, bias]).all():
         warnings.append(f"rx_phase_bias has {pairs.size} numbers, expected 12 pairs; no calibration is taken from it")
         return config
-    bias = float(getattr(frame, "range_bias", 0.0))
     factors = tuple((float(re), float(im)) for re, im in pairs.reshape(12, 2))
     return config.model_copy(update={"range_bias": bias, "channel_calibration": factors})
 
@@ -169,7 +176,8 @@ def _intrinsics(bag: Bag, companions: dict[str, Companion]) -> None:
 def _batches(
     path: Path, radar: str, companions: dict[str, Companion], capture: Capture, stamps: Stamps
 ) -> Iterator[Batch]:
-    config, size, done = capture.config, batch_frames(capture.config), 0
+    config, done = capture.config, 0
+    size = batch_frames(config, capture.streams)
     frames = Frames(config)
 
     def batch(count: int) -> Batch:

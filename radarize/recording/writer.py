@@ -75,7 +75,7 @@ class RecordingWriter:
 
     def _create(self, cfg_text, attributes, streams, products) -> None:
         file = self._file
-        file.attrs.update({"format": FORMAT, "radarize_version": __version__, **attributes})
+        file.attrs.update({"format": FORMAT, "radarize_version": __version__, **_storable(attributes)})
         radar = file.create_group("radar")
         radar.attrs["config"] = self.config.model_dump_json()
         radar.attrs["cfg"] = cfg_text
@@ -177,7 +177,7 @@ class RecordingWriter:
                 self._file.close()
                 if self._notes:  # HDF5 takes no new attributes while readers may follow
                     with h5py.File(self.part, "r+", libver="latest") as file:
-                        file.attrs.update(self._notes)
+                        file.attrs.update(_storable(self._notes))
             except (OSError, RuntimeError) as error:
                 raise InputError(f"cannot finish {self.part}: {reason(error)}; {self._survivors()}") from error
             if not keep_part:
@@ -215,6 +215,16 @@ def grow(file: h5py.File, name: str, stream: Stream) -> h5py.Dataset:
     if stream.labels:
         data.attrs["labels"] = stream.labels
     return data
+
+
+def _storable(attributes: Mapping[str, object]) -> dict[str, object]:
+    """Attributes in which text is what HDF5 takes for it: no NUL, and nothing that UTF-8 cannot say."""
+    return {
+        name: value.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")
+        if isinstance(value, str)
+        else value
+        for name, value in attributes.items()
+    }
 
 
 def _unwritten(name: str, stream: Stream) -> float | int | None:

@@ -37,7 +37,7 @@ from tests.importers.ros import write_published
 from tests.importers.test_import_pcap import pcap, udp
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
-#: A reader may take so much time (s), and memory (bytes): buffers of a fixed size, and so many times the input's.
+#: A reader may take so much processor time (s), and memory (bytes): buffers of a fixed size, and so many times the input's.
 MOST_SECONDS, MOST_MEMORY, MOST_TIMES = 5.0, 96 << 20, 20
 #: 3,072 bytes a frame.
 CONFIG = RadarConfig(
@@ -67,7 +67,7 @@ class Reader:
 
 @dataclass(frozen=True)
 class Attempt:
-    """What came of an input: whether it was read, the time (s), and the memory beyond what was in use (bytes)."""
+    """What came of an input: whether it was read, processor time (s), and memory beyond what was in use (bytes)."""
 
     accepted: bool
     seconds: float
@@ -82,13 +82,13 @@ def attempt(reader: Reader, data: object, folder: Path) -> Attempt:
         Exception: whatever else than an InputError the reader raised.
     """
     placed, accepted = reader.place(data, folder), True
-    before, start = _peak_memory(anew=True), time.perf_counter()
+    before, start = _peak_memory(anew=True), time.process_time()
     try:
         reader.read(placed)
     except InputError as error:
         accepted, text = False, str(error)
         assert text.isprintable() and 10 < len(text) < 1500, f"{text[:200]!r}... is no sentence"
-    seconds, memory = time.perf_counter() - start, _peak_memory() - before
+    seconds, memory = time.process_time() - start, _peak_memory() - before
     clear(folder)
     assert seconds < MOST_SECONDS, f"took {seconds:.1f} s"
     assert memory < MOST_MEMORY + MOST_TIMES * reader.size(data), f"took {memory >> 20} MiB"

@@ -20,6 +20,7 @@ from hypothesis.strategies import SearchStrategy
 from rosbags.rosbag2 import StoragePlugin
 from scipy.io import savemat
 
+import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
 from radarize.contents import contents
 from radarize.errors import InputError
 from radarize.importers import import_recording

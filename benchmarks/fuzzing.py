@@ -110,8 +110,8 @@ def main() -> None:
         notes=[
             "Valid files after bit flips, cuts, splices and edits of fields, or random bytes, drawn by hypothesis. "
             "None raised anything but a refusal in one sentence, crashed or hung.",
-            f"More than {MOST_SECONDS:g} s of processor time, or {MOST_MEMORY >> 20} MiB and {MOST_TIMES} times its size in memory, "
-            "would have failed the input. Memory is what was resident beyond the state before; the longest is in "
+            f"More than {MOST_SECONDS:g} s of processor time, or {MOST_MEMORY >> 20} MiB and {MOST_TIMES} times its size in "
+            "memory, would have failed the input. Memory is what was resident beyond the state before; the longest is in "
             "processor time, s are on the clock, making and placing the inputs included.",
             surroundings(),
         ],

@@ -37,7 +37,8 @@ from tests.importers.ros import write_published
 from tests.importers.test_import_pcap import pcap, udp
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
-#: A reader may take so much processor time (s), and memory (bytes): buffers of a fixed size, and so many times the input's.
+#: A reader may take so much processor time (s), and memory (bytes): buffers of a fixed size, and so many times the
+#: input's.
 MOST_SECONDS, MOST_MEMORY, MOST_TIMES = 5.0, 96 << 20, 20
 #: 3,072 bytes a frame.
 CONFIG = RadarConfig(

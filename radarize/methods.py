@@ -213,6 +213,11 @@ def segmentation(inputs: Inputs) -> Segmentation:
     return Segmentation(inputs.maker, inputs.weights.of("segmentation"))
 
 
+def segmentation_alone(inputs: Inputs) -> Segmentation:
+    """The network without the first echo rule."""
+    return Segmentation(inputs.maker, inputs.weights.of("segmentation"), first=False)
+
+
 def of_heatmaps(method: str, inputs: Inputs) -> HeatmapScans:
     """No networks."""
     return HeatmapScans(inputs.heatmaps, method, stage=inputs.stage)
@@ -228,10 +233,12 @@ ODOMETRY: dict[str, Method[Follower]] = {
     "rnin": Method("RNIN", rnin, ("rnin",)),
 }
 SCANS: dict[str, Method[Scanner]] = {
-    "segmentation": Method("segmentation network", segmentation, ("segmentation",)),
+    "segmentation": Method("segmentation network, first echo", segmentation, ("segmentation",)),
+    "segmentation-alone": Method("segmentation network alone", segmentation_alone, ("segmentation",)),
     "radarhd": Method("RadarHD", radarhd, ("radarhd",)),
     "elevation-aware": Method("elevation-aware first echo", partial(of_heatmaps, "elevation-aware")),
     "first-echo": Method("first echo", partial(of_heatmaps, "first-echo")),
+    "cfar": Method("CFAR", partial(of_heatmaps, "cfar")),
     "threshold": Method("threshold", partial(of_heatmaps, "threshold")),
 }
 #: Methods of choice.

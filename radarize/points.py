@@ -211,9 +211,9 @@ class PointClouds:
         power = cube.real**2 + cube.imag**2
         level = 10 * np.log10(power + np.float32(1e-9)).mean(axis=2).transpose(0, 2, 1)
         over_range, over_doppler = self.settings.range_cfar, self.settings.doppler_cfar
-        noise = _surroundings(level, over_range, axis=1, cyclic=False)
+        noise = level_around(level, over_range, axis=1, cyclic=False)
         found = level > noise + over_range.threshold
-        found &= level > _surroundings(level, over_doppler, axis=2, cyclic=True) + over_doppler.threshold
+        found &= level > level_around(level, over_doppler, axis=2, cyclic=True) + over_doppler.threshold
         found &= level >= maximum_filter(level, (1, 3, 3), mode=("nearest", "nearest", "wrap"))
         found &= ((self.ranges if ranges is None else ranges) >= self.settings.min_range)[:, None]
         return level, noise, found
@@ -239,8 +239,15 @@ class PointClouds:
         return which, self.u_y[cell], u_z
 
 
-def _surroundings(level: np.ndarray, cfar: Cfar, axis: int, cyclic: bool) -> np.ndarray:
-    """Mean level of the cells around each along an axis; at the ends of an axis that is no circle, of one side only."""
+def level_around(level: np.ndarray, cfar: Cfar, axis: int, cyclic: bool) -> np.ndarray:
+    """Mean level of the cells around each along an axis; at the ends of an axis that is no circle, of one side only.
+
+    Args:
+        level: dB.
+        cfar: which cells count.
+        axis: along which.
+        cyclic: its ends meet.
+    """
     reach = cfar.window + cfar.guard
     level = np.moveaxis(level, axis, -1)
     padded = np.pad(level, [(0, 0)] * (level.ndim - 1) + [(reach, reach)], mode="wrap")

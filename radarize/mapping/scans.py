@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.mapping import echoes
+from radarize.points import Cfar, level_around
 
 #: Bearings of a scan: 88 columns of 1 deg, -44...+43 deg, left positive, rad (the paper's field of view).
 BEARINGS = np.radians(np.arange(-44.0, 44.0))
@@ -33,6 +34,7 @@ class ScanConfig(BaseModel):
             and nearer is clutter above or below the plane, or the skirt of a neighbour. In simulated offices 6 dB
             halves the echoes that come too early and costs one in ten of the others.
         noise_quantile: the noise is this quantile of a frame's cells: most of a room's cells are behind its walls.
+        cfar: what an echo stands above along its bearing, for the method of that name.
         elevation_power: how strongly echoes from above and below are weighed down: a cell's power is multiplied with
             (elevation-aware / reference power)^this, at most 1.
     """
@@ -44,6 +46,7 @@ class ScanConfig(BaseModel):
     below_ring_db: float = Field(15.0, gt=0)
     below_bearing_db: float = Field(6.0, gt=0)
     noise_quantile: float = Field(0.25, gt=0, lt=1)
+    cfar: Cfar = Cfar(window=8, guard=4, threshold=10.0)
     elevation_power: float = Field(2.0, gt=0)
 
 
@@ -83,6 +86,15 @@ def threshold(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
     return echoes.strongest(detect(maps.power, maps), maps.power)
 
 
+def cfar(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
+    """The strongest cell of every bearing that stands out from its neighbours in range and in bearing."""
+    level, cfar = 10 * np.log10(np.maximum(maps.power, 1e-30)), maps.config.cfar
+    found = np.broadcast_to((maps.ranges >= maps.config.min_range)[:, None], level.shape)
+    for axis in (1, 2):
+        found = found & (level > level_around(level, cfar, axis, cyclic=False) + cfar.threshold)
+    return echoes.strongest(found, maps.power)
+
+
 def first_echo(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
     """The first echo of every bearing."""
     return echoes.first(detect(maps.power, maps), maps.power)
@@ -99,6 +111,7 @@ def elevation_aware(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
 
 METHODS: dict[str, Callable[[Maps], np.ndarray]] = {
     "threshold": threshold,
+    "cfar": cfar,
     "first-echo": first_echo,
     "elevation-aware": elevation_aware,
 }

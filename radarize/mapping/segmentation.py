@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from jaxtyping import Complex64, Float
 
+from radarize.mapping import echoes
 from radarize.nets.windows import Windows
 from radarize.training.maps import MapMaker
 
@@ -23,14 +24,16 @@ class Segmentation:
         weights: file; the shipped ones if None.
         least: least probability that a range is right within `NEAR` cells: higher leaves fewer ghosts and fewer
             bearings.
+        first: take the first surface; False: the likeliest occupied cell of each bearing, wherever it is, for
+            comparison.
 
     Raises:
         InputError: no such weights, or they are for another radar.
     """
 
-    def __init__(self, maker: MapMaker, weights: Path | None = None, least: float = LEAST):
+    def __init__(self, maker: MapMaker, weights: Path | None = None, least: float = LEAST, first: bool = True):
         self._windows, self._ranges = Windows(maker, "segmentation", weights), maker.heatmaps.ranges
-        self.least = least
+        self.least, self.first = least, first
 
     @torch.inference_mode()
     def occupancy(
@@ -43,7 +46,11 @@ class Segmentation:
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
     ) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen."""
-        bins = first_surface(self.occupancy(spectrum), self.least)
+        occupancy = self.occupancy(spectrum)
+        if self.first:
+            bins = first_surface(occupancy, self.least)
+        else:
+            bins = echoes.strongest(occupancy >= self.least, occupancy)
         return np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
 
 

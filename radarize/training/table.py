@@ -130,12 +130,12 @@ class Table:
         )
 
     def starts(self, reach: int) -> Int[Tensor, "window"]:
-        """Frames that have `reach` - 1 more after them in their recording, all of them with truth that is known."""
+        """Frames that have `reach` - 1 more after them in their recording, all with truth and readings that are known."""
         first = np.cumsum([0, *self.lengths[:-1]])
         windows = [np.arange(a, a + max(0, n - reach + 1)) for a, n in zip(first, self.lengths, strict=True)]
         found = torch.from_numpy(np.concatenate(windows))
         blind = torch.zeros(sum(self.lengths) + 1, dtype=torch.int64)  # unknown ones up to each frame
-        for values in self.truth.values():
+        for values in (*self.truth.values(), *self.sensed.values()):
             blind[1:] |= ~values.isfinite().flatten(1).all(dim=1)
         blind = blind.cumsum(0)
         return found[blind[found + reach] == blind[found]]

@@ -130,7 +130,7 @@ class Table:
         )
 
     def starts(self, reach: int) -> Int[Tensor, "window"]:
-        """Frames that have `reach` - 1 more after them in their recording, all with truth and readings that are known."""
+        """Frames that have `reach` - 1 more after them in their recording, with truth and readings that are known."""
         first = np.cumsum([0, *self.lengths[:-1]])
         windows = [np.arange(a, a + max(0, n - reach + 1)) for a, n in zip(first, self.lengths, strict=True)]
         found = torch.from_numpy(np.concatenate(windows))

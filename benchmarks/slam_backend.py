@@ -177,7 +177,7 @@ def graph_rows(seed: int) -> list[dict[str, object]]:
 
 def simulated(folder: Path) -> Path:
     """Make recordings, run the pipeline on them, and keep the runs; what is there already is left as it is."""
-    from radarize.pipeline import run
+    from radarize.run import run
     from radarsim.simulate import simulate
 
     folder.mkdir(parents=True, exist_ok=True)

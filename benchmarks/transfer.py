@@ -19,9 +19,9 @@ from radarize.errors import InputError
 from radarize.evaluation.likeness import frechet_distance, patch_statistics
 from radarize.importers import import_recording
 from radarize.methods import best_methods
-from radarize.pipeline import run
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
+from radarize.run import run
 from radarize.training.dataset import recordings
 from radarize.training.maps import MapMaker, maps_of
 from radarsim.calibrate import calibrate

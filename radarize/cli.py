@@ -237,7 +237,7 @@ def run_(
     ] = None,
 ):
     """Estimate trajectory and map of a recording."""
-    from radarize.pipeline import run
+    from radarize.run import run
 
     choices = {"odometry": odometry, "scans": scans, "settings": settings, "weights": weights}
     given = {name: value for name, value in choices.items() if value is not None}

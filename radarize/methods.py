@@ -5,6 +5,7 @@ A new method is a class with a `follow` or a `scan`, and an entry here or, from 
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from copy import copy
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,7 +13,7 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import torch
-from jaxtyping import Complex64, Float
+from jaxtyping import Bool, Complex64, Float, Int16
 
 from radarize.baselines.odometry import MilliEgoOdometry, RninOdometry
 from radarize.baselines.ransac import RansacVelocity
@@ -71,8 +72,13 @@ class Weights:
         return shipped(kind) if self.folder is None else self.folder / f"{kind}.safetensors"
 
 
+#: A frame with a smaller share of its chirps is left out. On a simulated walk, with the rest of each burst lost, 95 %
+#: of Doppler velocities are within 0.02 m/s from whole bursts, 0.06 m/s from an eighth, 0.21 m/s from a sixteenth.
+LEAST_SHARE = 1 / 8
+
+
 class Inputs:
-    """What methods are made from. Those made from the same share spectra, maps and scans.
+    """What methods are made from. Those made from the same share spectra, maps, scans and odometry.
 
     Args:
         config: radar configuration.
@@ -84,6 +90,8 @@ class Inputs:
     Attributes:
         heatmaps: on a degree's grid.
         maker: of the networks' maps.
+        frames: which of the next frames are neither lost nor silent, and their spectra (None if none is), from samples
+            and the chirps that are valid.
     """
 
     def __init__(
@@ -97,7 +105,28 @@ class Inputs:
         self.config, self.weights, self.scans = config, weights or Weights(), scans
         self.recording, self.stage = recording, stage
         self.heatmaps, self.maker = Heatmaps(config), MapMaker(config, stage=stage)
-        self._scanners: dict[str, _Once] = {}
+        self.frames: Callable[..., tuple[np.ndarray, torch.Tensor | None]] = self._whole
+        self._scanners: dict[str, _OnceScanner] = {}
+        self._followers: dict[tuple[str, str], _OnceFollower] = {}
+        self._asked = False
+
+    def beside(self, scans: str) -> "Inputs":
+        """The same with other scans for odometry. From now on `frames` takes the same samples for the same frames."""
+        if self.frames == self._whole:
+            self.frames = _Once(self._whole)
+        other = copy(self)
+        other.scans = scans
+        return other
+
+    def _whole(
+        self, adc: Int16[np.ndarray, "frame loop tx rx sample 2"], valid: Bool[np.ndarray, "frame loop tx"] | None
+    ) -> tuple[Bool[np.ndarray, "frame"], Complex64[torch.Tensor, "whole range doppler antenna"] | None]:
+        used = adc.reshape(len(adc), -1).any(axis=1)  # networks would see motion in nothing, too
+        if valid is not None:
+            used &= valid.mean(axis=(1, 2)) >= LEAST_SHARE
+            valid = valid[used]
+        with self.stage("spectra"):
+            return used, self.heatmaps.spectrum(adc[used], valid) if used.any() else None
 
     def scanner(self, name: str | None = None) -> Scanner:
         """Scans by a key of `SCANS`, made once a batch however many ask; None: of the method chosen.
@@ -105,18 +134,24 @@ class Inputs:
         Raises:
             InputError: unknown name, or see `Method`.
         """
+        self._asked |= name is None
         name = name or self.scans
         if name not in self._scanners:
-            self._scanners[name] = _Once(_method("scans", name, SCANS).make(self), self.stage)
+            self._scanners[name] = _OnceScanner(_method("scans", name, SCANS).make(self), self.stage)
         return self._scanners[name]
 
     def odometry(self, name: str) -> Follower:
-        """Odometry by a key of `ODOMETRY`.
+        """Odometry by a key of `ODOMETRY`, which moves on once a batch however many ask.
 
         Raises:
             InputError: unknown name, or see `Method`.
         """
-        return _method("odometry", name, ODOMETRY).make(self)
+        for key in ((name, ""), (name, self.scans)):
+            if key in self._followers:
+                return self._followers[key]
+        self._asked = False
+        made = _OnceFollower(_method("odometry", name, ODOMETRY).make(self))
+        return self._followers.setdefault((name, self.scans if self._asked else ""), made)
 
     def imu(self, method: str) -> Recording:
         """The recording, for a method that needs its IMU.
@@ -129,19 +164,34 @@ class Inputs:
         return self.recording
 
 
-class _Once:
-    """A scanner that remembers what it said of the last spectrum."""
+Answer = TypeVar("Answer")
 
+
+class _Once(Generic[Answer]):
+    """Remembers what was answered about the last batch."""
+
+    def __init__(self, answer: Callable[..., Answer]):
+        self._answer_to, self._batch, self._answer = answer, None, None
+
+    def __call__(self, batch: object, *rest: object) -> Answer:
+        if batch is not self._batch:
+            self._batch, self._answer = batch, self._answer_to(batch, *rest)
+        return self._answer
+
+
+class _OnceScanner:
     def __init__(self, scanner: Scanner, stage: Callable[[str], AbstractContextManager]):
         self._scanner, self._stage = scanner, stage
-        self._spectrum: torch.Tensor | None = None
-        self._ranges = np.zeros((0, 0))
+        self.scan = _Once(self._scan)
 
-    def scan(self, spectrum: torch.Tensor) -> np.ndarray:
-        if spectrum is not self._spectrum:
-            with self._stage("scans"):
-                self._spectrum, self._ranges = spectrum, self._scanner.scan(spectrum)
-        return self._ranges
+    def _scan(self, spectrum: torch.Tensor) -> np.ndarray:
+        with self._stage("scans"):
+            return self._scanner.scan(spectrum)
+
+
+class _OnceFollower:
+    def __init__(self, follower: Follower):
+        self.follow = _Once(follower.follow)
 
 
 Made = TypeVar("Made")

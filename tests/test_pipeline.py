@@ -8,10 +8,11 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate
-from radarize.pipeline import Pipeline, run
+from radarize.pipeline import Pipeline
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter, Stream
+from radarize.run import run
 from radarize.tum import read_tum
 from radarsim.simulate import simulate
 

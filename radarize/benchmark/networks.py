@@ -63,6 +63,7 @@ class Training:
     epochs: int | None = None
     seed: int = 0
     alone = True
+    together = None
 
     @property
     def place(self) -> str:

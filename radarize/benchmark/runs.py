@@ -10,13 +10,15 @@ from radarize import __version__
 from radarize.benchmark.dataset import Case
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.steps import Report
+from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate, trajectory_errors
 from radarize.evaluation.runfiles import read_scans
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import missed, sources
 from radarize.methods import ODOMETRY, SCANS
-from radarize.pipeline import BATCH, Pipeline, run
+from radarize.pipeline import BATCH, Pipeline
 from radarize.recording import Recording
+from radarize.run import run_each
 from radarize.slam import log
 from radarize.slam.config import LoopConfig, SlamConfig
 
@@ -49,6 +51,7 @@ class _Step:
     case: Case
     pair: Pair
     networks: Networks
+    together = None
 
     @property
     def _name(self) -> str:
@@ -78,17 +81,42 @@ class Run(_Step):
     def frames(self) -> int:
         return self.case.frames
 
+    @property
+    def together(self) -> object:
+        """With the recording's other runs: what methods have in common is made once."""
+        return self.case, self.networks
+
     def do(self, folder: Path, report: Report) -> dict[str, object]:
-        """Returns: see `figures`."""
-        run(
-            self.case.path,
-            folder,
-            odometry=self.pair.odometry,
-            scans=self.pair.scans,
-            weights=self.networks.folder,
-            progress=lambda done, total: report(done / total),
-        )
-        return figures(folder, self.case.path)
+        """Returns: see `figures`.
+
+        Raises:
+            InputError: it cannot be run.
+        """
+        found = self.do_each({folder: self}, report)[folder]
+        if isinstance(found, str):
+            raise InputError(found)
+        return found
+
+    def do_each(self, places: "dict[Path, Run]", report: Report) -> dict[Path, dict[str, object] | str]:
+        """Of one recording and the same networks; see `do`."""
+        pairs = {folder: (run.pair.odometry, run.pair.scans) for folder, run in places.items()}
+        share = 0.7  # of the time, until trajectories are there
+
+        def running(done: int, total: int) -> None:
+            report(share * done / total)
+
+        found: dict[Path, dict[str, object] | str] = {}
+        try:
+            failed = run_each(self.case.path, pairs, weights=self.networks.folder, progress=running)
+        except InputError as error:
+            failed = dict.fromkeys(places, error)
+        for folder in places:
+            try:
+                found[folder] = str(failed[folder]) if folder in failed else figures(folder, self.case.path)
+            except InputError as error:
+                found[folder] = str(error)
+            report(share + (1 - share) * len(found) / len(places))
+        return found
 
 
 def figures(run: Path, recording: Path) -> dict[str, object]:

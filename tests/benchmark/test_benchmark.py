@@ -87,7 +87,7 @@ def test_what_cannot_run_is_a_dash_with_a_reason(rooms, toys, tmp_path):
 
 def test_runs_are_done_once(rooms, toys, tmp_path, monkeypatch):
     benchmark("odometry", rooms, tmp_path, methods=toys)
-    monkeypatch.setattr("radarize.benchmark.runs.run", None)  # would break whatever runs now
+    monkeypatch.setattr("radarize.benchmark.runs.run_each", None)  # would break whatever runs now
     benchmark("odometry", rooms, tmp_path, methods=toys)
     with pytest.raises(TypeError):
         benchmark("buildings", rooms, tmp_path, methods=toys)  # B_robot is new

@@ -27,6 +27,7 @@ class Note:
     trouble: str = field(default="", compare=False)
     alone: bool = False
     frames: int = 10
+    together: str | None = None
 
     @property
     def place(self) -> str:
@@ -45,6 +46,12 @@ class Note:
         report(1.0)
         return {"pair": (self.name, self.of)}
 
+    def do_each(self, places, report) -> dict[Path, dict[str, object] | str]:
+        assert len({step.together for step in places.values()}) == 1
+        with (next(iter(places)).parent / "units").open("a") as units:
+            units.write(",".join(step.name for step in places.values()) + "\n")
+        return {folder: step.trouble or step.do(folder, report) for folder, step in places.items()}
+
 
 def log(step: Note, output: Path) -> list[int]:
     """Processes that did a step."""
@@ -60,6 +67,21 @@ def test_each_once_and_in_order(tmp_path):
     assert moved[0] == (0, 30) and moved[-1] == (30, 30) and moved == sorted(moved)
     assert perform(steps, tmp_path, 1, lambda *where: None) == found
     assert [len(log(step, tmp_path)) for step in steps[:3]] == [1, 0, 1]
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_some_are_done_together(tmp_path, workers):
+    """All of a kind that have not been done, in one go; one that fails spoils no other."""
+    (tmp_path / "notes").mkdir()
+    steps = [Note(name, together=name[0]) for name in ("a1", "b1", "a2", "a3", "b2", "c1")] + [Note("d")]
+    steps[3] = Note("a3", together="a", trouble="no")
+    perform(steps[:1], tmp_path, 1, lambda *where: None)
+    moved = []
+    found = perform(steps, tmp_path, workers, lambda *where: moved.append(where))
+    assert found == {step: step.trouble or {"pair": [step.name, 0]} for step in steps}
+    assert sorted((tmp_path / "notes" / "units").read_text().split()) == ["a2,a3", "b1,b2"]
+    assert [len(log(step, tmp_path)) for step in steps] == [1, 1, 1, 0, 1, 1, 1]
+    assert moved[0] == (10, 70) and moved[-1] == (70, 70)
 
 
 def test_what_a_step_depends_on_counts(tmp_path):

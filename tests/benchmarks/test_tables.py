@@ -8,7 +8,7 @@ import pytest
 from benchmarks import evaluation, transfer
 from radarize.benchmark.odometry import Followed, row
 from radarize.benchmark.runs import figures
-from radarize.pipeline import run
+from radarize.run import run
 from radarsim.simulate import simulate
 
 

@@ -11,11 +11,11 @@ from radarize.errors import InputError
 from radarize.importers import import_recording
 from radarize.importers.bag import open_bag
 from radarize.importers.companions import depth_picture
-from radarize.pipeline import run
 from radarize.points import PointClouds
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter, Stream
+from radarize.run import run
 from radarize.tum import planar, planar_poses, read_tum
 from tests.echoes import record
 from tests.importers.ros import EPOCH, RADAR, BagWriter, write_published

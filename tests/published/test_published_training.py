@@ -11,13 +11,13 @@ from typer.testing import CliRunner
 from radarize.cli import app
 from radarize.errors import InputError
 from radarize.nets.weights import Grid, Header, build, example, load, save
-from radarize.pipeline import run
 from radarize.published import labels
 from radarize.published.chain import Chain, first_occupied
 from radarize.published.heatmaps import PublishedMaps
 from radarize.published.tasks import PUBLISHED_TASKS, pooled_dice
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
+from radarize.run import run
 from radarize.training.table import Table
 from radarize.tum import read_tum
 

@@ -59,7 +59,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "multipath": Benchmark(
         "Multipath",
         "Ghosts, missed surfaces, maps and odometry as multipath becomes severe (data set `stress`).",
-        mapping.pairs,
+        varied.stress_pairs,
         varied.stress_tables,
         lacks=varied.lacks_stress,
         draw=varied.draw_stress,

@@ -18,8 +18,8 @@ PLACES = {
     "odometry": ("odometry", "ate", "position", "mean"),
     "slam": ("slam", "ate", "position", "mean"),
 }
-#: Those that are drawn.
-DRAWN = ("ghosts", "missed", "map_f1", "odometry")
+#: Odometry that is as good as its scans.
+MATCHING = "scan-matching"
 
 
 def lacks_stress(data: DataSet) -> str:
@@ -47,20 +47,27 @@ def classical_pairs(chosen: Chosen) -> list[Pair]:
     ]
 
 
+def stress_pairs(chosen: Chosen) -> list[Pair]:
+    """Every scan with the odometry of choice, and with odometry that is made of nothing else."""
+    return [
+        *(Pair(chosen.partner.odometry, scans) for scans in chosen.scans),
+        *(Pair(MATCHING, scans) for scans in chosen.scans if MATCHING in chosen.odometry),
+    ]
+
+
 def stress_tables(study: Study) -> list[Table]:
     """A ranking of scans, then all figures over severity."""
-    rows = varied(study, "stress", "severity")
-    ranking = []
-    for pair in study.pairs:
-        own = [row for row in rows if row["scans"] == pair.scans]
+    rows, ranking = stress_rows(study), []
+    names = [name for name in FIGURES if any(row[name] is not None for row in rows)]
+    for scans in study.chosen.scans:
+        own = [row for row in rows if row["scans"] == scans]
         worst = max((row["severity"] for row in own), default=0)
         for title, chosen in (("all", own), ("most severe", [row for row in own if row["severity"] == worst])):
-            ranking.append(
-                {"scans": pair.scans, "levels": title} | _words({n: mean([r[n] for r in chosen]) for n in PLACES})
-            )
-    ranking.sort(key=lambda row: (row["levels"], row[_title("ghosts")]))
+            ranking.append({"scans": scans, "levels": title} | _words({n: mean([r[n] for r in chosen]) for n in names}))
+    ranking.sort(key=lambda row: (row["levels"], row.get(_title("ghosts"), 0.0)))
     notes = [
-        f"Means over places; odometry: {study.chosen.partner.odometry}. Truth by provenance: a wrong return is more "
+        f"Means over places; odometry: {study.chosen.partner.odometry}, which needs no scans, and by matching these "
+        "scans alone. Truth by provenance: a wrong return is more "
         "than 10 cm off the first surface on its bearing, and comes from the strongest cause of its cell. Missed: "
         "bearings with a surface in reach that return nothing at it or before it."
     ]
@@ -70,9 +77,27 @@ def stress_tables(study: Study) -> list[Table]:
     ]
 
 
+def stress_rows(study: Study) -> list[dict[str, object]]:
+    """Rows of `varied` for every scan with the odometry of choice; ``matching``: odometry's error by these scans."""
+    rows, partner = varied(study, "stress", "severity"), study.chosen.partner.odometry
+
+    def of(odometry: str) -> dict[tuple, dict[str, object]]:
+        own = [row for row in rows if row["methods"] == f"{odometry}+{row['scans']}"]
+        return {(row["stress"], row["severity"], row["scans"]): row for row in own}
+
+    matching = of(MATCHING)
+    rows = [row | {"matching": matching.get(key, {}).get("odometry")} for key, row in of(partner).items()]
+    return [_without(row, "methods") for row in rows]
+
+
 def ablation_tables(study: Study) -> list[Table]:
     """Figures over the values of each parameter."""
-    return [_table(varied(study, "ablation", "value"), "By parameter")]
+    return [_table(ablation_rows(study), "By parameter")]
+
+
+def ablation_rows(study: Study) -> list[dict[str, object]]:
+    """Rows of `varied` for every pair."""
+    return [_without(row, "scans") for row in varied(study, "ablation", "value")]
 
 
 def varied(study: Study, panel: str, over: str) -> list[dict[str, object]]:
@@ -83,20 +108,21 @@ def varied(study: Study, panel: str, over: str) -> list[dict[str, object]]:
             about = run.case.attributes
             if panel in about and over in about:
                 figures = {name: at(study.results[run], *path) for name, path in PLACES.items()}
-                label = {panel: str(about[panel]), over: about[over], "odometry": pair.odometry, "scans": pair.scans}
-                rows.append({**label, "methods": str(pair), **figures})
+                label = {panel: str(about[panel]), over: about[over], "scans": pair.scans, "methods": str(pair)}
+                rows.append(label | figures)
     return sorted(rows, key=lambda row: (row[panel], str(type(row[over])), row[over]))
 
 
 def _table(rows: Sequence[dict[str, object]], title: str) -> Table:
-    named = [name for name in FIGURES if any(row[name] is not None for row in rows)]
+    named = [name for name in FIGURES if any(row.get(name) is not None for row in rows)]
     return Table(
         title,
-        [
-            {k: v for k, v in row.items() if k not in FIGURES and k != "methods"} | _words({n: row[n] for n in named})
-            for row in rows
-        ],
+        [_without(row, *FIGURES) | _words({name: row[name] for name in named}) for row in rows],
     )
+
+
+def _without(row: dict[str, object], *keys: str) -> dict[str, object]:
+    return {key: value for key, value in row.items() if key not in keys}
 
 
 def _words(figures: dict[str, float | None]) -> dict[str, float | None]:
@@ -111,17 +137,17 @@ def _title(name: str) -> str:
 
 def draw_stress(study: Study, page: Page) -> None:
     """Curves over severity."""
-    _draw(study, page, "stress", "severity", "scans")
+    _draw(page, stress_rows(study), "stress", "severity", "scans", ("ghosts", "missed", "map_f1", "matching", "slam"))
 
 
 def draw_ablation(study: Study, page: Page) -> None:
     """Curves over values; values that are no numbers have none."""
-    _draw(study, page, "ablation", "value", "methods")
+    rows = [row for row in ablation_rows(study) if isinstance(row["value"], int | float)]
+    _draw(page, rows, "ablation", "value", "methods", ("ghosts", "missed", "map_f1", "odometry"))
 
 
-def _draw(study: Study, page: Page, panel: str, over: str, line: str) -> None:
-    rows = [row for row in varied(study, panel, over) if isinstance(row[over], int | float)]
-    names = [name for name in DRAWN if any(row[name] is not None for row in rows)]
+def _draw(page: Page, rows: list[dict], panel: str, over: str, line: str, names: Sequence[str]) -> None:
+    names = [name for name in names if any(row[name] is not None for row in rows)]
     if rows and names:
         page.section("Curves", f"Figures over {over}, a column for each {panel}.")
         page.picture(curves(rows, over, panel, line, names))

@@ -11,10 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.evaluation.drawings import canvas
-from radarize.evaluation.evaluate import evaluate
 from radarize.evaluation.mapping import TOLERANCE
-from radarize.evaluation.runfiles import read_scans
-from radarize.evaluation.scans import true_ranges, wrong_by_cause
+from radarize.evaluation.scans import wrong_by_cause
 from radarize.recording import Recording
 
 #: What wrong returns come from, by labels of /truth/cause.
@@ -34,35 +32,10 @@ FIGURES = {
     "noise": ("noise and leakage", "% of returns", 100),
     "missed": ("missed surfaces", "% of bearings", 100),
     "map_f1": ("map F1", "%", 100),
+    "matching": ("ATE of scan matching", "m", 1),
     "odometry": ("odometry ATE", "m", 1),
     "slam": ("SLAM ATE", "m", 1),
 }
-
-
-def figures(run: Path, recording: Path) -> dict[str, float]:
-    """Figures of a run on a recording whose truth is known.
-
-    Args:
-        run: folder of the run.
-        recording: that it was made of.
-
-    Returns:
-        `FIGURES` by name, linear. ``ghosts`` to ``noise``: shares of returned bearings that are wrong for that reason,
-        NaN where the recording does not know. ``missed``: see `missed`. NaN for whatever does not exist.
-
-    Raises:
-        InputError: not a run, no truth, or a damaged file.
-    """
-    metrics, scans = evaluate(run), read_scans(Path(run) / "scans.h5")
-    found = dict.fromkeys(FIGURES, np.nan)
-    found["odometry"], found["slam"] = (metrics[name]["ate"]["position"]["mean"] for name in ("odometry", "slam"))
-    f1 = metrics.get("map", {}).get("f1")
-    found["map_f1"] = np.nan if f1 is None else f1
-    if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
-        true = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
-        found["missed"] = missed(scans["ranges"], true)
-        found |= sources(scans, true, recording)
-    return found
 
 
 def missed(measured: Float[np.ndarray, "scan beam"], true: Float[np.ndarray, "scan beam"]) -> float:

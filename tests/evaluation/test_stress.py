@@ -8,7 +8,7 @@ from fake_run import write_run
 
 from radarize.evaluation.runfiles import read_scans
 from radarize.evaluation.scans import true_ranges
-from radarize.evaluation.stress import FIGURES, SOURCES, curves, figures, missed
+from radarize.evaluation.stress import SOURCES, curves, missed, sources
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, RecordingWriter, Stream
 
@@ -36,7 +36,7 @@ def record(path, times, cause, labels=LABELS):
     return path
 
 
-def test_figures_of_a_run(tmp_path):
+def test_what_wrong_returns_come_from(tmp_path):
     """Causes are given frame by frame, and some frames are not in the run: figures must find the right ones."""
     run = write_run(tmp_path / "run")
     with h5py.File(run / "scans.h5", "r+") as file:
@@ -49,26 +49,24 @@ def test_figures_of_a_run(tmp_path):
     causes = rng.integers(0, len(LABELS) + 1, (len(scans["time"]), 1, len(BEARINGS)))
     cause = np.full((len(times), 96, len(BEARINGS)), LABELS.index("leakage"), np.uint8)
     cause[::2] = np.where(causes == len(LABELS), 255, causes)
-    found = figures(run, record(tmp_path / "a.h5", times, cause))
-    assert set(found) == set(FIGURES)
     true = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
+    found = sources(scans, true, record(tmp_path / "a.h5", times, cause))
+    assert set(found) == set(SOURCES)
     returned = np.isfinite(scans["ranges"])
     wrong = returned & ~(np.abs(np.where(returned, scans["ranges"], 0) - true) <= 0.1)
     assert 0.3 < wrong.sum() / returned.sum() < 0.4
     for name, labels in SOURCES.items():
         numbers = [LABELS.index(label) if label in LABELS else len(LABELS) for label in labels]
         assert found[name] == pytest.approx(np.mean(np.isin(causes[:, 0][returned], numbers) & wrong[returned])), name
-    assert 0.5 < found["missed"] < 0.56  # three in ten bearings are left out, and of the others every third is behind
-    assert found["map_f1"] > 0.9 and 0.05 < found["odometry"] < 0.5 and found["slam"] < found["odometry"]
+    # Three in ten bearings are left out, and of the others every third is behind.
+    assert 0.5 < missed(scans["ranges"], true) < 0.56
 
 
-def test_figures_of_a_recording_that_knows_no_causes(tmp_path):
-    run = write_run(tmp_path / "run")
-    times = read_scans(run / "scans.h5")["time"] - 0.01
+def test_a_recording_that_knows_no_causes(tmp_path):
+    scans = read_scans(write_run(tmp_path / "run") / "scans.h5")
+    times = scans["time"] - 0.01
     path = record(tmp_path / "a.h5", times, np.zeros((len(times), 96, len(BEARINGS)), np.uint8), labels=())
-    found = figures(run, path)
-    assert all(np.isnan(found[name]) for name in SOURCES)
-    assert found["missed"] > 0 and found["map_f1"] > 0.9
+    assert sources(scans, scans["ranges"], path) == {}
 
 
 def test_curves():

@@ -1,12 +1,16 @@
 """A recording by a pair of methods: the run, and its figures; and how long each stage takes."""
 
+import inspect
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 
-from radarize import __version__
+import radarize
 from radarize.benchmark.dataset import Case
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.steps import Report
@@ -63,7 +67,7 @@ class _Step:
             "frames": self.case.frames,
             "bytes": self.case.path.stat().st_size,
             "networks": self.networks.digests(self.pair.networks),
-            "version": __version__,
+            "code": code(ODOMETRY[self.pair.odometry].make, SCANS[self.pair.scans].make),
         }
 
 
@@ -117,6 +121,18 @@ class Run(_Step):
                 found[folder] = str(error)
             report(share + (1 - share) * len(found) / len(places))
         return found
+
+
+@cache
+def code(*makers: Callable) -> str:
+    """What tells this package's sources, and the files that methods of one's own are in, from others."""
+    files = sorted(Path(radarize.__file__).parent.rglob("*.py"))
+    for maker in makers:
+        try:
+            files.append(Path(inspect.getsourcefile(maker.func if isinstance(maker, partial) else maker)))
+        except TypeError:  # made in an interpreter
+            continue
+    return sha256(b"".join(path.read_bytes() for path in files if path.is_file())).hexdigest()[:16]
 
 
 def figures(run: Path, recording: Path) -> dict[str, object]:

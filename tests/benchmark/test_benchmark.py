@@ -2,6 +2,7 @@
 
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,10 @@ from radarize.benchmark.benchmarks import BENCHMARKS
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.protocol import PROTOCOLS
 from radarize.benchmark.run import benchmark
-from radarize.benchmark.runs import Pair, Run
+from radarize.benchmark.runs import Pair, Run, code
 from radarize.console import run as command_line
 from radarize.errors import InputError
-from radarize.methods import SCANS
+from radarize.methods import ODOMETRY, SCANS
 from radarize.recording import Recording
 from tests.benchmark import toys as toy_file
 from tests.benchmark.rooms import ROOMS, write_rooms
@@ -93,6 +94,22 @@ def test_runs_are_done_once(rooms, toys, tmp_path, monkeypatch):
     with pytest.raises(TypeError):
         benchmark("buildings", rooms, tmp_path, methods=toys)  # B_robot is new
     benchmark("mapping", rooms, tmp_path, methods=toys)
+
+
+def test_a_changed_method_is_run_again(tmp_path, monkeypatch):
+    """Whatever file a method comes from; a run whose sources are the same is kept."""
+    monkeypatch.syspath_prepend(tmp_path)
+    own = tmp_path / "own_method.py"
+    own.write_text("def make(inputs):\n    return 1\n")
+    from own_method import make
+
+    before = code(make, partial(make, None))
+    assert before != code(ODOMETRY["doppler"].make)  # of the package
+    code.cache_clear()
+    assert before == code(make, partial(make, None))
+    own.write_text("def make(inputs):\n    return 2\n")
+    code.cache_clear()
+    assert before != code(make, partial(make, None))
 
 
 def test_networks_are_trained_on_each_split(rooms, toys, monkeypatch, tmp_path):

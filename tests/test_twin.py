@@ -4,16 +4,15 @@ The figures must be perfect for the recording itself, and fall with wrong materi
 """
 
 import json
-import shutil
 from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
-from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from benchmarks import transfer
+from benchmarks.twin import altered, shaken
 from radarize.errors import InputError
 from radarize.evaluation.twin import compare
 from radarize.evaluation.twin_report import report_twin
@@ -78,26 +77,6 @@ def real(tmp_path_factory):
     return simulate(
         PLACE, folder / "real.h5", trajectory=folder / "poses.tum", radar=str(folder / "slow.cfg"), duration=3.0, seed=3
     )
-
-
-def altered(real, path, change):
-    """A copy of a recording whose poses, and more, were changed: `change(poses, file)` returns new poses."""
-    shutil.copy(real, path)
-    with h5py.File(path, "r+") as file:
-        file["truth/pose"][:] = change(file["truth/pose"][:], file)
-    return path
-
-
-def shaken(metres: float, degrees: float):
-    """Slow errors of poses."""
-
-    def change(poses, file):
-        noise = gaussian_filter1d(np.random.default_rng(1).standard_normal((len(poses), 6)), 2, axis=0)
-        noise /= noise.std(axis=0)
-        turn = Rotation.from_rotvec(np.deg2rad(degrees) * noise[:, 3:]) * Rotation.from_quat(poses[:, 3:])
-        return np.hstack([poses[:, :3] + metres * noise[:, :3], turn.as_quat()])
-
-    return change
 
 
 def medians(found) -> dict[str, float]:

@@ -13,7 +13,7 @@ import torch
 
 from benchmarks.results import FOLDER
 from radarize.benchmark.dataset import Case, DataSet, groups
-from radarize.benchmark.results import command
+from radarize.benchmark.results import Results, command
 from radarize.benchmark.run import benchmark
 from radarize.console import progress
 from radarsim.dataset.run import make
@@ -50,8 +50,8 @@ def cases(data: Path | None) -> Iterator[list[Case]]:
 
 def compare(
     name: str, file: str, title: str, options: Namespace, notes: list[str], script: str = "", **choices: Any
-) -> None:
-    """Carry out a benchmark of `radarize.benchmark` on these recordings and publish its tables.
+) -> Results:
+    """Carry out a benchmark of `radarize.benchmark` on these recordings, publish its tables, and return them.
 
     Args:
         name: of the benchmark.
@@ -75,6 +75,7 @@ def compare(
         )[name]
     found.notes.extend(notes)
     print(found.write(FOLDER, file).read_text())
+    return found
 
 
 def through(work: Callable[[Case], Any], found: list[Case], processes: int, label: str) -> dict[Case, Any]:

@@ -5,7 +5,12 @@ import argparse
 from pathlib import Path
 
 from benchmarks.evaluation import add_options, compare
+from benchmarks.results import FOLDER
 from radarize.benchmark.benchmarks import BENCHMARKS
+from radarize.benchmark.varied import ABLATION, STRESS, picture
+
+#: Those with curves.
+DRAWN = {"multipath": STRESS, "ablation": ABLATION}
 
 
 def main() -> None:
@@ -20,7 +25,10 @@ def main() -> None:
             parser.error(f"NAME is {name!r}, expected some of: {', '.join(BENCHMARKS)}")
     for name in options.names:
         file = name.replace("-", "_")
-        compare(name, file, BENCHMARKS[name].title, options, [], weights=options.weights, script="tables")
+        notes = [f"![Curves]({file}.png)"] if name in DRAWN else []
+        found = compare(name, file, BENCHMARKS[name].title, options, notes, weights=options.weights, script="tables")
+        if name in DRAWN:
+            picture(found.tables[-1], DRAWN[name]).savefig(FOLDER / f"{file}.png", dpi=70, bbox_inches="tight")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """What changes as one thing is varied: the severity of multipath, or a parameter of the radar."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from radarize.benchmark.benchmark import Chosen, Study
 from radarize.benchmark.dataset import DataSet
@@ -18,21 +19,41 @@ PLACES = {
     "odometry": ("odometry", "ate", "position", "mean"),
     "slam": ("slam", "ate", "position", "mean"),
 }
+
+
+@dataclass(frozen=True)
+class Panels:
+    """How figures are drawn over what was varied.
+
+    Attributes:
+        panel, over, line: columns of the table: a panel each, the abscissa, a line each.
+        names: figures, of `FIGURES`.
+    """
+
+    panel: str
+    over: str
+    line: str
+    names: tuple[str, ...]
+
+
+STRESS = Panels("stress", "severity", "scans", ("ghosts", "missed", "map_f1", "matching", "slam"))
+ABLATION = Panels("ablation", "value", "methods", ("ghosts", "missed", "map_f1", "odometry"))
 #: Odometry that is as good as its scans.
 MATCHING = "scan-matching"
 
 
 def lacks_stress(data: DataSet) -> str:
     """Whether recordings say how severe their multipath is."""
-    return _lacks(data, "stress", "severity", "radarsim dataset stress")
+    return _lacks(data, STRESS, "radarsim dataset stress")
 
 
 def lacks_ablation(data: DataSet) -> str:
     """Whether recordings say what is varied."""
-    return _lacks(data, "ablation", "value", "radarsim dataset ablation/bandwidth")
+    return _lacks(data, ABLATION, "radarsim dataset ablation/bandwidth")
 
 
-def _lacks(data: DataSet, panel: str, over: str, hint: str) -> str:
+def _lacks(data: DataSet, panels: Panels, hint: str) -> str:
+    panel, over = panels.panel, panels.over
     if any({panel, over} <= case.attributes.keys() for case in data.cases):
         return ""
     return f"no recording has attributes {panel} and {over}, expected a data set such as that of `{hint}`"
@@ -79,7 +100,7 @@ def stress_tables(study: Study) -> list[Table]:
 
 def stress_rows(study: Study) -> list[dict[str, object]]:
     """Rows of `varied` for every scan with the odometry of choice; ``matching``: odometry's error by these scans."""
-    rows, partner = varied(study, "stress", "severity"), study.chosen.partner.odometry
+    rows, partner = varied(study, STRESS), study.chosen.partner.odometry
 
     def of(odometry: str) -> dict[tuple, dict[str, object]]:
         own = [row for row in rows if row["methods"] == f"{odometry}+{row['scans']}"]
@@ -97,12 +118,12 @@ def ablation_tables(study: Study) -> list[Table]:
 
 def ablation_rows(study: Study) -> list[dict[str, object]]:
     """Rows of `varied` for every pair."""
-    return [_without(row, "scans") for row in varied(study, "ablation", "value")]
+    return [_without(row, "scans") for row in varied(study, ABLATION)]
 
 
-def varied(study: Study, panel: str, over: str) -> list[dict[str, object]]:
+def varied(study: Study, panels: Panels) -> list[dict[str, object]]:
     """A row for each pair and recording that has the attributes, by these."""
-    rows = []
+    rows, panel, over = [], panels.panel, panels.over
     for pair in study.pairs:
         for run in study.once(pair):
             about = run.case.attributes
@@ -137,17 +158,27 @@ def _title(name: str) -> str:
 
 def draw_stress(study: Study, page: Page) -> None:
     """Curves over severity."""
-    _draw(page, stress_rows(study), "stress", "severity", "scans", ("ghosts", "missed", "map_f1", "matching", "slam"))
+    _draw(page, stress_tables(study)[-1], STRESS)
 
 
 def draw_ablation(study: Study, page: Page) -> None:
-    """Curves over values; values that are no numbers have none."""
-    rows = [row for row in ablation_rows(study) if isinstance(row["value"], int | float)]
-    _draw(page, rows, "ablation", "value", "methods", ("ghosts", "missed", "map_f1", "odometry"))
+    """Curves over values."""
+    _draw(page, ablation_tables(study)[-1], ABLATION)
 
 
-def _draw(page: Page, rows: list[dict], panel: str, over: str, line: str, names: Sequence[str]) -> None:
-    names = [name for name in names if any(row[name] is not None for row in rows)]
-    if rows and names:
-        page.section("Curves", f"Figures over {over}, a column for each {panel}.")
-        page.picture(curves(rows, over, panel, line, names))
+def _draw(page: Page, table: Table, panels: Panels) -> None:
+    if (figure := picture(table, panels)) is not None:
+        page.section("Curves", f"Figures over {panels.over}, a column for each {panels.panel}.")
+        page.picture(figure)
+
+
+def picture(table: Table, panels: Panels):
+    """Curves of a table's figures, a matplotlib figure; None without any. Values that are no numbers have none."""
+    names = {_title(name): name for name in FIGURES}
+    rows = [
+        {names.get(k, k): v / FIGURES[names[k]][2] if k in names and v is not None else v for k, v in row.items()}
+        for row in table.rows
+        if isinstance(row[panels.over], int | float)
+    ]
+    shown = [name for name in panels.names if any(row.get(name) is not None for row in rows)]
+    return curves(rows, panels.over, panels.panel, panels.line, shown) if shown else None

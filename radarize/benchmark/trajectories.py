@@ -48,5 +48,7 @@ def trajectory_tables(
                     [column for column in rows[0] if column.startswith(("ATE", "RE"))],
                 )
             )
+        if any(pair.odometry == "rnin" for pair in labels):
+            notes.append("Turns of rnin are those of the IMU's gyroscope, which from frame to frame no radar reaches.")
         found.append(Table(f"{about or trajectory.capitalize()}, {protocol.title}", rows, notes))
     return found

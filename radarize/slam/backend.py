@@ -236,9 +236,8 @@ class Slam:
         c = self.config.loop
         if number % c.every == 0:
             self._search.ask(self._questions(number, c.candidates, c.min_score, self._jury.spread))
-        jumps = self._hear(number - c.lag)
-        if jumps or number % c.update_every == 0:
-            self.graph.update(steps=2 if jumps else 1)
+        if self._hear(number - c.lag) or number % c.update_every == 0:
+            self.graph.update()
 
     def _close_again(self) -> None:
         """With loops closed, nodes and submaps lie where they overlap: match what was not matched.

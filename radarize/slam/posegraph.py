@@ -73,12 +73,8 @@ class PoseGraph:
             self.accepted[closure] = True
             self._news.add(self._uncertain[closure])
 
-    def update(self, steps: int = 2) -> None:
-        """Move poses to where everything believed agrees, solving anew only what changed.
-
-        Args:
-            steps: of Gauss and Newton; closing a loop is far from linear and wants two.
-        """
+    def update(self) -> None:
+        """Move poses towards where everything believed agrees, by one step, solving anew only what changed."""
         if self._count < 2:
             return
         if self._isam is None:
@@ -88,8 +84,6 @@ class PoseGraph:
         for k in range(self._known, self._count):
             values.insert(k, gtsam.Pose2(*self._poses[k]))
         self._isam.update(self._news, values)
-        for _ in range(steps - 1):
-            self._isam.update()
         self._news, self._known = gtsam.NonlinearFactorGraph(), self._count
         self._poses[: self._count] = gtsam.utilities.extractPose2(self._isam.calculateBestEstimate())
 

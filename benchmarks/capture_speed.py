@@ -11,11 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import psutil
+from jaxtyping import Bool
 
-from benchmarks.results import publish
+from benchmarks.results import publish, surroundings
 from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import MAX_PAYLOAD
 from radarize.recording import Losses, Recording, RecordingWriter
+from radarsim.emulator.disturbance import Disturbance
 
 BOARD, COMPUTER = "127.0.0.2", "127.0.0.1"
 LOOP = 64  # frames played again and again
@@ -47,8 +50,24 @@ class Cost:
         return sum(self._seconds.values())
 
 
-def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: int, options: list[str]) -> dict:
+def chirps_that_arrive(config: RadarConfig, frames: int, network: Disturbance) -> Bool[np.ndarray, "frame loop tx"]:
+    """Chirps (physical order) of which a network loses no packet."""
+    count = -(-frames * config.frame_bytes // MAX_PAYLOAD)
+    sent = (number.to_bytes(8, "little") for number in range(count))
+    through = [packet for each in sent for packet in network(each)] + list(network.rest())
+    lost = np.ones(count, int)
+    lost[np.unique(np.frombuffer(b"".join(through), "<u8"))] = 0
+    before = np.concatenate([[0], np.cumsum(lost)])  # lost packets before each
+    loops, tx = config.frame_shape[:2]
+    size = config.frame_bytes // (loops * tx)
+    first = size * np.arange(frames * loops * tx)
+    hit = before[(first + size - 1) // MAX_PAYLOAD + 1] - before[first // MAX_PAYLOAD]
+    return (hit == 0).reshape(frames, loops, tx)[:, :, list(config.slot)]
+
+
+def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: int, shares: dict[str, float]) -> dict:
     """One capture; a row of the table."""
+    options = [word for name, share in shares.items() for word in (f"--{name}", str(share))]
     rng = np.random.default_rng(seed)
     played = rng.normal(0, NOISE, (LOOP, *config.frame_shape)).round().astype(np.int16)
     with RecordingWriter(folder / "played.h5", config) as writer:
@@ -79,14 +98,18 @@ def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: in
     if capture.returncode:
         raise SystemExit("the capture failed")
     late = re.findall(r"(\d+) of them late, ([\d.]+) s", said)
+    arriving = chirps_that_arrive(config, frames, Disturbance(**shares, rng=np.random.default_rng(seed)))
     losses = Losses()
-    wrong = 0
+    wrong = mismarked = 0
     with Recording(folder / "captured.h5") as recording:
         numbers = np.round((recording.times - recording.times[0]) / config.frame_period).astype(int)
         for where, adc in recording.batches(LOOP):
             valid = recording.valid(where.start, where.stop)
             losses.add(valid)
-            wrong += int((adc[valid] != played[numbers[where] % LOOP][valid]).any(axis=(1, 2, 3)).sum())
+            mismarked += int((valid != arriving[numbers[where]]).sum())
+            sent = played[numbers[where] % LOOP]
+            wrong += int((adc[valid] != sent[valid]).any(axis=(1, 2, 3)).sum())
+            wrong += int(((adc != sent) & (adc != 0))[~valid].any(axis=(1, 2, 3)).sum())
         warnings = recording.attributes["warnings"]
     return {
         "configuration": " ".join([preset, *options]),
@@ -96,7 +119,8 @@ def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: in
         "frames not written": frames - losses.frames,
         "frames with lost samples": losses.hit_frames,
         "chirps lost": losses.lost_chirps,
-        "chirps wrong": wrong,
+        "lost but not marked, or marked but not lost": mismarked,
+        "chirps with a wrong sample": wrong,
         "emulator late, s": float(late[-1][1]) if late else 0.0,
         "capture, share of a core": (costs[1].seconds - before[1]) / wall,
         "emulator, share of a core": (costs[0].seconds - before[0]) / wall,
@@ -113,18 +137,20 @@ def main() -> None:
     parser.add_argument("--bad-seconds", type=float, default=60.0, help="length of another one over a bad network")
     arguments = parser.parse_args()
     config, _ = load_config(arguments.config)
-    runs = [(arguments.seconds, [])]
+    runs = [(arguments.seconds, {})]
     if arguments.bad_seconds:
-        runs.append((arguments.bad_seconds, "--loss 0.01 --duplicate 0.01 --reorder 0.01".split()))
+        runs.append((arguments.bad_seconds, {"loss": 0.01, "duplicate": 0.01, "reorder": 0.01}))
     rows = []
-    for seconds, options in runs:
+    for seconds, shares in runs:
         with tempfile.TemporaryDirectory() as folder:
-            rows.append(run(config, arguments.config, seconds, Path(folder), arguments.seed, options))
+            rows.append(run(config, arguments.config, seconds, Path(folder), arguments.seed, shares))
     heard = [row.pop("_warnings") for row in rows]
     notes = [
-        f"Noise of {NOISE} counts RMS, {LOOP} frames played again and again; every sample compared with the one sent.",
+        f"Noise of {NOISE} counts RMS, {LOOP} frames played again and again; every sample compared with the one sent, "
+        "and every chirp's mark with what the network's seed says was lost.",
         "Frames are not written if disk or processor are too slow for them; the emulator is late if it gets no time.",
     ]
+    notes.append(surroundings())
     notes += [f"{row['configuration']}: {said}." for row, said in zip(rows, heard, strict=True) if said]
     publish("capture_speed", "Capture at the virtual radar", rows, seed=arguments.seed, notes=notes)
 

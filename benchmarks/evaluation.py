@@ -1,10 +1,9 @@
 """The recordings that methods are compared on, and how a table goes through them."""
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
-from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,28 +11,17 @@ from typing import Any
 
 import torch
 
+from benchmarks.results import FOLDER
+from radarize.benchmark.dataset import Case, DataSet, groups
+from radarize.benchmark.results import command
+from radarize.benchmark.run import benchmark
 from radarize.console import progress
-from radarize.recording import Recording
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
 
+__all__ = ["Case", "add_options", "cases", "compare", "groups", "through"]
+
 SPECIFICATION = Path(__file__).parents[1] / "scenes" / "datasets" / "evaluation.yaml"
-PLATFORMS = ("handheld", "cart", "robot")
-
-
-@dataclass(frozen=True)
-class Case:
-    """A recording and what it is of."""
-
-    path: Path
-    building: str
-    platform: str
-
-    @classmethod
-    def of(cls, path: Path) -> "Case":
-        with Recording(path) as recording:
-            about = recording.attributes
-        return cls(path, str(about.get("scene", path.stem)).split("_")[0], str(about.get("platform", "-")))
 
 
 def add_options(parser: ArgumentParser) -> None:
@@ -43,18 +31,54 @@ def add_options(parser: ArgumentParser) -> None:
 
 
 @contextmanager
-def cases(data: Path | None) -> Iterator[list[Case]]:
-    """The recordings of a folder; if it has none, the evaluation data set is made in it, or in a temporary one."""
+def recordings(data: Path | None) -> Iterator[Path]:
+    """A folder of recordings; if it has none, the evaluation data set is made in it, or in a temporary one."""
     with TemporaryDirectory() as temporary:
         folder = data or Path(temporary)
         if not any(folder.glob("*.h5")):
             with progress("making recordings") as report:
                 make(Specification.load(SPECIFICATION), folder, progress=report)
-        yield [Case.of(path) for path in sorted(folder.glob("*.h5"))]
+        yield folder
 
 
-def through(work: Callable[[Case], Any], found: list[Case], processes: int, label: str) -> list[Any]:
-    """What `work` makes of every recording, in their order, by several processes of one thread each."""
+@contextmanager
+def cases(data: Path | None) -> Iterator[list[Case]]:
+    """The recordings themselves."""
+    with recordings(data) as folder:
+        yield list(DataSet.load(folder).cases)
+
+
+def compare(
+    name: str, file: str, title: str, options: Namespace, notes: list[str], script: str = "", **choices: Any
+) -> None:
+    """Carry out a benchmark of `radarize.benchmark` on these recordings and publish its tables.
+
+    Args:
+        name: of the benchmark.
+        file: name of the results.
+        title: of the results.
+        options: of the command line; ``out`` is where runs are kept, and found again.
+        notes: sentences below the tables.
+        script: that does it; by default the name of its results.
+        choices: what else `radarize.benchmark.run.benchmark` takes.
+    """
+    with TemporaryDirectory() as temporary, recordings(options.data) as data, progress("runs") as report:
+        found = benchmark(
+            name,
+            data,
+            options.out or Path(temporary),
+            workers=options.processes,
+            command=command(f"python -m benchmarks.{script or file}"),
+            title=title,
+            progress=report,
+            **choices,
+        )[name]
+    found.notes.extend(notes)
+    print(found.write(FOLDER, file).read_text())
+
+
+def through(work: Callable[[Case], Any], found: list[Case], processes: int, label: str) -> dict[Case, Any]:
+    """What `work` makes of every recording, by several processes of one thread each."""
     results: dict[Case, Any] = {}
     pool = ProcessPoolExecutor(processes, get_context("spawn"), torch.set_num_threads, (1,))
     with progress(label) as report:
@@ -66,11 +90,4 @@ def through(work: Callable[[Case], Any], found: list[Case], processes: int, labe
                 report(len(results), len(found))
         finally:
             pool.shutdown(cancel_futures=True)
-    return [results[case] for case in found]
-
-
-def groups(found: list[Case]) -> dict[str, list[int]]:
-    """Indices of the recordings by platform, then by building, then of all."""
-    names = [*PLATFORMS, *dict.fromkeys(case.building for case in found)]
-    chosen = {name: [i for i, case in enumerate(found) if name in (case.platform, case.building)] for name in names}
-    return {name: rows for name, rows in chosen.items() if rows} | {"all": list(range(len(found)))}
+    return {case: results[case] for case in found}

@@ -12,11 +12,12 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.results import publish
+from benchmarks.results import publish, surroundings
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
-from radarize.pipeline import BEST, CLASSICAL, Pipeline, best_methods
+from radarize.methods import BEST, CLASSICAL, best_methods
+from radarize.pipeline import Pipeline
 from radarsim.simulate import simulate
 
 
@@ -82,6 +83,7 @@ def main() -> None:
         notes=[
             "A browser's stream of events is read all the time. Dropped frames are whole ones that found no room "
             "because this machine was too slow for them; processor time is that of the main process.",
+            surroundings(),
         ],
     )
 

@@ -18,7 +18,8 @@ from radarize.console import progress
 from radarize.errors import InputError
 from radarize.evaluation.likeness import frechet_distance, patch_statistics
 from radarize.importers import import_recording
-from radarize.pipeline import best_methods, run
+from radarize.methods import best_methods
+from radarize.pipeline import run
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.training.dataset import recordings

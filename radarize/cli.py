@@ -53,7 +53,12 @@ def import_(
         str | None, typer.Option(metavar="AXES", help="Of an array: frame,loop,tx,rx,sample in its order, or lengths.")
     ] = None,
     variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
-    latency: Annotated[float, typer.Option(help="From a frame's start to its receipt in a bag, s.")] = 0.0,
+    latency: Annotated[
+        float | None,
+        typer.Option(
+            help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
+        ),
+    ] = None,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -159,7 +164,8 @@ def live(
     from radarize.capture.live import Live, prepare
     from radarize.capture.page import Page
     from radarize.capture.replay import Replay
-    from radarize.pipeline import Pipeline, best_methods
+    from radarize.methods import best_methods
+    from radarize.pipeline import Pipeline
     from radarize.recording import RecordingWriter
 
     if replay and (config or port):
@@ -219,7 +225,9 @@ def info(recording: RecordingFile, as_json: AsJson = False):
 def run_(
     recording: RecordingFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
-    odometry: Annotated[str | None, typer.Option(help="Where motion comes from: fused, learned or doppler.")] = None,
+    odometry: Annotated[
+        str | None, typer.Option(help="Where motion comes from: fused, learned, doppler or scan-matching.")
+    ] = None,
     scans: Annotated[
         str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
     ] = None,
@@ -243,7 +251,9 @@ def run_(
 
 @app.command()
 def train(
-    task: Annotated[str, typer.Argument(metavar="TASK", help="translation, rotation or segmentation.")],
+    task: Annotated[
+        str, typer.Argument(metavar="TASK", help="translation, rotation, segmentation, radarhd, milliego or rnin.")
+    ],
     data: Annotated[Path, typer.Option(help="Folder of recordings, see `radarsim dataset`.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Weights to write (.safetensors).")],
     split: Annotated[str | None, typer.Option(help="Of the data set; else every tenth recording validates.")] = None,
@@ -252,7 +262,7 @@ def train(
     epochs: Annotated[int | None, typer.Option(help="At most (30, 30, 5).")] = None,
     batch: Annotated[int | None, typer.Option(help="Items of a step (128, 128, 48).")] = None,
     rate: Annotated[float | None, typer.Option(help="Learning rate (1e-3, 1e-3, 1e-4).")] = None,
-    schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, or cosine for few epochs.")] = None,
+    schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, steps, or cosine for few epochs.")] = None,
     patience: Annotated[int | None, typer.Option(help="Epochs without progress before it ends (15).")] = None,
     precision: Annotated[str | None, typer.Option(help="Of convolutions: float32, or bfloat16.")] = None,
     seed: Annotated[int | None, typer.Option(help="Of everything random (0).")] = None,
@@ -359,6 +369,68 @@ def report(
     with working("drawing"):
         written = report_run(source, output, beside or ()) if source.is_dir() else report_recording(source, output)
     print(written)
+
+
+@app.command()
+def benchmark(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="list, all, or a benchmark of the list.")],
+    data: Annotated[Path | None, typer.Option(help="Folder of recordings, see `radarsim dataset`.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder to write; goes on where it was left.")] = None,
+    methods: Annotated[
+        list[str] | None, typer.Option(help="Odometry and scans to compare, all by default: fused,doppler,threshold.")
+    ] = None,
+    weights: Annotated[
+        Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
+    ] = None,
+    train: Annotated[bool, typer.Option("--train", help="Train networks on each split first.")] = False,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Of that training, at most.")] = None,
+    protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; by default one per core.")] = None,
+):
+    """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
+    import os
+
+    from radarize.benchmark.benchmarks import BENCHMARKS
+
+    if name == "list":
+        width = max(map(len, BENCHMARKS))
+        for each, about in BENCHMARKS.items():
+            print(f"{each:<{width}}  {about.about}")
+        return
+    for option, value in (("--data", data), ("--out", out)):
+        if value is None:
+            raise InputError(f"{option} is missing, expected a folder")
+    from radarize.benchmark.results import command
+    from radarize.benchmark.run import benchmark as compare
+
+    chosen = [method for word in methods or () for method in word.split(",")]
+    try:
+        with progress("benchmark") as report:
+            published = compare(
+                name, data, out, methods=chosen, weights=weights, trained=train, epochs=epochs, protocol=protocol,
+                workers=workers or len(os.sched_getaffinity(0)), command=command("radarize"), progress=report,
+                say=lambda line: typer.echo(line, err=True),
+            )  # fmt: skip
+    except KeyboardInterrupt:
+        raise InputError(f"stopped; what has ended is kept in {out}, and the same command goes on after it") from None
+    for each in published:
+        print(out / f"{each}.html")
+    print(out / "index.html")
+
+
+@app.command()
+def view(
+    source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
+    run: Annotated[Path | None, typer.Option(help="Run of the recording, to show with it.")] = None,
+    save: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write a file instead of a window.")] = None,
+):
+    """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and causes on one time line."""
+    from radarize.viewer import view
+
+    with progress("view") as report:
+        written = view(source, run, save, progress=report)
+    if written:
+        print(written)
 
 
 def _print_json(content: dict) -> None:

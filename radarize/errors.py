@@ -1,9 +1,29 @@
 """The one exception that users meet."""
 
+#: Characters of a sentence that somebody reads.
+_LONGEST = 1000
+
 
 class InputError(Exception):
     """Something the user supplied cannot be used.
 
     Its text is one sentence that names the file or field, the value found and what was expected; the command
-    lines print it and exit with code 2.
+    lines print it and exit with code 2. What a file holds may be part of it: it is shown as printable characters, and
+    not at any length.
     """
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        text = text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
+        return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def reason(error: Exception) -> str:
+    """What a library or the system says went wrong with a file, in a few printable words."""
+    text = str(error)
+    if "No space left" in text or "errno = 28" in text:
+        return "no space left on the device"
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return line[:120] or type(error).__name__

@@ -262,7 +262,8 @@ class Heatmaps:
         Args:
             spectrum: see `spectrum`.
             method: see `range_azimuth`.
-            elevation_aware: by Bartlett from the elevation pairs instead of the row.
+            elevation_aware: from the elevation pairs instead of the row, and by Bartlett whatever the method: there are
+                too few of them for Capon.
 
         Raises:
             InputError: `elevation_aware` without elevation pairs.
@@ -276,7 +277,8 @@ class Heatmaps:
             x, steering = spectrum[..., torch.as_tensor(self.row, device=self.device)], self._steering
         x = x.transpose(1, 2)  # (frame, doppler, range, antenna)
         covariance = x.transpose(-1, -2) @ x.conj() / self._range_energy
-        return self._capon(covariance) if method == "capon" else self._bartlett(covariance, steering)
+        sharp = method == "capon" and not elevation_aware
+        return self._capon(covariance) if sharp else self._bartlett(covariance, steering)
 
     def range_profile(self, adc, valid=None) -> Float32[torch.Tensor, "frame range"]:
         """Power over range, summed over Doppler and averaged over all antennas."""

@@ -14,10 +14,9 @@ import torch
 
 from radarize import __version__
 from radarize.errors import InputError
-from radarize.mapping.scans import BEARINGS, METHODS, ScanConfig, make_scans
-from radarize.mapping.segmentation import Segmentation
+from radarize.mapping.scans import BEARINGS, ScanConfig
+from radarize.methods import BEST, CLASSICAL, ODOMETRY, SCANS, Inputs, Weights, best_methods
 from radarize.odometry.integration import Track
-from radarize.odometry.methods import ODOMETRY, Weights, make_odometry
 from radarize.published.chain import CHAINS, Chain
 from radarize.published.heatmaps import PublishedMaps
 from radarize.radar.config import RadarConfig
@@ -25,15 +24,8 @@ from radarize.recording import Recording
 from radarize.settings import SETTINGS
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
-from radarize.training.maps import MapMaker
 from radarize.tum import planar, planar_poses, write_tum
 
-#: Scans by name: a network's, and those of heat maps alone.
-SCANS = ("segmentation", *METHODS)
-#: Methods without networks, for radars that the shipped ones do not fit.
-CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
-#: Methods of choice.
-BEST = {"odometry": "fused", "scans": "segmentation"}
 #: A frame with a smaller share of its chirps is left out. On a simulated walk, with the rest of each burst lost, 95 %
 #: of Doppler velocities are within 0.02 m/s from whole bursts, 0.06 m/s from an eighth, 0.21 m/s from a sixteenth.
 LEAST_SHARE = 1 / 8
@@ -51,9 +43,10 @@ class Pipeline:
 
     Args:
         config: radar configuration.
-        scans: how scans are made, one of `SCANS`.
-        odometry: where motion comes from, a key of `ODOMETRY`.
+        scans: how scans are made, a key of `radarize.methods.SCANS`.
+        odometry: where motion comes from, a key of `radarize.methods.ODOMETRY`.
         weights: of the networks; the shipped ones if None.
+        recording: with other sensors' streams, for methods that use them.
         chain: what else makes odometry and scans of samples, then in place of all these.
 
     Raises:
@@ -66,17 +59,13 @@ class Pipeline:
         scans: str = CLASSICAL["scans"],
         odometry: str = CLASSICAL["odometry"],
         weights: Weights | None = None,
+        recording: Recording | None = None,
         chain: Chain | None = None,
     ):
-        if scans not in SCANS:
-            raise InputError(f"scans is {scans!r}, expected one of {', '.join(SCANS)}")
-        weights = weights or Weights()
         self.config, self.scans, self.chain = config, scans, chain
-        self.maker = MapMaker(config, stage=self._stage)
-        self.odometry = make_odometry(odometry, self.maker, weights)
-        self.segmentation = Segmentation(self.maker, weights.of("segmentation")) if scans == "segmentation" else None
-        self.heatmaps = self.odometry.heatmaps
-        self.scan_config = ScanConfig()
+        self._inputs = Inputs(config, weights, scans, recording, self._stage)
+        self.heatmaps = self._inputs.heatmaps
+        self.odometry, self.scanner = self._inputs.odometry(odometry), self._inputs.scanner()
         self.slam = Slam(SlamConfig.preset("radar"))
         self.pushed = self.lost = 0
         self.frames: list[np.ndarray] = []  # numbers of those used, counted as pushed
@@ -126,29 +115,7 @@ class Pipeline:
     def _follow(self, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None) -> tuple[Track, np.ndarray]:
         with self._stage("spectra"):
             spectrum = self.heatmaps.spectrum(adc, valid)
-        return self.odometry.follow(spectrum, times, self._stage), self._scan(spectrum)
-
-    def _scan(self, spectrum: torch.Tensor) -> np.ndarray:
-        if self.segmentation is not None:
-            with self._stage("scans"):
-                return self.segmentation.scan(spectrum)
-        with self._stage("maps"):
-            # Scans want Capon's sharp beams; the horizon is told from two maps of one beamformer, Bartlett's.
-            sharp = self.heatmaps.range_azimuth_of(spectrum, "capon").numpy()
-            level = reference = None
-            if self.scans == "elevation-aware":
-                level = self.heatmaps.elevation_aware_of(spectrum).numpy()
-                reference = self.heatmaps.range_azimuth_of(spectrum).numpy()
-        with self._stage("scans"):
-            return make_scans(
-                sharp,
-                self.heatmaps.ranges,
-                self.heatmaps.azimuths,
-                level,
-                reference=reference,
-                method=self.scans,
-                config=self.scan_config,
-            )
+        return self.odometry.follow(spectrum, times, self._stage), self.scanner.scan(spectrum)
 
     def finish(self) -> None:
         """Close the last loops and optimise."""
@@ -162,17 +129,6 @@ class Pipeline:
         yield
         within = sum(self.stage_seconds.values()) - others
         self.stage_seconds[name] += clock.perf_counter() - start - within
-
-
-def best_methods(config: RadarConfig) -> tuple[dict[str, str], str]:
-    """Odometry and scans of choice for a radar, and if these are the classical ones, why."""
-    maker = MapMaker(config)
-    try:
-        make_odometry(BEST["odometry"], maker)
-        Segmentation(maker)
-    except InputError as error:
-        return CLASSICAL, str(error)
-    return BEST, ""
 
 
 def run(
@@ -217,11 +173,7 @@ def run(
         else:
             methods, why = (BEST, "") if weights else best_methods(source.config)
             odometry, scans = odometry or methods["odometry"], scans or methods["scans"]
-            pipeline = Pipeline(source.config, scans, odometry, Weights(weights))
-        if scans == "elevation-aware" and pipeline.heatmaps.pairs is None:
-            raise InputError(
-                f"{recording}: its antennas have no vertical pairs, which scans=elevation-aware needs; use first-echo"
-            )
+            pipeline = Pipeline(source.config, scans, odometry, Weights(weights), source)
         for frames, adc in source.batches(BATCH):
             pipeline.push(adc, source.times[frames], source.valid(frames.start, frames.stop))
             if progress:
@@ -272,7 +224,7 @@ def _write(pipeline: Pipeline, source: Recording, output: Path, methods: dict[st
         "duration_s": float(times[-1] - times[0] + source.config.frame_period),
         "methods": methods,
         "radar": source.config_json(),
-        "scan_settings": pipeline.scan_config.model_dump(),
+        "scan_settings": ScanConfig().model_dump(),
         "slam_settings": pipeline.slam.config.model_dump(),
         "ms_per_frame": {name: 1e3 * seconds / frames for name, seconds in pipeline.stage_seconds.items()},
         "closures": int(pipeline.slam.graph.accepted.sum()),

@@ -12,12 +12,14 @@ The steps of the mmWave SDK 3.x demo (`Mmwave demo data processing chain`), with
 
 import numpy as np
 import scipy.fft
-from jaxtyping import Bool, Float, Int, Int16
+import torch
+from jaxtyping import Bool, Complex64, Float, Int, Int16
 from pydantic import BaseModel, ConfigDict, Field
 from scipy.ndimage import maximum_filter
 from scipy.signal import windows
 
 from radarize.errors import InputError
+from radarize.heatmaps import Heatmaps
 from radarize.radar.array import azimuth_row, rows, virtual_positions
 from radarize.radar.config import RadarConfig
 
@@ -64,6 +66,13 @@ class PointCloudConfig(BaseModel):
     second_peak: float = Field(0.5, gt=0)
     angles: int = Field(64, ge=8)
     min_range: float = Field(0.2, ge=0)
+
+
+#: For methods that need many points, such as RANSAC over them (`radarize.baselines`): thresholds 10 dB lower.
+DENSE = PointCloudConfig(
+    range_cfar=Cfar(window=8, guard=4, smallest=True, threshold=5.0),
+    doppler_cfar=Cfar(window=4, guard=2, threshold=5.0),
+)
 
 
 class PointClouds:
@@ -138,15 +147,39 @@ class PointClouds:
         if tuple(adc.shape[1:]) != self.config.frame_shape:
             raise InputError(f"frames have shape {tuple(adc.shape[1:])}, expected {self.config.frame_shape}")
         cube = self._cube(np.asarray(adc), valid)
-        level, noise, found = self.detect(cube)
+        return self._points(cube, self.ranges, self.velocities, self._turn)
+
+    def of(
+        self, heatmaps: Heatmaps, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
+    ) -> tuple[Float[np.ndarray, "point 6"], Int[np.ndarray, "point"]]:
+        """The same detections in a spectrum at hand, with its windows and bins instead of the chip's.
+
+        Args:
+            heatmaps: that made it.
+            spectrum: see `Heatmaps.spectrum`.
+        """
+        cube = spectrum.permute(0, 2, 3, 1).cpu().numpy()
+        return self._points(cube, heatmaps.ranges, heatmaps.velocities, np.ones((cube.shape[1], 1)))
+
+    def _points(
+        self, cube: np.ndarray, ranges: np.ndarray, velocities: np.ndarray, turn: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Points of spectra (frame, doppler, antenna, range), and their frames.
+
+        Args:
+            cube: of spectra.
+            ranges, velocities: of its cells.
+            turn: (doppler, antenna) what turns delays between transmitters back.
+        """
+        level, noise, found = self.detect(cube, ranges)
         frame, near, speed = np.nonzero(found)
         noise = noise[frame, near, speed]
         snr = level[frame, near, speed] - noise
-        x = cube[frame, speed, :, near] * self._turn[speed]
+        x = cube[frame, speed, :, near] * turn[speed]
         which, u_y, u_z = self._directions(x)
         u_x = np.sqrt(np.clip(1 - u_y**2 - u_z**2, 0, None))
         points = np.column_stack(
-            [self.ranges[near][which, None] * np.column_stack([u_x, u_y, u_z]), self.velocities[speed][which],
+            [ranges[near][which, None] * np.column_stack([u_x, u_y, u_z]), velocities[speed][which],
              snr[which], noise[which]]
         )  # fmt: skip
         real = u_y**2 + u_z**2 < 1
@@ -167,21 +200,22 @@ class PointClouds:
         return spectrum.reshape(*spectrum.shape[:2], -1, self._bins)
 
     def detect(
-        self, cube: np.ndarray
+        self, cube: np.ndarray, ranges: np.ndarray | None = None
     ) -> tuple[
         Float[np.ndarray, "frame range doppler"],
         Float[np.ndarray, "frame range doppler"],
         Bool[np.ndarray, "frame range doppler"],
     ]:
-        """Level (dB), noise around (dB) and whether it is a detection, per cell of a spectrum."""
+        """Level (dB), noise around (dB) and whether it is a detection, per cell of a spectrum; ranges are the chip's
+        unless told."""
         power = cube.real**2 + cube.imag**2
         level = 10 * np.log10(power + np.float32(1e-9)).mean(axis=2).transpose(0, 2, 1)
-        ranges, dopplers = self.settings.range_cfar, self.settings.doppler_cfar
-        noise = _surroundings(level, ranges, axis=1, cyclic=False)
-        found = level > noise + ranges.threshold
-        found &= level > _surroundings(level, dopplers, axis=2, cyclic=True) + dopplers.threshold
+        over_range, over_doppler = self.settings.range_cfar, self.settings.doppler_cfar
+        noise = level_around(level, over_range, axis=1, cyclic=False)
+        found = level > noise + over_range.threshold
+        found &= level > level_around(level, over_doppler, axis=2, cyclic=True) + over_doppler.threshold
         found &= level >= maximum_filter(level, (1, 3, 3), mode=("nearest", "nearest", "wrap"))
-        found &= (self.ranges >= self.settings.min_range)[:, None]
+        found &= ((self.ranges if ranges is None else ranges) >= self.settings.min_range)[:, None]
         return level, noise, found
 
     def _directions(
@@ -205,8 +239,15 @@ class PointClouds:
         return which, self.u_y[cell], u_z
 
 
-def _surroundings(level: np.ndarray, cfar: Cfar, axis: int, cyclic: bool) -> np.ndarray:
-    """Mean level of the cells around each along an axis; at the ends of an axis that is no circle, of one side only."""
+def level_around(level: np.ndarray, cfar: Cfar, axis: int, cyclic: bool) -> np.ndarray:
+    """Mean level of the cells around each along an axis; at the ends of an axis that is no circle, of one side only.
+
+    Args:
+        level: dB.
+        cfar: which cells count.
+        axis: along which.
+        cyclic: its ends meet.
+    """
     reach = cfar.window + cfar.guard
     level = np.moveaxis(level, axis, -1)
     padded = np.pad(level, [(0, 0)] * (level.ndim - 1) + [(reach, reach)], mode="wrap")

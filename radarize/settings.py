@@ -5,6 +5,9 @@ from dataclasses import dataclass
 
 from torch import nn
 
+from radarize.baselines.milliego import MilliEgoNet
+from radarize.baselines.radarhd import RadarHdNet
+from radarize.baselines.rnin import RninNet
 from radarize.nets import NETS
 from radarize.published.heatmaps import PublishedMaps
 from radarize.published.nets import PUBLISHED_NETS
@@ -24,5 +27,7 @@ class Setting:
     nets: Mapping[str, Callable[..., nn.Module]]
 
 
+#: Networks of the baselines, which see what those of the default setting see.
+BASELINES = {net.kind: net for net in (RadarHdNet, MilliEgoNet, RninNet)}
 #: What the physics asks for, and what the artefact does.
-SETTINGS = {"corrected": Setting(MapMaker, NETS), "published": Setting(PublishedMaps, PUBLISHED_NETS)}
+SETTINGS = {"corrected": Setting(MapMaker, NETS | BASELINES), "published": Setting(PublishedMaps, PUBLISHED_NETS)}

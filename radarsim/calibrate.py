@@ -17,6 +17,7 @@ from scipy.signal import windows
 from radarize.errors import InputError
 from radarize.radar.array import BOARDS, virtual_positions
 from radarize.radar.config import RadarConfig
+from radarize.radar.noise import noise_floor, noise_profile
 from radarize.recording import Recording
 from radarsim.physics.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
 from radarsim.physics.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, PhaseNoise
@@ -77,7 +78,7 @@ def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarCon
     profile = noise_profile(signal)
     n = config.samples
     flat = slice(n // 10, 8 * n // 10)
-    floor = float(np.median(profile[flat]))
+    floor = noise_floor(profile)
     if floor <= 2 / 12:
         raise InputError(f"{source}: a noise power of {floor:.3g} counts^2, expected more than the rounding to counts")
     band, fall = band_edge(profile / floor)
@@ -106,19 +107,6 @@ def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarCon
         remarks.append("no leakage above the noise")
     mismatch, remark = fit_channels(signal, config, floor)
     return Calibration(settings.model_copy(update={"leakage": leakage, "mismatch": mismatch}), [*remarks, remark])
-
-
-def noise_profile(signal: Complex[np.ndarray, "frame loop tx rx sample"]) -> Float[np.ndarray, "sample"]:
-    """Noise power per sample that each range bin speaks of, counts^2: of white noise, its power in every bin.
-
-    The median over fast Doppler bins: a few movers do not lift it, and of exponential noise it is ln 2 of the mean.
-    """
-    loops, n = signal.shape[1], signal.shape[-1]
-    slow, fast = windows.hann(loops, sym=False), windows.hann(n, sym=False)
-    cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
-    cube = cube[:, loops // 4 : loops - loops // 4 + 1]
-    power = np.abs(cube) ** 2 / (np.sum(slow**2) * np.sum(fast**2))
-    return np.median(power.reshape(-1, n), axis=0) / np.log(2)
 
 
 def band_edge(profile: Float[np.ndarray, "sample"]) -> tuple[Band, float]:

@@ -12,7 +12,9 @@ app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as ra
 scene_app = typer.Typer(help="Look at a scene without simulating it.", no_args_is_help=True)
 app.add_typer(scene_app, name="scene")
 
-SceneName = Annotated[str, typer.Argument(metavar="SCENE", help="A scene of this project (office) or a .yaml file.")]
+SceneName = Annotated[
+    str, typer.Argument(metavar="SCENE", help="A scene of this project (office, stress/corner@2) or a file.")
+]
 
 
 @app.command()
@@ -84,7 +86,7 @@ def simulate(
 @app.command()
 def dataset(
     specification: Annotated[
-        Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, training, evaluation, radarize146.")
+        Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, training, evaluation, stress, ...")
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the recordings.")],
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
@@ -118,6 +120,49 @@ def calibrate(
     for remark in found.remarks:
         print(remark)
     print(output)
+
+
+@app.command()
+def twin(
+    recording: Annotated[Path, typer.Argument(metavar="REAL.h5", help="Recording of a real radar, with poses.")],
+    scene: Annotated[str, typer.Option(help="Model of the place: a scene of this project, or a .yaml file.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Twin to write (.h5), with .html and .json beside.")],
+    origin: Annotated[
+        str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="The poses' origin in the scene, m and degrees.")
+    ] = "",
+    mounting: Annotated[
+        str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="Radar on the body whose poses they are.")
+    ] = "",
+    at: Annotated[
+        str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="Place of a radar at rest, instead of poses.")
+    ] = "",
+    frontend: Annotated[Path | None, typer.Option(help="A front-end file (.yaml); else an IWR1843BOOST.")] = None,
+    calibrate: Annotated[
+        bool, typer.Option("--calibrate", help="Fit the front end to the recording first; kept beside, as .yaml.")
+    ] = False,
+    every: Annotated[int, typer.Option(min=1, help="Simulate every so manieth frame.")] = 1,
+    duration: Annotated[float | None, typer.Option(min=0.0, help="Of the recording, s; else all of it.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of speckle and noise.")] = 0,
+):
+    """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
+    from radarize.evaluation.twin_report import report_twin
+    from radarize.recording import Recording
+    from radarsim.motion import Mounting
+    from radarsim.twin import make_twin
+
+    places = [Mounting.parse(text) if text else None for text in (origin, mounting, at)]
+    with keeping(output), progress("twin") as report:
+        made = make_twin(
+            recording, scene, output, origin=places[0], mounting=places[1], at=places[2], frontend=frontend,
+            fit=calibrate, every=every, duration=duration, seed=seed, progress=lambda *done: report("simulate", *done),
+        )  # fmt: skip
+        page, sentences = report_twin(recording, made, progress=lambda *done: report("compare", *done))
+    with Recording(made) as opened:
+        if opened.attributes["warnings"]:
+            print(f"warning: {opened.attributes['warnings']}")
+    print("\n".join(sentences))
+    for path in (made, page, page.with_suffix(".json")):
+        print(path)
 
 
 @scene_app.command()

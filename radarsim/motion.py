@@ -171,19 +171,41 @@ def motion_from_tum(path: str | Path, mounting: Mounting | None = None) -> Motio
 
     Raises:
         InputError: missing file, wrong columns, something that is no finite number, stamps that do not ascend, a
-            quaternion that is not of unit length, fewer than four poses; poses too far from each other for a motion
-            between them, or a gap in which a smooth curve through them leaves them.
+            quaternion that is not of unit length; poses that make no motion, see `motion_through`.
     """
     stamps, poses = read_tum(path)
+    return motion_through(stamps, poses, stamps[0], mounting, str(path))
+
+
+def motion_through(
+    stamps: Float[np.ndarray, "pose"],
+    poses: Float[np.ndarray, "pose 7"],
+    start: float,
+    mounting: Mounting | None,
+    source: str,
+) -> Motion:
+    """Motion through poses.
+
+    Args:
+        stamps: s, ascending.
+        poses: position, m, and quaternion x y z w.
+        start: stamp that is t = 0 of the motion.
+        mounting: of the sensor on the body that the poses are of; None: they are the sensor's own.
+        source: where they come from, for errors.
+
+    Raises:
+        InputError: fewer than four poses; poses too far from each other for a motion between them, or a gap in which a
+            smooth curve through them leaves them.
+    """
     if len(stamps) < 4:
-        raise InputError(f"{path}: {len(stamps)} poses, expected at least 4")
-    times, steps, chords = stamps - stamps[0], np.diff(stamps), np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
+        raise InputError(f"{source}: {len(stamps)} poses, expected at least 4")
+    times, steps, chords = stamps - start, np.diff(stamps), np.linalg.norm(np.diff(poses[:, :3], axis=0), axis=1)
     attitude = Rotation.from_quat(poses[:, 3:])
 
     def refuse(bad: np.ndarray, what: Callable[[int], str], expected: str) -> None:
         if bad.any():
             i = int(bad.argmax())
-            raise InputError(f"{path}: between times {stamps[i]:.3f} and {stamps[i + 1]:.3f} {what(i)}, {expected}")
+            raise InputError(f"{source}: between times {stamps[i]:.3f} and {stamps[i + 1]:.3f} {what(i)}, {expected}")
 
     speed, turn = chords / steps, (attitude[:-1].inv() * attitude[1:]).magnitude()
     refuse(

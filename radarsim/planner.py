@@ -45,9 +45,9 @@ def plan_motion(
     if duration is not None and not (np.isfinite(duration) and duration > 0):
         raise InputError(f"duration is {duration} s, expected a positive number")
     carrier = PLATFORMS[platform]
+    tilt = carrier.tilt * rng.standard_normal(2)  # always drawn: the same tour whatever the mounting
     if mounting is None:
-        tilt = Rotation.from_euler("ZYX", [0.0, *(carrier.tilt * rng.standard_normal(2))])
-        mounting = Mounting((carrier.lever_arm, 0.0, 0.0), tilt)
+        mounting = Mounting((carrier.lever_arm, 0.0, 0.0), Rotation.from_euler("ZYX", [0.0, *tilt]))
     arm = np.hypot(*mounting.lever_arm[:2])
     height = ground_level(scene) + carrier.height
     low, top = carrier.body

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int16
+from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
 from radarize.errors import InputError
@@ -111,6 +111,8 @@ class Simulator:
     def _received(self, times, echoes: list[Echoes]) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Path lengths and amplitudes behind the IF filters, by frame."""
         lengths = [e.lengths(self.config, self.motion, t) for t, e in zip(times, echoes, strict=True)]
+        for each in lengths:
+            each[..., 0] += 2 * self.config.range_bias  # a board's own delay, which the pipeline takes off again
         filtered = [
             e.amplitude * self.front_end.if_response(length[:, 0, 0]) for length, e in zip(lengths, echoes, strict=True)
         ]
@@ -123,13 +125,14 @@ def simulate(
     *,
     platform: str = "handheld",
     trajectory: Path | None = None,
-    waypoints: Path | None = None,
+    waypoints: Path | Float[np.ndarray, "n 2"] | None = None,
+    planned_in: Scene | None = None,
     mounting: Mounting | None = None,
     duration: float | None = None,
     seed: int = 0,
-    radar: str = "radarize",
+    radar: str | RadarConfig = "radarize",
     device: str = "cpu",
-    frontend: Path | None = None,
+    frontend: Path | FrontEndConfig | None = None,
     provenance: bool = False,
     engine: str = "radarsim",
     sensors: Sequence[str] = (),
@@ -144,13 +147,16 @@ def simulate(
         platform: ``handheld``, ``cart`` or ``robot``: how a planned tour moves.
         trajectory: TUM file of poses to follow instead of a planned tour; of the sensor, or if there is a mounting, of
             the body that carries it.
-        waypoints: file of places to go through on the platform (see `waypoints.read_waypoints`) instead of a tour.
+        waypoints: places to go through on the platform instead of a tour, m, or a file of them
+            (`waypoints.read_waypoints`).
+        planned_in: the scene for which tour or walk is planned, so that scenes which differ can share one; default:
+            the scene itself.
         mounting: of the sensor on the platform; default: the platform's own.
         duration: s; default: 40 s of a tour, or all of a trajectory or walk, which end the recording if shorter.
         seed: of the tour, the scatterers and the noise.
-        radar: preset or configuration file.
+        radar: preset, configuration file or configuration.
         device: ``cpu`` or ``cuda``.
-        frontend: front-end file (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
+        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
         provenance: also write I/Q by cause, before noise and converter, as /truth/adc_by_cause. Such recordings are
             several times as large.
         engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver, for comparison. Its known defects
@@ -181,17 +187,17 @@ def simulate(
     if engine not in ("radarsim", "sionna"):
         raise InputError(f"engine is {engine!r}, expected radarsim or sionna")
     chosen(sensors)
-    settings = FrontEndConfig.load(frontend) if frontend else FrontEndConfig()
+    settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     route, physics = np.random.default_rng(seed).spawn(2)
     if trajectory is not None and waypoints is not None:
         raise InputError("both a trajectory and way-points are given, expected one of them")
     if trajectory is not None:
         motion = motion_from_tum(trajectory, mounting)
-    elif waypoints is not None:
-        motion = plan_motion(world, platform, duration, route, read_waypoints(waypoints), mounting)
     else:
-        motion = plan_motion(world, platform, _TOUR if duration is None else duration, route, mounting=mounting)
+        places = read_waypoints(waypoints) if isinstance(waypoints, (str, Path)) else waypoints
+        length = _TOUR if duration is None and places is None else duration
+        motion = plan_motion(planned_in or world, platform, length, route, places, mounting)
     motion = motion if duration is None else motion.until(duration)
     crossed = crossings(motion, world)
     simulator = Simulator(world, motion, config, physics, device, settings, engine)
@@ -208,22 +214,59 @@ def simulate(
         "engine": engine,
         "front_end": settings.model_dump_json(),
         "motion": motion.statistics(world).json(),
-        "warnings": f"{trajectory or waypoints or 'tour'}: {crossed}" if crossed else "",
+        "warnings": f"{trajectory or 'walk'}: {crossed}" if crossed else "",
     }
     if engine == "radarsim":
         facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}
     suite = Suite(Rig(world, motion, config, simulator.front_end, Sight(world)), sensors, seed, provenance)
+    return record(
+        output, simulator, suite, times, cfg_text=cfg_text, attributes=facts | dict(attributes or {}),
+        by_cause=provenance, progress=progress,
+    )  # fmt: skip
+
+
+def record(
+    output: Path,
+    simulator: Simulator,
+    suite: Suite,
+    times: Float[np.ndarray, "frame"],
+    *,
+    start: float = 0.0,
+    valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+    cfg_text: str = "",
+    attributes: Mapping[str, object],
+    by_cause: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Simulate frames and write them.
+
+    Args:
+        output: recording to write.
+        simulator: of the radar.
+        suite: the sensors beside it.
+        times: of the frames' starts on the clock of the motion, s.
+        start: stamp of that clock's zero, s.
+        valid: False where a chirp is lost; its samples are then zero, as a capture's are.
+        cfg_text: original configuration text.
+        attributes: of the file.
+        by_cause: whether the suite records I/Q by cause.
+        progress: called with (frames done, frames in all).
+
+    Raises:
+        InputError: the recording cannot be written.
+    """
     with RecordingWriter(
-        output,
-        config,
-        cfg_text=cfg_text,
-        attributes=facts | dict(attributes or {}),
-        products=suite.products,
+        output, simulator.config, cfg_text=cfg_text, attributes=attributes, products=suite.products,
         streams=suite.streams,
-    ) as writer:
-        for first in range(0, frames, BATCH):
-            batch = simulator.observe(times[first : first + BATCH], provenance)
-            writer.append(batch.samples, batch.times, rows=suite.observe(batch))
+    ) as writer:  # fmt: skip
+        for first in range(0, len(times), BATCH):
+            batch = simulator.observe(times[first : first + BATCH], by_cause)
+            arrived = None if valid is None else valid[first : first + BATCH]
+            samples = batch.samples if arrived is None else batch.samples * arrived[..., None, None, None]
+            rows = suite.observe(batch)
+            for clock in suite.clocks & set(rows):
+                rows[clock] = rows[clock] + start
+            writer.append(samples, batch.times + start, arrived, rows=rows)
             if progress:
-                progress(first + len(batch), frames)
+                progress(first + len(batch), len(times))
     return Path(output)

@@ -53,9 +53,9 @@ def test_help_is_instant(name):
 @pytest.mark.parametrize(
     "command",
     ["radarize import", "radarize info", "radarize run", "radarize slam", "radarize train", "radarize evaluate",
-     "radarize report", "radarize export", "radarsim simulate", "radarsim dataset", "radarsim calibrate",
-     "radarsim scene", "radarsim scene info", "radarsim scene preview", "radarsim scene import", "radarsim export",
-     "radarsim emulate", "radarsim doctor"],
+     "radarize report", "radarize benchmark", "radarize export", "radarize view", "radarsim simulate",
+     "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene", "radarsim scene info",
+     "radarsim scene preview", "radarsim scene import", "radarsim export", "radarsim emulate", "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
     code, out, _ = call(capsys, command, "--help")
@@ -74,6 +74,7 @@ def test_every_command_explains_itself(capsys, command):
         ("radarize import", ["missing.bin", "-o", "out.h5", "--config", "bogus"], "bogus: no such radar configuration"),
         ("radarize export", ["missing.h5", "--format", "tum", "-o", "x"], "missing.h5: no such file"),
         ("radarize export", ["x.h5", "--format", "wav", "-o", "x"], "export format is 'wav', expected one of bin"),
+        ("radarize view", ["missing.h5", "--save", "x.rrd"], "missing.h5: no such file"),
         ("radarize info", [], "Missing argument"),
         ("radarize info", ["a", "--bogus"], "No such option"),
         ("radarize fly", [], "No such command"),
@@ -84,6 +85,7 @@ def test_every_command_explains_itself(capsys, command):
         ("radarsim simulate", ["office", "-o", "out.h5", "--engine", "unreal"], "unreal"),
         ("radarsim dataset", ["missing.yaml", "-o", "out"], "no specification 'missing.yaml', expected"),
         ("radarsim calibrate", ["missing.h5", "-o", "board.yaml"], "missing.h5: no such file"),
+        ("radarsim twin", ["missing.h5", "--scene", "office", "-o", "twin.h5"], "missing.h5: no such file"),
         ("radarsim export", ["missing.h5", "--to", "tum", "-o", "x.tum"], "missing.h5: no such file"),
         ("radarsim scene info", ["castle"], "castle"),
         ("radarsim scene import", ["castle.glb", "-o", "out"], "castle.glb: no such file"),

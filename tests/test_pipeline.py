@@ -186,7 +186,7 @@ def test_silence_is_survived(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"odometry": "magic"}, "odometry is 'magic', expected one of doppler"),
+        ({"odometry": "magic"}, "odometry is 'magic', expected one of fused"),
         ({"scans": "magic"}, "scans is 'magic', expected one of"),
         ({"settings": "magic"}, "settings is 'magic', expected one of corrected"),
     ],

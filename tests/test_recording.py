@@ -14,6 +14,7 @@ from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
+from radarize.recording.growing import lookup3
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 4})
 
@@ -126,6 +127,47 @@ def test_readers_follow_a_growing_recording_and_survive_its_death(process, tmp_p
     with Recording(tmp_path / "a.h5.part") as recording:
         assert np.array_equal(recording.adc(0, 9), frames(0, 3))
         assert recording.valid(0, 3).all()
+
+
+def test_what_is_damaged_in_a_growing_recording_is_refused_at_once(process, tmp_path):
+    """In HDF5's multiple-reader mode it would try again without end."""
+    process.kill()
+    process.wait()
+    whole = (tmp_path / "a.h5.part").read_bytes()
+    rng = np.random.default_rng(0)
+    refused = 0
+    for place in [8, 11, 28, 44, *rng.integers(48, 6000, 40)]:
+        data = bytearray(whole)
+        data[place] ^= 0x10
+        data[11] |= 1
+        (tmp_path / "b.h5").write_bytes(data)
+        start = time.monotonic()
+        try:
+            with Recording(tmp_path / "b.h5") as recording:
+                recording.adc(0, 9)
+        except InputError as error:
+            refused += 1
+            assert "b.h5" in str(error)
+        assert time.monotonic() - start < 5
+    assert refused >= 10
+
+
+def test_hdf5s_checksum():
+    assert lookup3(b"Four score and seven years ago") == 0x17770551  # lookup3.c, driver5
+
+
+def test_declared_sizes_are_not_believed(tmp_path):
+    """Four terabytes of times in a file of some kilobytes, and a hundred thousand chunks of nothing."""
+    with RecordingWriter(tmp_path / "a.h5", CONFIG) as writer:
+        writer.append(frames(0, 2), np.arange(2.0))
+    whole = (tmp_path / "a.h5").read_bytes()
+    for chunks in (1024, 1):
+        (tmp_path / "b.h5").write_bytes(whole)
+        with h5py.File(tmp_path / "b.h5", "r+") as file:
+            del file["radar/time"]
+            file.create_dataset("radar/time", (2**39 if chunks > 1 else 100_000,), "f8", chunks=(chunks,))
+        with pytest.raises(InputError, match="b.h5: /radar/time declares .* but 0 are in the file"):
+            Recording(tmp_path / "b.h5")
 
 
 def test_ctrl_c_keeps_every_frame(process, tmp_path):

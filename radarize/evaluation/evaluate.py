@@ -11,18 +11,21 @@ from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, w
 from radarize.evaluation.motion import velocity_errors
 from radarize.evaluation.runfiles import read_map, read_scans, write_whole
 from radarize.evaluation.scans import scan_errors, true_ranges
-from radarize.evaluation.trajectory import load, matched, trajectory, yaws
+from radarize.evaluation.trajectory import Association, load, matched, trajectory, yaws
 
 #: Trajectories of a run by what the metrics call them, the best last.
 TRAJECTORIES = {"odometry": "odometry.tum", "slam": "trajectory.tum"}
 
 
-def trajectory_errors(run: Path, reference: Path | None = None) -> dict[str, TrajectoryErrors]:
+def trajectory_errors(
+    run: Path, reference: Path | None = None, association: Association = "interpolate"
+) -> dict[str, TrajectoryErrors]:
     """Errors of the run's trajectories, by ``odometry`` and ``slam``.
 
     Args:
         run: folder of a run.
         reference: TUM file of the truth; by default the run's ``reference.tum``.
+        association: see `radarize.evaluation.trajectory.matched`.
 
     Raises:
         InputError: not a run, no reference, or nothing that matches.
@@ -34,7 +37,7 @@ def trajectory_errors(run: Path, reference: Path | None = None) -> dict[str, Tra
         raise InputError(f"{path}: no such file, expected true poses (TUM); --reference names another file")
     truth = load(path)
     return {
-        name: evaluate_trajectory(load(run / file), truth, names=(str(run / file), str(path)))
+        name: evaluate_trajectory(load(run / file), truth, association=association, names=(str(run / file), str(path)))
         for name, file in TRAJECTORIES.items()
         if (run / file).is_file()
     }

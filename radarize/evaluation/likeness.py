@@ -1,18 +1,64 @@
-"""How alike two sets of heat maps are, whatever places they show: statistics of their patches, and Fréchet's distance.
+"""How alike heat maps are: cell by cell, of the same place, by correlation and MS-SSIM; or as sets, whatever places
+they show, by statistics of their patches and Fréchet's distance.
 
-As in the single-image form of the Fréchet inception distance (Shaham et al., "SinGAN", ICCV 2019), patches are the
-samples, so that a single frame has a distribution too; their features are not a network's but what a reader of heat
-maps looks at: levels and contrasts, in dB.
+Of sets: as in the single-image form of the Fréchet inception distance (Shaham et al., "SinGAN", ICCV 2019), patches
+are the samples, so that a single frame has a distribution too; their features are not a network's but what a reader of
+heat maps looks at: levels and contrasts, in dB.
 """
 
 import numpy as np
 import scipy.linalg
+import torch
 from jaxtyping import Float
 
 #: Cells of a patch, rows and columns: 36 cm or 0.9 m/s by 12 deg at the radarize preset.
 PATCH = (8, 8)
 #: Quantiles of a patch's levels.
 QUANTILES = (0.1, 0.5, 0.9)
+#: dB over a map's median that count: what is louder is as loud.
+DEPTH = 45.0
+#: Weights of MS-SSIM's scales from fine to coarse, and side of its Gaussian window of 1.5 cells (Wang, Simoncelli and
+#: Bovik, "Multiscale structural similarity for image quality assessment", Asilomar 2003). At the coarsest scale
+#: maps are mirrored at their borders.
+SCALES, WINDOW = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333), 11
+
+
+def foreground(maps: Float[np.ndarray, "frame row column"]) -> Float[np.ndarray, "frame row column"]:
+    """dB over each map's median, 0...`DEPTH`: most cells of a room are empty, and their noise is nobody's likeness."""
+    return np.clip(maps - np.median(maps, axis=(1, 2), keepdims=True), 0, DEPTH)
+
+
+def correlation(
+    one: Float[np.ndarray, "frame *cell"], other: Float[np.ndarray, "frame *cell"]
+) -> Float[np.ndarray, "frame"]:
+    """Pearson's correlation over the cells of each pair; NaN where either has the same everywhere."""
+    a, b = (np.asarray(maps, float).reshape(len(maps), -1) for maps in (one, other))
+    a, b = (values - values.mean(axis=1, keepdims=True) for values in (a, b))
+    scale = np.sqrt(np.sum(a**2, axis=1) * np.sum(b**2, axis=1))
+    return np.where(scale > 0, np.sum(a * b, axis=1) / np.where(scale > 0, scale, 1), np.nan)
+
+
+def similarity(
+    one: Float[np.ndarray, "frame row column"], other: Float[np.ndarray, "frame row column"]
+) -> Float[np.ndarray, "frame"]:
+    """MS-SSIM of each pair of maps of 0...`DEPTH` dB, at as many of its five scales as their smaller side has room for;
+    NaN where it has none."""
+    from torchmetrics.functional.image import multiscale_structural_similarity_index_measure as ms_ssim
+
+    side = min(one.shape[1:])
+    scales = [n for n in range(2, len(SCALES) + 1) if side >> (n - 1) > WINDOW // 2]
+    if not scales:
+        return np.full(len(one), np.nan)
+    weights = np.array(SCALES[: scales[-1]])
+    found = [
+        ms_ssim(
+            *(torch.as_tensor(np.asarray(maps, np.float32))[:, None] for maps in (one[k : k + 64], other[k : k + 64])),
+            sigma=1.5, data_range=DEPTH, betas=tuple(weights / weights.sum()), reduction="none", normalize="relu",
+            kernel_size=1,  # of uniform windows; a Gaussian one's follows from sigma
+        ).double().numpy()
+        for k in range(0, len(one), 64)
+    ]  # fmt: skip
+    return np.concatenate(found)
 
 
 def patch_statistics(maps: Float[np.ndarray, "frame row column"]) -> Float[np.ndarray, "frame patch 5"]:

@@ -37,10 +37,38 @@ th, td { padding: 7px 14px 7px 0; border-bottom: 1px solid var(--line); vertical
 td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
 td.note { color: var(--soft); }
 figure { margin: 8px 0 18px; }
-figure img { width: 100%; height: auto; display: block; }
+figure img { max-width: 100%; height: auto; display: block; }
 figcaption { color: var(--soft); font-size: 13.5px; }
 .columns { display: grid; grid-template-columns: repeat(auto-fit, minmax(300px, 1fr)); gap: 8px 32px; }
 .wide { overflow-x: auto; }
+a { color: var(--accent); }
+table.sortable th, table.sortable td { overflow-wrap: normal; padding-right: 18px; }
+table.sortable td { white-space: nowrap; }
+table.sortable th { cursor: pointer; user-select: none; white-space: normal; vertical-align: bottom; }
+table.sortable th:hover { color: var(--ink); }
+table.sortable th[aria-sort="ascending"]::after { content: " ↑"; }
+table.sortable th[aria-sort="descending"]::after { content: " ↓"; }
+"""
+
+#: A click on a column's head sorts by it, another one the other way round; what is no figure goes last.
+SORT = """
+for (const head of document.querySelectorAll("table.sortable th")) {
+  head.addEventListener("click", () => {
+    const table = head.closest("table"), column = head.cellIndex;
+    const down = head.getAttribute("aria-sort") === "ascending";
+    for (const other of table.querySelectorAll("th")) other.removeAttribute("aria-sort");
+    head.setAttribute("aria-sort", down ? "descending" : "ascending");
+    const rows = [...table.rows].slice(1), text = row => row.cells[column].textContent;
+    const numeric = head.classList.contains("number");
+    const compare = (a, b) => {
+      if (!numeric) return (down ? -1 : 1) * text(a).localeCompare(text(b));
+      const [x, y] = [parseFloat(text(a)), parseFloat(text(b))];
+      if (isNaN(x) || isNaN(y)) return isNaN(x) - isNaN(y);
+      return down ? y - x : x - y;
+    };
+    rows.sort(compare).forEach(row => row.parentNode.append(row));
+  });
+}
 """
 
 
@@ -56,6 +84,7 @@ class Page:
         self.title = title
         self._body = [f"<header><h1>{_text(title)}</h1><p>{_text(about)}</p></header>"]
         self._plots = 0
+        self._sorts = False
 
     def section(self, title: str, about: str = "") -> None:
         """Start a section."""
@@ -70,8 +99,14 @@ class Page:
         cards = "".join(f"<div><b>{_text(value)}</b><span>{_text(words)}</span></div>" for value, words in figures)
         self._body.append(f'<div class="headline">{cards}</div>')
 
-    def table(self, head: tuple[str, ...], rows: Iterable[tuple[str, ...]], numbers: tuple[int, ...] = ()) -> None:
-        """A table; the columns named by `numbers` are right-aligned."""
+    def table(
+        self,
+        head: tuple[str, ...],
+        rows: Iterable[tuple[str, ...]],
+        numbers: tuple[int, ...] = (),
+        sortable: bool = False,
+    ) -> None:
+        """A table; the columns named by `numbers` are right-aligned, and sort by value where a click sorts."""
 
         def cells(values: tuple[str, ...], tag: str) -> str:
             kinds = (' class="number"' if column in numbers else "" for column in range(len(values)))
@@ -79,7 +114,22 @@ class Page:
             return f"<tr>{''.join(joined)}</tr>"
 
         body = "".join(cells(row, "td") for row in rows)
-        self._body.append(f'<div class="wide"><table>{cells(head, "th") if any(head) else ""}{body}</table></div>')
+        self._sorts |= sortable
+        kind = ' class="sortable"' if sortable else ""
+        self._body.append(
+            f'<div class="wide"><table{kind}>{cells(head, "th") if any(head) else ""}{body}</table></div>'
+        )
+
+    def links(self, head: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> None:
+        """A table whose rows begin with words and the file beside this one that they lead to, then have other words."""
+
+        def line(words: str, file: str, *others: str) -> str:
+            link = f'<a href="{_text(file)}">{_text(words)}</a>'
+            return f"<tr><td>{link}</td>{''.join(f'<td>{_text(other)}</td>' for other in others)}</tr>"
+
+        heads = "".join(f"<th>{_text(name)}</th>" for name in head)
+        lines = "".join(line(*row) for row in rows)
+        self._body.append(f'<div class="wide"><table><tr>{heads}</tr>{lines}</table></div>')
 
     def settings(self, title: str, content: Mapping[str, object]) -> None:
         """Nested plain data as a table of dotted names."""
@@ -140,7 +190,7 @@ class Page:
         Raises:
             InputError: it cannot be written.
         """
-        script = ""
+        script, last = "", f"<script>{SORT}</script>" if self._sorts else ""
         if self._plots:
             from plotly.offline import get_plotlyjs
 
@@ -150,7 +200,7 @@ class Page:
             '<!doctype html><html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1"><link rel="icon" href="data:,">'
             f"<title>{_text(self.title)}</title><style>{STYLE}</style>{script}</head>"
-            f"<body><main>{''.join(self._body)}</main></body></html>\n",
+            f"<body><main>{''.join(self._body)}</main>{last}</body></html>\n",
         )
 
 

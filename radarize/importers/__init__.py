@@ -45,7 +45,7 @@ def import_recording(
     poses: Path | None = None,
     shape: str | None = None,
     variable: str | None = None,
-    latency: float = 0.0,
+    latency: float | None = None,
     overrides: dict[str, object] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
@@ -65,7 +65,7 @@ def import_recording(
         poses: TUM file of the sensor's true poses on the recording's clock.
         shape: axes of an array: names in order, such as ``frame,loop,tx,rx,sample``, or five or six lengths.
         variable: which array of an ``.npz`` or ``.mat``.
-        latency: from a frame's start to its receipt in a ROS bag, s.
+        latency: from a frame's start to its receipt in a ROS bag, s; by default, see `radarize.importers.bag`.
         overrides: fields of `RadarConfig` that replace or stand in for the configuration's; ``rx`` and ``tx`` may be
             counts; ``start_time`` is the first frame's stamp, s.
         progress: called with frames done and (estimated) frames in all.
@@ -137,7 +137,7 @@ def _open(
     overrides: dict[str, object],
     shape: str | None,
     variable: str | None,
-    latency: float,
+    latency: float | None,
 ) -> Capture:
     """Choose the format and the configuration."""
     if not source.exists():
@@ -145,7 +145,7 @@ def _open(
     kind = _kind(source)
     if (shape or variable) and kind != "cube":
         raise InputError(f"{source}: is no array, but shape or variable is given, expected {', '.join(_ARRAYS)}")
-    if latency and kind != "bag":
+    if latency is not None and kind != "bag":
         raise InputError(f"{source}: is no ROS bag, but latency is {latency:g} s, expected none")
     if kind == "studio":
         studio = studio_format.find(source)

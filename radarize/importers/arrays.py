@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 from numpy.lib import format as npy
 
-from radarize.errors import InputError
+from radarize.errors import InputError, reason
 
 #: Bytes of a compressed member unpacked at a time.
 _PIECE = 1 << 18
@@ -110,7 +110,10 @@ class MatlabArray(ArrayFile):
     def take(self, axis: int, start: int, stop: int) -> np.ndarray:
         """Entries start...stop-1 along an axis."""
         rows = (slice(None),) * (len(self.shape) - 1 - axis) + (slice(start, stop),)
-        return _joined(self._data[rows], self.dtype).T
+        try:
+            return _joined(self._data[rows], self.dtype).T
+        except Exception as error:  # as in `open_array`
+            raise InputError(f"{self.name}: is damaged ({reason(error)})") from error
 
 
 def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
@@ -132,8 +135,10 @@ def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
         with path.open("rb") as file:
             header = _npy_header(file, str(path))
             return MappedArray(str(path), path, header, file.tell())
-    except (OSError, zipfile.BadZipFile, NotImplementedError, RuntimeError, EOFError) as error:
-        raise InputError(f"{path}: cannot be read ({' '.join(str(error).split())})") from error
+    except InputError:
+        raise
+    except Exception as error:  # zipfile, zlib, HDF5 and scipy raise whatever they meet in a damaged file
+        raise InputError(f"{path}: cannot be read ({reason(error)})") from error
 
 
 def _npy_header(file, name: str) -> tuple[tuple[int, ...], bool, np.dtype]:
@@ -141,9 +146,12 @@ def _npy_header(file, name: str) -> tuple[tuple[int, ...], bool, np.dtype]:
     try:
         version = npy.read_magic(file)
         reader = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        return reader(file)
-    except (ValueError, SyntaxError, TypeError, OverflowError) as error:
-        raise InputError(f"{name}: is no array in NumPy's format ({' '.join(str(error).split())[:120]})") from error
+        shape, fortran, stored = reader(file)
+    except Exception as error:  # Python's own tokenizer and parser are at work there
+        raise InputError(f"{name}: is no array in NumPy's format ({reason(error)})") from error
+    if min(shape, default=0) < 0:
+        raise InputError(f"{name}: has shape {shape}, expected no negative length")
+    return shape, fortran, stored
 
 
 def _open_npz(path: Path, variable: str | None, folder: Path) -> ArrayFile:
@@ -174,14 +182,10 @@ def _open_mat(path: Path, variable: str | None) -> ArrayFile:
         chosen = _choose(path, variable, shapes)
         return MatlabArray(f"{path}: {chosen}", data[chosen])
     from scipy.io import loadmat, whosmat
-    from scipy.io.matlab import MatReadError
 
-    try:
-        shapes = {name: shape for name, shape, kind in whosmat(path) if kind not in ("cell", "struct", "object")}
-        chosen = _choose(path, variable, shapes)
-        return MemoryArray(f"{path}: {chosen}", loadmat(path, variable_names=[chosen])[chosen])
-    except (MatReadError, ValueError, TypeError, KeyError, IndexError) as error:
-        raise InputError(f"{path}: is no readable MATLAB file ({' '.join(str(error).split())[:120]})") from error
+    shapes = {name: shape for name, shape, kind in whosmat(path) if kind not in ("cell", "struct", "object")}
+    chosen = _choose(path, variable, shapes)
+    return MemoryArray(f"{path}: {chosen}", loadmat(path, variable_names=[chosen])[chosen])
 
 
 def _choose(path: Path, variable: str | None, shapes: dict[str, tuple[int, ...]]) -> str:
@@ -189,7 +193,8 @@ def _choose(path: Path, variable: str | None, shapes: dict[str, tuple[int, ...]]
     wanted = variable if variable is not None else large[0] if len(large) == 1 else None
     if wanted in shapes:
         return wanted
-    found = ", ".join(f"{name} {'x'.join(map(str, shape))}" for name, shape in shapes.items())
+    named = [f"{ascii(name[:40])[1:-1]} {'x'.join(map(str, shape))}" for name, shape in shapes.items()]
+    found = ", ".join([*named[:12], *(["..."] if len(named) > 12 else [])])
     expected = f"one called {variable}" if variable is not None else "one of samples, or its name as variable"
     raise InputError(f"{path}: has arrays {found or '(none)'}, expected {expected}")
 

@@ -1,6 +1,6 @@
 """ROS bags of raw radar frames: the published Radarize data set's (ROS 1), and ROS 2 bags with the same topics.
 
-Frames are stamped with the time of their receipt, since their publisher leaves the header's stamp unset.
+Other topics are stamped as their headers say, or with their receipt where those are not of the bag's clock.
 """
 
 import math
@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.errors import InputError, reason
 from radarize.importers.bin import all_zero
 from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.importers.companions import ChipPoints, Companion, Depth, InertialSensor, TrackedPose
+from radarize.importers.frames import Frames, Stamps
 from radarize.importers.parameters import configure
 from radarize.importers.rosbag import Bag, is_frame
 from radarize.radar.config import RadarConfig
@@ -38,7 +39,7 @@ _AHEAD = 0.5
 
 
 def open_bag(
-    path: Path, config: RadarConfig | None, cfg_text: str, overrides: dict[str, object], *, latency: float = 0.0
+    path: Path, config: RadarConfig | None, cfg_text: str, overrides: dict[str, object], *, latency: float | None = None
 ) -> Capture:
     """Open a bag.
 
@@ -48,32 +49,41 @@ def open_bag(
     Args:
         path: a ROS 1 ``.bag``, a ROS 2 bag's folder, or its ``.mcap`` or ``.db3``.
         config, cfg_text, overrides: what is known of the radar.
-        latency: from a frame's start to its receipt, s.
+        latency: from a frame's start to its receipt, s; by default what the headers say, else the burst's length.
 
     Raises:
         InputError: no readable bag, one without raw frames, or frames that do not fit the configuration.
     """
     with Bag(path) as bag:
         radar, others, warnings = _topics(bag)
-        first = next(message for _, _, message in bag.messages([radar]))
+        received, first = _first(bag, radar)
         config, assumed = _configure(path, first, config, overrides)
-        config = _calibrated(config, first, warnings)
+        config = _calibrated(config, first, str(path), warnings)
         companions = {}
         for topic, kind in others.items():
             try:
-                companions[topic] = kind(config, next(message for _, _, message in bag.messages([topic])))
+                companions[topic] = kind(config, _first(bag, topic)[1])
             except InputError as error:
                 warnings.append(f"{topic} is left out: {error}")
         _intrinsics(bag, companions)
         count = bag.topics[radar][1]
     taken = list(companions.values())
     check_layout(config)
-    capture = Capture(config, cfg_text, (), count, (*assumed, *(["latency"] if not latency else [])), warnings)
+    stamps = Stamps(config, first, received, latency)
+    capture = Capture(config, cfg_text, (), count, (*assumed, *stamps.assumed), warnings)
+    capture.attributes["stamps"] = str(stamps)
     capture.streams = {name: stream for companion in taken for name, stream in companion.streams.items()}
     capture.products = {name: product for companion in taken for name, product in companion.products.items()}
     capture.attributes["topics"] = ", ".join([radar, *companions])
-    capture.batches = _batches(path, radar, companions, capture, latency)
+    capture.batches = _batches(path, radar, companions, capture, stamps)
     return capture
+
+
+def _first(bag: Bag, topic: str) -> tuple[float, object]:
+    """Time of receipt (s) and content of a topic's first message."""
+    for _, nanoseconds, message in bag.messages([topic]):
+        return 1e-9 * nanoseconds, message
+    raise InputError(f"{bag.path}: has no message on {topic}, though its index counts {bag.topics[topic][1]}")
 
 
 def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
@@ -105,9 +115,13 @@ def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
 def _configure(
     path: Path, frame: object, config: RadarConfig | None, overrides: dict[str, object]
 ) -> tuple[RadarConfig, tuple[str, ...]]:
-    shape = tuple(int(length) for length in np.atleast_1d(frame.shape))
-    rx, tx = _antennas(frame.rx), _antennas(frame.tx)
-    loops, rest = divmod(math.prod(shape), max(1, shape[-1] * len(rx) * len(tx)))
+    try:
+        shape = tuple(int(length) for length in np.atleast_1d(frame.shape))
+        rx, tx = _antennas(frame.rx), _antennas(frame.tx)
+        whole = np.asarray(frame.data).dtype.kind in "iu" and min(shape, default=0) > 0
+    except (AttributeError, TypeError, ValueError, OverflowError) as error:
+        raise InputError(f"{path}: has frames without usable shape, rx, tx and data ({reason(error)})") from error
+    loops, rest = divmod(math.prod(shape), max(1, shape[-1] * len(rx) * len(tx))) if whole else (0, 0)
     if rest or not loops:
         raise InputError(
             f"{path}: has frames of shape {shape} with {len(tx)} transmitters and {len(rx)} receivers, expected loops "
@@ -130,16 +144,19 @@ def _antennas(field: object) -> tuple[int, ...]:
     return tuple(k for k, value in enumerate(values) if value)
 
 
-def _calibrated(config: RadarConfig, frame: object, warnings: list[str]) -> RadarConfig:
+def _calibrated(config: RadarConfig, frame: object, name: str, warnings: list[str]) -> RadarConfig:
     """The configuration with the frame's calibration, unless it has one of its own."""
-    pairs = np.asarray(getattr(frame, "rx_phase_bias", ()), float).reshape(-1)
+    try:
+        pairs = np.asarray(getattr(frame, "rx_phase_bias", ()), float).reshape(-1)
+        bias = float(getattr(frame, "range_bias", 0.0))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{name}: has frames without usable range_bias and rx_phase_bias ({reason(error)})") from error
     untouched = config.range_bias == 0 and set(config.channel_calibration) == {(1.0, 0.0)}
     if not untouched or not pairs.any():
         return config
-    if pairs.size != 24 or not np.isfinite(pairs).all():
+    if pairs.size != 24 or not np.isfinite([*pairs, bias]).all():
         warnings.append(f"rx_phase_bias has {pairs.size} numbers, expected 12 pairs; no calibration is taken from it")
         return config
-    bias = float(getattr(frame, "range_bias", 0.0))
     factors = tuple((float(re), float(im)) for re, im in pairs.reshape(12, 2))
     return config.model_copy(update={"range_bias": bias, "channel_calibration": factors})
 
@@ -156,57 +173,11 @@ def _intrinsics(bag: Bag, companions: dict[str, Companion]) -> None:
                 break
 
 
-class Frames:
-    """Raw frames that wait for what comes along with them, and what was wrong with others.
-
-    Args:
-        config: radar configuration.
-    """
-
-    def __init__(self, config: RadarConfig):
-        self.config, self.words = config, config.frame_bytes // 2
-        self.times: list[float] = []
-        self.raw: list[np.ndarray] = []
-        self.last = -np.inf
-        self._odd = self._again = self._missing = 0
-
-    def add(self, time: float, message: object) -> None:
-        """Keep a frame, unless it has another size or does not come after the last one."""
-        words = np.asarray(message.data)
-        if words.dtype.itemsize == 1:
-            words = words[: words.size // 2 * 2].view("<i2")
-        if words.size != self.words:
-            self._odd += 1
-        elif time <= self.last:
-            self._again += 1
-        else:
-            if np.isfinite(self.last):
-                self._missing += max(0, round((time - self.last) / self.config.frame_period) - 1)
-            self.last = time
-            self.times.append(time)
-            self.raw.append(words.astype(np.int16, copy=False))
-
-    def take(self, count: int) -> tuple[np.ndarray, np.ndarray, float]:
-        """Stamps and words of the first frames, and the stamp of the frame after them, s."""
-        times, raw = np.array(self.times[:count]), np.concatenate(self.raw[:count])
-        del self.times[:count], self.raw[:count]
-        return times, raw, self.times[0] if self.times else self.last + self.config.frame_period
-
-    @property
-    def warnings(self) -> list[str]:
-        """What was wrong."""
-        counted = (
-            (self._odd, f"frames have not the {self.words} words of the configuration and are left out"),
-            (self._again, "frames came again or out of order and are left out"),
-            (self._missing, "frames are missing between others"),
-        )
-        return [f"{count} {what}" for count, what in counted if count]
-
-
 def _batches(
-    path: Path, radar: str, companions: dict[str, Companion], capture: Capture, latency: float
+    path: Path, radar: str, companions: dict[str, Companion], capture: Capture, stamps: Stamps
 ) -> Iterator[Batch]:
-    config, size, done = capture.config, batch_frames(capture.config), 0
+    config, done = capture.config, 0
+    size = batch_frames(config, capture.streams)
     frames = Frames(config)
 
     def batch(count: int) -> Batch:
@@ -221,7 +192,7 @@ def _batches(
     with Bag(path) as bag:
         for topic, nanoseconds, message in bag.messages([radar, *companions]):
             received = 1e-9 * nanoseconds
-            now = received - latency
+            now = stamps(message, received) if topic == radar else received
             if frames.times and now > frames.last + 2 * _AHEAD:  # the radar is silent: nothing to wait for
                 yield batch(size)
             elif len(frames.times) > size and now > frames.times[size] + _AHEAD:

@@ -1,5 +1,6 @@
 """What every foreign format is opened as."""
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -13,9 +14,10 @@ from radarize.recording import Product, Stream
 BATCH_BYTES = 16 << 20
 
 
-def batch_frames(config: RadarConfig) -> int:
-    """Frames in a batch."""
-    return max(1, BATCH_BYTES // config.frame_bytes)
+def batch_frames(config: RadarConfig, streams: Mapping[str, Stream] | None = None) -> int:
+    """Frames in a batch, with a row of each stream for each of them."""
+    rows = sum(math.prod(stream.shape) * np.dtype(stream.dtype).itemsize for stream in (streams or {}).values())
+    return max(1, BATCH_BYTES // (config.frame_bytes + rows))
 
 
 @dataclass

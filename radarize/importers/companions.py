@@ -19,13 +19,21 @@ from radarize.radar.config import RadarConfig
 from radarize.recording import Product, Stream
 
 #: s: header stamps that are further from the time of receipt are not of the same clock.
-_SAME_CLOCK = 0.5
+SAME_CLOCK = 0.5
 #: s: between poses further apart nothing is known.
 _LARGEST_GAP = 0.25
 #: Bytes before the picture in a compressedDepth message: an enumeration and two float32 (image_transport_plugins).
 _DEPTH_HEADER = 12
+#: More than any depth camera has: packed, they may come in few bytes.
+_MOST_PIXELS = 1 << 24
 #: fx fy cx cy of the Radarize data set's depth pictures, which come without a camera_info (pixels).
 STRIP = {(100, 848): (423.993, 423.993, 432.966, 50.938)}
+
+
+def header_time(message: object) -> float:
+    """A message's own stamp, s; minus infinity where it has no header."""
+    header = getattr(message, "header", None)
+    return header.stamp.sec + 1e-9 * header.stamp.nanosec if header is not None else -np.inf
 
 
 class Companion(ABC):
@@ -57,9 +65,9 @@ class Companion(ABC):
             message: as the bag has it.
             received: s; stands in for a header stamp that was not set.
         """
-        stamp = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+        stamp = header_time(message)
         if self._own_clock is None:
-            self._own_clock = abs(stamp - received) < _SAME_CLOCK
+            self._own_clock = abs(stamp - received) < SAME_CLOCK
         time = stamp if self._own_clock else received
         if time > self._last:  # what comes again or out of order adds nothing
             self._last = time
@@ -117,7 +125,11 @@ class TrackedPose(Companion):
         """
         half = self.config.frame_period / 2
         middle = times + self.config.burst_center
-        known = [(time, pose) for time, pose in self._waiting if np.isfinite(pose).all() and np.any(pose[3:])]
+        known = [
+            (time, pose)
+            for time, pose in self._waiting
+            if np.isfinite(pose).all() and 0.5 < np.abs(pose[3:]).max() < 2  # no rotation else
+        ]
         pose, before, after = (_interpolated(known, at) for at in (middle, middle - half, middle + half))
         velocity, span = np.full((len(times), 6), np.nan), np.zeros((len(times), 1))
         for side in (before, after):
@@ -212,6 +224,8 @@ def depth_picture(message: object) -> UInt16[np.ndarray, "row column"]:
     data = bytes(message.data)
     try:
         with Image.open(io.BytesIO(data[_DEPTH_HEADER:]), formats=["PNG"]) as packed:
+            if packed.width * packed.height > _MOST_PIXELS:
+                raise InputError(f"depth picture has {packed.width} x {packed.height} pixels, expected a camera's")
             picture = np.asarray(packed)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
         raise InputError(f"depth picture ({message.format}) is no readable PNG ({error})") from error

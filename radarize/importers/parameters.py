@@ -36,6 +36,9 @@ def configure(
         InputError: a value is impossible, or too few are known.
     """
     given = {key: value for key, value in overrides.items() if value is not None}
+    for key, most in (("rx", 4), ("tx", 3)):
+        if isinstance(count := given.get(key), int) and not 1 <= count <= most:
+            raise InputError(f"{name}: {key} is {count}, expected 1 to {most} antennas")
     if isinstance(rx := given.get("rx"), int):
         given["rx"] = tuple(range(rx))
     if (tx := given.pop("tx", None)) is not None:
@@ -54,6 +57,6 @@ def configure(
         fields.setdefault("ramp_end_time", adc_end + _AFTER_ADC)
         burst = fields["loops"] * len(fields["tx_order"]) * (fields["idle_time"] + fields["ramp_end_time"])
         fields.setdefault("frame_period", max(_FRAME_PERIOD, 1.5 * burst))
-    except (TypeError, ZeroDivisionError):
+    except (TypeError, ZeroDivisionError, OverflowError):
         pass  # the configuration's own checks name the field
     return RadarConfig.build(name, **fields), tuple(key for key in fields if key not in given)

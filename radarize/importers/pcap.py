@@ -24,6 +24,8 @@ MAGIC = {
 _NEXT_GENERATION = b"\x0a\x0d\x0d\x0a"
 _ETHERNET = 1
 _LONGEST_RECORD = 1 << 18
+#: With so many times more bytes lost than the file has, the byte counts are damaged, not the network.
+_MOST_LOST = 20
 
 
 def open_pcap(path: Path, config: RadarConfig, cfg_text: str = "", assumed: tuple[str, ...] = ()) -> Capture:
@@ -43,16 +45,20 @@ def open_pcap(path: Path, config: RadarConfig, cfg_text: str = "", assumed: tupl
 def _batches(path: Path, capture: Capture) -> Iterator[Batch]:
     assembler = FrameAssembler(capture.config)
     size = batch_frames(capture.config)
+    most_lost = _MOST_LOST * path.stat().st_size
     frames: list[tuple[np.ndarray, np.ndarray]] = []
     yielded = 0
-    for time, payload in _payloads(path, capture):
-        capture.attributes.setdefault("first_packet_time", time)
-        frames += assembler.take(payload)
+    for frame in _frames(path, capture, assembler):
+        if assembler.counts.lost_bytes > most_lost:
+            raise InputError(
+                f"{path}: lacks more than {most_lost} bytes between its data packets, {_MOST_LOST} times its size; "
+                "expected byte counts that grow as packets come"
+            )
+        frames.append(frame)
         if len(frames) >= size:
             yielded += len(frames)
             yield _stack(frames, capture.config)
             frames.clear()
-    frames += assembler.finish()
     if not yielded and not frames:
         raise InputError(
             f"{path}: holds {assembler.counts.incomplete_bytes} bytes of samples in {assembler.counts.received} data "
@@ -61,6 +67,13 @@ def _batches(path: Path, capture: Capture) -> Iterator[Batch]:
     capture.warnings += assembler.counts.warnings()
     if frames:
         yield _stack(frames, capture.config)
+
+
+def _frames(path: Path, capture: Capture, assembler: FrameAssembler) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    for time, payload in _payloads(path, capture):
+        capture.attributes.setdefault("first_packet_time", time)
+        yield from assembler.take(payload)
+    yield from assembler.finish()
 
 
 def _stack(frames: list[tuple[np.ndarray, np.ndarray]], config: RadarConfig) -> Batch:

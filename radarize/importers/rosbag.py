@@ -16,7 +16,7 @@ from rosbags.rosbag1.reader import Header, RecordType, read_bytes, read_uint32
 from rosbags.rosbag2 import Reader as Reader2
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-from radarize.errors import InputError
+from radarize.errors import InputError, reason
 
 #: What the Radarize data set's recorder publishes for every frame, where a bag does not say; header stamps stay unset.
 FRAME_TYPE = "xwr_raw_ros/msg/RadarFrameFull"
@@ -91,7 +91,7 @@ class Bag:
             self._types = self._definitions()
         except Exception as error:
             self._reader.close()
-            raise InputError(f"{path}: has message definitions that cannot be read ({_words(error)})") from error
+            raise InputError(f"{path}: has message definitions that cannot be read ({reason(error)})") from error
 
     def __enter__(self) -> "Bag":
         return self
@@ -100,7 +100,7 @@ class Bag:
         self._reader.close()
 
     def _damaged(self, error: Exception) -> InputError:
-        return InputError(f"{self.path}: is no readable ROS bag ({_words(error)})")
+        return InputError(f"{self.path}: is no readable ROS bag ({reason(error)})")
 
     def _definitions(self):
         """Standard messages, and the radar's frames as the bag defines them."""
@@ -146,7 +146,3 @@ class Bag:
 def is_frame(kind: str) -> bool:
     """Whether a message type is that of raw radar frames, of whatever package."""
     return bool(re.fullmatch(r"[A-Za-z]\w*/msg/RadarFrameFull", kind, re.ASCII))
-
-
-def _words(error: Exception) -> str:
-    return " ".join(str(error).split())[:120] or type(error).__name__

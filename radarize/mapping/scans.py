@@ -5,14 +5,18 @@ there, each a function of `Maps` that returns fractional range bins. A network j
 """
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+import torch
+from jaxtyping import Bool, Complex64, Float
 from pydantic import BaseModel, ConfigDict, Field
 
 from radarize.errors import InputError
+from radarize.heatmaps import Heatmaps
 from radarize.mapping import echoes
+from radarize.points import Cfar, level_around
 
 #: Bearings of a scan: 88 columns of 1 deg, -44...+43 deg, left positive, rad (the paper's field of view).
 BEARINGS = np.radians(np.arange(-44.0, 44.0))
@@ -30,6 +34,7 @@ class ScanConfig(BaseModel):
             and nearer is clutter above or below the plane, or the skirt of a neighbour. In simulated offices 6 dB
             halves the echoes that come too early and costs one in ten of the others.
         noise_quantile: the noise is this quantile of a frame's cells: most of a room's cells are behind its walls.
+        cfar: what an echo stands above along its bearing, for the method of that name.
         elevation_power: how strongly echoes from above and below are weighed down: a cell's power is multiplied with
             (elevation-aware / reference power)^this, at most 1.
     """
@@ -41,6 +46,7 @@ class ScanConfig(BaseModel):
     below_ring_db: float = Field(15.0, gt=0)
     below_bearing_db: float = Field(6.0, gt=0)
     noise_quantile: float = Field(0.25, gt=0, lt=1)
+    cfar: Cfar = Cfar(window=8, guard=4, threshold=10.0)
     elevation_power: float = Field(2.0, gt=0)
 
 
@@ -80,6 +86,15 @@ def threshold(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
     return echoes.strongest(detect(maps.power, maps), maps.power)
 
 
+def cfar(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
+    """The strongest cell of every bearing that stands out from its neighbours in range and in bearing."""
+    level, cfar = 10 * np.log10(np.maximum(maps.power, 1e-30)), maps.config.cfar
+    found = np.broadcast_to((maps.ranges >= maps.config.min_range)[:, None], level.shape)
+    for axis in (1, 2):
+        found = found & (level > level_around(level, cfar, axis, cyclic=False) + cfar.threshold)
+    return echoes.strongest(found, maps.power)
+
+
 def first_echo(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
     """The first echo of every bearing."""
     return echoes.first(detect(maps.power, maps), maps.power)
@@ -96,6 +111,7 @@ def elevation_aware(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
 
 METHODS: dict[str, Callable[[Maps], np.ndarray]] = {
     "threshold": threshold,
+    "cfar": cfar,
     "first-echo": first_echo,
     "elevation-aware": elevation_aware,
 }
@@ -154,6 +170,49 @@ def make_scans(
     )
     bins = METHODS[method](maps)
     return np.where(np.isfinite(bins), ranges[0] + bins * (ranges[1] - ranges[0]), np.inf)
+
+
+class HeatmapScans:
+    """Scans of a stream's frames, from heat maps alone.
+
+    Args:
+        heatmaps: make the maps.
+        method: a key of `METHODS`.
+        config: parameters of detection.
+        stage: entered with ``"maps"`` where maps are made, to time it.
+
+    Raises:
+        InputError: the array has no elevation-aware maps, and the method needs them.
+    """
+
+    def __init__(
+        self,
+        heatmaps: Heatmaps,
+        method: str,
+        config: ScanConfig | None = None,
+        stage: Callable[[str], AbstractContextManager] = nullcontext,
+    ):
+        if method == "elevation-aware" and heatmaps.pairs is None:
+            raise InputError(
+                "scans is 'elevation-aware', which needs antennas of two heights; this radar has none, use first-echo"
+            )
+        self.heatmaps, self.method, self.config = heatmaps, method, config or ScanConfig()
+        self._stage = stage
+
+    def scan(
+        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
+    ) -> Float[np.ndarray, "frame bearing"]:
+        """Ranges on `BEARINGS`, m, inf where nothing is seen."""
+        maps, level, reference = self.heatmaps, None, None
+        with self._stage("maps"):
+            # Scans want Capon's sharp beams; the horizon is told from two maps of one beamformer, Bartlett's.
+            sharp = maps.range_azimuth_of(spectrum, "capon").numpy()
+            if self.method == "elevation-aware":
+                level = maps.elevation_aware_of(spectrum).numpy()
+                reference = maps.range_azimuth_of(spectrum).numpy()
+        return make_scans(
+            sharp, maps.ranges, maps.azimuths, level, reference=reference, method=self.method, config=self.config
+        )
 
 
 def _resample(power: np.ndarray, azimuths: np.ndarray) -> np.ndarray:

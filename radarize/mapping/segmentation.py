@@ -6,7 +6,8 @@ import numpy as np
 import torch
 from jaxtyping import Complex64, Float
 
-from radarize.odometry.learned import Windows
+from radarize.mapping import echoes
+from radarize.nets.windows import Windows
 from radarize.training.maps import MapMaker
 
 #: Least probability that a returned range is right.
@@ -23,14 +24,16 @@ class Segmentation:
         weights: file; the shipped ones if None.
         least: least probability that a range is right within `NEAR` cells: higher leaves fewer ghosts and fewer
             bearings.
+        first: take the first surface; False: the likeliest occupied cell of each bearing, wherever it is, for
+            comparison.
 
     Raises:
         InputError: no such weights, or they are for another radar.
     """
 
-    def __init__(self, maker: MapMaker, weights: Path | None = None, least: float = LEAST):
+    def __init__(self, maker: MapMaker, weights: Path | None = None, least: float = LEAST, first: bool = True):
         self._windows, self._ranges = Windows(maker, "segmentation", weights), maker.heatmaps.ranges
-        self.least = least
+        self.least, self.first = least, first
 
     @torch.inference_mode()
     def occupancy(
@@ -43,14 +46,26 @@ class Segmentation:
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
     ) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen."""
-        bins = first_surface(self.occupancy(spectrum), self.least)
+        occupancy = self.occupancy(spectrum)
+        if self.first:
+            bins = first_surface(occupancy, self.least)
+        else:
+            bins = echoes.strongest(occupancy >= self.least, occupancy)
         return np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
 
 
 def first_surface(
     occupancy: Float[np.ndarray, "frame range bearing"], least: float
 ) -> Float[np.ndarray, "frame bearing"]:
-    """Fractional range bin of every bearing's first surface, inf where none is likely enough.
+    """Fractional range bin of every bearing's first surface, inf where none is likely enough."""
+    bins, probability = likeliest(occupancy)
+    return np.where(probability >= least, bins, np.inf)
+
+
+def likeliest(
+    occupancy: Float[np.ndarray, "frame range bearing"],
+) -> tuple[Float[np.ndarray, "frame bearing"], Float[np.ndarray, "frame bearing"]]:
+    """Fractional range bin where every bearing's first surface is likeliest, and how likely it is that near.
 
     With h the probability of a cell if nothing is before it, the first surface is in a cell with probability
     h * product over nearer cells of (1 - h): behind a surface hardly anything is left for ghosts, which is the
@@ -62,7 +77,7 @@ def first_surface(
     mass, moment = (_stretches(values) for values in (here, place))
     best = mass.argmax(axis=1)[:, None]
     mass, moment = (np.take_along_axis(values, best, axis=1)[:, 0] for values in (mass, moment))
-    return np.where(mass >= least, moment / np.maximum(mass, 1e-12), np.inf)
+    return moment / np.maximum(mass, 1e-12), mass
 
 
 def _stretches(values: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame range bearing"]:

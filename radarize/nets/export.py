@@ -25,7 +25,8 @@ class Estimate(nn.Module):
 
 def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
     """Write a network's `estimate` as one ONNX file: input ``maps`` (item, frame, map, row, azimuth) in dB, any number
-    of items, and for turns ``travel`` (item, 2); outputs ``estimate`` and ``covariance``, or ``probability``.
+    of items, and for turns ``travel`` (item, 2), or what else the network names; outputs ``estimate`` and
+    ``covariance``, or ``probability``.
 
     Raises:
         InputError: the packages for it are missing, or the file cannot be written.
@@ -37,12 +38,13 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
     # It lists what it would do with torchvision.
     logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
     # Not "mean", which is what torch calls the average over an image.
-    outputs = ["probability"] if header.kind == "segmentation" else ["estimate", "covariance"]
+    outputs = ["probability"] if header.kind in ("segmentation", "radarhd") else ["estimate", "covariance"]
     inputs, item = example(header), torch.export.Dim("item")
+    names = list(getattr(net, "inputs", ("maps", "travel")))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         program = torch.onnx.export(
-            Estimate(net).eval().cpu(), inputs, input_names=["maps", "travel"][: len(inputs)], output_names=outputs,
+            Estimate(net).eval().cpu(), inputs, input_names=names[: len(inputs)], output_names=outputs,
             dynamic_shapes=(tuple({0: item} for _ in inputs),), dynamo=True, verbose=False,
         )  # fmt: skip
     program.model.metadata_props["radarize"] = header.model_dump_json()

@@ -6,11 +6,12 @@ from torch import Tensor, nn
 from torch.nn.functional import max_pool2d, pad
 
 
-def double_convolution(inputs: int, outputs: int) -> nn.Sequential:
-    """Two 3 x 3 convolutions that keep the size."""
+def double_convolution(inputs: int, outputs: int, between: int | None = None) -> nn.Sequential:
+    """Two 3 x 3 convolutions that keep the size, with as many channels between them as after them, unless told."""
+    channels = (inputs, between or outputs, outputs)
     layers: list[nn.Module] = []
-    for channels in (inputs, outputs):
-        layers += [nn.Conv2d(channels, outputs, 3, padding=1, bias=False), nn.BatchNorm2d(outputs), nn.ReLU()]
+    for before, after in zip(channels[:-1], channels[1:], strict=True):
+        layers += [nn.Conv2d(before, after, 3, padding=1, bias=False), nn.BatchNorm2d(after), nn.ReLU()]
     return nn.Sequential(*layers)
 
 

@@ -20,6 +20,8 @@ from radarize.settings import SETTINGS
 
 #: Steps of range or speed that differ by less read as the same grid.
 _TOLERANCE = 0.01
+#: Networks that need to know how far their maps' rows are apart.
+_SCALED = ("translation", "rotation")
 
 
 class Grid(BaseModel):
@@ -68,8 +70,8 @@ class Header(BaseModel):
     Attributes:
         kind: of the network.
         setting: key of `radarize.settings.SETTINGS`.
-        frames, maps, width: what the network is built with.
-        grid: of its maps.
+        frames, maps, width: what the network is built with; maps are names of all that it reads of a frame.
+        grid: of its maps; None if it sees none.
         spacings: frames from one of the window to the next, as trained.
         data: name of the data set; split: of it.
         seed, epochs: of the training.
@@ -84,7 +86,7 @@ class Header(BaseModel):
     frames: int
     maps: tuple[str, ...]
     width: int
-    grid: Grid
+    grid: Grid | None
     spacings: tuple[int, ...] = (1,)
     data: str = ""
     split: str | None = None
@@ -107,9 +109,17 @@ class Header(BaseModel):
         return round(ratio)
 
 
-def make(kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid, setting: str = "corrected") -> nn.Module:
-    """An untrained network for maps of a grid."""
-    scale = {} if kind == "segmentation" else {"step": grid.step}
+def make(
+    kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid | None, setting: str = "corrected"
+) -> nn.Module:
+    """An untrained network for maps of a grid.
+
+    Raises:
+        ValueError: it needs to know the grid.
+    """
+    if kind in _SCALED and grid is None:
+        raise ValueError(f"{kind} without a grid")
+    scale = {"step": grid.step} if kind in _SCALED else {}
     return SETTINGS[setting].nets[kind](frames, maps, width, **scale)
 
 
@@ -145,26 +155,50 @@ def load(path: Path, config: RadarConfig | None = None) -> tuple[nn.Module, Head
     """
     tensors, about = read(path)
     try:
-        header = Header.model_validate(about)
-        for value, known in ((header.setting, SETTINGS), (header.kind, SETTINGS["corrected"].nets)):
-            if value not in known:
-                raise InputError(f"{path}: is a network for {value!r}, expected one of: {', '.join(known)}")
+        header = _header(about, path)
         net = build(header)
         net.load_state_dict(tensors)
-    except (ValidationError, ValueError, RuntimeError) as error:
-        reason = str(error).splitlines()[0].rstrip(":")
-        raise InputError(f"{path}: its weights do not fit its header ({reason})") from error
+    except (ValueError, RuntimeError) as error:
+        raise _misfit(path, error) from error
     if config is not None:
-        difference = header.grid.difference(Grid.of(config, header.maps[0], header.setting), ignore=("frame_period",))
-        try:
-            header.stride(config)
-        except ValueError as error:
-            difference = difference or str(error)
-        if difference:
-            raise InputError(
-                f"{path}: does not fit this radar, whose maps have {difference}; it needs weights of its own"
-            )
+        _check(header, config, path)
     return net.eval(), header
+
+
+def check(path: Path, config: RadarConfig) -> None:
+    """Whether a network reads a radar's maps, by its header alone.
+
+    Raises:
+        InputError: see `load`.
+    """
+    _check(_header(read(path, tensors=False)[1], path), config, path)
+
+
+def _header(about: dict[str, Any], path: Path) -> Header:
+    try:
+        header = Header.model_validate(about)
+    except ValidationError as error:
+        raise _misfit(path, error) from error
+    for value, known in ((header.setting, SETTINGS), (header.kind, SETTINGS["corrected"].nets)):
+        if value not in known:
+            raise InputError(f"{path}: is a network for {value!r}, expected one of: {', '.join(known)}")
+    return header
+
+
+def _misfit(path: Path, error: Exception) -> InputError:
+    return InputError(f"{path}: its weights do not fit its header ({str(error).splitlines()[0].rstrip(':')})")
+
+
+def _check(header: Header, config: RadarConfig, path: Path) -> None:
+    if header.grid is None:
+        return
+    difference = header.grid.difference(Grid.of(config, header.maps[0], header.setting), ignore=("frame_period",))
+    try:
+        header.stride(config)
+    except ValueError as error:
+        difference = difference or str(error)
+    if difference:
+        raise InputError(f"{path}: does not fit this radar, whose maps have {difference}; it needs weights of its own")
 
 
 def shipped(kind: str) -> Path:
@@ -184,8 +218,8 @@ def write(tensors: dict[str, Tensor], about: dict[str, Any], path: Path) -> None
         part.write_bytes(data)  # safetensors' own writer hides the file from other users
 
 
-def read(path: Path) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
-    """What `write` wrote.
+def read(path: Path, tensors: bool = True) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
+    """What `write` wrote, or its header alone.
 
     Raises:
         InputError: no such file, or none of this project.
@@ -195,15 +229,17 @@ def read(path: Path) -> tuple[dict[str, Float[Tensor, "..."]], dict[str, Any]]:
     try:
         with safe_open(path, "pt") as file:
             about = json.loads((file.metadata() or {})["radarize"])
-            return {name: file.get_tensor(name) for name in file.keys()}, about  # noqa: SIM118
+            return {name: file.get_tensor(name) for name in (file.keys() if tensors else ())}, about
     except (OSError, SafetensorError, KeyError, ValueError) as error:
         reason = "has no header of radarize" if isinstance(error, KeyError) else str(error)
         raise InputError(f"{path}: is no file of weights of this project ({reason})") from error
 
 
 def example(header: Header) -> tuple[Tensor, ...]:
-    """What a network reads, twice: maps of noise, and for turns of setting `corrected` a travel."""
+    """What a network reads, twice: maps of noise, and for turns of setting `corrected` a travel; or other readings."""
     noise = torch.Generator().manual_seed(0)
+    if header.grid is None:
+        return tuple(torch.randn((2, *shape), generator=noise) for shape in build(header).shapes)
     shape = (2, header.frames, len(header.maps), header.grid.rows, header.grid.azimuths)
     maps = 10 * torch.randn(shape, generator=noise)
     told = header.kind == "rotation" and header.setting == "corrected"

@@ -139,13 +139,7 @@ class Odometry:
     ) -> Track:
         """As `push`, from spectra of `Heatmaps.spectrum`; `stage` is entered with each estimator's name, to time it."""
         centers = np.asarray(times, float) + self.config.burst_center
-        before = centers[0] - 1 if self._last is None else self._last[0]
-        steps = np.diff(centers, prepend=before)
-        if not (steps > 0).all():
-            bad = int(np.argmin(steps > 0))
-            raise InputError(
-                f"frame times step by {steps[bad]:.6f} s before {times[bad]:.6f} s, expected ascending times"
-            )
+        intervals(centers, None if self._last is None else self._last[0])
         with stage("translation"):
             velocities = self._filter.filter(centers, self.velocity.estimate(spectrum))
         with stage("rotation"):
@@ -169,3 +163,16 @@ class Odometry:
             self._last = (times[i], velocity, spread)
             self._pose = pose[i] = compose(self._pose, step[i])
         return Track(times, pose, step, covariance, velocities.velocity, velocities.covariance)
+
+
+def intervals(times: Float[np.ndarray, "frame"], last: float | None) -> Float[np.ndarray, "frame"]:
+    """Seconds since the frame before, a frame of any batch before at `last`; 1 if there is none.
+
+    Raises:
+        InputError: stamps that do not increase.
+    """
+    steps = np.diff(times, prepend=times[0] - 1 if last is None else last)
+    if not (steps > 0).all():
+        bad = int(np.argmin(steps > 0))
+        raise InputError(f"frame times step by {steps[bad]:.6f} s before {times[bad]:.6f} s, expected ascending times")
+    return steps

@@ -1,63 +1,20 @@
-"""Velocity and turns by the networks (paper, sections 4.2 and 4.3), as estimators like any others.
-
-Networks know the frame rate they were trained at; a radar whose frames come twice as often shows them every second one.
-"""
+"""Velocity and turns by the networks (paper, sections 4.2 and 4.3), as estimators like any others."""
 
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float
+from jaxtyping import Complex64, Float
 
-from radarize.nets.weights import load, shipped
+from radarize.nets.windows import Windows, silent
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
-from radarize.training.maps import FLOOR, MapMaker
+from radarize.odometry.ties import Ties
+from radarize.training.maps import MapMaker
 
 #: m/s and rad, standard deviations of what may have happened meanwhile.
 _ANY_VELOCITY, _ANY_TURN = 2.0, 1.0
-
-
-class Windows:
-    """A network of one kind, fed with windows of a stream's frames.
-
-    Args:
-        maker: makes the maps; estimators that share it share the maps.
-        kind: of the network.
-        weights: file; the shipped ones if None.
-
-    Raises:
-        InputError: no such weights, or they are for another radar.
-    """
-
-    def __init__(self, maker: MapMaker, kind: str, weights: Path | None = None):
-        self.net, self.header = load(weights or shipped(kind), maker.heatmaps.config)
-        self.stride = self.header.stride(maker.heatmaps.config)
-        self._maker = maker
-        self._past: torch.Tensor | None = None
-
-    def push(
-        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"], spacings: Sequence[int] = (1,)
-    ) -> list[Float[torch.Tensor, "frame window map row azimuth"]]:
-        """Windows that end at the next frames, for each spacing (frames of the network's) between their frames.
-
-        Before the stream began everything looked as in its first frame.
-        """
-        made = self._maker.of(spectrum, self.header.maps)
-        new = torch.stack([torch.from_numpy(made[name]) for name in self.header.maps], dim=1).float()
-        reach = (self.header.frames - 1) * self.stride * max(self.header.spacings)
-        past = new[:1].expand(reach, -1, -1, -1) if self._past is None else self._past
-        everything = torch.cat([past, new])
-        self._past = everything[len(everything) - reach :]
-        newest = torch.arange(reach, reach + len(new))[:, None]
-        back = torch.arange(self.header.frames - 1, -1, -1) * self.stride
-        return [everything[newest - back * spacing] for spacing in spacings]
-
-
-def silent(windows: Float[torch.Tensor, "frame window map row azimuth"]) -> Bool[torch.Tensor, "frame"]:
-    """Windows of which a frame shows nothing at all: networks were not trained to say that they know nothing."""
-    return (windows <= FLOOR).flatten(2).all(dim=2).any(dim=1)
 
 
 class LearnedVelocity:
@@ -85,7 +42,7 @@ class LearnedRotation:
     """Rotation estimator by `radarize.nets.RotationNet`: turns over several spacings, reconciled by a filter.
 
     The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
-    one Gaussian state: a measured turn ties two of them, and all that are tied to them move along.
+    one Gaussian state (`Ties`).
 
     Args:
         maker: see `Windows`.
@@ -105,14 +62,11 @@ class LearnedRotation:
     ):
         self._windows = Windows(maker, "rotation", weights)
         known = self._windows.header.spacings
-        self.spacings, self.jerk = [s for s in spacings if s in known] or list(known), jerk
-        self.fastest = fastest
+        self.spacings = [s for s in spacings if s in known] or list(known)
         size = max(self.spacings) * self._windows.stride + 1
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
-        self._yaws, self._covariance = np.zeros(size), np.zeros((size, size))  # oldest first
-        self._seen = 0
+        self._yaws = Ties(size, jerk, fastest)
 
-    @torch.inference_mode()
     def estimate(
         self,
         spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
@@ -120,27 +74,42 @@ class LearnedRotation:
         velocities: Velocities,
     ) -> Rotations:
         """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
+        turns = self.turns(spectrum, times, velocities)
+        yaw, growth = np.zeros(len(times)), np.zeros(len(times))
+        for i in range(len(times)):
+            before, known = self._yaws.values[-1], self._yaws.covariance[-1, -1]
+            now = len(self._times) - len(times) + i
+            self._yaws.predict(float(self._times[now] - self._times[max(now - 1, 0)]))
+            for spacing, (turn, noise) in zip(self.spacings, turns[:, i], strict=True):
+                self._yaws.tie(spacing * self._windows.stride, turn, noise)
+            yaw[i] = self._yaws.values[-1] - before
+            growth[i] = max(self._yaws.covariance[-1, -1] - known, 1e-8)
+        return Rotations(yaw, growth, np.zeros(len(times)))
+
+    @property
+    def stride(self) -> int:
+        """The radar's frames from one of the network's to the next."""
+        return self._windows.stride
+
+    @torch.inference_mode()
+    def turns(
+        self,
+        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
+        times: Float[np.ndarray, "frame"],
+        velocities: Velocities,
+    ) -> Float[np.ndarray, "spacing frame 2"]:
+        """What the network says of the next frames: turns (rad) over each of `spacings` until them, and variances."""
         windows = self._windows.push(spectrum, self.spacings)
         travel = self._travel(np.asarray(times, float), velocities.velocity)
         shown = torch.cat(windows)
         mean, variance = self._windows.net.estimate(shown, torch.from_numpy(travel).float())
         lost = silent(shown)
         mean[lost], variance[lost] = 0.0, _ANY_TURN**2
-        turns = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)
-        yaw, growth = np.zeros(len(times)), np.zeros(len(times))
-        for i in range(len(times)):
-            before, known = self._yaws[-1], self._covariance[-1, -1]
-            self._predict(self._times[len(self._times) - len(times) + i - 1 :][:2])
-            for spacing, (turn, noise) in zip(self.spacings, turns[:, i], strict=True):
-                if (back := spacing * self._windows.stride) < self._seen:
-                    self._tie(back, turn, noise)
-            yaw[i] = self._yaws[-1] - before
-            growth[i] = max(self._covariance[-1, -1] - known, 1e-8)
-        return Rotations(yaw, growth, np.zeros(len(times)))
+        return torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)
 
     def _travel(self, times: np.ndarray, velocities: np.ndarray) -> Float[np.ndarray, "window 2"]:
         """What `RotationNet` wants to be told of the windows, spacing by spacing."""
-        new, size = len(times), len(self._yaws)
+        new, size = len(times), len(self._yaws.values)
         self._times = np.concatenate([self._times[1 - size :], times])
         self._velocities = np.concatenate([self._velocities[1 - size :], velocities])
         newest = np.arange(len(self._times) - new, len(self._times))
@@ -148,30 +117,3 @@ class LearnedRotation:
         lasting = [self._times[newest] - self._times[start] for start in first]
         mean = [(self._velocities[newest] + self._velocities[start]) / 2 for start in first]
         return np.concatenate(lasting)[:, None] * np.concatenate(mean)
-
-    def _predict(self, last_two: np.ndarray) -> None:
-        """The next yaw goes on at the last rate, more or less.
-
-        Args:
-            last_two: times of the frame before and of this one, s.
-        """
-        move, noise = np.eye(len(self._yaws), k=1), 0.0
-        move[-1, -1] = 1.0
-        if self._seen == 1:
-            noise = (self.fastest * float(np.diff(last_two)[0])) ** 2
-        elif self._seen > 1:
-            move[-1, -2:] = -1.0, 2.0
-            noise = (self.jerk * float(np.diff(last_two)[0])) ** 2
-        self._yaws = move @ self._yaws
-        self._covariance = move @ self._covariance @ move.T
-        self._covariance[-1, -1] += noise
-        self._seen = min(self._seen + 1, len(self._yaws))
-
-    def _tie(self, back: int, turn: float, noise: float) -> None:
-        """Kalman update by a turn from `back` frames ago to now."""
-        row = np.zeros(len(self._yaws))
-        row[-1], row[-1 - back] = 1.0, -1.0
-        spread = self._covariance @ row
-        gain = spread / (row @ spread + noise)
-        self._yaws = self._yaws + gain * (turn - row @ self._yaws)
-        self._covariance = self._covariance - np.outer(gain, spread)

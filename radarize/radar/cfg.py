@@ -39,16 +39,16 @@ REQUIRED = ("dfeDataOutputMode", "channelCfg", "adcCfg", "adcbufCfg", "profileCf
 REFUSED = {"advFrameCfg": "advanced frames", "subFrameCfg": "advanced frames", "contModeCfg": "continuous mode"}
 
 
-def load_config(source: str | Path) -> tuple[RadarConfig, str]:
-    """A configuration by preset name, or from a ``.cfg`` or ``.mmwave.json`` file.
+def load_config(source: str | Path | RadarConfig) -> tuple[RadarConfig, str]:
+    """A configuration by preset name, from a ``.cfg`` or ``.mmwave.json`` file, or as it is given.
 
-    Returns the configuration and the text it was read from (``write_cfg`` of it for a preset).
+    Returns the configuration and the text it was read from (``write_cfg`` of it where there is none).
 
     Raises:
         InputError: no such preset or file, or its content cannot be used.
     """
-    if str(source) in PRESETS:
-        config = PRESETS[str(source)]
+    config = source if isinstance(source, RadarConfig) else PRESETS.get(str(source))
+    if config is not None:
         return config, write_cfg(config)
     path = Path(source)
     if not path.is_file():

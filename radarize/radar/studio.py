@@ -130,7 +130,7 @@ def _board(device: str, start_frequency: float) -> str:
 def _object(text: str, name: str) -> dict:
     try:
         data = json.loads(text, parse_float=Decimal)
-    except (json.JSONDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # no JSON, a number of thousands of digits, or too deep
         raise InputError(f"{name}: is not valid JSON ({error})") from error
     if not isinstance(data, dict):
         raise InputError(f"{name}: holds a JSON {type(data).__name__}, expected an object with radar settings")

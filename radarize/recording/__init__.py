@@ -6,16 +6,18 @@ Layout (one chunk per frame, readable while it grows):
     /radar/adc      int16 (frame, loop, tx, rx, sample, iq)   absent where only heat maps were kept
     /radar/time     float64 (frame,)                          s, start of the first chirp
     /radar/valid    bool (frame, loop, tx)                    False where samples of the chirp were lost
-    /truth/NAME, /imu/NAME, /tracking/NAME, /points/NAME      optional, attributes `unit`, `about` and `clock`
+    /truth/NAME, /imu/NAME, /tracking/NAME, /points/NAME      optional, attributes `unit`, `about` and `clock`,
+                                                              `labels` where values stand for something
 
 `clock` names the data set that says which frame or instant a row belongs to: ``radar/time`` for one row a frame,
 ``imu/time`` (s) for a stream at its own rate, ``points/frame`` (frame numbers) for many rows or none a frame. Data sets
 without a clock were written once.
 """
 
+from radarize.recording.additions import add
 from radarize.recording.losses import Losses
 from radarize.recording.reader import Recording
 from radarize.recording.streams import Product, Stream
 from radarize.recording.writer import RecordingWriter
 
-__all__ = ["Losses", "Product", "Recording", "RecordingWriter", "Stream"]
+__all__ = ["Losses", "Product", "Recording", "RecordingWriter", "Stream", "add"]

@@ -2,36 +2,19 @@
 
 import json
 from collections.abc import Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import EllipsisType
 
 import h5py
 import numpy as np
 from jaxtyping import Bool, Float, Int16
-from pydantic import ValidationError
 
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
-from radarize.recording.streams import reason
-
-
-def _is_growing(path: Path) -> bool:
-    """Whether a writer has the file open, or died with it open: then HDF5 must read in its multiple-reader mode.
-
-    That mode retries without end where a file is cut short, so this is looked at first (superblock version 3: byte 11
-    holds the flags, bytes 28-35 the end of the file).
-
-    Raises:
-        OSError: the file is shorter than its writer left it.
-    """
-    with path.open("rb") as file:
-        head = file.read(48)
-    if len(head) < 48 or head[:8] != b"\x89HDF\r\n\x1a\n" or head[8] != 3 or not head[11] & 0b101:
-        return False
-    size, end = path.stat().st_size, int.from_bytes(head[28:36], "little")
-    if size < end:
-        raise OSError(f"truncated: has {size} bytes of at least {end}")
-    return True
+from radarize.recording.damage import dataset, reading
+from radarize.recording.growing import GrowingFile, is_growing
 
 
 @dataclass
@@ -53,28 +36,34 @@ class Recording:
         self.path = Path(self.path)
         if not self.path.is_file():
             raise InputError(f"{self.path}: no such file, expected a recording (.h5)")
-        try:
-            self.file = h5py.File(self.path, "r", libver="latest", swmr=_is_growing(self.path))
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"{self.path}: not a readable HDF5 recording ({reason(error)})") from error
-        try:
-            self._clocks: dict[str, np.ndarray] = {}
-            radar = self.file["radar"]
-            self.config = RadarConfig.model_validate_json(radar.attrs["config"])
-            self._adc, self._valid, times = radar.get("adc"), radar["valid"], radar["time"][:]
-        except (KeyError, OSError, TypeError, ValidationError) as error:
-            self.file.close()
-            raise InputError(f"{self.path}: not a recording of this project ({reason(error)})") from error
+        with ExitStack() as stack:
+            with reading(f"{self.path}: not a readable HDF5 recording"):
+                source = stack.enter_context(GrowingFile(self.path)) if is_growing(self.path) else self.path
+                self.file = stack.enter_context(h5py.File(source, "r"))
+            with reading(f"{self.path}: not a recording of this project"):
+                self._look()
+            self._files = stack.pop_all()
+
+    def _look(self) -> None:
+        radar = self.file["radar"]
+        self.config = RadarConfig.model_validate_json(radar.attrs["config"])
+        self.cfg_text = str(radar.attrs.get("cfg", ""))
+        self._clocks: dict[str, np.ndarray] = {}
+        self._adc = dataset(radar, "adc", self.path) if "adc" in radar else None
         if self._adc is None and "maps" not in self.file:
-            self.file.close()
             raise InputError(f"{self.path}: not a recording of this project (neither /radar/adc nor /maps)")
-        if self._adc is not None and (self._adc.dtype != np.int16 or self._adc.shape[1:] != self.config.frame_shape):
-            shape, kind = self._adc.shape[1:], self._adc.dtype
-            self.file.close()
-            raise InputError(
-                f"{self.path}: /radar/adc holds {kind} of shape {shape}, "
-                f"expected int16 of {self.config.frame_shape} from its configuration"
-            )
+        self._valid, times = dataset(radar, "valid", self.path), dataset(radar, "time", self.path)
+        for data, kind, shape in (
+            (self._adc, np.int16, self.config.frame_shape),
+            (self._valid, np.bool_, self.config.frame_shape[:2]),
+            (times, np.float64, ()),
+        ):
+            if data is not None and (data.dtype != kind or not data.ndim or data.shape[1:] != shape):
+                raise InputError(
+                    f"{self.path}: {data.name} holds {data.dtype} of shape {data.shape[1:]}, "
+                    f"expected {np.dtype(kind)} of {shape} from its configuration"
+                )
+        times = times[:]
         # A frame counts once its time is written, which happens after its samples are on disk.
         whole = min(len(data) for data in (times, self._adc, self._valid) if data is not None)
         unwritten = np.flatnonzero(~np.isfinite(times[:whole]))
@@ -87,17 +76,17 @@ class Recording:
         return self
 
     def __exit__(self, *_) -> None:
-        self.file.close()
-
-    @property
-    def cfg_text(self) -> str:
-        """The configuration text the recording was made with, or an empty string."""
-        return str(self.file["radar"].attrs.get("cfg", ""))
+        self._files.close()
 
     @property
     def attributes(self) -> dict[str, object]:
-        """Scene, seed, versions and the like."""
-        return {k: v.item() if hasattr(v, "item") else v for k, v in self.file.attrs.items()}
+        """Scene, seed, versions and the like.
+
+        Raises:
+            InputError: they are damaged.
+        """
+        with reading(f"{self.path}: its attributes are damaged"):
+            return {k: v.item() if isinstance(v, np.generic) else v for k, v in self.file.attrs.items()}
 
     def adc(self, start: int, stop: int) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
         """Raw samples of frames start...stop-1.
@@ -114,10 +103,8 @@ class Recording:
         return self._read(self._valid, start, stop)
 
     def _read(self, data: h5py.Dataset, start: int, stop: int) -> np.ndarray:
-        try:
+        with reading(f"{self.path}: frames {start}...{stop - 1} of {data.name} are damaged"):
             return data[start : min(stop, len(self))]
-        except OSError as error:
-            raise InputError(f"{self.path}: frames {start}...{stop - 1} of {data.name} are damaged") from error
 
     def batches(self, size: int = 32) -> Iterator[tuple[slice, np.ndarray]]:
         """Frames in batches, as (slice of frames, raw samples)."""
@@ -127,7 +114,8 @@ class Recording:
 
     def has(self, name: str) -> bool:
         """Whether a data set such as ``truth/pose`` is there."""
-        return name in self.file
+        with reading(f"{self.path}: is damaged"):
+            return name in self.file
 
     def read(self, name: str) -> np.ndarray:
         """A whole data set by path; of a stream, nothing past the last whole frame.
@@ -136,9 +124,8 @@ class Recording:
             InputError: there is none of that name, or it is damaged.
         """
         data = self._dataset(name)
-        if "clock" not in data.attrs:
-            return self._slice(data, slice(None))
-        return self._slice(data, slice(0, self._row(data, len(self))))
+        clock = self._clock(data)
+        return self._slice(data, slice(0, self._row(data, clock, len(self))) if clock else ...)
 
     def rows(self, name: str, start: int, stop: int) -> np.ndarray:
         """Rows of a stream that belong to frames start...stop-1.
@@ -149,19 +136,28 @@ class Recording:
             InputError: there is none of that name, it is no stream, or it is damaged.
         """
         data = self._dataset(name)
-        if "clock" not in data.attrs:
+        if not (clock := self._clock(data)):
             raise InputError(f"{self.path}: /{name} was written once, expected a stream with rows for every frame")
-        return self._slice(data, slice(self._row(data, start), self._row(data, stop)))
+        return self._slice(data, slice(self._row(data, clock, start), self._row(data, clock, stop)))
 
-    def _row(self, data: h5py.Dataset, frame: int) -> int:
+    def _clock(self, data: h5py.Dataset) -> str:
+        """Name of the data set that says what a stream's rows belong to; empty where there is none."""
+        with reading(f"{self.path}: {data.name} is damaged"):
+            clock = str(data.attrs.get("clock", ""))
+            if clock and not data.ndim:
+                raise InputError(f"{self.path}: {data.name} is a single value with a clock, expected rows")
+            return clock
+
+    def _row(self, data: h5py.Dataset, clock: str, frame: int) -> int:
         """First row of a stream that belongs to `frame` or a later one."""
         frame = int(np.clip(frame, 0, len(self)))
-        clock = str(data.attrs["clock"])
         if clock == "radar/time" or not len(self):
             return min(frame, len(data))
         if clock not in self._clocks:
-            self._clocks[clock] = self._slice(self._dataset(clock), slice(None))
+            self._clocks[clock] = self._slice(self._dataset(clock), ...)
         ticks = self._clocks[clock]
+        if ticks.ndim != 1 or ticks.dtype.kind not in "iuf":
+            raise InputError(f"{self.path}: /{clock} holds {ticks.dtype} of shape {ticks.shape}, expected a clock")
         if ticks.dtype.kind == "f":
             after = self.times[-1] + self.config.frame_period
             # Sums and products of the same period differ in the last bit; no sample falls between the two.
@@ -169,26 +165,36 @@ class Recording:
         return min(int(np.searchsorted(ticks, frame)), len(data))
 
     def _dataset(self, name: str) -> h5py.Dataset:
-        if name not in self.file:
+        if not self.has(name):
             raise InputError(f"{self.path}: has no /{name}; there are {', '.join(self.names())}")
-        return self.file[name]
+        with reading(f"{self.path}: /{name} is damaged"):
+            return dataset(self.file, name, self.path)
 
-    def _slice(self, data: h5py.Dataset, rows: slice) -> np.ndarray:
-        try:
+    def _slice(self, data: h5py.Dataset, rows: slice | EllipsisType) -> np.ndarray:
+        with reading(f"{self.path}: {data.name} is damaged"):
             return data[rows]
-        except OSError as error:
-            raise InputError(f"{self.path}: {data.name} is damaged") from error
 
     def names(self) -> list[str]:
         """Paths of all data sets."""
         found: list[str] = []
-        self.file.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
+        with reading(f"{self.path}: its data sets cannot be listed"):
+            self.file.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
         return found
 
     def describe(self, name: str) -> dict[str, object]:
         """Shape, type, unit and meaning of a data set."""
-        data = self.file[name]
-        return {"shape": data.shape, "dtype": str(data.dtype), **{k: data.attrs.get(k, "") for k in ("unit", "about")}}
+        data = self._dataset(name)
+        with reading(f"{self.path}: /{name} is damaged"):
+            notes = {key: str(data.attrs.get(key, "")) for key in ("unit", "about")}
+            return {"shape": data.shape, "dtype": str(data.dtype), **notes}
+
+    def labels(self, name: str) -> tuple[str, ...]:
+        """What the values 0, 1, ... of a data set stand for; empty where they are numbers.
+
+        Raises:
+            InputError: there is no data set of that name.
+        """
+        return tuple(map(str, self._dataset(name).attrs.get("labels", ())))
 
     def config_json(self) -> dict[str, object]:
         """The radar configuration as plain data."""

@@ -18,6 +18,7 @@ class Stream:
         about: one sentence for the reader.
         clock: data set that says which instant (float, s) or frame (integer) each row belongs to; ``radar/time``: the
             rows are the frames.
+        labels: what the values 0, 1, ... stand for, where they stand for something.
     """
 
     shape: tuple[int, ...]
@@ -25,6 +26,7 @@ class Stream:
     unit: str
     about: str
     clock: str = "radar/time"
+    labels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -34,13 +36,3 @@ class Product:
     data: np.ndarray
     unit: str
     about: str
-
-
-def reason(error: Exception) -> str:
-    """What went wrong with a file, in a few words."""
-    text = str(error)
-    if "No space left" in text or "errno = 28" in text:
-        return "no space left on the device"
-    if isinstance(error, OSError) and error.strerror:
-        return error.strerror
-    return text.splitlines()[0] if text else type(error).__name__

@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
-from radarize.errors import InputError
+from radarize.errors import InputError, reason
 from radarize.radar.config import RadarConfig
 from radarize.recording.losses import Losses
-from radarize.recording.streams import FORMAT, Product, Stream, reason
+from radarize.recording.streams import FORMAT, Product, Stream
 
 #: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
 #: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.
@@ -75,36 +75,21 @@ class RecordingWriter:
 
     def _create(self, cfg_text, attributes, streams, products) -> None:
         file = self._file
-        file.attrs.update({"format": FORMAT, "radarize_version": __version__, **attributes})
+        file.attrs.update({"format": FORMAT, "radarize_version": __version__, **_storable(attributes)})
         radar = file.create_group("radar")
         radar.attrs["config"] = self.config.model_dump_json()
         radar.attrs["cfg"] = cfg_text
         loops, tx, rx, samples, _ = self.config.frame_shape
         if self.raw:
-            self._grow("radar/adc", Stream((loops, tx, rx, samples, 2), "i2", "ADC counts", "I/Q, TX1..3 x RX1..4"))
-        self._grow("radar/valid", Stream((loops, tx), "?", "", "False where samples of the chirp were lost"))
-        self._grow("radar/time", Stream((), "f8", "s", "start of the frame's first chirp"))
+            grow(file, "radar/adc", Stream((loops, tx, rx, samples, 2), "i2", "ADC counts", "I/Q, TX1..3 x RX1..4"))
+        grow(file, "radar/valid", Stream((loops, tx), "?", "", "False where samples of the chirp were lost"))
+        grow(file, "radar/time", Stream((), "f8", "s", "start of the frame's first chirp"))
         for name, product in products.items():
             data = file.create_dataset(name, data=product.data)
             data.attrs.update({"unit": product.unit, "about": product.about})
         for name, stream in streams.items():
-            self._grow(name, stream)
+            grow(file, name, stream)
         file.swmr_mode = True
-
-    def _grow(self, name: str, stream: Stream) -> None:
-        per_row = int(np.prod(stream.shape, dtype=int)) * np.dtype(stream.dtype).itemsize
-        rows = int(np.clip(16384 // max(per_row, 1), 1, 1024))
-        packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if per_row >= 1024 else {}
-        data = self._file.create_dataset(
-            name,
-            shape=(0, *stream.shape),
-            maxshape=(None, *stream.shape),
-            dtype=stream.dtype,
-            chunks=(rows, *stream.shape),
-            fillvalue=_unwritten(name, stream),
-            **packed,
-        )
-        data.attrs.update({"unit": stream.unit, "about": stream.about, "clock": stream.clock})
 
     def append(
         self,
@@ -192,7 +177,7 @@ class RecordingWriter:
                 self._file.close()
                 if self._notes:  # HDF5 takes no new attributes while readers may follow
                     with h5py.File(self.part, "r+", libver="latest") as file:
-                        file.attrs.update(self._notes)
+                        file.attrs.update(_storable(self._notes))
             except (OSError, RuntimeError) as error:
                 raise InputError(f"cannot finish {self.part}: {reason(error)}; {self._survivors()}") from error
             if not keep_part:
@@ -210,6 +195,36 @@ class RecordingWriter:
                 self.close(keep_part=True)
             except InputError:
                 pass  # the first error is the one to report
+
+
+def grow(file: h5py.File, name: str, stream: Stream) -> h5py.Dataset:
+    """A stream's data set, without rows yet."""
+    per_row = int(np.prod(stream.shape, dtype=int)) * np.dtype(stream.dtype).itemsize
+    rows = int(np.clip(16384 // max(per_row, 1), 1, 1024))
+    packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if per_row >= 1024 else {}
+    data = file.create_dataset(
+        name,
+        shape=(0, *stream.shape),
+        maxshape=(None, *stream.shape),
+        dtype=stream.dtype,
+        chunks=(rows, *stream.shape),
+        fillvalue=_unwritten(name, stream),
+        **packed,
+    )
+    data.attrs.update({"unit": stream.unit, "about": stream.about, "clock": stream.clock})
+    if stream.labels:
+        data.attrs["labels"] = stream.labels
+    return data
+
+
+def _storable(attributes: Mapping[str, object]) -> dict[str, object]:
+    """Attributes in which text is what HDF5 takes for it: no NUL, and nothing that UTF-8 cannot say."""
+    return {
+        name: value.encode("utf-8", "backslashreplace").decode().replace("\0", "\\x00")
+        if isinstance(value, str)
+        else value
+        for name, value in attributes.items()
+    }
 
 
 def _unwritten(name: str, stream: Stream) -> float | int | None:

@@ -203,7 +203,9 @@ def keep_maps(source: Path, output: Path) -> Path:
             data, about = recording.file[name], recording.describe(name)
             if "clock" in data.attrs:
                 clock = str(data.attrs["clock"])
-                streams[name] = Stream(data.shape[1:], data.dtype.str, about["unit"], about["about"], clock)
+                streams[name] = Stream(
+                    data.shape[1:], data.dtype.str, about["unit"], about["about"], clock, recording.labels(name)
+                )
             else:
                 products[name] = Product(data[()], about["unit"], about["about"])
         own = ("format", "radarize_version")

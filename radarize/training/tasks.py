@@ -15,6 +15,9 @@ from radarize.nets.weights import Grid, make
 from radarize.training import augment, losses
 from radarize.training.table import Table
 
+#: What a network reads, one tensor or several.
+Inputs = Tensor | tuple[Tensor, ...]
+
 
 @dataclass(frozen=True)
 class Settings:
@@ -25,7 +28,7 @@ class Settings:
         frames: of a window.
         epochs, batch, rate, betas: of Adam; a batch is what all processes take together.
         schedule: of the rate: ``plateau``, or ``cosine``, which warms up and then falls to nothing in the last epoch:
-            as good in a third of the epochs.
+            as good in a third of the epochs; or ``steps``: to three quarters every 25 epochs.
         plateau: epochs without a better validation loss after which the rate halves.
         patience: such epochs after which training ends.
         precision: of convolutions, ``float32`` or ``bfloat16``.
@@ -52,7 +55,9 @@ class Task(ABC):
         kind: key of `radarize.nets.NETS`.
         setting: key of `radarize.settings.SETTINGS`.
         maps: that its network reads.
+        sensed: what else it reads, keys of `radarize.training.table.SENSED`.
         truth: that its labels are made of, keys of `radarize.training.table.TRUTH`.
+        share: of all windows, which an epoch takes, drawn anew each time: neighbours among long ones are nearly alike.
         reach: s, from one frame of a window to the next, at most; None: the very next. Drawn for every item; the
             farthest is what is validated.
         optimiser: algorithm.
@@ -63,16 +68,27 @@ class Task(ABC):
 
     kind: str
     setting: str = "corrected"
-    maps: tuple[str, ...]
+    maps: tuple[str, ...] = ()
+    sensed: tuple[str, ...] = ()
     truth: tuple[str, ...]
+    share: float = 1.0
     reach: float | None = None
     optimiser: type[torch.optim.Optimizer] = torch.optim.Adam
     steepest: float = 1.0
     defaults: Settings
 
-    def net(self, settings: Settings, grid: Grid) -> nn.Module:
-        """A network for maps of a grid, with random weights from torch's generator."""
-        return make(self.kind, settings.frames, self.maps, settings.width, grid, self.setting)
+    @property
+    def reads(self) -> tuple[str, ...]:
+        """All that its network reads of a frame."""
+        return self.maps + self.sensed
+
+    def net(self, settings: Settings, grid: Grid | None) -> nn.Module:
+        """A network for maps of a grid, if it reads any, with random weights from torch's generator."""
+        return make(self.kind, settings.frames, self.reads, settings.width, grid, self.setting)
+
+    def optimise(self, parameters: Iterable[nn.Parameter], settings: Settings) -> torch.optim.Optimizer:
+        """The algorithm, at work."""
+        return self.optimiser(parameters, settings.rate, settings.betas)
 
     def spacings(self, frame_period: float) -> Sequence[int]:
         """Frames from one of a window to the next, for frames that come every `frame_period` (s)."""
@@ -83,6 +99,10 @@ class Task(ABC):
     ) -> Int[Tensor, "item frame"]:
         """Frames of windows."""
         return starts[:, None] + spacing[:, None] * torch.arange(count)
+
+    def inputs(self, table: Table, frames: Int[Tensor, "item frame"]) -> Inputs:
+        """What the network reads of windows."""
+        return table.window(frames)
 
     def label(self, table: Table, frames: Int[Tensor, "item frame"]) -> Tensor:
         """What the network should say of windows."""
@@ -182,7 +202,7 @@ class Rotation(Motion):
     def label(self, table: Table, frames: Tensor) -> Float[Tensor, "item 3"]:
         """Turn (rad) and travel (m): the mean of the velocities at the window's ends times its duration."""
         velocity, first, last = table.truth["velocity"], frames[:, 0], frames[:, -1]
-        duration = (last - first)[:, None] * table.grid.frame_period
+        duration = (last - first)[:, None] * table.frame_period
         return torch.cat([turns(table, frames), duration * (velocity[first] + velocity[last]) / 2], dim=1)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:

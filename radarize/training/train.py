@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from radarize.baselines.tasks import BASELINE_TASKS
 from radarize.errors import InputError
 from radarize.nets.weights import Header, save
 from radarize.published.tasks import PUBLISHED_TASKS
@@ -19,7 +20,7 @@ from radarize.training.team import team
 from radarize.training.trainer import Trainer
 
 #: Trainings by setting (see `radarize.settings`) and name.
-TRAININGS = {"corrected": TASKS, "published": PUBLISHED_TASKS}
+TRAININGS = {"corrected": TASKS | BASELINE_TASKS, "published": PUBLISHED_TASKS}
 #: Without a split, every so manieth recording validates.
 _TENTH = 10
 
@@ -117,7 +118,7 @@ def _fit(
     if lead:
         metrics = trainer.finish()
         header = Header(
-            frames=settings.frames, maps=trainer.task.maps, width=settings.width, grid=trainer.training.grid,
+            frames=settings.frames, maps=trainer.task.reads, width=settings.width, grid=trainer.training.grid,
             spacings=tuple(trainer.spacings), seed=settings.seed, epochs=len(trainer.history), metrics=metrics,
             **about,
         )  # fmt: skip
@@ -151,7 +152,7 @@ def _read(
         parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
     else:
         parts = [recordings(data, split, part) for part in ("train", "validation")]
-    table = Table.read(parts[0] + parts[1], task.maps, task.truth, workers, progress, task.setting)
+    table = Table.read(parts[0] + parts[1], task.maps, task.truth, workers, progress, task.setting, task.sensed)
     return table.divide(len(parts[0]))
 
 
@@ -159,11 +160,11 @@ def _check(kind: str, settings: Settings, output: Path) -> None:
     for name in ("width", "frames", "epochs", "batch", "rate", "plateau", "patience"):
         if not (value := getattr(settings, name)) > 0:
             raise InputError(f"{name} is {value}, expected a positive number")
-    if kind == "rotation" and settings.frames < 2:
-        raise InputError(f"frames is {settings.frames}, expected at least two to turn between")
-    for name, known in (("schedule", ("plateau", "cosine")), ("precision", ("float32", "bfloat16"))):
+    if kind in ("rotation", "milliego") and settings.frames < 2:
+        raise InputError(f"frames is {settings.frames}, expected at least two to move between")
+    for name, known in (("schedule", ("plateau", "cosine", "steps")), ("precision", ("float32", "bfloat16"))):
         if (value := getattr(settings, name)) not in known:
-            raise InputError(f"{name} is {value!r}, expected {' or '.join(known)}")
+            raise InputError(f"{name} is {value!r}, expected one of: {', '.join(known)}")
     if settings.seed < 0:
         raise InputError(f"seed is {settings.seed}, expected no negative number")
     if output.is_dir() or output.suffix != ".safetensors":

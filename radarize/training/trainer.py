@@ -18,11 +18,13 @@ from torch.optim.lr_scheduler import ReduceLROnPlateau
 from radarize.errors import InputError
 from radarize.nets import weights
 from radarize.training.table import Table
-from radarize.training.tasks import Settings, Task
+from radarize.training.tasks import Inputs, Settings, Task
 from radarize.training.team import Team
 
 #: Share of a cosine schedule in which the rate rises.
 _WARM = 0.05
+#: What the rate of a schedule of steps falls to each time, and how many epochs a step lasts.
+_DROP, _LASTS = 0.75, 25
 
 
 class Trainer:
@@ -46,9 +48,10 @@ class Trainer:
     def __init__(self, task: Task, settings: Settings, training: Table, validation: Table, team: Team):
         self.task, self.settings, self.team = task, settings, team
         self.training, self.validation = training, validation
-        self.spacings = task.spacings(training.grid.frame_period)
+        self.spacings = task.spacings(training.frame_period)
         reach = (settings.frames - 1) * max(self.spacings) + 1
-        self._starts, self._validated = training.starts(reach), validation.starts(reach)
+        self._starts = training.starts(reach)
+        self._validated = validation.starts(reach)[:: round(1 / task.share)]
         for name, starts in (("training", self._starts), ("validation", self._validated)):
             if len(starts) < 2 * team.size:
                 raise InputError(f"{name} has {len(starts)} windows of {reach} frames, expected longer recordings")
@@ -63,7 +66,7 @@ class Trainer:
             if hasattr(module, "coarse"):
                 module.coarse = settings.precision == "bfloat16"
         self._shared = team.share(self.net)
-        self._optimiser = task.optimiser(self.net.parameters(), settings.rate, settings.betas)
+        self._optimiser = task.optimise(self.net.parameters(), settings)
         self._schedule = ReduceLROnPlateau(self._optimiser, factor=0.5, patience=settings.plateau)
         self.history: list[dict[str, float]] = []
         self.best: tuple[float, dict[str, Tensor]] = (math.inf, {})
@@ -71,7 +74,7 @@ class Trainer:
     @property
     def steps(self) -> int:
         """Of an epoch."""
-        return max(1, len(self._starts) // self.settings.batch)
+        return max(1, int(self.task.share * len(self._starts)) // self.settings.batch)
 
     @property
     def finished(self) -> bool:
@@ -129,13 +132,17 @@ class Trainer:
         return self.history[-1]
 
     def _warm_or_cool(self, step: int) -> None:
-        """The cosine schedule's rate at a step of all (Loshchilov and Hutter, "SGDR", 2017, without restarts)."""
+        """The rate at a step of all, by a schedule that knows it beforehand: cosine (Loshchilov and Hutter, "SGDR",
+        2017, without restarts), or steps."""
+        if self.settings.schedule == "plateau":
+            return
+        total = self.settings.epochs * self.steps
         if self.settings.schedule == "cosine":
-            total = self.settings.epochs * self.steps
-            warm = min(1.0, (step + 1) / (_WARM * total))
-            rate = self.settings.rate * warm * (1 + math.cos(math.pi * step / total)) / 2
-            for group in self._optimiser.param_groups:
-                group["lr"] = rate
+            share = min(1.0, (step + 1) / (_WARM * total)) * (1 + math.cos(math.pi * step / total)) / 2
+        else:
+            share = _DROP ** (step // self.steps // _LASTS)
+        for group in self._optimiser.param_groups:
+            group["lr"] = self.settings.rate * share
 
     @torch.no_grad()
     def validate(self) -> dict[str, float]:
@@ -219,11 +226,13 @@ class Trainer:
         seed = np.random.SeedSequence((self.settings.seed, epoch, step, self.team.rank)).generate_state(1, np.uint64)
         return Generator(self.team.device).manual_seed(int(seed[0] >> 1))
 
-    def _items(self, table: Table, starts: Tensor, spacings: Tensor) -> tuple[Tensor, Tensor]:
-        frames = self.task.frames(starts, spacings, self.settings.frames)
-        return table.window(frames).to(self.team.device), self.task.label(table, frames).to(self.team.device)
+    def _items(self, table: Table, starts: Tensor, spacings: Tensor) -> tuple[Inputs, Tensor]:
+        frames, device = self.task.frames(starts, spacings, self.settings.frames), self.team.device
+        inputs = self.task.inputs(table, frames)
+        inputs = tuple(each.to(device) for each in inputs) if isinstance(inputs, tuple) else inputs.to(device)
+        return inputs, self.task.label(table, frames).to(device)
 
-    def _validation(self, rank: int, size: int) -> Iterator[tuple[Tensor, Tensor]]:
+    def _validation(self, rank: int, size: int) -> Iterator[tuple[Inputs, Tensor]]:
         mine = self._validated[rank::size]
         spacing = torch.tensor(self.spacings[-1])
         for starts in mine.split(self.settings.batch):

@@ -12,18 +12,24 @@
     frontend: board.yaml               # as `radarsim calibrate` writes it; an IWR1843BOOST's by default
     sensors: [depth, imu]              # or all, or none
     storage: raw                       # or heatmaps: no samples, about a tenth of the size, for training
+    variants:                          # every recording once for each, with the same seed and walk
+      plain: {}
+      coarse: {radar: {samples: 48}, attributes: {value: 48}}             # see `radarsim.dataset.variant`
     splits:
       random: {kind: random, folds: 5}                                  # random-0 ... random-4
       platform: {kind: platform, train: [handheld]}                     # tested on all others
       building: {kind: building, held_out: [A, shop]}                   # building-A, building-shop
 
-A recording is called BUILDING_FLOOR_PLATFORM_NUMBER. Its seed comes from the data set's seed and this name alone, so a
-recording stays the same whatever else the data set holds and in whatever order it is made.
+A recording is called BUILDING_FLOOR_PLATFORM_NUMBER, and _VARIANT where there are some. Its seed comes from the data
+set's seed and the name without the variant alone, so a recording stays the same whatever else the data set holds and in
+whatever order it is made. Recordings can go through `waypoints` ([[x, y], ...], m) instead of on a tour. `attributes`,
+of the data set, of recordings or of a variant, become attributes of the files.
 """
 
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Literal
@@ -33,12 +39,13 @@ from pydantic import Field, ValidationError, model_validator
 
 from radarize.errors import InputError
 from radarize.radar.cfg import load_config
+from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.yamlfile import read_yaml
-from radarsim.dataset.splits import Split, Strict
+from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task
-from radarsim.physics.frontend_config import FrontEndConfig
-from radarsim.scene.description import Description, find, shipped
+from radarsim.dataset.variant import Attributes, Strict, Variant
+from radarsim.scene.description import Description, described, find, shipped, split_level
 
 Platform = Literal["handheld", "cart", "robot"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
@@ -53,6 +60,8 @@ class Recordings(Strict):
         platform: one, or several with `count` recordings each.
         count: recordings per platform.
         duration: s, each.
+        waypoints: to go through instead of a tour, m.
+        attributes: of the recordings.
     """
 
     building: Name
@@ -60,10 +69,21 @@ class Recordings(Strict):
     platform: Platform | tuple[Platform, ...]
     count: int = Field(gt=0)
     duration: float = Field(gt=0)
+    waypoints: Annotated[tuple[tuple[float, float], ...], Field(min_length=2)] | None = None
+    attributes: Attributes = {}
 
     @property
     def platforms(self) -> tuple[str, ...]:
         return (self.platform,) if isinstance(self.platform, str) else self.platform
+
+    def each(self, count: Counter) -> Iterator[tuple[str, str, int | None]]:
+        """Name, platform and floor of each recording; `count` says how many there are by place and platform."""
+        for platform in self.platforms:
+            for k in range(self.count):
+                floor = self.floors[k % len(self.floors)] if self.floors else None
+                place = self.building if floor is None else f"{self.building}_{floor}"
+                yield f"{place}_{platform}_{count[place, platform]:02d}", platform, floor
+                count[place, platform] += 1
 
 
 class Specification(Strict):
@@ -77,6 +97,8 @@ class Specification(Strict):
     frontend: str | None = None
     sensors: tuple[str, ...] | Literal["all", "none"] = "none"
     storage: Literal["raw", "heatmaps"] = "raw"
+    variants: dict[Name, Variant] = {}
+    attributes: Attributes = {}
     splits: dict[Name, Split] = {}
     _folder: Path = Path()
 
@@ -125,37 +147,29 @@ class Specification(Strict):
             InputError: a scene, radar or front-end file is missing or wrong.
         """
         radar = self._beside(self.radar)
-        config, _ = load_config(radar)
-        check_limits(config)
         frontend = None if self.frontend is None else self._beside(self.frontend)
-        settings = FrontEndConfig.load(frontend) if frontend else FrontEndConfig()
-        fixed = {
-            "radar": radar,
-            "frontend": frontend,
-            "sensors": self._sensors(),
-            "storage": self.storage,
-            "settings": hashlib.sha256((config.model_dump_json() + settings.model_dump_json()).encode()).hexdigest(),
-        }
+        fixed = {"radar": radar, "frontend": frontend, "sensors": self._sensors(), "storage": self.storage}
+        variants = [("", Variant())] if not self.variants else [(f"_{key}", v) for key, v in self.variants.items()]
+        settings = {key: self._settings(key, variant, radar, frontend) for key, variant in variants}
         tasks, count = [], Counter()
         for number, group in enumerate(self.recordings):
-            frames = config.frames_within(group.duration)
-            if not frames:
-                raise InputError(
-                    f"recordings[{number}].duration is {group.duration} s, expected at least one frame "
-                    f"({config.burst_time:.4f} s)"
-                )
-            for platform in group.platforms:
-                for k in range(group.count):
-                    floor = group.floors[k % len(group.floors)] if group.floors else None
-                    place = group.building if floor is None else f"{group.building}_{floor}"
-                    name = f"{place}_{platform}_{count[place, platform]:02d}"
-                    count[place, platform] += 1
-                    seed = np.random.SeedSequence([self.seed, *name.encode()]).generate_state(1, np.uint64)[0]
+            for name, platform, floor in group.each(count):
+                seed = np.random.SeedSequence([self.seed, *name.encode()]).generate_state(1, np.uint64)[0]
+                for key, variant in variants:
+                    config, digest = settings[key]
+                    frames = config.frames_within(group.duration)
+                    if not frames:
+                        raise InputError(
+                            f"recordings[{number}].duration is {group.duration} s, expected at least one frame "
+                            f"({config.burst_time:.4f} s)"
+                        )
                     tasks.append(
                         Task(
-                            name=name, building=group.building, floor=floor, platform=platform,
-                            scene=self._scene(group.building, floor), duration=group.duration, frames=frames,
-                            seed=int(seed >> np.uint64(1)), **fixed,
+                            name=name + key, building=group.building, floor=floor, platform=platform,
+                            scene=self._scene(group.building, floor, variant.level), duration=group.duration,
+                            frames=frames, seed=int(seed >> np.uint64(1)), settings=digest, waypoints=group.waypoints,
+                            variant=variant, attributes=self.attributes | group.attributes | variant.attributes,
+                            **fixed,
                         )
                     )  # fmt: skip
         return tuple(tasks)
@@ -180,6 +194,16 @@ class Specification(Strict):
             "splits": self.members,
         }
 
+    def _settings(self, key: str, variant: Variant, radar: str, frontend: str | None) -> tuple[RadarConfig, str]:
+        """A variant's radar, and a digest of it and the front end."""
+        try:
+            config, _ = load_config(variant.radar_of(radar))
+            check_limits(config)
+            settings = variant.frontend_of(frontend)
+        except InputError as error:
+            raise InputError(f"variants.{key[1:]}: {error}" if key else str(error)) from error
+        return config, hashlib.sha256((config.model_dump_json() + settings.model_dump_json()).encode()).hexdigest()
+
     def _sensors(self) -> tuple[str, ...]:
         names = {"all": ("all",), "none": ()}.get(self.sensors, self.sensors)
         if not names:
@@ -188,13 +212,18 @@ class Specification(Strict):
 
         return tuple(chosen(names))
 
-    def _scene(self, building: str, floor: int | None) -> dict | str:
+    def _scene(self, building: str, floor: int | None, level: int) -> dict | str:
         given = self.buildings[building]
         if isinstance(given, str):
             try:
-                return str(find(self._beside(given)).resolve())
+                file = find(self._beside(given)).resolve()
+                level = level or split_level(given)[1]
+                described(read_yaml(file), file.name, level)
             except InputError as error:
                 raise InputError(f"buildings.{building}: {error}") from error
+            return f"{file}@{level}" if level else str(file)
+        if level:
+            raise InputError(f"buildings.{building}: is generated and has no levels, expected a scene file")
         description = {"building": given if floor is None else given | {"floor": floor}}
         try:
             Description.model_validate(description)
@@ -214,9 +243,9 @@ def _find(path: str | Path) -> Path:
     if given.is_file():
         return given
     folder = shipped() / "datasets"
-    if given.suffix not in (".yaml", ".yml") and (named := folder / f"{given.name}.yaml").is_file():
+    if given.suffix not in (".yaml", ".yml") and (named := folder / f"{given}.yaml").is_file():
         return named
-    known = ", ".join(sorted(file.stem for file in folder.glob("*.yaml")))
+    known = ", ".join(sorted(str(file.relative_to(folder).with_suffix("")) for file in folder.glob("**/*.yaml")))
     raise InputError(f"no specification {str(path)!r}, expected a .yaml file or one of: {known or 'none found'}")
 
 

@@ -4,19 +4,14 @@ from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
 from radarize.errors import InputError
 from radarsim.dataset.task import Task
+from radarsim.dataset.variant import Strict
 
 Members = dict[str, list[str]]
 Share = Annotated[float, Field(ge=0, le=1)]
-
-
-class Strict(BaseModel):
-    """What a specification is made of: no unknown keys, no changes."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class RandomSplit(Strict):

@@ -3,13 +3,17 @@
 import json
 import os
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from pathlib import Path
+
+import numpy as np
 
 from radarize import __version__
 from radarize.errors import InputError
 from radarize.recording import Recording
+from radarsim.dataset.variant import Attributes, Variant
+from radarsim.scene.description import split_level
 
 #: Attribute of a recording that holds its task's parameters.
 ATTRIBUTE = "task"
@@ -29,7 +33,7 @@ class Task:
         name: of the recording, without suffix.
         building, floor: as in the specification.
         platform: how the sensor moves.
-        scene: a scene's description, or the path of its file.
+        scene: a scene's description, or the path of its file (with a level, ``corner.yaml@2``).
         duration: s.
         frames: that the recording will have.
         seed: of tour, scatterers and noise.
@@ -38,6 +42,9 @@ class Task:
         settings: digest of what these two hold.
         sensors: truth sensors.
         storage: ``raw`` or ``heatmaps``.
+        waypoints: to go through instead of a tour, m.
+        variant: what differs from other recordings of the same walk.
+        attributes: of the recording.
     """
 
     name: str
@@ -53,15 +60,21 @@ class Task:
     settings: str
     sensors: tuple[str, ...]
     storage: str
+    waypoints: tuple[tuple[float, float], ...] | None = None
+    variant: Variant = Variant()
+    attributes: Attributes = field(default_factory=dict)
 
     @property
     def parameters(self) -> dict[str, object]:
         """Everything that decides the recording's bytes; files by their content, so that they may move."""
         found = asdict(self) | {"sensors": list(self.sensors), "version": __version__}
-        for field in ("radar", "frontend"):
-            found[field] = found[field] and Path(found[field]).name
+        for file in ("radar", "frontend"):
+            found[file] = found[file] and Path(found[file]).name
+        found["attributes"] = self.attributes or None  # older recordings know no such fields
+        found["variant"] = self.variant.model_dump(mode="json", exclude_defaults=True) or None
         if isinstance(self.scene, str):
-            found["scene"] = {"file": Path(self.scene).name, "sha256": _digest(Path(self.scene))}
+            file, _ = split_level(self.scene)
+            found["scene"] = {"file": Path(self.scene).name, "sha256": _digest(Path(file))}
         return found
 
     @property
@@ -74,7 +87,7 @@ class Task:
         return folder / f"{self.name}.h5"
 
     def is_finished(self, folder: Path) -> bool:
-        """Whether the recording is there and whole.
+        """Whether the recording is there, whole, and with all its sensors.
 
         Raises:
             Stale: it is, but was made with other parameters, or is no recording of a data set.
@@ -89,14 +102,17 @@ class Task:
             return False  # cut short or damaged
         if made is None:
             raise Stale(f"{self.name} does not come from a data set")
-        made = json.loads(str(made))
-        for field, wanted in json.loads(self.identity).items():
-            if made.get(field) != wanted:
-                raise Stale(f"{self.name} has {field} {_short(made.get(field))}, now {_short(wanted)}")
-        return frames == self.frames
+        made, complete = json.loads(str(made)), True
+        for key, wanted in json.loads(self.identity).items():
+            if key == "sensors" and self._replanned and _can_follow(made.get(key), wanted):
+                complete = False
+            elif made.get(key) != wanted:
+                raise Stale(f"{self.name} has {key} {_short(made.get(key))}, now {_short(wanted)}")
+        return complete and frames == self.frames
 
     def make(self, folder: Path, threads: int | None = None, progress: Callable[[int, int], None] | None = None) -> str:
-        """Simulate the recording; it appears under its name when it is whole.
+        """Simulate the recording, or what it lacks of sensors beside the radar; it appears under its name when it is
+        whole.
 
         Args:
             folder: where.
@@ -112,36 +128,66 @@ class Task:
         if threads:
             _use_threads(threads)
         from radarize.training.maps import keep_maps
+        from radarsim.accompany import accompany
         from radarsim.scene.scene import Scene
         from radarsim.simulate import simulate
         from radarsim.statistics import Statistics
 
         final = self.path(folder)
+        late = self._late(folder)
         path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
         try:
             scene = Scene.load(self.scene) if isinstance(self.scene, str) else Scene.of(self.scene, self._place)
-            simulate(
-                scene,
-                path,
-                platform=self.platform,
-                duration=self.duration,
-                seed=self.seed,
-                radar=self.radar,
-                frontend=None if self.frontend is None else Path(self.frontend),
-                sensors=self.sensors,
-                attributes={ATTRIBUTE: self.identity},
-                progress=progress,
-            )
-            with Recording(path) as recording:
+            walk = {"platform": self.platform, "duration": self.duration, "seed": self.seed, "progress": progress}
+            walk["attributes"] = {**self.attributes, ATTRIBUTE: self.identity}
+            if late:
+                accompany(final, scene, sensors=late, **walk)
+            else:
+                mild = Scene.load(split_level(self.scene)[0]) if self.variant.level else scene
+                simulate(
+                    scene,
+                    path,
+                    waypoints=None if self.waypoints is None else np.array(self.waypoints),
+                    planned_in=mild,
+                    mounting=self.variant.mounted,
+                    radar=self.variant.radar_of(self.radar),
+                    frontend=self.variant.frontend_of(self.frontend),
+                    sensors=self.sensors,
+                    **walk,
+                )
+                with Recording(path) as recording:
+                    frames = len(recording)
+                if frames < self.frames:
+                    path.unlink()
+                    raise InputError(
+                        f"the way-points are passed after {frames} of {self.frames} frames, expected more way"
+                    )
+                if path != final:
+                    keep_maps(path, final)
+            with Recording(final) as recording:
                 moved = Statistics.from_json(str(recording.attributes["motion"]))
-            if path != final:
-                keep_maps(path, final)
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from error
         finally:
             if path != final:
                 path.unlink(missing_ok=True)
         return str(moved)
+
+    @property
+    def _replanned(self) -> bool:
+        """Whether its walk can be planned anew: a tour of the platform's own."""
+        return self.waypoints is None and self.variant == Variant()
+
+    def _late(self, folder: Path) -> list[str]:
+        """Sensors that a recording of this task, otherwise finished, has yet to get."""
+        try:
+            if not self.path(folder).is_file() or self.is_finished(folder):
+                return []
+            with Recording(self.path(folder)) as recording:
+                made = json.loads(str(recording.attributes[ATTRIBUTE]))["sensors"]
+                return [name for name in self.sensors if name not in made] if len(recording) == self.frames else []
+        except InputError:
+            return []
 
     def clear(self, folder: Path) -> None:
         """Remove what a killed run left half-written."""
@@ -169,6 +215,13 @@ class Event:
     frames: int = 0
     motion: str | None = None
     error: str | None = None
+
+
+def _can_follow(made: list[str], wanted: list[str]) -> bool:
+    """Whether a recording with some sensors can be given the others without the radar."""
+    from radarsim.sensors.suite import SENSORS
+
+    return set(made) < set(wanted) and not any(SENSORS[name].of_radar for name in set(wanted) - set(made))
 
 
 def _digest(path: Path) -> str:

@@ -173,7 +173,7 @@ class FrontEndConfig(_Strict):
         return max(float(np.polyval(line, 10 ** (-gain_db / 10))), 1.0)
 
     @classmethod
-    def load(cls, path: Path) -> "FrontEndConfig":
+    def load(cls, path: str | Path) -> "FrontEndConfig":
         """Read a front-end file; what it does not name keeps its default.
 
         Raises:
@@ -182,18 +182,27 @@ class FrontEndConfig(_Strict):
         data = read_yaml(path)
         if not isinstance(data, dict | None):
             raise InputError(f"{path}: holds {type(data).__name__}, expected keys such as tx_power_dbm and leakage")
+        return cls.build(str(path), data or {})
+
+    @classmethod
+    def build(cls, source: str, fields: dict[str, object]) -> "FrontEndConfig":
+        """Settings from their fields; `source` is what errors name as their origin.
+
+        Raises:
+            InputError: unknown or impossible value; with the field.
+        """
         try:
-            return cls.model_validate(data or {})
+            return cls.model_validate(fields)
         except ValidationError as error:
             first = error.errors()[0]
             field = ".".join(str(part) for part in first["loc"])
             if first["type"] == "extra_forbidden":
                 raise InputError(
-                    f"{path}: {field}: unknown key, expected one of {', '.join(cls.model_fields)}"
+                    f"{source}: {field}: unknown key, expected one of {', '.join(cls.model_fields)}"
                 ) from error
             value = "" if isinstance(first["input"], dict) else f" is {first['input']!r}"
             message = first["msg"].removeprefix("Value error, ")
-            raise InputError(f"{path}: {field}{value}: {message[0].lower()}{message[1:]}") from error
+            raise InputError(f"{source}: {field}{value}: {message[0].lower()}{message[1:]}") from error
 
     def save(self, path: Path, remarks: list[str] = ()) -> None:
         """Write as a front-end file, with remarks as comments on top."""

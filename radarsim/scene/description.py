@@ -12,8 +12,19 @@
 
 Lengths in m, angles in degrees (this is what people type), mesh files relative to the scene file. An open mesh that is
 the outside of a body says ``solid: true``; otherwise it is a sheet with two sides. `importers` writes such files.
+
+A scene can have levels, from mild to severe. The file without them is level 0; each level is laid upon the one before:
+an entry whose name is there already (``*`` and ``?`` stand for others) changes the fields it gives, another is added.
+
+    levels:
+      - objects: [{name: wall, material: glass}]                                         # level 1
+      - objects: [{name: "*", material: metal}, {name: pillar, shape: cylinder, ...}]    # level 2
+
+Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 """
 
+import re
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -133,6 +144,19 @@ class Mesh(_Turned):
         return self._placed(shapes.mesh(self.scale * vertices, faces))
 
 
+class _Change(BaseModel):
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    name: Annotated[str, Field(min_length=1)]
+
+
+class Level(_Strict):
+    """What one level changes and adds."""
+
+    objects: list[_Change] = []
+    moving: list[_Change] = []
+
+
 class Description(_Strict):
     """A scene file. Needs objects, a building, or both."""
 
@@ -140,14 +164,22 @@ class Description(_Strict):
     objects: list[Annotated[Box | Rectangle | Cylinder | Sphere | Mesh, Field(discriminator="shape")]] = []
     building: Annotated[Office | Building, Field(discriminator="kind")] | None = None
     moving: list[Mover] = []
+    levels: list[Level] = []
+
+
+def split_level(name: str | Path) -> tuple[str, int]:
+    """A scene's file or bare name, and the level that it ends in (``corner@2``), 0 if in none."""
+    plain, _, level = str(name).rpartition("@")
+    return (plain, int(level)) if plain and re.fullmatch(r"\d+", level) else (str(name), 0)
 
 
 def find(path: str | Path) -> Path:
-    """The scene file meant by a path or a bare name.
+    """The scene file meant by a path or a bare name, whatever its level.
 
     Raises:
         InputError: there is none, with the names that would work.
     """
+    path = split_level(path)[0]
     given = Path(path)
     if given.suffix in (".yaml", ".yml") or given.is_file():
         if given.is_file():
@@ -162,7 +194,7 @@ def find(path: str | Path) -> Path:
             str(f.relative_to(d).with_suffix(""))
             for d in folders
             for f in d.glob("**/*.yaml")
-            if f.parent.name != "datasets"
+            if f.relative_to(d).parts[0] != "datasets"
         }
     )
     raise InputError(f"no scene {str(path)!r}, expected a .yaml file or one of: {', '.join(known) or 'none found'}")
@@ -175,41 +207,72 @@ def shipped() -> Path:
     return packaged if packaged.is_dir() else here.parents[2] / "scenes"
 
 
-def read(path: Path) -> tuple[str, list[SceneObject], list[Mover]]:
-    """Name, objects and movers of a scene file.
+def read(path: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover]]:
+    """Name, objects and movers of a scene file at one of its levels.
 
     Raises:
-        InputError: unreadable, malformed YAML, unknown key, value, material or mesh file.
+        InputError: unreadable, malformed YAML, unknown key, value, material, mesh file or level.
     """
-    name, objects, moving = built(read_yaml(path), str(path), path.parent)
-    return name or path.stem, objects, moving
+    name, objects, moving = built(read_yaml(path), str(path), path.parent, level)
+    name = name or path.stem
+    return (f"{name}@{level}" if level else name), objects, moving
 
 
-def built(data: object, source: str, folder: Path) -> tuple[str, list[SceneObject], list[Mover]]:
+def built(data: object, source: str, folder: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover]]:
     """Name ("" where it has none), objects and movers of a description as read from YAML.
 
     Args:
         data: the description.
         source: what to call it in errors.
         folder: mesh files are relative to it.
+        level: of severity, where there are some.
 
     Raises:
-        InputError: unknown key, value, material or mesh file.
+        InputError: unknown key, value, material, mesh file or level.
     """
-    if not isinstance(data, dict):
-        raise InputError(f"{source}: holds {type(data).__name__}, expected keys such as objects and building")
+    description = described(data, source, level)
     try:
-        description = Description.model_validate(data)
         objects = [SceneObject(o.name, o.mesh(folder), _material(o), o.solid) for o in description.objects]
         if description.building:
             objects += description.building.build()
-    except ValidationError as error:
-        raise InputError(f"{source}: {_first(error, data)}") from error
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
     return description.name, objects, description.moving
+
+
+def described(data: object, source: str, level: int = 0) -> Description:
+    """A description as read from YAML, checked, at one of its levels.
+
+    Raises:
+        InputError: unknown key, value or level.
+    """
+    if not isinstance(data, dict):
+        raise InputError(f"{source}: holds {type(data).__name__}, expected keys such as objects and building")
+    try:
+        plain = Description.model_validate(data)
+        if not 0 <= level <= len(plain.levels):
+            raise InputError(f"{source}: level is {level}, expected 0 to {len(plain.levels)}")
+        for changes in plain.levels[:level]:
+            data = _laid_upon(data, changes)
+        return Description.model_validate(data)
+    except ValidationError as error:
+        raise InputError(f"{source}: {_first(error, data)}") from error
+
+
+def _laid_upon(data: dict, changes: Level) -> dict:
+    """A description with the changes of a level."""
+    parts = {}
+    for part in ("objects", "moving"):
+        parts[part] = entries = [dict(entry) for entry in data.get(part, [])]
+        for change in (item.model_dump() for item in getattr(changes, part)):
+            known = [entry for entry in entries if fnmatchcase(entry["name"], change["name"])]
+            for entry in known:
+                entry.update(change | {"name": entry["name"]})
+            if not known:
+                entries.append(change)
+    return data | parts
 
 
 def _material(item: _Item) -> Material:

@@ -92,15 +92,14 @@ class Scene:
 
         Args:
             path: a YAML file; a bare name such as ``office`` is looked for as a file here, then in ``scenes/`` here,
-                then among the scenes that come with the project.
+                then among the scenes that come with the project. ``NAME@2`` is level 2 of a scene that has levels.
 
         Raises:
-            InputError: missing file, malformed YAML, unknown key or material, missing mesh; with file and field.
+            InputError: missing file, malformed YAML, unknown key, material or level, missing mesh; with file and field.
         """
-        from radarsim.scene.description import find, read
+        from radarsim.scene.description import find, read, split_level
 
-        file = find(path)
-        return cls(*read(file))
+        return cls(*read(find(path), split_level(path)[1]))
 
     @classmethod
     def of(cls, description: dict, name: str) -> "Scene":

@@ -14,6 +14,8 @@ CAUSES = (*(p.name.lower() for p in Provenance), "leakage")
 class CauseCounts(Sensor):
     """Number and total power of the echoes of each cause."""
 
+    of_radar = True
+
     streams = {
         "truth/echoes": Stream((len(Provenance),), "i4", "", f"echoes per cause: {_NAMES}"),
         "truth/echo_power": Stream((len(Provenance),), "f4", "1", f"received over transmitted power: {_NAMES}"),
@@ -31,6 +33,8 @@ class CauseCounts(Sensor):
 
 class AdcByCause(Sensor):
     """I/Q of each cause before noise and converter."""
+
+    of_radar = True
 
     def __init__(self, rig: Rig, rng: np.random.Generator):
         about = "I/Q before noise and converter, by cause, which add up: " + ", ".join(CAUSES)

@@ -34,6 +34,8 @@ NOISE = 255
 class Ghosts(Sensor):
     """Power by cause on the radar's range bins and the scan's bearings, and the strongest cause of every cell."""
 
+    of_radar = True
+
     def __init__(self, rig: Rig, rng: np.random.Generator):
         config, front_end = rig.config, rig.front_end
         self._front_end, self._maps = front_end, CauseMaps(config)
@@ -51,7 +53,10 @@ class Ghosts(Sensor):
                 (len(Provenance), *shape), "f2", "dB of ADC counts^2",
                 f"range-azimuth power by cause ({names}), not below {DEPTH:g} dB under the noise",
             ),
-            "truth/cause": Stream(shape, "u1", "", f"strongest cause of a range-azimuth cell: {labels}, {NOISE} noise"),
+            "truth/cause": Stream(
+                shape, "u1", "", f"strongest cause of a range-azimuth cell: {labels}, {NOISE} noise",
+                labels=CAUSES,
+            ),
         }  # fmt: skip
         self.products = {
             "truth/cause_ranges": Product(config.ranges - config.range_bias, "m", "range bins of /truth/cause"),

@@ -10,6 +10,8 @@ from radarsim.sensors.sensor import Frames, Rig, Sensor
 class ChipPoints(Sensor):
     """TI's point cloud of every frame, from the simulated samples."""
 
+    of_radar = True
+
     def __init__(self, rig: Rig, rng: np.random.Generator):
         self._clouds = PointClouds(rig.config)
         self._frames = 0

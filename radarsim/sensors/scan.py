@@ -68,7 +68,9 @@ class Occupancy(Sensor):
         about = "state of cells (radar range bin, bearing) in the horizontal plane: " + ", ".join(
             f"{cell} {cell.name.lower()}" for cell in Cell
         )
-        self.streams = {"truth/occupancy": Stream(cells, "u1", "", about)}
+        self.streams = {
+            "truth/occupancy": Stream(cells, "u1", "", about, labels=tuple(cell.name.lower() for cell in Cell))
+        }
         ranges = rig.config.ranges - rig.config.range_bias
         self.products = {
             "truth/occupancy_ranges": Product(ranges, "m", "middles of the range cells of /truth/occupancy"),

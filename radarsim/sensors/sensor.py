@@ -67,8 +67,10 @@ class Sensor(ABC):
     Attributes:
         streams: growing data sets of the recording by path.
         products: data sets written once, by path.
+        of_radar: whether it looks at the radar's echoes or samples, rather than at the world.
     """
 
+    of_radar: bool = False
     streams: Mapping[str, Stream]
     products: Mapping[str, Product] = {}
 

@@ -56,6 +56,9 @@ class Suite:
         names: of optional sensors, from `SENSORS`.
         seed: of the recording.
         by_cause: with I/Q by cause.
+
+    Attributes:
+        clocks: paths of streams that hold stamps, s.
     """
 
     def __init__(self, rig: Rig, names: Sequence[str], seed: int, by_cause: bool = False):
@@ -67,6 +70,9 @@ class Suite:
         }
         self.streams = {path: s for sensor in self.sensors.values() for path, s in sensor.streams.items()}
         self.products = {path: p for sensor in self.sensors.values() for path, p in sensor.products.items()}
+        # Streams of stamps: those in s that others name as their clock, and the truth's.
+        named = {"truth/time", *(s.clock for s in self.streams.values())}
+        self.clocks = {path for path in named & set(self.streams) if self.streams[path].unit == "s"}
 
     @one_blas_thread
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:

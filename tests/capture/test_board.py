@@ -4,12 +4,12 @@ import socket
 import threading
 
 import pytest
-from virtual import SMALL, network
 
 from radarize.capture.board import Board, Network
 from radarize.errors import InputError
 from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings
 from radarize.radar.presets import PRESETS
+from tests.virtual import SMALL, network
 
 
 class Scripted:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from virtual import SMALL, emulated, network, sensor
 
 from radarize.capture import stream
 from radarize.capture.receiver import buffer_warning
@@ -21,7 +20,8 @@ from radarize.radar.dca1000 import MAX_PAYLOAD, FrameAssembler, decode, encode, 
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarsim.emulator.disturbance import Disturbance
-from tests.emulator import rig
+from tests import virtual
+from tests.virtual import SMALL, emulated, network, sensor
 
 FRAMES = 100
 
@@ -35,7 +35,7 @@ def impatient(monkeypatch):
 @pytest.fixture(scope="module")
 def played(tmp_path_factory):
     path = tmp_path_factory.mktemp("played") / "noise.h5"
-    return path, rig.record(path, SMALL, FRAMES)
+    return path, virtual.record(path, SMALL, FRAMES)
 
 
 def test_every_sample_arrives(played, tmp_path):
@@ -66,7 +66,7 @@ def test_the_end_of_the_stream_ends_the_recording_with_its_late_last_packet(play
 def test_lost_late_repeated_and_reordered_packets_over_the_network(played, tmp_path):
     source, sent = played
     disturbance = Disturbance(0.03, 0.03, 0.03, rng=np.random.default_rng(4))
-    with emulated(source, disturbance) as (emulator, where), sensor(emulator, where) as radar:
+    with emulated(source, disturbance=disturbance) as (emulator, where), sensor(emulator, where) as radar:
         record(radar, tmp_path / "lossy.h5", threading.Event(), frames=90)
         counts = radar.packets
     assert disturbance.lost and disturbance.duplicated and disturbance.reordered

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
 from typer.testing import CliRunner
-from virtual import SMALL, emulated
 
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
@@ -19,7 +18,8 @@ from radarize.pipeline import Pipeline
 from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
-from tests.emulator import rig
+from tests import virtual
+from tests.virtual import SMALL, emulated
 
 FRAMES = 60
 
@@ -112,7 +112,7 @@ def test_a_browser_shows_it_while_it_runs(walk, tmp_path):
 
 
 def test_the_command_follows_a_radar_and_records(tmp_path):
-    rig.record(tmp_path / "played.h5", SMALL, 40)
+    virtual.record(tmp_path / "played.h5", SMALL, 40)
     (tmp_path / "small.cfg").write_text(write_cfg(SMALL))
     with emulated(tmp_path / "played.h5") as (emulator, where):
         options = ["--port", emulator.port, "--host", where.host, "--dca", where.dca, "--address", "127.0.0.1:0"]

@@ -6,11 +6,11 @@ import time
 import numpy as np
 import pytest
 import sources
-from virtual import SMALL
 
 from radarize.capture.ring import FrameRing
 from radarize.capture.stream import Stream, follow
 from radarize.errors import InputError
+from tests.virtual import SMALL
 
 
 def put(ring: FrameRing, number: int) -> bool:

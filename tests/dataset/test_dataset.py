@@ -7,6 +7,7 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from fakes import FakeSpecification, fake
@@ -16,6 +17,8 @@ from radarize.recording import Recording
 from radarize.training.maps import MAPS
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
+from radarsim.planner import plan_motion
+from radarsim.scene.scene import Scene
 
 PLAIN = {
     "name": "tiny",
@@ -56,6 +59,66 @@ def test_a_recording_holds_what_was_asked_for(undisturbed, tmp_path):
         for name in ("truth/pose", "truth/scan", "truth/occupancy", "imu/gyroscope", *(f"maps/{m}" for m in MAPS)):
             assert recording.has(name)
         assert not recording.has("radar/adc") and not recording.has("truth/depth")
+
+
+HALL = """
+objects:
+  - {name: floor, shape: rectangle, size: [6, 4], position: [3, 2, 0], facing: [0, 0, 1], material: vinyl}
+  - {name: wall, shape: rectangle, size: [4, 2.5], position: [6, 2, 1.25], facing: [-1, 0, 0], material: wood}
+levels:
+  - objects: [{name: crate, shape: box, size: [0.5, 0.5, 2], position: [2.2, 2.9, 1.01], material: metal}]
+"""
+
+
+def test_variants_of_a_recording_share_its_walk(tmp_path):
+    """The crate of level 1 would push a walk of its own aside, and heights are on one and the same."""
+    (tmp_path / "hall.yaml").write_text(HALL)
+    group = {"building": "hall", "platform": "cart", "count": 1, "duration": 2, "waypoints": [[1, 2.4], [5, 2.4]]}
+    variants = {
+        "mild": {},
+        "severe": {"level": 1, "attributes": {"severity": 1}},
+        "coarse": {"radar": {"samples": 48, "frame_period": 0.1}, "frontend": {"noise": False}},
+        "low": {"mounting": [0.2, 0, -0.5, 0, 0, 0]},
+        "high": {"mounting": [0.2, 0, 0.1, 0, 0, 0]},
+    }
+    (tmp_path / "spec.yaml").write_text(
+        yaml.safe_dump(PLAIN | {"buildings": {"hall": "hall.yaml"}, "recordings": [group], "storage": "raw"}
+                       | {"variants": variants, "attributes": {"stress": "hall", "severity": 0}})
+    )  # fmt: skip
+    seen = {}
+    for task in Specification.load(tmp_path / "spec.yaml").tasks:
+        task.make(tmp_path)
+        assert task.is_finished(tmp_path)
+        with Recording(task.path(tmp_path)) as recording:
+            seen[task.name.split("_")[-1]] = (
+                recording.read("truth/pose"), recording.adc(0, 2), recording.config, recording.attributes
+            )  # fmt: skip
+    poses = {name: pose for name, (pose, *_) in seen.items()}
+    np.testing.assert_array_equal(poses["severe"], poses["mild"])
+    route, places = np.random.default_rng(task.seed).spawn(2)[0], np.array(group["waypoints"])
+    own = plan_motion(Scene.load(f"{tmp_path / 'hall.yaml'}@1"), "cart", 2.0, route, places)
+    assert np.abs(own.position(np.array([1.9])) - poses["mild"][-1, :3]).max() > 0.05
+    np.testing.assert_allclose(poses["coarse"], poses["mild"][::3][: len(poses["coarse"])], atol=2e-3)
+    np.testing.assert_allclose(poses["high"][:, :2], poses["low"][:, :2], atol=0.02)
+    np.testing.assert_allclose(poses["high"][:, 2] - poses["low"][:, 2], 0.6, atol=0.01)
+    assert np.ptp(poses["mild"][:, 0]) > 0.1
+    assert (seen["severe"][1] != seen["mild"][1]).any()
+    assert seen["coarse"][2].samples == 48 and 'noise":false' in seen["coarse"][3]["front_end"]
+    facts = seen["severe"][3]
+    assert (facts["scene"], facts["stress"], facts["severity"]) == ("hall@1", "hall", 1)
+    assert seen["mild"][3]["severity"] == 0
+
+
+def test_too_short_a_walk_is_refused(tmp_path):
+    (tmp_path / "hall.yaml").write_text(HALL)
+    group = {"building": "hall", "platform": "cart", "count": 1, "duration": 4, "waypoints": [[1, 2], [2, 2]]}
+    (tmp_path / "spec.yaml").write_text(
+        yaml.safe_dump(PLAIN | {"buildings": {"hall": "hall.yaml"}, "recordings": [group]})
+    )
+    (task,) = Specification.load(tmp_path / "spec.yaml").tasks
+    with pytest.raises(InputError, match="hall_cart_00: the way-points are passed after .* of 120 frames"):
+        task.make(tmp_path)
+    assert not list(tmp_path.glob("*.h5*"))
 
 
 def test_killed_and_resumed(specification, undisturbed, tmp_path):

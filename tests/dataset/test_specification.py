@@ -3,11 +3,19 @@
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
 from radarize.errors import InputError
+from radarize.radar.array import azimuth_row, virtual_positions
+from radarize.radar.cfg import load_config
+from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.radar.presets import PRESETS
 from radarsim.dataset.specification import Specification
+from radarsim.scene.description import shipped
+
+CONFIG = PRESETS["radarize"]
 
 PLAIN = {
     "name": "plain",
@@ -99,6 +107,89 @@ def test_the_small_data_set():
     assert all(parts["train"] and parts["test"] for parts in found.members.values())
 
 
+def test_variants_share_seed_and_name(tmp_path):
+    variants = {"plain": {}, "coarse": {"radar": {"samples": 48}, "attributes": {"value": 48}}}
+    found = load(tmp_path, variants=variants, attributes={"ablation": "samples", "value": 96}).tasks
+    plain = load(tmp_path).tasks
+    assert [task.name for task in found[:4]] == [
+        "old_0_handheld_00_plain", "old_0_handheld_00_coarse", "old_2_handheld_00_plain", "old_2_handheld_00_coarse",
+    ]  # fmt: skip
+    assert [task.seed for task in found[::2]] == [task.seed for task in found[1::2]] == [task.seed for task in plain]
+    assert found[0].attributes == {"ablation": "samples", "value": 96} and found[1].attributes["value"] == 48
+    assert found[0].settings == plain[0].settings != found[1].settings
+    assert len({task.identity for task in found}) == 14
+    assert found[1].variant.radar_of("radarize").samples == 48 and found[0].variant.radar_of("radarize") == "radarize"
+
+
+def test_a_plain_recording_is_the_one_it_always_was(tmp_path):
+    """Fields that data sets did not have before count as absent, so that finished recordings stay finished."""
+    parameters = load(tmp_path).tasks[0].parameters
+    assert all(parameters[name] is None for name in ("waypoints", "variant", "attributes"))
+
+
+def test_levels_are_scenes_of_their_own(tmp_path):
+    (tmp_path / "mine.yaml").write_text(
+        "objects: [{name: a, shape: sphere, radius: 1, material: wood}]\nlevels: [{objects: [{name: a, radius: 2}]}]"
+    )
+    fields = {"platform": "cart", "count": 1, "duration": 1, "waypoints": [[0, 1], [2, 3]]}
+    groups = [fields | {"building": name} for name in ("mine", "severe")]
+    buildings = {"mine": "mine.yaml", "severe": str(tmp_path / "mine.yaml@1")}
+    tasks = load(tmp_path, buildings=buildings, recordings=groups, variants={"x": {}, "y": {"level": 1}}).tasks
+    assert [Path(task.scene).name for task in tasks] == ["mine.yaml", "mine.yaml@1", "mine.yaml@1", "mine.yaml@1"]
+    assert tasks[0].waypoints == ((0, 1), (2, 3))
+    assert tasks[0].parameters["scene"]["sha256"] == tasks[1].parameters["scene"]["sha256"]
+
+
+def test_the_stress_test():
+    """Seven places at four levels; all that differs between them is the level."""
+    tasks = Specification.load("stress").tasks
+    assert Counter(task.attributes["severity"] for task in tasks) == dict.fromkeys(range(4), 7)
+    assert len({task.attributes["stress"] for task in tasks}) == 7
+    for task in tasks:
+        assert task.variant.model_dump(exclude_defaults=True).keys() <= {"level", "attributes"}
+    assert len({(task.building, task.seed, task.waypoints, task.settings) for task in tasks}) == 7
+
+
+def test_ablations_change_what_they_are_called_after():
+    """The right way, by closed forms of the radar."""
+    found: dict[str, list] = {}
+    for file in (shipped() / "datasets" / "ablation").glob("*.yaml"):
+        tasks = Specification.load(f"ablation/{file.stem}").tasks
+        radars = [load_config(task.variant.radar_of(task.radar))[0] for task in tasks]
+        found[file.stem] = list(zip(tasks, radars, [task.attributes["value"] for task in tasks], strict=True))
+        assert len({task.seed for task in tasks}) == 1 and len({task.attributes["ablation"] for task in tasks}) == 1
+        for task in tasks:
+            assert set(task.variant.model_dump(exclude_defaults=True)) <= {
+                "radar",
+                "frontend",
+                "mounting",
+                "attributes",
+            }
+    assert sorted(found) == [
+        "antennas", "bandwidth", "device", "frame_rate", "height", "loops", "noise_figure", "tilt", "tx_order",
+    ]  # fmt: skip
+
+    def check(name, measure, law):
+        for task, radar, value in found[name]:
+            assert measure(task, radar) == pytest.approx(law(value), rel=0.01), (name, value)
+
+    check("bandwidth", lambda _, radar: radar.range_resolution, lambda value: SPEED_OF_LIGHT / 2 / value)
+    check("bandwidth", lambda _, radar: radar.max_range, lambda value: 4.28)
+    check("antennas", lambda _, radar: virtual_positions(radar).reshape(-1, 3).shape[0], lambda value: value)
+    check("antennas", lambda _, radar: radar.loop_time, lambda value: 516e-6)
+    check("loops", lambda _, radar: radar.velocity_resolution, lambda value: CONFIG.wavelength / 2 / (value * 516e-6))
+    check("frame_rate", lambda _, radar: radar.frame_rate, lambda value: value)
+    check("noise_figure", lambda task, _: 10 * np.log10(task.variant.frontend_of(None).noise_factor(30)), lambda v: v)
+    check("height", lambda task, _: 1.2 + task.variant.mounted.lever_arm[2], lambda value: value)
+    check(
+        "tilt", lambda task, _: -np.rad2deg(np.arcsin(task.variant.mounted.rotation.apply([1, 0, 0])[2])), lambda v: v
+    )
+    check("device", lambda _, radar: radar.center_frequency, {"IWR1843BOOST": 78.9e9, "IWR6843ISK": 61.9e9}.get)
+    apart = {"TX1 TX3 TX2": 1, "TX1 TX2 TX3": 2, "TX2 TX1 TX3": 1}
+    check("tx_order", lambda _, radar: radar.slot[2] - radar.slot[0], apart.get)
+    assert [len(azimuth_row(radar)) for _, radar, _ in found["antennas"]] == [2, 4, 8, 8]
+
+
 GROUP = PLAIN["recordings"][0]
 
 
@@ -122,6 +213,13 @@ GROUP = PLAIN["recordings"][0]
         ({"recordings": [GROUP | {"duration": 0.001}]}, "recordings[0].duration is 0.001 s, expected at least one"),
         ({"recordings": [GROUP | {"building": "x"}]}, "recordings[0].building is 'x', expected one of buildings: old"),
         ({"recordings": [GROUP | {"building": "office"}]}, "recordings[0].floors is [0, 2], but building office is a"),
+        ({"recordings": [GROUP | {"waypoints": [[1, 2]]}]}, "recordings[0].waypoints is [[1, 2]]"),
+        ({"variants": {"a": {"level": 1}}}, "buildings.old: is generated and has no levels"),
+        ({"variants": {"a": {"radar": {"slop": 1}}}}, "variants.a.radar: slop: unknown key, expected some of board"),
+        ({"variants": {"a": {"radar": {"slope": "steep"}}}}, "variants.a: radar: slope is 'steep'"),
+        ({"variants": {"a": {"radar": {"slope": 90e12}}}}, "variants.a: radar configuration: start_frequency, slope"),
+        ({"variants": {"a": {"frontend": {"noize": 1}}}}, "variants.a: frontend: noize: unknown key"),
+        ({"variants": {"a": {"mounting": [1, 2]}}}, "variants.a.mounting"),
         ({"splits": {"a": {"kind": "random", "train": 0.5}}}, "splits.a: train + validation + test is 0.8, expected 1"),
         ({"splits": {"a": {"kind": "x"}}}, "splits.a: input tag 'x'"),
         ({"splits": {"a": {"kind": "random", "folds": 0}}}, "splits.a.folds is 0"),
@@ -142,7 +240,8 @@ def test_mistakes_are_one_sentence(tmp_path, changes, expected):
 
 def test_files_that_are_no_specification(tmp_path):
     with pytest.raises(
-        InputError, match="no specification 'huge', expected .* one of: evaluation, radarize146, small, training"
+        InputError,
+        match="no specification 'huge', expected .* one of: ablation/.*, evaluation, .*radarize146, small, str",
     ):
         Specification.load("huge")
     path = tmp_path / "x.yaml"

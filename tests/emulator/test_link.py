@@ -13,7 +13,7 @@ from radarize.radar.dca1000_commands import Status
 from radarsim.emulator.disturbance import DELAYED, REORDERED, Disturbance
 from radarsim.emulator.link import Link
 from tests.emulator.captures import captured
-from tests.emulator.rig import CONFIG
+from tests.virtual import CONFIG
 
 
 class Wire:

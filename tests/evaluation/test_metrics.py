@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from radarize.errors import InputError
 from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.evaluation.trajectory import load, matched, trajectory
+from tests.evaluation.fake_run import write_run
 
 FREIBURG = Path(__file__).parents[3] / "shared" / "recordings" / "tum-freiburg1"
 
@@ -35,42 +36,41 @@ def transformed(poses, angle, shift):
     return np.hstack([turn.apply(poses[:, :3]) + shift, (turn * Rotation.from_quat(poses[:, 3:])).as_quat()])
 
 
-@pytest.fixture(scope="module")
-def evo_results(tmp_path_factory):
-    """Statistics of `evo_ape` and `evo_rpe` by (command, relation)."""
+def evo(command: str, relation: str, reference: Path, estimate: Path, home: Path) -> dict[str, float]:
+    """Statistics of `evo_ape` (after alignment) or `evo_rpe` (from pose to pose), run as a user does."""
+    archive = home / f"{command}-{relation}.zip"
+    options = ["-r", relation, "--t_max_diff", "0.01", "--save_results", archive]
+    options += ["-a"] if command == "ape" else ["--delta", "1", "--delta_unit", "f"]
+    program = Path(sys.executable).parent / f"evo_{command}"
+    environment = {**os.environ, "HOME": str(home), "MPLBACKEND": "agg"}
+    subprocess.run([program, "tum", reference, estimate, *options], env=environment, check=True, capture_output=True)
+    with zipfile.ZipFile(archive) as content:
+        return json.loads(content.read("stats.json"))
+
+
+@pytest.fixture(params=["freiburg", "run"])
+def pair(request, tmp_path) -> tuple[Path, Path]:
+    """Reference and estimate: a public pair of six degrees of freedom, or of a run, which has a frame of its own."""
+    if request.param == "run":
+        run = write_run(tmp_path / "run")
+        return run / "reference.tum", run / "odometry.tum"
     if not FREIBURG.is_dir():
         pytest.skip("../shared/recordings/tum-freiburg1 is not there")
-    home = tmp_path_factory.mktemp("evo")
-    environment = {**os.environ, "HOME": str(home), "MPLBACKEND": "agg"}
-    files = [str(FREIBURG / f"freiburg1_xyz-{name}.txt") for name in ("groundtruth", "rgbdslam")]
-    results = {}
-    for command, extra in {"ape": ["-a"], "rpe": ["--delta", "1", "--delta_unit", "f"]}.items():
-        for relation in ("trans_part", "angle_rad"):
-            archive = home / f"{command}-{relation}.zip"
-            program = Path(sys.executable).parent / f"evo_{command}"
-            subprocess.run(
-                [program, "tum", *files, "-r", relation, *extra, "--t_max_diff", "0.01", "--save_results", archive],
-                env=environment,
-                check=True,
-                capture_output=True,
-            )
-            with zipfile.ZipFile(archive) as content:
-                results[command, relation] = json.loads(content.read("stats.json"))
-    return results
+    return FREIBURG / "freiburg1_xyz-groundtruth.txt", FREIBURG / "freiburg1_xyz-rgbdslam.txt"
 
 
-def test_agrees_with_the_evo_commands(evo_results):
-    reference, estimate = (load(FREIBURG / f"freiburg1_xyz-{name}.txt") for name in ("groundtruth", "rgbdslam"))
-    errors = evaluate_trajectory(estimate, reference, in_plane=False, association="nearest")
+def test_agrees_with_the_evo_commands(pair, tmp_path):
+    errors = evaluate_trajectory(load(pair[1]), load(pair[0]), in_plane=False, association="nearest")
     ours = {
         ("ape", "trans_part"): errors.position,
         ("ape", "angle_rad"): errors.rotation,
         ("rpe", "trans_part"): errors.relative_position["frame"],
         ("rpe", "angle_rad"): errors.relative_rotation["frame"],
     }
-    for key, statistics in ours.items():
+    for (command, relation), statistics in ours.items():
+        theirs = evo(command, relation, *pair, tmp_path)
         for name in ("mean", "rmse", "max"):
-            assert getattr(statistics, name) == pytest.approx(evo_results[key][name], abs=1e-6), (key, name)
+            assert getattr(statistics, name) == pytest.approx(theirs[name], abs=1e-6), (command, relation, name)
 
 
 def test_a_moved_copy_has_no_error():

@@ -69,13 +69,16 @@ class BagWriter:
         data = encode_message(self.make(kind, **fields), kind)
         self.bag.write(self.connections[topic], round(1e9 * (EPOCH + received)), data)
 
-    def frame(self, time: float, samples: np.ndarray, config, calibration=None) -> None:
-        """A raw frame; its header's stamp is never set."""
+    def frame(self, time: float, samples: np.ndarray, config, calibration=None, latency=None, stamp=None) -> None:
+        """A raw frame that began at `time`, received when its burst is over or `latency` later; its header's stamp is
+        not set, as in the data set, unless given.
+        """
+        received = time + (config.burst_time if latency is None else latency)
         words = encode(samples[None], config)
         pairs = np.asarray(calibration if calibration is not None else config.channel_calibration, float).reshape(-1)
         loops, tx, rx, count, _ = config.frame_shape
         self.write(
-            RADAR, FRAME, time, header=self.header(None), platform="xWR18xx", adc_output_fmt=1, max_range=4.0,
+            RADAR, FRAME, received, header=self.header(stamp), platform="xWR18xx", adc_output_fmt=1, max_range=4.0,
             range_bias=config.range_bias, rx_phase_bias=pairs,
             rx=np.isin(np.arange(4), config.rx).astype(np.uint8), tx=np.isin(np.arange(3), config.tx).astype(np.uint8),
             shape=np.array([loops, tx * rx, count]), data=words, LIMIT=7,
@@ -132,7 +135,7 @@ def write_published(path: Path, source: Path, version: int = 1, storage: Storage
     """A recording as a bag; its tracking poses, IMU, depth and points come along as far as there are any."""
     with Recording(source) as recording, BagWriter(path, version, storage) as bag:
         config, middle = recording.config, recording.times + recording.config.burst_center
-        events = [(time, bag.frame, (k,)) for k, time in enumerate(recording.times)]
+        events = [(time + config.burst_time, bag.frame, (k,)) for k, time in enumerate(recording.times)]
         if recording.has("tracking/time"):
             name = "tracking/true_pose" if recording.has("tracking/true_pose") else "tracking/pose"
             tracked = zip(recording.read("tracking/time"), recording.read(name), strict=True)
@@ -149,7 +152,7 @@ def write_published(path: Path, source: Path, version: int = 1, storage: Storage
             ]
         for time, write, values in sorted(events, key=lambda event: event[0]):
             if write == bag.frame:
-                bag.frame(time, recording.adc(values[0], values[0] + 1)[0], config)
+                bag.frame(recording.times[values[0]], recording.adc(values[0], values[0] + 1)[0], config)
             elif write == bag.depth:
                 bag.depth(time, recording.rows("truth/depth", values[1], values[1] + 1)[0])
             else:

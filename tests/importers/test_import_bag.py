@@ -44,7 +44,7 @@ def original(motion, tmp_path_factory) -> Path:
     points, amplitudes = furnished_room(rng, density=3.0)
     stamps = CONFIG.frame_period * np.arange(round(DURATION / CONFIG.frame_period))
     adc = record(CONFIG, motion, points, amplitudes, stamps, rng, noise=20.0, block=32, gain=antenna_gain)
-    ticks = np.arange(0, DURATION, 0.005)
+    ticks = np.arange(0.001, DURATION, 0.005)  # none at a frame's very start
     clouds, frame = PointClouds(CONFIG)(adc)
     streams = {
         "truth/time": Stream((), "f8", "s", ""),
@@ -173,11 +173,26 @@ def test_calibration_and_sizes_come_from_the_frames(tmp_path):
         assert {"start_frequency", "idle_time"} <= set(recording.attributes["assumed"].split(", "))
 
 
-def test_latency_moves_the_stamps(tmp_path):
-    write(tmp_path / "a.bag", SMALL, 0.05 * np.arange(3))
-    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", config=SMALL, latency=0.02)) as recording:
-        assert recording.times - EPOCH == pytest.approx(0.05 * np.arange(3) - 0.02, abs=1e-6)
-        assert recording.attributes["assumed"] == ""
+def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
+    """Received 30 ms after their start. Nothing said: the burst's length, 1 ms, is the least."""
+    times = 0.05 * np.arange(3)
+    write(tmp_path / "a.bag", SMALL, times, latency=0.03)
+    with BagWriter(tmp_path / "b.bag", 1) as bag:
+        for time, frame in zip(times, noise(SMALL, 3), strict=True):
+            bag.frame(time, frame, SMALL, latency=0.03, stamp=time + 0.001)
+    assert SMALL.burst_time == pytest.approx(0.96e-3)
+    for name, latency, late, assumed in (
+        ("a.bag", None, 0.03 - 0.96e-3, "latency"),
+        ("a.bag", 0.03, 0, ""),
+        ("a.bag", 0.0, 0.03, ""),
+        ("b.bag", None, 0.001, ""),
+        ("b.bag", 0.03, 0, ""),
+    ):
+        out = import_recording(tmp_path / name, tmp_path / "a.h5", config=SMALL, latency=latency)
+        with Recording(out) as recording:
+            assert recording.times - EPOCH == pytest.approx(times + late, abs=1e-6), (name, latency)
+            assert recording.attributes["assumed"] == assumed
+            assert ("headers" in recording.attributes["stamps"]) == (name == "b.bag" and latency is None)
 
 
 def test_missing_frames_leave_a_gap_and_repeated_ones_are_dropped(tmp_path):

@@ -155,7 +155,7 @@ def test_without_a_configuration(tmp_path, iq_order):
         ({"samples": "many"}, "samples is 'many'"),
         ({"rx": 0}, "rx"),
         ({"rx": 5}, "rx is"),
-        ({"tx": 4}, "tx_order"),
+        ({"tx": 4}, "tx is 4"),
         ({"iq_order": "iqiq"}, "iq_order is 'iqiq'"),
         ({"sample_rate": 0}, "sample_rate is 0"),
         ({"frame_period": 1e-6}, "frame_period is 0.001 ms"),

@@ -7,7 +7,7 @@ import pytest
 from radarize.errors import InputError
 from radarize.importers import import_recording
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import encode, packets
+from radarize.radar.dca1000 import Packet, encode, packets
 from radarize.recording import Recording
 
 PUBLIC = {"samples": 256, "loops": 16, "rx": 1}
@@ -160,3 +160,13 @@ def test_files_without_anything_usable(tmp_path, data, message):
         imported(source)
     assert "\n" not in str(error.value)
     assert not list(tmp_path.glob("*.h5*"))
+
+
+def test_byte_counts_that_leap_are_damage_not_loss(tmp_path):
+    """200 MB between two packets of a small file would be 40,000 frames of zeros."""
+    sent = list(packets(encode(FRAMES, CONFIG).tobytes()))
+    far = Packet(99, 200_000_000, sent[1].payload)
+    source = pcap(tmp_path / "a.pcap", [udp(packet.encode()) for packet in (*sent, far)])
+    with pytest.raises(InputError, match="a.pcap: lacks more than .* expected byte counts that grow"):
+        imported(source)
+    assert not (tmp_path / "a.h5").exists()

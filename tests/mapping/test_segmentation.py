@@ -63,3 +63,7 @@ def test_ghosts_behind_a_surface_and_guesses_are_not_returned(tmp_path):
     assert np.isinf(found[:, 20]).all() and np.isfinite(found).sum() == 2
     scans.least = 0.4
     assert np.allclose(scans.scan(spectrum)[:, 20], maker.heatmaps.ranges[40], atol=step / 2)
+    alone = Segmentation(maker, tmp_path / "s.safetensors", first=False)
+    alone._windows.net = Says(likely)
+    found = alone.scan(spectrum)
+    assert np.allclose(found[:, 10], maker.heatmaps.ranges[60], atol=step / 2) and np.isfinite(found).sum() == 2

@@ -6,10 +6,10 @@ import torch
 
 from radarize.errors import InputError
 from radarize.nets.weights import Grid, Header, build, example, save
+from radarize.nets.windows import Windows
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.fused import FusedVelocity
-from radarize.odometry.learned import LearnedRotation, LearnedVelocity, Windows
-from radarize.odometry.methods import make_odometry
+from radarize.odometry.learned import LearnedRotation, LearnedVelocity
 from radarize.radar.presets import PRESETS
 from radarize.training.maps import MapMaker
 
@@ -140,9 +140,3 @@ def test_fusion_is_the_product_of_the_two():
     assert np.allclose(found.velocity[0], covariance @ (np.linalg.inv(p) @ a + np.linalg.inv(q) @ b))
     apart = FusedVelocity(Says(a, p), Says(b + 3, q)).estimate(None)
     assert np.linalg.eigvalsh(apart.covariance[0] - covariance)[0] > 5 * np.linalg.eigvalsh(covariance)[-1]
-
-
-def test_methods_by_name(tmp_path):
-    maker = MapMaker(CONFIG)
-    with pytest.raises(InputError, match="odometry is 'wheel', expected one of doppler, learned, fused"):
-        make_odometry("wheel", maker)

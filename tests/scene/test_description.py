@@ -117,3 +117,47 @@ def test_movers(tmp_path):
 def test_bad_movers(tmp_path, mover, complaint):
     with pytest.raises(InputError, match=complaint):
         load(tmp_path, f"objects: [{WALL}]\nmoving: [{mover}]")
+
+
+LEVELS = f"""
+objects:
+  - {WALL}
+  - {{name: wall two, shape: box, size: [1, 1, 1], position: [0, 3, 0], material: wood}}
+moving: [{{kind: person, name: guest, path: [[1, 0], [4, 0]]}}]
+levels:
+  - objects: [{{name: wall two, size: [2, 1, 1]}}, {{name: post, shape: sphere, radius: 1, material: metal}}]
+  - objects: [{{name: "wall*", material: glass}}]
+    moving: [{{name: guest, speed: 2.5}}, {{kind: person, name: other, path: [[0, 0]]}}]
+"""
+
+
+def test_each_level_is_laid_upon_the_one_before(tmp_path):
+    plain = load(tmp_path, LEVELS)
+    path = str(tmp_path / "scene.yaml")
+    first, second = Scene.load(f"{path}@1"), Scene.load(f"{path}@2")
+    assert [scene.name for scene in (plain, first, second)] == ["scene", "scene@1", "scene@2"]
+    assert [o.name for o in plain.objects] == ["wall", "wall two"]
+    assert [o.name for o in first.objects] == [o.name for o in second.objects] == ["wall", "wall two", "post"]
+    assert [np.ptp(s.objects[1].mesh.vertices[:, 0]) for s in (plain, first, second)] == [1, 2, 2]
+    assert [s.objects[1].material.name for s in (plain, first, second)] == ["wood", "wood", "glass"]
+    assert second.objects[0].material.name == "glass" and second.objects[2].material.name == "metal"
+    assert [m.speed for m in first.movers] == [1.0] and [m.speed for m in second.movers] == [2.5, 1.0]
+    assert Scene.load(f"{path}@0").name == "scene"
+
+
+@pytest.mark.parametrize(
+    ("level", "text", "complaint"),
+    [
+        (3, LEVELS, "level is 3, expected 0 to 2"),
+        (1, f"objects: [{WALL}]", "level is 1, expected 0 to 0"),
+        (0, LEVELS.replace("moving: [{name", "movink: [{name"), r"levels\[1\].movink: unknown key"),
+        (1, LEVELS.replace("name: wall two, size", "nam: wall two, size"), r"levels\[0\].objects\[0\].name"),
+        (1, LEVELS.replace("size: [2, 1, 1]", "size: [2, 1, -1]"), r"size\[2\] \(object 'wall two'\) is -1"),
+        (1, LEVELS.replace("name: wall two, size", "name: wal two, size"), r"objects\[2\] \(object 'wal two'\)"),
+    ],
+)
+def test_mistakes_in_levels(tmp_path, level, text, complaint):
+    with pytest.raises(InputError, match=complaint) as caught:
+        load(tmp_path, text)
+        Scene.load(f"{tmp_path / 'scene.yaml'}@{level}")
+    assert "scene.yaml" in str(caught.value) and "\n" not in str(caught.value)

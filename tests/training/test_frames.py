@@ -1,4 +1,4 @@
-"""Recordings as a torch data set: windows, truth, splits, worker processes, and the README's example."""
+"""Recordings as a torch data set: windows, truth, splits, worker processes, and the how-to's example."""
 
 import json
 import re
@@ -15,7 +15,7 @@ from radarize.recording import Recording
 from radarize.training.dataset import DEFAULT, Frames
 from radarize.training.maps import MAPS, STEP, keep_maps
 
-README = Path(__file__).parents[2] / "README.md"
+HOW_TO = Path(__file__).parents[2] / "docs" / "learning.md"
 
 
 @pytest.fixture(scope="module")
@@ -124,9 +124,9 @@ def test_folders_that_are_no_data_set(folder, maps_folder, tmp_path):
 
 def test_the_example_of_the_readme_trains(folder, monkeypatch, capsys):
     """As printed, on these recordings: the loss falls."""
-    code = next(c for c in re.findall(r"```python\n(.*?)```", README.read_text(), re.S) if "Frames(" in c)
+    code = next(c for c in re.findall(r"```python\n(.*?)```", HOW_TO.read_text(), re.S) if "Frames(" in c)
     assert len([line for line in code.splitlines() if line.strip()]) <= 12
     torch.manual_seed(0)
-    exec(compile(code.replace('"small"', repr(str(folder))), "README", "exec"), {})
+    exec(compile(code.replace('"small"', repr(str(folder))), HOW_TO.name, "exec"), {})
     losses = [float(line.split()[-1]) for line in capsys.readouterr().out.splitlines()]
     assert losses[-1] < 0.5 * losses[0]

@@ -244,6 +244,27 @@ def test_recordings_of_two_radars_or_broken_truth_are_refused(tmp_path):
     import h5py
 
     with h5py.File(good, "r+") as file:
-        file["truth/velocity"][3, 0] = np.nan
-    with pytest.raises(InputError, match="a.h5: /truth/velocity lacks values or has some that are no numbers"):
+        file["truth/velocity"][:] = np.nan
+    with pytest.raises(InputError, match="a.h5: /truth/velocity lacks values or holds no numbers"):
         Table.read([good], ("doppler_azimuth",), ("velocity",))
+
+
+def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
+    """As where a tracking camera was blind, or an IMU stalled."""
+    import h5py
+
+    paths = [write(tmp_path / name, "velocity", 8) for name in ("a.h5", "b.h5")]
+    with h5py.File(paths[0], "r+") as file:
+        file["truth/velocity"][3, 1] = np.nan
+        file["truth/pose"][7] = np.nan
+    table = Table.read(paths, ("doppler_azimuth",), ("velocity", "yaw"))
+    assert table.starts(1).tolist() == [0, 1, 2, 4, 5, 6, *range(8, 16)]
+    assert table.starts(3).tolist() == [0, 4, *range(8, 14)]
+    table.sensed = {"imu": torch.zeros(16, 15, 6)}
+    table.sensed["imu"][9, 3, 0] = torch.nan
+    assert table.starts(1).tolist() == [0, 1, 2, 4, 5, 6, 8, *range(10, 16)]
+    walk_with_gap = data_set(tmp_path / "data", "velocity", frames=60)
+    for path in sorted(walk_with_gap.glob("*.h5")):
+        with h5py.File(path, "r+") as file:
+            file["truth/velocity"][20:25] = np.nan
+    train("translation", walk_with_gap, tmp_path / "net.safetensors", settings=TINY)

@@ -1,9 +1,10 @@
-"""A virtual radar for tests: recordings to play, free ports, and the command line's emulator in a process."""
+"""A virtual radar for tests: recordings to play, addresses that are free, the emulator here or as a command."""
 
 import signal
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,22 +12,31 @@ from pathlib import Path
 
 import numpy as np
 
+from radarize.capture.board import Network
+from radarize.capture.sensor import Sensor
+from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.recording import RecordingWriter
+from radarsim.emulator.emulator import Emulator
+from radarsim.emulator.source import Playback, Source
 
 BOARD, COMPUTER = "127.0.0.2", "127.0.0.1"
-#: Powers of two, as `xwr` wants them; 25 frames/s of 196,608 bytes.
-CONFIG = RadarConfig(
+#: 9,216 bytes a frame, 768 a chirp: neither is a multiple of the packets' 1456.
+SMALL = RadarConfig(
     start_frequency=77e9,
     slope=60e12,
-    idle_time=30e-6,
+    idle_time=20e-6,
     adc_start_time=5e-6,
     ramp_end_time=60e-6,
-    samples=128,
+    samples=48,
     sample_rate=5e6,
-    loops=32,
-    frame_period=40e-3,
-    tx_order=(0, 1, 2),
+    loops=4,
+    frame_period=20e-3,
+    tx_order=(0, 2, 1),
+)
+#: Powers of two, as `xwr` wants them; 25 frames/s of 196,608 bytes.
+CONFIG = SMALL.model_copy(
+    update={"idle_time": 30e-6, "samples": 128, "loops": 32, "frame_period": 40e-3, "tx_order": (0, 1, 2)}
 )
 
 
@@ -36,6 +46,11 @@ def record(path: Path, config: RadarConfig, frames: int) -> np.ndarray:
     with RecordingWriter(path, config) as writer:
         writer.append(adc, np.arange(frames) * config.frame_period)
     return adc
+
+
+def network() -> Network:
+    """Addresses on this machine with ports that nobody uses."""
+    return Network(COMPUTER, BOARD, *free_ports())
 
 
 def free_ports() -> tuple[int, int]:
@@ -54,6 +69,28 @@ def free_ports() -> tuple[int, int]:
                 continue
             found.append(port)
     return found[0], found[1]
+
+
+@contextmanager
+def emulated(source: Path | Source, **options: object) -> Iterator[tuple[Emulator, Network]]:
+    """A virtual sensor in this process, by default playing a recording, with its first frames ready."""
+    where = network()
+    with Emulator(
+        Playback(source) if isinstance(source, Path) else source,
+        board=where.dca,
+        computer=where.host,
+        command_port=where.command_port,
+        data_port=where.data_port,
+        **{"say": lambda words: None} | options,
+    ) as emulator:
+        while not emulator.ready:
+            time.sleep(0.02)
+        yield emulator, where
+
+
+def sensor(emulator: Emulator, where: Network, config: RadarConfig = SMALL) -> Sensor:
+    """Our client of a virtual sensor."""
+    return Sensor(config, write_cfg(config), "test.cfg", emulator.port, network=where, slots=256)
 
 
 @dataclass

@@ -1,0 +1,178 @@
+"""A recording by a pair of methods: the run, and its figures; and how long each stage takes."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from radarize import __version__
+from radarize.benchmark.dataset import Case
+from radarize.benchmark.networks import Networks
+from radarize.benchmark.steps import Report
+from radarize.evaluation.evaluate import evaluate, trajectory_errors
+from radarize.evaluation.runfiles import read_scans
+from radarize.evaluation.scans import true_ranges
+from radarize.evaluation.stress import missed, sources
+from radarize.methods import ODOMETRY, SCANS
+from radarize.pipeline import BATCH, Pipeline, run
+from radarize.recording import Recording
+from radarize.slam import log
+from radarize.slam.config import LoopConfig, SlamConfig
+
+#: Folder in a run's with the back end's result where no loops were closed.
+OPEN = "without-loops"
+#: Errors of a trajectory are kept as so many quantiles.
+QUANTILES = 101
+#: Frames that are timed.
+TIMED = 300
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Methods of odometry and of scans, keys of `radarize.methods.ODOMETRY` and `SCANS`."""
+
+    odometry: str
+    scans: str
+
+    def __str__(self) -> str:
+        return f"{self.odometry}+{self.scans}"
+
+    @property
+    def networks(self) -> tuple[str, ...]:
+        """Kinds of weights that they need."""
+        return tuple(dict.fromkeys((*ODOMETRY[self.odometry].networks, *SCANS[self.scans].networks)))
+
+
+@dataclass(frozen=True)
+class _Step:
+    case: Case
+    pair: Pair
+    networks: Networks
+
+    @property
+    def _name(self) -> str:
+        suffix = "" if self.networks.label == "shipped" else f"@{self.networks.label}"
+        return f"{self.case.name}/{self.pair}{suffix}"
+
+    def identity(self) -> dict[str, object]:
+        return {
+            "frames": self.case.frames,
+            "bytes": self.case.path.stat().st_size,
+            "networks": self.networks.digests(self.pair.networks),
+            "version": __version__,
+        }
+
+
+@dataclass(frozen=True)
+class Run(_Step):
+    """The pipeline on a recording: a folder as `radarize run` writes it, and one without loop closure in it."""
+
+    alone = False
+
+    @property
+    def place(self) -> str:
+        return f"runs/{self._name}"
+
+    @property
+    def frames(self) -> int:
+        return self.case.frames
+
+    def do(self, folder: Path, report: Report) -> dict[str, object]:
+        """Returns: see `figures`."""
+        run(
+            self.case.path,
+            folder,
+            odometry=self.pair.odometry,
+            scans=self.pair.scans,
+            weights=self.networks.folder,
+            progress=lambda done, total: report(done / total),
+        )
+        return figures(folder, self.case.path)
+
+
+def figures(run: Path, recording: Path) -> dict[str, object]:
+    """All figures of a run; None for numbers that do not exist.
+
+    Args:
+        run: folder of the run.
+        recording: that it was made of.
+
+    Returns:
+        What `evaluate` returns, and ``nearest``: `TrajectoryErrors.summary` of ``odometry``, ``slam`` and ``open``
+        (without loop closure) by the paper's association; ``quantiles``: of the same trajectories' position errors, m;
+        ``sources`` and ``missed``: see `radarize.evaluation.stress`, where the recording knows.
+
+    Raises:
+        InputError: no truth.
+    """
+    found = evaluate(run)
+    settings = SlamConfig.preset("radar")
+    log.run(run, None, run / OPEN, config=settings.model_copy(update={"loop": LoopConfig(enabled=False)}))
+    errors = trajectory_errors(run, association="nearest")
+    errors["open"] = trajectory_errors(run / OPEN, association="nearest")["slam"]
+    found["nearest"] = {name: each.summary() for name, each in errors.items()}
+    levels = np.linspace(0, 1, QUANTILES)
+    found["quantiles"] = {
+        name: np.quantile(each.position_errors, levels).round(4).tolist() for name, each in errors.items()
+    }
+    scans = read_scans(run / "scans.h5")
+    if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
+        true = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
+        found["missed"] = missed(scans["ranges"], true)
+        found["sources"] = sources(scans, true, recording)
+    return found
+
+
+@dataclass(frozen=True)
+class Timing(_Step):
+    """Stages of the pipeline on a recording's first frames, on cores that do nothing else."""
+
+    alone = True
+
+    @property
+    def place(self) -> str:
+        return f"timings/{self._name}"
+
+    @property
+    def frames(self) -> int:
+        return min(self.case.frames, TIMED)
+
+    def do(self, folder: Path, report: Report) -> dict[str, object]:
+        """Returns: ``stages``: ms per frame of each, ``whole``: of all of it, and ``frames``."""
+        with Recording(self.case.path) as source:
+            return measure(source, self.pair, self.networks, self.frames, report)
+
+
+def measure(
+    source: Recording, pair: Pair, networks: Networks, frames: int, report: Report = lambda share: None
+) -> dict[str, object]:
+    """Time the pipeline.
+
+    Args:
+        source: recording.
+        pair, networks: methods and their weights.
+        frames: how many of its frames.
+        report: takes the share that is done.
+
+    Returns:
+        ``stages``: ms per frame by name, ``whole``: ms per frame, reading included; ``frames``.
+    """
+
+    def pipeline() -> Pipeline:
+        return Pipeline(source.config, pair.scans, pair.odometry, networks.weights, source)
+
+    pipeline().push(source.adc(0, BATCH), source.times[:BATCH])  # compiles
+    timed = pipeline()
+    start = time.perf_counter()
+    for first in range(0, frames, BATCH):
+        stop = min(first + BATCH, frames)
+        timed.push(source.adc(first, stop), source.times[first:stop], source.valid(first, stop))
+        report(stop / frames)
+    timed.finish()
+    whole = 1e3 * (time.perf_counter() - start) / frames
+    return {
+        "stages": {name: 1e3 * seconds / frames for name, seconds in timed.stage_seconds.items()},
+        "whole": whole,
+        "frames": frames,
+    }

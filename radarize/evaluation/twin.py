@@ -1,0 +1,316 @@
+"""How alike a recording and its twin are, frame by frame: the same radar on the same walk, in the real place and in a
+model of it (`radarsim twin`).
+
+Maps are those that networks see (`radarize.training.maps`), in dB over their own median, so that the receiver's gain,
+which is a figure of its own, and the noise of empty cells drop out. Velocities and scans are made without networks, of
+single frames (Doppler least squares; Capon's maps, first echo), so that any radar has them.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+
+from radarize.errors import InputError
+from radarize.evaluation.likeness import correlation, foreground, frechet_distance, patch_statistics, similarity
+from radarize.mapping.scans import ScanConfig, make_scans
+from radarize.odometry.doppler import DopplerVelocity
+from radarize.radar.config import RadarConfig
+from radarize.radar.noise import noise_floor, noise_profile
+from radarize.recording import Recording
+from radarize.training.maps import MapMaker
+
+#: What is compared of every frame, with unit and meaning. Those of maps end in the map's name.
+FIGURES = {
+    "profile_correlation": ("", "correlation of the range profiles in dB"),
+    "profile_rms": ("dB", "RMS difference of the range profiles, gain taken out"),
+    "gain": ("dB", "twin over recording: median over the range profile, where it is well above its floor"),
+    "noise": ("dB", "noise floor, twin over recording"),
+    **{f"correlation_{name}": ("", f"correlation: {about}") for name, about in MapMaker.maps.items()},
+    **{f"similarity_{name}": ("", f"MS-SSIM: {about}") for name, about in MapMaker.maps.items()},
+    "velocity": ("m/s", "length of the difference of the velocities"),
+    "velocity_error_recording": ("m/s", "recording's velocity against that of the poses"),
+    "velocity_error_twin": ("m/s", "twin's velocity against that of the poses"),
+    "bearings_within_10cm": ("", "share of bearings returned by both whose ranges agree within 10 cm"),
+    "bearings_returned": ("", "share of the recording's returned bearings that the twin returns too"),
+}
+#: Shifts of the twin that are tried, each way: s, rad, m.
+SHIFTS = {"time": 1.5, "azimuth": np.radians(18.0), "range": 0.5}
+#: Frames that shifts are tried on, spread over the recording.
+_TRIED = 200
+#: A shift is told if maps correlate so much better with it, at least so well, and in so many frames.
+BETTER, WELL, FEWEST = 0.05, 0.3, 5
+#: s by which stamps of the same frame may differ.
+_SAME = 1e-4
+#: Loops that noise and velocity are told from, at least.
+_LOOPS = 8
+_BATCH = 16
+
+
+@dataclass
+class Comparison:
+    """Figures and what they were made of, frame by frame.
+
+    Attributes:
+        config: radar configuration.
+        frames: numbers in the recording and in the twin.
+        times: stamps since the recording's first frame, s.
+        ranges, azimuths: of the range-azimuth maps' cells, m and rad.
+        figures: one value a frame, NaN where there is none, see `FIGURES`.
+        chance: the same figures' medians between frames that have nothing to do with each other: the recording's, and
+            the twin's of half a recording later.
+        profiles: of recording and twin, counts^2.
+        noise: noise floors of recording and twin, counts^2.
+        velocity: of recording, twin, and poses (NaN if unknown), m/s, forward and left.
+        scans: of recording and twin on `BEARINGS`, m, inf where nothing is seen.
+        alignment: mean correlation of range-azimuth maps over shifts of the twin: by what is shifted, the shifts (s,
+            rad, m) and the correlations.
+        frechet: by map, Fréchet's distance of patch statistics: twin from recording, and, for scale, the recording's
+            second half from its first, dB.
+    """
+
+    config: RadarConfig
+    frames: Int[np.ndarray, "frame 2"]
+    times: Float[np.ndarray, "frame"]
+    ranges: Float[np.ndarray, "range"]
+    azimuths: Float[np.ndarray, "azimuth"]
+    figures: dict[str, np.ndarray] = field(default_factory=dict)
+    chance: dict[str, float] = field(default_factory=dict)
+    profiles: np.ndarray | None = None
+    noise: np.ndarray | None = None
+    velocity: np.ndarray | None = None
+    scans: np.ndarray | None = None
+    alignment: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
+    frechet: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    def misfits(self) -> dict[str, tuple[float, float]]:
+        """Shifts with which the maps agree better than without: the shift (s, rad, m) and the gain in correlation.
+
+        Time, heading or distances of the poses are then off, or those of the scene. A best shift at the end of those
+        tried says nothing, nor does one of a few frames.
+        """
+        found = {}
+        if len(self.frames) < FEWEST:
+            return found
+        for name, (shifts, values) in self.alignment.items():
+            best, here = int(np.argmax(values)), values[np.argmin(np.abs(shifts))]
+            if values[best] > max(here + BETTER, WELL) and 0 < best < len(values) - 1:
+                found[name] = (float(shifts[best]), float(values[best] - here))
+        return found
+
+    @property
+    def noise_counts(self) -> Float[np.ndarray, "2"]:
+        """Noise of recording and twin, counts; NaN where it cannot be told."""
+        known = self.noise[np.isfinite(self.noise).all(axis=1)]
+        return np.sqrt(np.median(known, axis=0)) if len(known) else np.full(2, np.nan)
+
+    def summary(self) -> dict[str, object]:
+        """All figures as plain data; not-a-number is None."""
+        spread = {
+            name: {
+                "median": _plain(np.nanmedian(values)),
+                "p10": _plain(np.nanpercentile(values, 10)),
+                "p90": _plain(np.nanpercentile(values, 90)),
+                "unrelated_frames": _plain(self.chance.get(name, np.nan)),
+            }
+            for name, values in self.figures.items()
+            if np.isfinite(values).any()
+        }
+        return {
+            "frames": len(self.frames),
+            "figures": spread,
+            "noise_counts": dict(zip(("recording", "twin"), map(_plain, self.noise_counts), strict=True)),
+            "frechet_db": {n: {"twin": _plain(a), "own_halves": _plain(b)} for n, (a, b) in self.frechet.items()},
+            "misfits": {n: {"shift": _plain(a), "gain": _plain(b)} for n, (a, b) in self.misfits().items()},
+            "alignment": {n: {"shift": _plain(a), "correlation": _plain(b)} for n, (a, b) in self.alignment.items()},
+            "per_frame": {
+                "frame": self.frames[:, 0].tolist(),
+                "time": _plain(self.times),
+                **{name: _plain(values) for name, values in self.figures.items()},
+            },
+        }
+
+
+def _plain(value) -> object:
+    if np.ndim(value):
+        return [_plain(item) for item in value]
+    return round(float(value), 5) if np.isfinite(value) else None
+
+
+def compare(real: Path, twin: Path, progress: Callable[[int, int], None] | None = None) -> Comparison:
+    """Compare a recording with its twin. Takes some 100 kB of memory a frame.
+
+    Args:
+        real, twin: recordings of the same radar configuration; frames of the same stamp belong together.
+        progress: called with (frames done, frames in all).
+
+    Raises:
+        InputError: unusable recordings, other configurations, or no frame in common.
+    """
+    with Recording(real) as one, Recording(twin) as other:
+        _require_same(one, other)
+        frames = _pairs(one, other)
+        analysis = _Analysis(one.config)
+        parts = []
+        for first in range(0, len(frames), _BATCH):
+            batch = frames[first : first + _BATCH]
+            parts.append([analysis(source, batch[:, k]) for k, source in enumerate((one, other))])
+            if progress:
+                progress(min(first + _BATCH, len(frames)), len(frames))
+        moved = other.read("truth/velocity")[frames[:, 1], :2] if other.has("truth/velocity") else np.nan
+    seen = [{name: np.concatenate([part[k][name] for part in parts]) for name in parts[0][k]} for k in range(2)]
+    start = one.times[0]
+    result = Comparison(one.config, frames, one.times[frames[:, 0]] - start, analysis.ranges, analysis.azimuths)
+    result.figures = _figures(*seen)
+    half = len(frames) // 2
+    if half:
+        later = {name: np.roll(values, -half, axis=0) for name, values in seen[1].items()}
+        result.chance = {n: float(np.nanmedian(v)) for n, v in _figures(seen[0], later).items() if np.isfinite(v).any()}
+    result.profiles = np.stack([part["profile"] for part in seen], axis=1)
+    result.noise = np.stack([part["noise"] for part in seen], axis=1)
+    if "range_azimuth" in seen[0]:
+        result.velocity = np.stack([*(part["velocity"] for part in seen), np.broadcast_to(moved, (len(frames), 2))], 1)
+        for k, name in enumerate(("recording", "twin")):
+            off = np.linalg.norm(result.velocity[:, k] - result.velocity[:, 2], axis=1)
+            result.figures[f"velocity_error_{name}"] = off
+        result.scans = np.stack([part["scan"] for part in seen], axis=1)
+        result.alignment = _alignment(*(part["range_azimuth"] for part in seen), result)
+        result.frechet = {name: _distances(seen[0][name], seen[1][name]) for name in analysis.maps}
+    return result
+
+
+def _require_same(one: Recording, other: Recording) -> None:
+    for name, value in one.config:
+        if getattr(other.config, name) != value:
+            raise InputError(
+                f"{other.path}: {name} is {getattr(other.config, name)}, expected {value} as in {one.path}"
+            )
+
+
+def _pairs(one: Recording, other: Recording) -> Int[np.ndarray, "frame 2"]:
+    """Numbers of frames that have the same stamp, but for those that either has lost as a whole."""
+    if not len(one) or not len(other):
+        raise InputError(f"{(other if len(one) else one).path}: has no whole frame, expected at least one")
+    nearest = np.clip(np.searchsorted(other.times, one.times - _SAME), 0, len(other) - 1)
+    same = np.abs(other.times[nearest] - one.times) <= _SAME
+    there = one.valid(0, len(one)).any(axis=(1, 2)) & other.valid(0, len(other)).any(axis=(1, 2))[nearest]
+    if not same.any():
+        raise InputError(f"{other.path}: has no frame with the stamp of a frame of {one.path}, expected its twin")
+    if not (same & there).any():
+        raise InputError(f"{other.path}: all frames that it shares with {one.path} are lost, expected one with samples")
+    return np.column_stack([np.arange(len(one)), nearest])[same & there]
+
+
+class _Analysis:
+    """What is compared of frames: range profile, noise, and, of more than one antenna, maps, velocity and scan."""
+
+    def __init__(self, config: RadarConfig):
+        self.config, self.maker = config, MapMaker(config)
+        self.ranges, self.azimuths = self.maker.heatmaps.ranges, self.maker.heatmaps.azimuths
+        self.maps = self.maker.names if len(self.maker.heatmaps.row) > 1 else ()
+        self._far = self.ranges >= ScanConfig().min_range  # nearer is leakage, the same anywhere
+        self._velocity = DopplerVelocity(self.maker.heatmaps)
+
+    def __call__(self, source: Recording, frames: Int[np.ndarray, "frame"]) -> dict[str, np.ndarray]:
+        adc = np.concatenate([source.adc(k, k + 1) for k in frames])
+        valid = np.concatenate([source.valid(k, k + 1) for k in frames])
+        spectrum = self.maker.heatmaps.spectrum(adc, valid)
+        power = spectrum.abs().square().sum(dim=2).mean(dim=-1).numpy()
+        found = {"profile": power, "noise": self._noise(adc, valid), "far": np.broadcast_to(self._far, power.shape)}
+        if not self.maps:
+            return found
+        for name, made in self.maker.of(spectrum, self.maps).items():
+            rows = self._far if not name.startswith("doppler") else slice(None)
+            found[name] = foreground(made.astype(np.float32)[:, rows]).astype(np.float16)
+        found["velocity"] = self._velocities(spectrum)
+        sharp = self.maker.heatmaps.range_azimuth_of(spectrum, "capon").numpy()
+        found["scan"] = make_scans(sharp, self.ranges, self.azimuths, method="first-echo")
+        return found
+
+    def _noise(self, adc: np.ndarray, valid: np.ndarray) -> Float[np.ndarray, "frame"]:
+        """Noise floors, counts^2; NaN of frames with lost chirps, or of too few to tell."""
+        signal = adc.astype(np.float32).view(np.complex64)[..., 0]
+        whole = valid.all(axis=(1, 2)) & (self.config.loops >= _LOOPS)
+        return np.array(
+            [noise_floor(noise_profile(s[None])) if w else np.nan for s, w in zip(signal, whole, strict=True)]
+        )
+
+    def _velocities(self, spectrum: torch.Tensor) -> Float[np.ndarray, "frame 2"]:
+        if self.config.loops < _LOOPS:
+            return np.full((len(spectrum), 2), np.nan)
+        found = self._velocity.estimate(spectrum)
+        return np.where(found.inliers[:, None] > 0, found.velocity, np.nan)
+
+
+def _figures(real: dict[str, np.ndarray], twin: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Figures of pairs of frames by name."""
+    far = real["far"][0]
+    level = [10 * np.log10(np.maximum(part["profile"][:, far], 1e-9)) for part in (real, twin)]
+    apart = level[1] - level[0]
+    # Echoes: 10 dB above what most bins hold.
+    heard = level[0] > np.quantile(level[0], 0.25, axis=1, keepdims=True) + 10
+    gain = np.array([np.median(row[h]) if h.any() else np.median(row) for row, h in zip(apart, heard, strict=True)])
+    found = {
+        "profile_correlation": correlation(level[0], level[1]),
+        "profile_rms": np.sqrt(np.mean((apart - gain[:, None]) ** 2, axis=1)),
+        "gain": gain,
+        "noise": 10 * np.log10(twin["noise"] / real["noise"]),
+    }
+    for name in (n for n in real if n in MapMaker.maps):
+        found[f"correlation_{name}"] = correlation(real[name], twin[name])
+        found[f"similarity_{name}"] = similarity(real[name], twin[name])
+    if "scan" in real:
+        found["velocity"] = np.linalg.norm(twin["velocity"] - real["velocity"], axis=1)
+        one, other = np.isfinite(real["scan"]), np.isfinite(twin["scan"])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            near = np.abs(np.where(one & other, twin["scan"], 0) - np.where(one & other, real["scan"], 0)) <= 0.10
+            found["bearings_within_10cm"] = (near & one & other).sum(axis=1) / (one & other).sum(axis=1)
+            found["bearings_returned"] = (one & other).sum(axis=1) / one.sum(axis=1)
+    return found
+
+
+def _alignment(real: np.ndarray, twin: np.ndarray, result: Comparison) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+    """Mean correlations over shifts of the twin's range-azimuth maps."""
+    tried = np.unique(np.linspace(0, len(real) - 1, _TRIED).astype(int))
+    period = float(np.median(np.diff(result.times))) if len(result.times) > 1 else np.inf
+    found = {}
+    for name, step in (
+        ("time", period),
+        ("azimuth", float(result.azimuths[1] - result.azimuths[0])),
+        ("range", float(result.ranges[1] - result.ranges[0])),
+    ):
+        most = min(int(SHIFTS[name] / step), real.shape[("time", "range", "azimuth").index(name)] // 2)
+        if not most:
+            continue
+        shifts, values = np.arange(-most, most + 1), []
+        for shift in shifts:
+            if name == "time":
+                both = tried[(tried - shift >= 0) & (tried - shift < len(real))]
+                pair = real[both], twin[both - shift]
+            else:
+                pair = _overlap(real[tried], twin[tried], int(shift), 2 if name == "azimuth" else 1)
+            values.append(_mean(correlation(*pair)))
+        found[name] = (shifts * step, np.array(values))
+    return found
+
+
+def _overlap(real: np.ndarray, twin: np.ndarray, shift: int, axis: int) -> tuple[np.ndarray, np.ndarray]:
+    """What the two have in common once the twin is shifted upward along an axis."""
+    length = real.shape[axis]
+    kept = np.arange(max(shift, 0), length + min(shift, 0))
+    return real.take(kept, axis), twin.take(kept - shift, axis)
+
+
+def _mean(values: np.ndarray) -> float:
+    known = values[np.isfinite(values)]
+    return float(known.mean()) if len(known) else 0.0
+
+
+def _distances(real: np.ndarray, twin: np.ndarray) -> tuple[float, float]:
+    one, other = patch_statistics(real), patch_statistics(twin)
+    half = len(one) // 2
+    own = frechet_distance(np.concatenate(one[:half]), np.concatenate(one[half:])) if half else np.nan
+    return frechet_distance(np.concatenate(one), np.concatenate(other)), own

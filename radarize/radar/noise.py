@@ -1,0 +1,24 @@
+"""Noise of the receivers, told from a recording's own samples."""
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.signal import windows
+
+
+def noise_profile(signal: Complex[np.ndarray, "frame loop tx rx sample"]) -> Float[np.ndarray, "sample"]:
+    """Noise power per sample that each range bin speaks of, counts^2: of white noise, its power in every bin.
+
+    The median over fast Doppler bins: a few movers do not lift it, and of exponential noise it is ln 2 of the mean.
+    """
+    loops, n = signal.shape[1], signal.shape[-1]
+    slow, fast = windows.hann(loops, sym=False), windows.hann(n, sym=False)
+    cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
+    cube = cube[:, loops // 4 : loops - loops // 4 + 1]
+    power = np.abs(cube) ** 2 / (np.sum(slow**2) * np.sum(fast**2))
+    return np.median(power.reshape(-1, n), axis=0) / np.log(2)
+
+
+def noise_floor(profile: Float[np.ndarray, "sample"]) -> float:
+    """Noise power of a sample, counts^2: the profile's level where neither leakage nor the band's edge bend it."""
+    n = len(profile)
+    return float(np.median(profile[n // 10 : 8 * n // 10]))

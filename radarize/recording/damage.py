@@ -1,0 +1,52 @@
+"""What damaged and hostile files come to: whatever HDF5 raises on the way, and data sets that declare more than is
+there."""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+
+from radarize.errors import InputError, reason
+
+#: Packed best, deflate makes 1032 bytes of one (zlib's technical details); a chunk takes that many bytes at least.
+_DEFLATE, _PACKED_CHUNK = 1032, 16
+#: Bytes and chunks that a data set may declare before they are on disk: frames of a growing file that are not flushed
+#: yet. HDF5 itself takes some 3 kB for each chunk that it reads at once.
+_BYTES_AHEAD, _CHUNKS_AHEAD = 64 << 20, 8192
+
+
+@contextmanager
+def reading(message: str) -> Iterator[None]:
+    """Turn whatever comes of reading a file into an InputError of `message` and the reason."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # h5py raises whatever HDF5 meets in a damaged file
+        raise InputError(f"{message} ({reason(error)})") from error
+
+
+def dataset(group: h5py.Group, name: str, path: Path) -> h5py.Dataset:
+    """A data set of numbers that is no larger than what lies in the file can be.
+
+    Raises:
+        InputError: it is not.
+        KeyError: there is none of that name.
+    """
+    data = group[name]
+    where = f"{path}: {group.name.rstrip('/')}/{name}"
+    if not isinstance(data, h5py.Dataset) or data.shape is None:
+        raise InputError(f"{where} is no data set, expected one")
+    if data.dtype.kind not in "biufc":
+        raise InputError(f"{where} holds {str(data.dtype)[:40]}, expected numbers")
+    chunks = data.chunks or data.shape
+    declared = data.dtype.itemsize * max(math.prod(data.shape), math.prod(chunks))
+    count = math.prod(-(-rows // length) for rows, length in zip(data.shape, chunks, strict=True) if length)
+    stored = data.id.get_storage_size()
+    if declared > _DEFLATE * stored + _BYTES_AHEAD or count > stored // _PACKED_CHUNK + _CHUNKS_AHEAD:
+        raise InputError(
+            f"{where} declares {declared} bytes in {count} chunks (shape {data.shape}), but {stored} are in the file"
+        )
+    return data

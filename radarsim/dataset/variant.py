@@ -1,0 +1,67 @@
+"""What differs between recordings that have everything else in common: scatterers, noise and the walk included."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from radarize.radar.cfg import load_config
+from radarize.radar.config import RadarConfig
+from radarsim.motion import Mounting
+from radarsim.physics.frontend_config import FrontEndConfig
+
+Attributes = dict[str, str | float | int | bool]
+
+
+class Strict(BaseModel):
+    """What a specification is made of: no unknown keys, no changes."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Variant(Strict):
+    """Changes against what the specification says.
+
+    Attributes:
+        level: of a scene that has levels (`radarsim.scene.description`); the walk is planned in its level 0.
+        radar: fields of `RadarConfig` to change.
+        frontend: fields of `FrontEndConfig` to change.
+        mounting: of the sensor on the platform: x y z in m, roll pitch yaw in degrees.
+        attributes: of the recordings.
+    """
+
+    level: int = Field(0, ge=0)
+    radar: dict[str, object] = {}
+    frontend: dict[str, object] = {}
+    mounting: Annotated[tuple[float, ...], Field(min_length=6, max_length=6)] | None = None
+    attributes: Attributes = {}
+
+    @field_validator("radar")
+    @classmethod
+    def _known(cls, fields: dict) -> dict:
+        if unknown := fields.keys() - RadarConfig.model_fields:
+            raise ValueError(f"{min(unknown)}: unknown key, expected some of {', '.join(RadarConfig.model_fields)}")
+        return fields
+
+    def radar_of(self, name: str) -> str | RadarConfig:
+        """The radar of that name (preset or file) with the changes; the name itself where there are none.
+
+        Raises:
+            InputError: no such preset or file, or an impossible value.
+        """
+        if not self.radar:
+            return name
+        return RadarConfig.build("radar", **load_config(name)[0].model_dump() | self.radar)
+
+    def frontend_of(self, file: str | None) -> FrontEndConfig:
+        """The front end of that file, by default an IWR1843BOOST's, with the changes.
+
+        Raises:
+            InputError: unreadable file, or an unknown or impossible value.
+        """
+        settings = FrontEndConfig.load(file) if file else FrontEndConfig()
+        return FrontEndConfig.build("frontend", settings.model_dump() | self.frontend)
+
+    @property
+    def mounted(self) -> Mounting | None:
+        """The sensor's mounting; None: the platform's own."""
+        return self.mounting and Mounting.of(self.mounting[:3], self.mounting[3:])

@@ -1,0 +1,103 @@
+"""What wrong returns come from, by a recording that knows; missed surfaces; curves."""
+
+import h5py
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+from fake_run import write_run
+
+from radarize.evaluation.runfiles import read_scans
+from radarize.evaluation.scans import true_ranges
+from radarize.evaluation.stress import FIGURES, SOURCES, curves, figures, missed
+from radarize.radar.presets import PRESETS
+from radarize.recording import Product, RecordingWriter, Stream
+
+CONFIG = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
+LABELS = ("direct", "floor_ceiling", "ghost_1", "ghost_2", "ghost_3", "through_slab", "moving", "leakage")
+BEARINGS = np.radians(np.arange(-44.0, 44.0))
+
+
+def test_a_surface_is_missed_where_nothing_stands_for_it():
+    true = np.array([[2.0, 2.0, 2.0, 2.0, 2.0, np.inf]])
+    #                     at it  before  ghost  none   zero  none there
+    measured = np.array([[2.09, 1.0, 2.5, np.inf, 0.0, 3.0]])
+    assert missed(measured, true) == pytest.approx(3 / 5)
+    assert np.isnan(missed(measured, np.full((1, 6), np.inf)))
+
+
+def record(path, times, cause, labels=LABELS):
+    """A recording with every frame of which one whole bearing has one cause."""
+    streams = {"truth/cause": Stream(cause.shape[1:], "u1", "", "strongest cause", labels=labels)}
+    axes = {"ranges": 0.0446 * np.arange(cause.shape[1]), "azimuths": BEARINGS}
+    products = {f"truth/cause_{name}": Product(axis, "", "") for name, axis in axes.items()}
+    with RecordingWriter(path, CONFIG, streams=streams, products=products) as writer:
+        rows = {"truth/cause": cause}
+        writer.append(np.zeros((len(times), *CONFIG.frame_shape), np.int16), times, rows=rows)
+    return path
+
+
+def test_figures_of_a_run(tmp_path):
+    """Causes are given frame by frame, and some frames are not in the run: figures must find the right ones."""
+    run = write_run(tmp_path / "run")
+    with h5py.File(run / "scans.h5", "r+") as file:
+        file["ranges"][::3] = file["ranges"][::3] + 0.3
+    scans = read_scans(run / "scans.h5")
+    # Every second frame of the recording is in the run, whose instants are in the middle of the bursts.
+    times = np.repeat(scans["time"], 2) - 0.01
+    times[1::2] += 1 / 30
+    rng = np.random.default_rng(0)
+    causes = rng.integers(0, len(LABELS) + 1, (len(scans["time"]), 1, len(BEARINGS)))
+    cause = np.full((len(times), 96, len(BEARINGS)), LABELS.index("leakage"), np.uint8)
+    cause[::2] = np.where(causes == len(LABELS), 255, causes)
+    found = figures(run, record(tmp_path / "a.h5", times, cause))
+    assert set(found) == set(FIGURES)
+    true = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
+    returned = np.isfinite(scans["ranges"])
+    wrong = returned & ~(np.abs(np.where(returned, scans["ranges"], 0) - true) <= 0.1)
+    assert 0.3 < wrong.sum() / returned.sum() < 0.4
+    for name, labels in SOURCES.items():
+        numbers = [LABELS.index(label) if label in LABELS else len(LABELS) for label in labels]
+        assert found[name] == pytest.approx(np.mean(np.isin(causes[:, 0][returned], numbers) & wrong[returned])), name
+    assert 0.5 < found["missed"] < 0.56  # three in ten bearings are left out, and of the others every third is behind
+    assert found["map_f1"] > 0.9 and 0.05 < found["odometry"] < 0.5 and found["slam"] < found["odometry"]
+
+
+def test_figures_of_a_recording_that_knows_no_causes(tmp_path):
+    run = write_run(tmp_path / "run")
+    times = read_scans(run / "scans.h5")["time"] - 0.01
+    path = record(tmp_path / "a.h5", times, np.zeros((len(times), 96, len(BEARINGS)), np.uint8), labels=())
+    found = figures(run, path)
+    assert all(np.isnan(found[name]) for name in SOURCES)
+    assert found["missed"] > 0 and found["map_f1"] > 0.9
+
+
+def test_curves():
+    """A row for each figure, a column for each place, a line for each method, in the order of severity."""
+    rows = [
+        {"stress": place, "severity": level, "scans": scans, "ghosts": 0.1 * level, "missed": None if level else 0.5}
+        for place in ("corner", "shelves")
+        for level in (2, 0, 1)
+        for scans in ("first-echo", "threshold")
+    ]
+    figure = curves(rows, names=("ghosts", "missed"))
+    axes = np.array(figure.axes).reshape(2, 2)
+    assert [axis.get_title() for axis in axes[0]] == ["corner", "shelves"]
+    lines = axes[0, 1].get_lines()
+    assert [line.get_label() for line in lines] == ["first-echo", "threshold"]
+    np.testing.assert_allclose(lines[0].get_xydata(), [[0, 0], [1, 10], [2, 20]], atol=1e-9)
+    np.testing.assert_allclose(axes[1, 0].get_lines()[1].get_xydata(), [[0, 50]])
+    assert axes[0, 0].get_ylim() == axes[0, 1].get_ylim()
+    plt.close(figure)
+
+
+def test_curves_over_names():
+    """What has no number stands in the order it is given."""
+    rows = [
+        {"ablation": "device", "value": name, "scans": "first-echo", "odometry": error}
+        for name, error in (("IWR6843ISK", 0.2), ("IWR1843BOOST", 0.1))
+    ]
+    figure = curves(rows, over="value", panel="ablation", names=("odometry",))
+    axis = figure.axes[0]
+    assert [label.get_text() for label in axis.get_xticklabels()] == ["IWR6843ISK", "IWR1843BOOST"]
+    np.testing.assert_allclose(axis.get_lines()[0].get_xydata(), [[0, 0.2], [1, 0.1]])
+    plt.close(figure)

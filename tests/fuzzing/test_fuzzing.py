@@ -1,0 +1,30 @@
+"""Each reader of foreign bytes on damaged and hostile input; `benchmarks/fuzzing.py` is the long run of the same."""
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+
+from tests.fuzzing.readers import READERS, attempt, clear
+
+#: Inputs by reader, as far as they fit into a few seconds in all.
+EXAMPLES = {name: 60 if name.startswith("ROS") else 150 for name in READERS}
+
+
+@pytest.mark.filterwarnings("ignore")  # numpy and scipy about numbers that make no sense
+@pytest.mark.parametrize("name", READERS)
+def test_every_input_ends_in_a_result_or_in_one_sentence(name, tmp_path):
+    reader = READERS[name]()
+
+    @settings(
+        max_examples=EXAMPLES[name],
+        deadline=None,
+        database=None,
+        derandomize=True,
+        phases=(Phase.generate, Phase.shrink),
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(reader.inputs)
+    def try_one(data):
+        clear(tmp_path)  # of what an input that failed has left
+        attempt(reader, data, tmp_path)
+
+    try_one()

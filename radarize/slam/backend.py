@@ -235,7 +235,7 @@ class Slam:
         """Begin to search a node in the submaps near it, and take in what was found for earlier ones."""
         c = self.config.loop
         if number % c.every == 0:
-            self._search.ask(self._questions(number, c.candidates, c.min_score, self._jury.spread))
+            self._search.ask(self._questions(number, c.candidates, c.min_score, self._drift.between))
         if self._hear(number - c.lag) or number % c.update_every == 0:
             self.graph.update()
 

@@ -24,7 +24,6 @@ from radarize.slam.posegraph import PoseGraph
 from radarize.slam.submap import Submap
 
 _PYRAMIDS = 12  # kept of the submaps searched last
-_TIES = 100  # believed closures, the latest, that say how far an estimate may be off
 _WORKERS = 2
 
 
@@ -137,20 +136,6 @@ class Jury:
         self.graph, self.drift, self.config = graph, drift, config
         self._limit = float(chi2.ppf(config.inlier_probability, 3))
         self._doubtful: deque[tuple[int, Closure]] = deque(maxlen=4 * config.support)
-        self._believed: deque[Closure] = deque(maxlen=_TIES)
-
-    def spread(self, anchor: int, node: int) -> Float[np.ndarray, "3 3"]:
-        """How far the estimate of a node, seen from an earlier one, may be off: what odometry may have drifted between
-        them, or on the way over the believed closure that makes it shortest. Covariance in the frame of the node."""
-        length = self.drift.length
-        best, direct = None, length(anchor, node)
-        for closure in self._believed:
-            way = length(closure.anchor, anchor) + length(closure.node, node)
-            if way < direct:
-                best, direct = closure, way
-        if best is None:
-            return self.drift.between(anchor, node)
-        return self.drift.between(best.anchor, anchor) + best.covariance + self.drift.between(best.node, node)
 
     def hear(self, closure: Closure) -> bool:
         """Enter a closure into the graph; True if poses should move for it now."""
@@ -159,21 +144,17 @@ class Jury:
         poses = self.graph.poses
         error = between(between(poses[closure.anchor], poses[closure.node]), closure.pose)
         if self._fits(error, closure.covariance):
-            self._believe(number, closure)
+            self.graph.believe(number)
             return False
         if not self._fits(error, closure.covariance + self.drift.between(closure.anchor, closure.node)):
             return False
-        agreeing = [(n, other) for n, other in self._doubtful if self._agree(other, closure)]
+        agreeing = [n for n, other in self._doubtful if self._agree(other, closure)]
         self._doubtful.append((number, closure))
         if len(agreeing) + 1 < self.config.support:
             return False
-        for doubt in (*agreeing, (number, closure)):
-            self._believe(*doubt)
+        for n in (*agreeing, number):
+            self.graph.believe(n)
         return True
-
-    def _believe(self, number: int, closure: Closure) -> None:
-        self.graph.believe(number)
-        self._believed.append(closure)
 
     def _agree(self, first: Closure, second: Closure) -> bool:
         if first.node == second.node and first.anchor == second.anchor:

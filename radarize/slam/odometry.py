@@ -113,10 +113,6 @@ class Drift:
         self._sums.append((self._sums[-1] if self._sums else 0) + carry @ covariance @ carry.T)
         self._lengths.append((self._lengths[-1] if self._lengths else 0.0) + length)
 
-    def length(self, first: int, second: int) -> float:
-        """Length of the way between two nodes, m."""
-        return abs(self._lengths[second] - self._lengths[first])
-
     def between(self, first: int, second: int) -> Float[np.ndarray, "3 3"]:
         """Covariance of the motion between two nodes, in the frame of the later one."""
         low, high = min(first, second), max(first, second)

@@ -65,6 +65,8 @@ class Slam:
         self._building: list[Submap] = []
         self._centers: list[np.ndarray] = []  # of finished submaps, as seen from their anchors
 
+    STEP = int(__import__("os").environ.get("STEP","1"))
+
     def add_odometry(
         self, time: float, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"] | None = None
     ) -> None:
@@ -253,7 +255,7 @@ class Slam:
             carry = adjoint(between(self.graph.poses[number], self.graph.poses[anchor]))
             return near + unknown[number] + carry @ unknown[anchor] @ carry.T
 
-        for number in range(len(self.nodes)):
+        for number in range(0, len(self.nodes), self.STEP):
             questions = self._questions(number, 2 * c.candidates, c.final_score, spread)
             self._search.ask([q for q in questions if (q.submap.anchor, number) not in done])
             self._hear(number - _AHEAD)  # what waits takes memory
@@ -274,16 +276,14 @@ class Slam:
             return []
         last = np.array([submap.nodes[-1] for submap in self.submaps[:ready]])
         anchors = np.array([submap.anchor for submap in self.submaps[:ready]])
-        centers = compose(poses[anchors], np.pad(np.array(self._centers), ((0, 0), (0, 1))))[:, :2]
-        away = np.hypot(*(centers - poses[number, :2]).T)
-        near = np.flatnonzero((away <= self.config.loop.radius) & ((last < first) | (anchors > number)))
-        if not len(near):
-            return []
         members = range(first, number + 1)
         points, fronts = (
             thin(np.concatenate([transform(between(poses[number], poses[k]), part[k]) for k in members]), spacing)
             for part in ({k: self.nodes[k].points for k in members}, {k: self.nodes[k].fronts for k in members})
         )
+        centers = compose(poses[anchors], np.pad(np.array(self._centers), ((0, 0), (0, 1))))[:, :2]
+        away = np.hypot(*(centers - transform(poses[number], points.mean(axis=0))).T)
+        near = np.flatnonzero((away <= self.config.loop.radius) & ((last < first) | (anchors > number)))
         return [
             Question(
                 self.submaps[k],

@@ -65,8 +65,6 @@ class Slam:
         self._building: list[Submap] = []
         self._centers: list[np.ndarray] = []  # of finished submaps, as seen from their anchors
 
-    STEP = int(__import__("os").environ.get("STEP","1"))
-
     def add_odometry(
         self, time: float, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"] | None = None
     ) -> None:
@@ -255,7 +253,7 @@ class Slam:
             carry = adjoint(between(self.graph.poses[number], self.graph.poses[anchor]))
             return near + unknown[number] + carry @ unknown[anchor] @ carry.T
 
-        for number in range(0, len(self.nodes), self.STEP):
+        for number in range(0, len(self.nodes), max(c.nodes // 2, 1)):
             questions = self._questions(number, 2 * c.candidates, c.final_score, spread)
             self._search.ask([q for q in questions if (q.submap.anchor, number) not in done])
             self._hear(number - _AHEAD)  # what waits takes memory

@@ -16,7 +16,7 @@ from jaxtyping import Float
 
 from radarize.slam.grid import OccupancyGrid
 
-_STRIDE = 2  # cells between the poses that `scatter` looks at
+_STEPS = 9  # between the middle of the window and its edge, at which `scatter` looks
 _TURN = 0.05  # rad between them, at most
 _BLIND = 1e-2  # least share of a window's information that counts
 
@@ -149,8 +149,10 @@ def scatter(
     Returns:
         for (x, y, yaw) in the scan's frame.
     """
-    half = min(int(np.ceil(distance / pyramid.resolution)), pyramid.half) // _STRIDE * _STRIDE
-    shifts = np.arange(-half, half + 1, _STRIDE)
+    half = min(int(np.ceil(distance / pyramid.resolution)), pyramid.half)
+    stride = max(half // _STEPS, 1)
+    half -= half % stride
+    shifts = np.arange(-half, half + 1, stride)
     turns = np.linspace(-angle, angle, 2 * int(np.ceil(angle / _TURN)) + 1)
     residuals = (1 - np.maximum(2 * np.arange(256) / 255 - 1, 0)) ** 2
     cost = _costs(

@@ -124,7 +124,7 @@ class LoopSearch:
         covariance += scatter(
             pyramid, points, refined.pose, distance=c.distance / 2, angle=c.angle / 2, sigma=c.sigma
         )
-        covariance = covariance * float(__import__("os").environ.get("DEF","1"))
+        covariance *= c.nodes
         return Closure(submap.anchor, question.node, refined.pose, covariance, score)
 
 

@@ -18,7 +18,7 @@ from radarize.slam.grid import OccupancyGrid
 
 _STEPS = 9  # between the middle of the window and its edge, at which `scatter` looks
 _TURN = 0.05  # rad between them, at most
-_BLIND = 1e-2  # least share of a window's information that counts
+_BLIND = 0.1  # least share of a window's information that counts
 
 
 @dataclass(frozen=True)

@@ -185,8 +185,10 @@ class MapRotation:
         self._heading = self._heading + gain * offset
         self._spread = self._spread - np.outer(gain, self._spread[0])
         self._renew(feature, u_z, time, velocity)
-        unseen = 0.0 if believed else s.unseen**2 * dt
-        return self._heading[0] - start, self._spread[0, 0] + unseen, peak
+        # The spread is that of the yaw in the map. Half of it cancels in the sum of steps: the next frame, matched with
+        # the same map, takes it back.
+        spread = self._spread[0, 0]
+        return self._heading[0] - start, spread / 2 if believed else spread + s.unseen**2 * dt, peak
 
     def _peak(self, correlation: np.ndarray) -> tuple[float, float, float, bool]:
         """Yaw offset (rad) of the best match, its variance and height; if it is not believed, the variance is large."""

@@ -121,9 +121,7 @@ class LoopSearch:
         if max(moved[0], moved[1]) > 4 * grid.resolution or moved[2] > 0.1:
             return None  # the peak of the search is no minimum of the refinement: not a place that fits
         covariance = uncertainty(refined, c.translation_floor, c.rotation_floor)
-        covariance += scatter(
-            pyramid, points, refined.pose, distance=c.distance / 2, angle=c.angle / 2, sigma=c.sigma
-        )
+        covariance += scatter(pyramid, points, refined.pose, distance=c.distance / 2, angle=c.angle / 2, sigma=c.sigma)
         covariance *= c.nodes
         return Closure(submap.anchor, question.node, refined.pose, covariance, score)
 

@@ -35,6 +35,7 @@ class PoseGraph:
         self._matches_kept = np.zeros(0, bool)
         self._uncertain: list[gtsam.BetweenFactorPose2] = []
         self._isam: gtsam.ISAM2 | None = None
+        self._factorization = "CHOLESKY"
         self._news = gtsam.NonlinearFactorGraph()  # not in iSAM2 yet
         self._known = 0  # nodes in iSAM2
 
@@ -77,8 +78,15 @@ class PoseGraph:
         """Move poses towards where everything believed agrees, by one step, solving anew only what changed."""
         if self._count < 2:
             return
+        try:
+            self._step()
+        except RuntimeError:  # steps known to 0.1 mm beside ones known to radians are too much for Cholesky, the faster
+            self._isam, self._factorization = None, "QR"
+            self._step()
+
+    def _step(self) -> None:
         if self._isam is None:
-            self._isam, self._known = gtsam.ISAM2(_incremental()), 0
+            self._isam, self._known = gtsam.ISAM2(_incremental(self._factorization)), 0
             self._news = self._graph(self._believed())
         values = gtsam.Values()
         for k in range(self._known, self._count):
@@ -148,9 +156,9 @@ def _levenberg() -> gtsam.LevenbergMarquardtParams:
     return parameters
 
 
-def _incremental() -> gtsam.ISAM2Params:
+def _incremental(factorization: str) -> gtsam.ISAM2Params:
     parameters = gtsam.ISAM2Params()
     parameters.setRelinearizeThreshold(0.02)
     parameters.relinearizeSkip = 1
-    parameters.setFactorization("QR")  # steps known to 0.1 mm beside ones known to radians are too much for Cholesky
+    parameters.setFactorization(factorization)
     return parameters

@@ -269,7 +269,7 @@ def main() -> None:
             "runs in two threads beside it. s, CPU s: the whole log, final optimisation included.",
             "Settings were chosen among about 20 variants by looking at these very logs, their disturbed versions and "
             "radar runs: the undisturbed figures flatter, the disturbed ones show the spread. Where the radar sees "
-            "nothing for seconds (the floor, handheld), a few closures decide, and small changes of anything move much.",
+            "nothing for seconds (the floor, handheld), a few closures decide, and small changes move much.",
             *notes,
         ],
     )

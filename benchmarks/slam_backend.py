@@ -268,8 +268,8 @@ def main() -> None:
             "Per scan: what `add_odometry` and `add_scan` take of the caller, wall and processor time; the loop search "
             "runs in two threads beside it. s, CPU s: the whole log, final optimisation included.",
             "Settings were chosen among about 20 variants by looking at these very logs, their disturbed versions and "
-            "radar runs: the undisturbed figures flatter, the disturbed ones show the spread. Small changes of "
-            "rounding move floor_hand1 between 0.4 and 0.8 of its odometry.",
+            "radar runs: the undisturbed figures flatter, the disturbed ones show the spread. Where the radar sees "
+            "nothing for seconds (the floor, handheld), a few closures decide, and small changes move much.",
             *notes,
         ],
     )

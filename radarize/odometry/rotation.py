@@ -58,7 +58,9 @@ class RotationSettings:
         fan, step: rad, half width and spacing of the yaws tried around the prediction.
         jerk: rad/s, standard deviation of the change of turning rate from frame to frame.
         yaw_noise: rad, standard deviation of a match at full correlation.
-        least_correlation: a match below it is not believed: turning is taken to go on as before.
+        least_correlation: a match below it is not believed: turning is taken to go on as before, or as the prior says.
+        unseen: rad/s^0.5, by how much yaw may wander where no match is believed, beside what the filter or the prior
+            says: what is not seen turning is missed for a second or more, and steps are claimed as independent.
     """
 
     field: float = 0.85
@@ -74,6 +76,7 @@ class RotationSettings:
     jerk: float = np.radians(12.0)
     yaw_noise: float = np.radians(0.3)
     least_correlation: float = 0.15
+    unseen: float = np.radians(20.0)
 
 
 class MapRotation:
@@ -177,24 +180,27 @@ class MapRotation:
 
         yaws = self._heading[0] + self._offsets
         correlation = _correlate(feature, u_z, self._ranges, self._sines, *self._map, *self._position, yaws, s.cell)
-        offset, noise, peak = self._peak(correlation)
+        offset, noise, peak, believed = self._peak(correlation)
         gain = self._spread[:, 0] / (self._spread[0, 0] + noise)
         self._heading = self._heading + gain * offset
         self._spread = self._spread - np.outer(gain, self._spread[0])
         self._renew(feature, u_z, time, velocity)
-        return self._heading[0] - start, self._spread[0, 0], peak
+        # The spread is that of the yaw in the map. Half of it cancels in the sum of steps: the next frame, matched with
+        # the same map, takes it back.
+        spread = self._spread[0, 0]
+        return self._heading[0] - start, spread / 2 if believed else spread + s.unseen**2 * dt, peak
 
-    def _peak(self, correlation: np.ndarray) -> tuple[float, float, float]:
-        """Yaw offset (rad) of the best match, its variance and height; if not believed, the variance is large."""
+    def _peak(self, correlation: np.ndarray) -> tuple[float, float, float, bool]:
+        """Yaw offset (rad) of the best match, its variance and height; if it is not believed, the variance is large."""
         s = self.settings
         best = int(np.argmax(correlation))
         peak = float(correlation[best])
         if not 0 < best < len(correlation) - 1 or peak < s.least_correlation:
-            return 0.0, (2 * s.fan) ** 2, peak
+            return 0.0, (2 * s.fan) ** 2, peak, False
         left, right = correlation[best - 1], correlation[best + 1]
         bend = left - 2 * peak + right
         slip = 0.5 * (left - right) / bend if bend < -1e-9 else 0.0
-        return float(self._offsets[best] + s.step * np.clip(slip, -1, 1)), (s.yaw_noise / peak) ** 2, peak
+        return float(self._offsets[best] + s.step * np.clip(slip, -1, 1)), (s.yaw_noise / peak) ** 2, peak, True
 
     def _renew(self, feature: np.ndarray, u_z: np.ndarray, time: float, velocity: np.ndarray) -> None:
         """Blend the frame into the map at the current pose, keeping the sensor in the map's middle metre."""

@@ -5,13 +5,13 @@ in a local frame that is smooth and drifts, the graph's poses are global and jum
 """
 
 from collections import deque
-from dataclasses import replace
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
-from radarize.pose import adjoint, between, compose, interpolate, inverse, transform
+from radarize.pose import adjoint, between, compose, interpolate, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.grid import OccupancyGrid
@@ -235,10 +235,9 @@ class Slam:
         """Begin to search a node in the submaps near it, and take in what was found for earlier ones."""
         c = self.config.loop
         if number % c.every == 0:
-            self._search.ask(self._questions(number, c.candidates))
-        jumps = self._hear(number - c.lag)
-        if jumps or number % c.update_every == 0:
-            self.graph.update(steps=2 if jumps else 1)
+            self._search.ask(self._questions(number, c.candidates, c.min_score, self._drift.between))
+        if self._hear(number - c.lag) or number % c.update_every == 0:
+            self.graph.update()
 
     def _close_again(self) -> None:
         """With loops closed, nodes and submaps lie where they overlap: match what was not matched.
@@ -249,13 +248,14 @@ class Slam:
         c, done = self.config.loop, set(self.graph.closures)
         near = np.diag([8 * self.config.grid.resolution / 3] * 2 + [0.03]) ** 2
         unknown = self.graph.covariances()
-        for number in range(len(self.nodes)):
-            for question in self._questions(number, 2 * c.candidates):
-                anchor = question.submap.anchor
-                if (anchor, number) not in done:
-                    carry = adjoint(inverse(question.guess))
-                    spread = near + unknown[number] + carry @ unknown[anchor] @ carry.T
-                    self._search.ask([replace(question, spread=spread, min_score=c.final_score)])
+
+        def spread(anchor: int, number: int) -> np.ndarray:
+            carry = adjoint(between(self.graph.poses[number], self.graph.poses[anchor]))
+            return near + unknown[number] + carry @ unknown[anchor] @ carry.T
+
+        for number in range(0, len(self.nodes), max(c.nodes // 2, 1)):
+            questions = self._questions(number, 2 * c.candidates, c.final_score, spread)
+            self._search.ask([q for q in questions if (q.submap.anchor, number) not in done])
             self._hear(number - _AHEAD)  # what waits takes memory
         self._hear()
 
@@ -263,7 +263,9 @@ class Slam:
         """Take in what was found for nodes up to `before`, or for all; True if poses should move for it now."""
         return any([self._jury.hear(closure) for closure in self._search.answers(before)])
 
-    def _questions(self, number: int, count: int) -> list[Question]:
+    def _questions(
+        self, number: int, count: int, min_score: float, spread: Callable[[int, int], np.ndarray]
+    ) -> list[Question]:
         """Searches of a node and those before it in the finished submaps near it, nearest first."""
         spacing = self.config.matcher.spacing
         first = max(number - self.config.loop.nodes + 1, 0)
@@ -272,16 +274,14 @@ class Slam:
             return []
         last = np.array([submap.nodes[-1] for submap in self.submaps[:ready]])
         anchors = np.array([submap.anchor for submap in self.submaps[:ready]])
-        centers = compose(poses[anchors], np.pad(np.array(self._centers), ((0, 0), (0, 1))))[:, :2]
-        away = np.hypot(*(centers - poses[number, :2]).T)
-        near = np.flatnonzero((away <= self.config.loop.radius) & ((last < first) | (anchors > number)))
-        if not len(near):
-            return []
         members = range(first, number + 1)
         points, fronts = (
             thin(np.concatenate([transform(between(poses[number], poses[k]), part[k]) for k in members]), spacing)
             for part in ({k: self.nodes[k].points for k in members}, {k: self.nodes[k].fronts for k in members})
         )
+        centers = compose(poses[anchors], np.pad(np.array(self._centers), ((0, 0), (0, 1))))[:, :2]
+        away = np.hypot(*(centers - transform(poses[number], points.mean(axis=0))).T)
+        near = np.flatnonzero((away <= self.config.loop.radius) & ((last < first) | (anchors > number)))
         return [
             Question(
                 self.submaps[k],
@@ -289,8 +289,8 @@ class Slam:
                 points,
                 fronts,
                 between(poses[anchors[k]], poses[number]),
-                self._drift.between(anchors[k], number),
-                self.config.loop.min_score,
+                spread(anchors[k], number),
+                min_score,
             )
             for k in near[np.argsort(away[near], kind="stable")][:count]
         ]

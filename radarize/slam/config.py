@@ -115,13 +115,15 @@ class LoopConfig(_Section):
         distance, angle: half-widths of the search window, m and rad.
         candidates: at most so many submaps are searched per node, nearest first.
         every: only every so-many-th node is searched for.
-        nodes: points of so many nodes, the latest ones, are searched for together: one view may be too poor.
+        nodes: points of so many nodes, the latest ones, are searched for together: one view may be too poor. At the end
+            such windows overlap by half.
         front: so far in front of its points, m, a node must find the submap free: else a wall fits to any other one,
             a corridor's left to its right. 0: not asked, where every view is rich enough.
         min_score: mean probability at the points that a closure needs, and of being free in front of them.
         final_score: as `min_score`, for the search at the end: the graph then says how far to look, and judges at once.
         levels: halvings of the resolution in the branch-and-bound search.
-        sigma: as `MatcherConfig.sigma`, for closures.
+        sigma: as `MatcherConfig.sigma`, for closures; it also says how well another pose must fit to be as likely
+            (`radarize.slam.correlation.scatter`).
         translation_floor, rotation_floor: no closure is believed better than this, m and rad.
         lag: searches run in the background; what they find is taken in so many nodes later.
         support: closures that contradict the present estimate are believed when so many of them agree.
@@ -215,13 +217,13 @@ PRESETS: dict[str, SlamConfig] = {
             distance=3.0,
             angle=0.5,
             candidates=5,
-            every=2,
+            every=4,
             nodes=8,
             front=0.25,
             min_score=0.4,
             final_score=0.4,
             levels=4,
-            sigma=1.0,
+            sigma=2.0,
             translation_floor=0.05,
             rotation_floor=0.02,
         ),

@@ -16,6 +16,10 @@ from jaxtyping import Float
 
 from radarize.slam.grid import OccupancyGrid
 
+_STEPS = 9  # between the middle of the window and its edge, at which `scatter` looks
+_TURN = 0.05  # rad between them, at most
+_BLIND = 0.1  # least share of a window's information that counts
+
 
 @dataclass(frozen=True)
 class Pyramid:
@@ -117,6 +121,84 @@ def search(
         return None
     shift = np.array([dx, dy]) * pyramid.resolution
     return np.array([guess[0] + shift[0], guess[1] + shift[1], guess[2] + angles[a]]), score
+
+
+def scatter(
+    pyramid: Pyramid,
+    points: Float[np.ndarray, "n 2"],
+    pose: Float[np.ndarray, "3"],
+    *,
+    distance: float,
+    angle: float,
+    sigma: float,
+) -> Float[np.ndarray, "3 3"]:
+    """Covariance of a pose that was found, by how well its points fit elsewhere.
+
+    The curvature at the best pose knows nothing of a second place that fits as well, and takes the roughness of a
+    straight wall for knowledge of where along it one is. So poses of a whole window around it are weighed by their
+    likelihood, and the second moment is taken (Olson, Real-Time Correlative Scan Matching, ICRA 2009). What the
+    window's own size says is taken off again: where all of it fits alike, nothing is known.
+
+    Args:
+        pyramid: of the submap.
+        points: in the scan's frame, m.
+        pose: in the submap's frame.
+        distance, angle: half-widths of the window, m and rad.
+        sigma: standard deviation of the residual of one point, as in `radarize.slam.matcher`.
+
+    Returns:
+        for (x, y, yaw) in the scan's frame.
+    """
+    half = min(int(np.ceil(distance / pyramid.resolution)), pyramid.half)
+    stride = max(half // _STEPS, 1)
+    half -= half % stride
+    shifts = np.arange(-half, half + 1, stride)
+    turns = np.linspace(-angle, angle, 2 * int(np.ceil(angle / _TURN)) + 1)
+    residuals = (1 - np.maximum(2 * np.arange(256) / 255 - 1, 0)) ** 2
+    cost = _costs(
+        pyramid.buffer[: pyramid.rows[0] * pyramid.columns[0]].reshape(pyramid.rows[0], pyramid.columns[0]),
+        np.ascontiguousarray(points, float) / pyramid.resolution,
+        (pose[:2] - pyramid.origin) / pyramid.resolution,
+        pose[2] + turns,
+        shifts,
+        residuals / sigma**2,
+    )
+    weight = np.exp((cost.min() - cost) / 2)
+    away = np.stack(np.meshgrid(turns, shifts, shifts, indexing="ij"), axis=-1)[..., ::-1].reshape(-1, 3)
+    window = np.array([half, half, angle])
+    away = away / window  # -1...1
+    moment = (away * weight.reshape(-1, 1)).T @ away / weight.sum()
+    share, axes = np.linalg.eigh(3 * moment)  # 1: as much as a window without preference
+    spread = axes * (share / np.maximum(1 - share, _BLIND)) @ axes.T / 3
+    size = window * [pyramid.resolution, pyramid.resolution, 1]
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) * size
+    return turn @ spread @ turn.T
+
+
+@numba.njit(cache=True, nogil=True)
+def _costs(grid, points, origin, angles, shifts, residuals):
+    # Sum of the residuals at the points, of every pose of the window; shifts in cells.
+    costs = np.empty((len(angles), len(shifts), len(shifts)))
+    rows, columns = np.empty(len(points), np.int64), np.empty(len(points), np.int64)
+    low, high = shifts[0], shifts[-1]
+    for a in range(len(angles)):
+        cos, sin = np.cos(angles[a]), np.sin(angles[a])
+        n = 0
+        for k in range(len(points)):
+            column = int(np.floor(cos * points[k, 0] - sin * points[k, 1] + origin[0]))
+            row = int(np.floor(sin * points[k, 0] + cos * points[k, 1] + origin[1]))
+            if row + low >= 0 and column + low >= 0 and row + high < grid.shape[0] and column + high < grid.shape[1]:
+                rows[n], columns[n] = row, column
+                n += 1
+        outside = (len(points) - n) * residuals[0]
+        for i in range(len(shifts)):
+            for j in range(len(shifts)):
+                cost = outside
+                for k in range(n):
+                    cost += residuals[grid[rows[k] + shifts[i], columns[k] + shifts[j]]]
+                costs[a, i, j] = cost
+    return costs
 
 
 @numba.njit(cache=True, nogil=True)

@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from radarize.pose import between, compose
 from radarize.slam.config import LoopConfig
-from radarize.slam.correlation import Pyramid, search
+from radarize.slam.correlation import Pyramid, scatter, search
 from radarize.slam.grid import OccupancyGrid
 from radarize.slam.matcher import Match, match
 from radarize.slam.odometry import Drift
@@ -121,6 +121,8 @@ class LoopSearch:
         if max(moved[0], moved[1]) > 4 * grid.resolution or moved[2] > 0.1:
             return None  # the peak of the search is no minimum of the refinement: not a place that fits
         covariance = uncertainty(refined, c.translation_floor, c.rotation_floor)
+        covariance += scatter(pyramid, points, refined.pose, distance=c.distance / 2, angle=c.angle / 2, sigma=c.sigma)
+        covariance *= c.nodes  # they see the same from the same side, and are in other questions too: they count as one
         return Closure(submap.anchor, question.node, refined.pose, covariance, score)
 
 

@@ -35,6 +35,7 @@ class PoseGraph:
         self._matches_kept = np.zeros(0, bool)
         self._uncertain: list[gtsam.BetweenFactorPose2] = []
         self._isam: gtsam.ISAM2 | None = None
+        self._factorization = "CHOLESKY"
         self._news = gtsam.NonlinearFactorGraph()  # not in iSAM2 yet
         self._known = 0  # nodes in iSAM2
 
@@ -73,23 +74,24 @@ class PoseGraph:
             self.accepted[closure] = True
             self._news.add(self._uncertain[closure])
 
-    def update(self, steps: int = 2) -> None:
-        """Move poses to where everything believed agrees, solving anew only what changed.
-
-        Args:
-            steps: of Gauss and Newton; closing a loop is far from linear and wants two.
-        """
+    def update(self) -> None:
+        """Move poses towards where everything believed agrees, by one step, solving anew only what changed."""
         if self._count < 2:
             return
+        try:
+            self._step()
+        except RuntimeError:  # steps known to 0.1 mm beside ones known to radians are too much for Cholesky, the faster
+            self._isam, self._factorization = None, "QR"
+            self._step()
+
+    def _step(self) -> None:
         if self._isam is None:
-            self._isam, self._known = gtsam.ISAM2(_incremental()), 0
+            self._isam, self._known = gtsam.ISAM2(_incremental(self._factorization)), 0
             self._news = self._graph(self._believed())
         values = gtsam.Values()
         for k in range(self._known, self._count):
             values.insert(k, gtsam.Pose2(*self._poses[k]))
         self._isam.update(self._news, values)
-        for _ in range(steps - 1):
-            self._isam.update()
         self._news, self._known = gtsam.NonlinearFactorGraph(), self._count
         self._poses[: self._count] = gtsam.utilities.extractPose2(self._isam.calculateBestEstimate())
 
@@ -154,8 +156,9 @@ def _levenberg() -> gtsam.LevenbergMarquardtParams:
     return parameters
 
 
-def _incremental() -> gtsam.ISAM2Params:
+def _incremental(factorization: str) -> gtsam.ISAM2Params:
     parameters = gtsam.ISAM2Params()
     parameters.setRelinearizeThreshold(0.02)
     parameters.relinearizeSkip = 1
+    parameters.setFactorization(factorization)
     return parameters

@@ -7,7 +7,7 @@ from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.integration import Odometry, VelocityFilter
-from radarize.odometry.rotation import MapRotation
+from radarize.odometry.rotation import MapRotation, Rotations
 from radarize.pose import compose, exponential
 from radarize.radar.presets import PRESETS
 from tests.echoes import record
@@ -150,3 +150,19 @@ def test_filter_rejects_an_outlier_and_follows_a_step():
     found = VelocityFilter().filter(times, measured).velocity
     assert np.abs(found[15] - velocity[14]).max() < 0.3
     np.testing.assert_allclose(found[-1], velocity[-1], atol=0.02)
+
+
+def test_a_turn_that_nothing_is_seen_of_is_claimed():
+    rng, stamps = np.random.default_rng(6), np.arange(31) * CONFIG.frame_period
+
+    def nowhere(t):
+        return np.zeros((*t.shape, 3)), np.zeros(t.shape)
+
+    class Sure:
+        def estimate(self, spectrum, times, velocities):
+            return Rotations(np.zeros(len(times)), np.full(len(times), 1e-8), np.zeros(len(times)))
+
+    adc = record(CONFIG, nowhere, np.array([[2.0, 0.0, 0.0]]), np.zeros(1), stamps, rng, 20.0, block=16)
+    result = Odometry(CONFIG, rotation=MapRotation(Heatmaps(CONFIG), prior=Sure())).push(adc, stamps)
+    # People turn by 20 deg in a second, and more; and it is noise, so some frames match by chance.
+    assert np.sqrt(result.covariance[1:, 2, 2].sum()) > np.radians(15)

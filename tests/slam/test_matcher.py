@@ -7,7 +7,7 @@ import pytest
 
 from radarize.pose import transform, wrap
 from radarize.slam.config import GridConfig
-from radarize.slam.correlation import Pyramid, search
+from radarize.slam.correlation import Pyramid, scatter, search
 from radarize.slam.grid import OccupancyGrid
 from radarize.slam.matcher import interpolate, match, thin
 from tests.slam.world import box, ring, scan
@@ -117,6 +117,38 @@ def test_a_wall_seen_from_its_other_side_is_another_wall():
     fronts = ends * (1 - 0.25 / np.linalg.norm(ends, axis=1))[:, None]
     found = search(pyramid, ends, np.array([0.1, 0.2, 0.02]), fronts=fronts, **window)
     assert found is not None and abs(found[0][1]) < 0.08 and found[1] > 0.7
+
+
+def spread(walls, seen, pose, sigma=1.0):
+    """Scatter of points (n, 2), seen from the pose, in a submap of walls drawn as points (n, 2)."""
+    grid = OccupancyGrid.empty(0.05)
+    for _ in range(4):
+        grid.insert(np.zeros_like(walls), walls, np.ones(len(walls), bool), CONFIG, spread=True)
+    seen = transform(np.array([0, 0, -pose[2]]), seen - pose[:2])
+    return scatter(Pyramid.of(grid, 0, 1.5), seen, pose, distance=1.5, angle=0.25, sigma=sigma)
+
+
+def test_scatter_knows_what_a_wall_does_not_say():
+    along = np.arange(-4, 4, 0.04)
+    wall = np.stack([along, np.full_like(along, 1.02)], axis=-1)
+    part = wall[np.abs(along) < 1.5]
+    corner = np.concatenate([part, part[:, ::-1] + [-2.0, 0]])
+    alone = spread(wall, part, np.array([0, 0, 0.0]))
+    turned = spread(wall, part, np.array([0, 0, np.pi / 2]))
+    assert alone[0, 0] > 1.5**2  # all of the window fits alike along the wall
+    assert alone[1, 1] < 0.05**2 and alone[2, 2] < 0.05**2
+    np.testing.assert_allclose(turned[[0, 1], [0, 1]], alone[[1, 0], [1, 0]], rtol=1e-6)  # in the scan's frame
+    both = spread(np.concatenate([wall, wall[:, ::-1] + [-2.0, 0]]), corner, np.array([0, 0, 0.0]))
+    assert np.sqrt(both[[0, 1, 2], [0, 1, 2]]).max() < 0.05
+
+
+def test_scatter_sees_a_second_place_that_fits_as_well():
+    post = np.stack(np.meshgrid(0.025 + 0.05 * np.arange(5), 1.025 + 0.05 * np.arange(5)), axis=-1).reshape(-1, 2)
+    walls = np.concatenate([post, post + [0.9, 0]])
+    one, two = spread(post, post, np.zeros(3), sigma=0.3), spread(walls, post, np.zeros(3), sigma=0.3)
+    assert one[0, 0] < 0.1**2
+    # Half of the weight lies 0.9 m away, and the moment is taken about the pose that was found.
+    assert 0.55 < np.sqrt(two[0, 0]) < 1.0
 
 
 def test_finished_grids_match_as_others_do():

@@ -94,6 +94,23 @@ def test_covariances_grow_from_the_start_and_shrink_with_loops():
     np.testing.assert_allclose(loose.covariances()[:, 0, 0], 0.01 * np.arange(5), atol=1e-6)
 
 
+def test_steps_known_to_a_tenth_of_a_millimetre_beside_such_that_are_not_known_at_all():
+    rng, graph = np.random.default_rng(2), PoseGraph()
+    graph.add_node(np.zeros(3))
+    for k in range(300):
+        sigma = np.array([1e-4, 1e-4, 1e-4]) if k % 100 < 90 else np.array([3.0, 3.0, 2.0])
+        step = np.array([0.3, 0, 0]) + rng.normal(0, np.minimum(sigma, 0.3))
+        graph.add_node(compose(graph.poses[-1], step))
+        graph.add_motion(k, k + 1, step, np.diag(sigma**2))
+        if k > 40 and k % 4 == 0:
+            loop = between(graph.poses[k - 40], graph.poses[k]) + rng.normal(0, 0.5, 3)
+            graph.add_closure(k - 40, k, loop, np.diag([600.0, 0.01, 15.0]))
+            graph.believe(len(graph.closures) - 1)
+            graph.update()
+    graph.optimise()
+    assert np.isfinite(graph.poses).all() and np.isfinite(graph.covariances()).all()
+
+
 def test_empty_and_single():
     graph = PoseGraph()
     graph.optimise()

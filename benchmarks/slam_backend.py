@@ -21,7 +21,8 @@ RADISH = Path(__file__).parents[2] / "shared" / "recordings" / "radish"
 #: Cartographer on the same files, its best settings: mean ATE in m and rad, and s.
 CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "orebro": (0.149, 0.0138, 19)}
 #: Recordings made where none are given: scene, platform, duration in s, seed.
-RECORDINGS = [("office", "handheld", 110, 11), ("floor", "handheld", 120, 3), ("floor", "cart", 120, 2),
+RECORDINGS = [("office", "handheld", 110, 11), ("office", "cart", 110, 12), ("floor", "handheld", 120, 3),
+              ("floor", "handheld", 120, 4), ("floor", "cart", 120, 2), ("floor", "cart", 120, 5),
               ("corridor", "cart", 60, 3), ("corridor", "handheld", 90, 1)]  # fmt: skip
 #: How rows of the preset that the paper's settings make are marked.
 CLASSIC = "preset cartographer"

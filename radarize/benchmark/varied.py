@@ -104,11 +104,11 @@ def stress_rows(study: Study) -> list[dict[str, object]]:
 
     def of(odometry: str) -> dict[tuple, dict[str, object]]:
         own = [row for row in rows if row["methods"] == f"{odometry}+{row['scans']}"]
-        return {(row["stress"], row["severity"], row["scans"]): row for row in own}
+        return {(row["recording"], row["scans"]): row for row in own}
 
     matching = of(MATCHING)
     rows = [row | {"matching": matching.get(key, {}).get("odometry")} for key, row in of(partner).items()]
-    return [_without(row, "methods") for row in rows]
+    return [_without(row, "methods", "recording") for row in rows]
 
 
 def ablation_tables(study: Study) -> list[Table]:
@@ -118,7 +118,7 @@ def ablation_tables(study: Study) -> list[Table]:
 
 def ablation_rows(study: Study) -> list[dict[str, object]]:
     """Rows of `varied` for every pair."""
-    return [_without(row, "scans") for row in varied(study, ABLATION)]
+    return [_without(row, "scans", "recording") for row in varied(study, ABLATION)]
 
 
 def varied(study: Study, panels: Panels) -> list[dict[str, object]]:
@@ -129,8 +129,8 @@ def varied(study: Study, panels: Panels) -> list[dict[str, object]]:
             about = run.case.attributes
             if panel in about and over in about:
                 figures = {name: at(study.results[run], *path) for name, path in PLACES.items()}
-                label = {panel: str(about[panel]), over: about[over], "scans": pair.scans, "methods": str(pair)}
-                rows.append(label | figures)
+                label = {panel: str(about[panel]), over: about[over], "recording": run.case.name}
+                rows.append(label | {"scans": pair.scans, "methods": str(pair)} | figures)
     return sorted(rows, key=lambda row: (row[panel], str(type(row[over])), row[over]))
 
 

@@ -81,7 +81,7 @@ def curves(
     line: str = "scans",
     names: Sequence[str] = ("ghosts", "missed", "map_f1", "odometry"),
 ):
-    """Figures over what was varied: a row of axes for each figure, a column for each panel.
+    """Figures over what was varied: a row of axes for each figure, a column for each panel, means where rows are alike.
 
     Args:
         rows: of a table; each has `names` and the following.
@@ -101,9 +101,12 @@ def curves(
             here = [row for row in rows if row[panel] == place]
             at = _abscissa([row[over] for row in here])
             for number, label in enumerate(lines):
-                points = {at[row[over]]: row[name] for row in here if row[line] == label and row[name] is not None}
+                points: dict[float, list[float]] = {}
+                for row in here:
+                    if row[line] == label and row[name] is not None:
+                        points.setdefault(at[row[over]], []).append(float(row[name]))
                 x = sorted(points)
-                y = [factor * float(points[k]) for k in x]
+                y = [factor * float(np.mean(points[k])) for k in x]
                 axis.plot(x, y, "o-", ms=3.5, lw=1.4, color=f"C{number}", label=label)
             axis.set_xticks(list(at.values()), [f"{value:.4g}" if isinstance(value, float) else value for value in at])
             axis.grid(alpha=0.25)

@@ -77,12 +77,13 @@ def test_curves():
         for level in (2, 0, 1)
         for scans in ("first-echo", "threshold")
     ]
-    figure = curves(rows, names=("ghosts", "missed"))
+    figure = curves([*rows, rows[0] | {"ghosts": 0.4}], names=("ghosts", "missed"))  # two drives through the corner
     axes = np.array(figure.axes).reshape(2, 2)
     assert [axis.get_title() for axis in axes[0]] == ["corner", "shelves"]
     lines = axes[0, 1].get_lines()
     assert [line.get_label() for line in lines] == ["first-echo", "threshold"]
     np.testing.assert_allclose(lines[0].get_xydata(), [[0, 0], [1, 10], [2, 20]], atol=1e-9)
+    np.testing.assert_allclose(axes[0, 0].get_lines()[0].get_xydata(), [[0, 0], [1, 10], [2, 30]], atol=1e-9)
     np.testing.assert_allclose(axes[1, 0].get_lines()[1].get_xydata(), [[0, 50]])
     assert axes[0, 0].get_ylim() == axes[0, 1].get_ylim()
     plt.close(figure)

@@ -1,6 +1,10 @@
+import signal
 from pathlib import Path
 
 import pytest
+
+# A suite that a script starts in the background ignores Ctrl-C, and so would every program that it starts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture(scope="session")

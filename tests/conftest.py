@@ -14,3 +14,14 @@ def recordings() -> Path:
     if not folder.is_dir():
         pytest.skip(f"the public recordings are not at {folder}")
     return folder
+
+
+@pytest.fixture(scope="module")
+def one_thread():
+    """Torch with one thread, as a worker has: of small matrices more threads wait for each other."""
+    import torch
+
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    yield
+    torch.set_num_threads(before)

@@ -1,11 +1,11 @@
 """A recording by a pair of methods: the run, and its figures; and how long each stage takes."""
 
+import hashlib
 import inspect
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
-from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -126,13 +126,21 @@ class Run(_Step):
 @cache
 def code(*makers: Callable) -> str:
     """What tells this package's sources, and the files that methods of one's own are in, from others."""
-    files = sorted(Path(radarize.__file__).parent.rglob("*.py"))
+    found = _package().copy()
     for maker in makers:
         try:
-            files.append(Path(inspect.getsourcefile(maker.func if isinstance(maker, partial) else maker)))
+            own = inspect.getsourcefile(maker.func if isinstance(maker, partial) else maker)
         except TypeError:  # made in an interpreter
             continue
-    return sha256(b"".join(path.read_bytes() for path in files if path.is_file())).hexdigest()[:16]
+        if own and Path(own).is_file():
+            found.update(Path(own).read_bytes())
+    return found.hexdigest()[:16]
+
+
+@cache
+def _package() -> "hashlib._Hash":
+    """Of this package's sources, read once for all methods."""
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(Path(radarize.__file__).parent.rglob("*.py"))))
 
 
 def figures(run: Path, recording: Path) -> dict[str, object]:

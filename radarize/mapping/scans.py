@@ -34,7 +34,7 @@ class ScanConfig(BaseModel):
             and nearer is clutter above or below the plane, or the skirt of a neighbour. In simulated offices 6 dB
             halves the echoes that come too early and costs one in ten of the others.
         noise_quantile: the noise is this quantile of a frame's cells: most of a room's cells are behind its walls.
-        cfar: what an echo stands above along its bearing, for the method of that name.
+        cfar: what an echo stands above in range and in bearing, for the method of that name.
         elevation_power: how strongly echoes from above and below are weighed down: a cell's power is multiplied with
             (elevation-aware / reference power)^this, at most 1.
     """

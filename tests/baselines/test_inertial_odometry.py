@@ -17,6 +17,8 @@ from radarize.pose import between
 from radarize.recording import Recording
 from radarize.tum import planar
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 FRAMES = 90
 
 
@@ -24,15 +26,6 @@ FRAMES = 90
 def recording(tmp_path_factory):
     with Recording(walk(tmp_path_factory.mktemp("walk") / "a.h5", FRAMES)) as found:
         yield found
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    """Frame by frame, threads only wait for each other."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 @pytest.fixture

@@ -21,6 +21,8 @@ from radarize.training.team import Team
 from radarize.training.train import train
 from radarize.training.trainer import Trainer
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 ROWS, PERIOD = 16, 1 / 15
 GRID = Grid(rows=ROWS, step=0.2, azimuths=80, field=float(AZIMUTHS[-1] - AZIMUTHS[0]), frame_period=PERIOD)
 QUICK = {
@@ -29,14 +31,6 @@ QUICK = {
     "rnin": replace(BASELINE_TASKS["rnin"].defaults, width=4, frames=3, epochs=10, batch=8, rate=3e-3),
 }
 ALONE = Team(0, 1, torch.device("cpu"))
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 def table(kind: str, seed: int, frames: int) -> Table:

@@ -35,7 +35,8 @@ def test_one_echo_is_found_where_it_is(method, bearing):
     assert scan.shape == (88,)
     assert at(scan, bearing) == pytest.approx(2.031, abs=0.004)  # a tenth of a bin
     seen = BEARINGS[np.isfinite(scan)]
-    assert abs(np.degrees(seen.mean()) - bearing) < 2
+    # Near the edge of the field CFAR has neighbours on one side only.
+    assert abs(np.degrees(seen.mean()) - bearing) < (2 if method == "cfar" else 1.5)
     assert np.ptp(np.degrees(seen)) < 30
 
 

@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-import torch
 
 from radarize.errors import InputError
 from radarize.published.heatmaps import BEAMS, BEARINGS, PublishedMaps, area_weights
 from radarize.radar.presets import PRESETS
 from tests.echoes import record
+
+pytestmark = pytest.mark.usefixtures("one_thread")
 
 CONFIG = PRESETS["radarize"]
 DOPPLER, DOPPLER_LEVEL = "published_doppler_azimuth", "published_doppler_elevation_aware"
@@ -28,15 +29,6 @@ def frames(points, velocity=(0.0, 0.0, 0.0), count=1, config=CONFIG, noise=0.0, 
 
     rng = np.random.default_rng(1)
     return record(config, pose, points, np.full(len(points), amplitude), stamps, rng, noise, block=32)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    """Small matrices: more threads wait for each other."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 @pytest.fixture(scope="module")

@@ -21,17 +21,11 @@ from radarize.run import run
 from radarize.training.table import Table
 from radarize.tum import read_tum
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 8})
 PINHOLE = (30.0, 30.0, 29.5, 9.5)
 TURN = 0.02
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 def pictures(frames):

@@ -23,6 +23,8 @@ from radarize.training.tasks import TASKS
 from radarize.training.team import Team
 from radarize.training.train import train
 
+pytestmark = pytest.mark.usefixtures("one_thread")
+
 ROOT = Path(__file__).parents[2]
 QUICK = {
     "translation": replace(TASKS["translation"].defaults, width=8, frames=1, epochs=10, batch=32, rate=3e-3),
@@ -31,15 +33,6 @@ QUICK = {
 }
 TINY = replace(QUICK["translation"], width=2, epochs=4, batch=32)
 LAWS = {kind: task.truth[0] for kind, task in TASKS.items()}
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _one_thread():
-    """As the processes of a team have."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
 
 
 @pytest.fixture(scope="module")

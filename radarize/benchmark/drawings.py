@@ -8,11 +8,11 @@ import plotly.graph_objects as go
 
 from radarize.benchmark.benchmark import Study
 from radarize.benchmark.runs import Pair, Run
-from radarize.evaluation.drawings import canvas
 from radarize.evaluation.evaluate import TRAJECTORIES
-from radarize.evaluation.page import COLORS, INK, Page
 from radarize.evaluation.runfiles import read_map, read_scans
 from radarize.evaluation.trajectory import alignment, load, matched, moved, planar
+from radarize.report.drawings import canvas
+from radarize.report.page import COLORS, INK, Page
 
 #: Recordings whose maps are shown, and poses of a trajectory that are drawn.
 _MAPS, _POSES = 4, 240

@@ -6,8 +6,8 @@ from radarize.benchmark.benchmark import Study
 from radarize.benchmark.results import Results
 from radarize.benchmark.table import cell
 from radarize.errors import InputError
-from radarize.evaluation.page import Page
 from radarize.evaluation.runfiles import read_json
+from radarize.report.page import Page
 
 
 def write_page(study: Study, results: Results, path: Path) -> Path:

@@ -6,13 +6,14 @@ import subprocess
 
 import numpy as np
 import pytest
-from fake_run import write_run
 
 from radarize.errors import InputError
-from radarize.evaluation.drawings import canvas, draw_doppler, draw_fan
-from radarize.evaluation.report import report_recording, report_run
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, RecordingWriter
+from radarize.report.drawings import canvas, draw_doppler, draw_fan
+from radarize.report.recording import report_recording
+from radarize.report.run import report_run
+from tests.evaluation.fake_run import write_run
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 

@@ -18,7 +18,7 @@ from jaxtyping import Float, Shaped, UInt8
 
 from radarize.errors import InputError
 from radarize.evaluation.runfiles import read_map, read_scans
-from radarize.evaluation.trajectory import alignment, load, matched, planar
+from radarize.evaluation.trajectory import fitted, load
 from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
 from radarize.replacing import replacing
@@ -285,7 +285,7 @@ def show_run(screen: Screen, run: Path) -> None:
     screen.fixed("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     for name, path in paths.items():
         if reference is not None:
-            turn, shift = alignment(*matched(path, planar(reference)), in_plane=True)
+            turn, shift = fitted(path, reference)
             # SLAM's plane is the radar's: at the height that it was carried at.
             shift = shift + [0, 0, reference.positions_xyz[:, 2].mean()]
             screen.fixed(f"world/{name}", rr.Transform3D(translation=shift, mat3x3=turn))

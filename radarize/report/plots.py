@@ -29,6 +29,11 @@ def from_above() -> go.Figure:
     return figure
 
 
+def plain(name: str) -> str:
+    """A name that plotly shows as it is."""
+    return escape(name)
+
+
 def line(
     figure: go.Figure,
     points: Float[np.ndarray, "point 2"] | tuple[np.ndarray, np.ndarray],
@@ -43,7 +48,7 @@ def line(
     Lines of the same name in several rows have one entry in the legend. `style` is plotly's.
     """
     x, y = points if isinstance(points, tuple) else points.T[:2]
-    name = escape(name)
+    name = plain(name)
     stroke = {"color": color, "width": width, "dash": style.pop("dash", "solid")}
     style = {"showlegend": all(trace.name != name for trace in figure.data), "mode": "lines", "line": stroke} | style
     # Single precision is enough for a picture, and keeps the page small.

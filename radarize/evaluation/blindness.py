@@ -1,4 +1,4 @@
-"""Where odometry of a run saw nothing, as the run tells itself."""
+"""Where odometry of a run was blind, as the run tells itself."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,7 +12,7 @@ Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 
 class Span(BaseModel):
-    """From when to when, s since the first frame; the way meanwhile, m; why."""
+    """From when to when, s; the way meanwhile, m; why."""
 
     start_s: Amount
     stop_s: Amount
@@ -20,16 +20,21 @@ class Span(BaseModel):
     why: str
 
 
-class Blindness(BaseModel):
-    """The spans together: way, m, and its share of the whole way."""
+class BlindSpans(BaseModel):
+    """All spans, with their way, m, and its share of the whole way."""
 
     share_of_way: Amount
     way_m: Amount
     spans: list[Span]
 
     @classmethod
-    def of(cls, facts: Mapping[str, object], path: Path) -> "Blindness | None":
+    def of(cls, facts: Mapping[str, object], path: Path, start: float) -> "BlindSpans | None":
         """What ``run.json`` says; None where it does not, as runs of old.
+
+        Args:
+            facts: content of the file.
+            path: of the file, for errors.
+            start: stamp that the spans are counted from, s.
 
         Raises:
             InputError: it says something else.
@@ -37,8 +42,11 @@ class Blindness(BaseModel):
         if "blind" not in facts:
             return None
         try:
-            return cls.model_validate(facts["blind"])
+            found = cls.model_validate(facts["blind"])
         except ValidationError as error:
             problem = error.errors()[0]
             field = ".".join(map(str, ("blind", *problem["loc"])))
             raise InputError(f"{path}: {field} is {str(problem['input'])[:60]!r}: {problem['msg'].lower()}") from error
+        for span in found.spans:
+            span.start_s, span.stop_s = span.start_s - start, span.stop_s - start
+        return found

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError
-from radarize.evaluation.blindness import Blindness
+from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.motion import velocity_errors
@@ -70,7 +70,7 @@ def evaluate(
     Returns:
         ``slam`` and ``odometry``: `TrajectoryErrors.summary`. Where the run knows the truth about them, ``map``:
         `map_errors`, ``scans``: `scan_errors`, ``velocity``: `velocity_errors`. Numbers that do not exist are None.
-        Where the run tells it, ``blind``: `Blindness`.
+        Where the run tells it, ``blind``: `BlindSpans` since its first pose.
 
     Raises:
         InputError: not a run, no truth, or nothing that matches.
@@ -95,7 +95,8 @@ def evaluate(
             metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
             if true is not None:
                 metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
-    if blind := Blindness.of(read_json(run / "run.json"), run / "run.json"):
+    start = load(run / TRAJECTORIES["slam"]).timestamps[0]
+    if blind := BlindSpans.of(read_json(run / "run.json"), run / "run.json", start):
         metrics["blind"] = blind.model_dump()
     return without_nan(metrics)
 

@@ -1,62 +1,58 @@
-"""Methods beside each other on the same recordings: trajectories, distributions of errors, maps.
+"""Runs of several methods beside each other: trajectories, distributions of errors, maps.
 
-Methods and recordings are names, and `colors` has one for each method.
+Runs are folders by recording and method; `colors` has one for each method.
 """
 
-from collections.abc import Mapping
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
 
+from radarize.evaluation.evaluate import TRAJECTORIES
+from radarize.evaluation.runfiles import read_map, read_scans
+from radarize.evaluation.trajectory import fitted, load, moved
 from radarize.report.drawings import canvas
 from radarize.report.page import COLORS, INK, Page
 from radarize.report.plots import from_above, line, panels, plain, walls
 
 #: Poses of a trajectory that are drawn, and errors of a distribution.
 _POSES, _ERRORS = 240, 200
-Path = Float[np.ndarray, "pose 2"]
+Runs = Mapping[str, Mapping[str, Path]]
 
 
-def draw_trajectories(page: Page, paths: Mapping[str, Mapping[str, Path]], colors: Mapping[str, str]) -> None:
-    """Trajectories from above, of one recording at a time.
-
-    Args:
-        page: to draw on.
-        paths: by recording and method, in the truth's frame; ``truth`` among the methods is dotted.
-        colors: of methods.
-    """
+def draw_trajectories(page: Page, runs: Runs, colors: Mapping[str, str], which: str) -> None:
+    """Trajectories (of `TRAJECTORIES`) from above, laid upon the truth, of one recording at a time."""
     page.section(
         "Trajectories",
         "From above, each laid upon the truth. The menu chooses a recording; click a name to hide or show a method.",
     )
     figure, owners = from_above(), []
-    for recording, methods in paths.items():
-        for method, path in methods.items():
-            color, dash = (COLORS["good"], "dot") if method == "truth" else (colors[method], "solid")
-            shown = {"visible": recording == next(iter(paths)), "showlegend": True}
-            line(figure, path[_spread(path, _POSES)], method, color, dash=dash, **shown)
+    for recording, folders in runs.items():
+        truth = load(next(iter(folders.values())) / "reference.tum")
+        paths = {method: load(folder / TRAJECTORIES[which]) for method, folder in folders.items()}
+        paths = {method: moved(path, *fitted(path, truth)) for method, path in paths.items()}
+        for method, path in {"truth": truth, **paths}.items():
+            color, dash = (COLORS["good"], "dot") if path is truth else (colors[method], "solid")
+            shown = {"visible": recording == next(iter(runs)), "showlegend": True}
+            some = path.positions_xyz[_spread(len(path.timestamps), _POSES)]
+            line(figure, some, method, color, dash=dash, **shown)
             owners.append(recording)
     buttons = [
         {"label": plain(name), "method": "restyle", "args": [{"visible": [owner == name for owner in owners]}]}
-        for name in paths
+        for name in runs
     ]
     figure.update_layout(updatemenus=[{"buttons": buttons, "x": 1.02, "xanchor": "left", "y": 1, "yanchor": "top"}])
     page.plot(figure, height=640)
 
 
 def draw_errors(
-    page: Page,
-    errors: Mapping[str, Float[np.ndarray, "pose"]],
-    means: Mapping[str, Mapping[str, float]],
-    colors: Mapping[str, str],
+    page: Page, errors: Mapping[str, Mapping[str, tuple[Sequence[float], float]]], colors: Mapping[str, str]
 ) -> None:
     """Share of poses within an error, and errors of recordings.
 
     Args:
         page: to draw on.
-        errors: of position by method, as many of each recording, m.
-        means: mean errors of position by method and recording, m.
+        errors: of position by method and recording, m: quantiles, as many of each recording, and the mean.
         colors: of methods.
     """
     page.section(
@@ -66,11 +62,12 @@ def draw_errors(
     )
     shares = panels("share of poses", x="position error, m")
     boxes = panels("mean position error, m", x="")
-    for method, values in errors.items():
-        some = _spread(values, _ERRORS)
-        line(shares, (np.sort(values)[some], (some + 1) / len(values)), method, colors[method])
-        recordings = {"text": [plain(name) for name in means[method]], "boxpoints": "all"}
-        boxes.add_box(y=[*means[method].values()], name=plain(method), marker={"color": colors[method]}, **recordings)
+    for method, recordings in errors.items():
+        values = np.sort(np.concatenate([quantiles for quantiles, _ in recordings.values()]))
+        some = _spread(len(values), _ERRORS)
+        line(shares, (values[some], (some + 1) / len(values)), method, colors[method])
+        dots = {"text": [plain(name) for name in recordings], "boxpoints": "all", "marker": {"color": colors[method]}}
+        boxes.add_box(y=[mean for _, mean in recordings.values()], name=plain(method), **dots)
     shares.update_xaxes(rangemode="tozero")
     shares.update_yaxes(range=[0, 1])
     page.plot(shares)
@@ -79,43 +76,34 @@ def draw_errors(
     page.plot(boxes)
 
 
-class Floor(NamedTuple):
-    """What is known of a recording's floor, in the truth's frame.
-
-    Attributes:
-        plan: wall segments (x0 y0 x1 y1), m; None if unknown.
-        path: true one, m.
-        cells: occupied ones of the map by method, m.
-    """
-
-    plan: Float[np.ndarray, "segment 4"] | None
-    path: Path
-    cells: Mapping[str, Float[np.ndarray, "cell 2"]]
-
-
-def draw_maps(page: Page, floors: Mapping[str, Floor], colors: Mapping[str, str]) -> None:
+def draw_maps(page: Page, runs: Runs, colors: Mapping[str, str]) -> None:
     """Maps beside the floor plan, a picture for each recording."""
     page.section(
         "Maps", "Floor plan where the simulated recording knows it, and SLAM's maps, all in the truth's frame."
     )
-    for recording, floor in floors.items():
-        titles = ["floor plan", *floor.cells]
-        columns = min(len(titles), 4)
-        figure, axes = canvas(columns, -(-len(titles) // columns), height=3.0)
-        low, high = floor.path.min(axis=0) - 5, floor.path.max(axis=0) + 5
+    for recording, folders in runs.items():
+        first = next(iter(folders.values()))
+        plan, truth = read_scans(first / "scans.h5").get("truth/floor_plan"), load(first / "reference.tum")
+        path = truth.positions_xyz[:, :2]
+        columns = min(1 + len(folders), 4)
+        figure, axes = canvas(columns, -(-(1 + len(folders)) // columns), height=3.0)
+        low, high = path.min(axis=0) - 5, path.max(axis=0) + 5
         for axis in axes.flat:
             axis.set_axis_off()
-        for axis, title in zip(axes.flat, titles, strict=False):
+        for axis, method in zip(axes.flat, [None, *folders], strict=False):
             axis.set(aspect="equal", xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-            axis.set_title(title, parse_math=False)
-            if floor.plan is not None:
-                axis.plot(*walls(floor.plan).T, color=INK, lw=0.8 if axis is axes.flat[0] else 0.4, alpha=0.9)
-            if title in floor.cells:
-                axis.plot(*floor.cells[title].T, ",", color=colors[title])
-        axes.flat[0].plot(*floor.path.T, color=COLORS["good"], lw=1)
+            axis.set_title(method or "floor plan", parse_math=False)
+            if plan is not None:
+                axis.plot(*walls(plan).T, color=INK, lw=0.4 if method else 0.8, alpha=0.9)
+            if method:
+                grid = read_map(folders[method] / "map.yaml")
+                turn, shift = fitted(load(folders[method] / TRAJECTORIES["slam"]), truth)
+                cells = grid.centers(grid.occupied) @ turn[:2, :2].T + shift[:2]
+                axis.plot(*cells.T, ",", color=colors[method])
+        axes.flat[0].plot(*path.T, color=COLORS["good"], lw=1)
         page.picture(figure, recording)
 
 
-def _spread(values: np.ndarray, most: int) -> np.ndarray:
-    """Indices of some values from the first to the last."""
-    return np.linspace(0, len(values) - 1, min(most, len(values))).astype(int)
+def _spread(count: int, most: int) -> np.ndarray:
+    """Indices of some of so many from the first to the last."""
+    return np.linspace(0, count - 1, min(most, count)).astype(int)

@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+import pandas as pd
 
 from radarize.evaluation.stress import FIGURES
 from radarize.report.drawings import canvas
@@ -27,40 +28,28 @@ def curves(
     Returns:
         The matplotlib figure.
     """
-    panels, lines = (list(dict.fromkeys(row[key] for row in rows)) for key in (panel, line))
+    table = pd.DataFrame(rows)
+    panels, lines = table[panel].unique(), table[line].unique()
     figure, axes = canvas(len(panels), len(names), width=2.4 * len(panels) + 1.2, height=2.1)
     for axis_row, name in zip(axes, names, strict=True):
         words, unit, factor = FIGURES[name]
-        for axis, place in zip(axis_row, panels, strict=True):
-            here = [row for row in rows if row[panel] == place]
-            at = _abscissa([row[over] for row in here])
-            for number, label in enumerate(lines):
-                points: dict[float, list[float]] = {}
-                for row in here:
-                    if row[line] == label and row[name] is not None:
-                        points.setdefault(at[row[over]], []).append(float(row[name]))
-                x = sorted(points)
-                y = [factor * float(np.mean(points[k])) for k in x]
-                axis.plot(x, y, "o-", ms=3.5, lw=1.4, color=f"C{number}", label=label)
+        for axis, (place, here) in zip(axis_row, table.groupby(panel, sort=False), strict=True):
+            values = here[over].unique()
+            number = all(isinstance(value, (int, float)) for value in values.tolist())
+            at = {value: float(value) if number else k for k, value in enumerate(values)}
+            for k, label in enumerate(lines):
+                means = here[here[line] == label].groupby(over)[name].mean().dropna().rename(at).sort_index()
+                axis.plot(means.index, factor * means, "o-", ms=3.5, lw=1.4, color=f"C{k}", label=label)
             axis.set_xticks(list(at.values()), [f"{value:.4g}" if isinstance(value, float) else value for value in at])
             axis.grid(alpha=0.25)
             axis.label_outer()
+            if name == names[0]:
+                axis.set_title(place)
         top = max(axis.dataLim.y1 for axis in axis_row)
         for axis in axis_row:
             axis.set_ylim(0, 1.06 * top if np.isfinite(top) and top > 0 else 1)
         axis_row[0].set_ylabel(f"{words},\n{unit}")
-    for axis, place in zip(axes[0], panels, strict=True):
-        axis.set_title(place)
     for axis in axes[-1]:
         axis.set_xlabel(over)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(lines), frameon=False)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(lines), frameon=False)
     return figure
-
-
-def _abscissa(values: Sequence[object]) -> dict[object, float]:
-    """Where values stand: numbers at themselves, names one after the other."""
-    distinct = dict.fromkeys(values)
-    if all(isinstance(value, (int, float)) for value in distinct):
-        return {value: float(value) for value in sorted(distinct)}
-    return {value: float(k) for k, value in enumerate(distinct)}

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError
-from radarize.evaluation.blindness import Blindness
+from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.evaluate import TRAJECTORIES, evaluate, trajectory_errors
 from radarize.evaluation.metrics import TrajectoryErrors
 from radarize.evaluation.runfiles import read_json, read_map, read_scans
@@ -42,7 +42,8 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
         raise InputError(f"{run}: has no trajectory.tum, expected a folder that radarize run wrote")
     errors = trajectory_errors(run) if (run / "reference.tum").is_file() else {}
     metrics = evaluate(run, errors=errors) if errors else {}
-    blind = Blindness.of(facts, run / "run.json")
+    start = load(run / TRAJECTORIES["slam"]).timestamps[0]
+    blind = BlindSpans.of(facts, run / "run.json", start)
 
     page = Page(f"Run {run.resolve().name}", _about(facts, errors))
     if errors:
@@ -58,9 +59,9 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     _plan(page, run, scans, errors, beside)
     spans = blind.spans if blind else []
     if errors:
-        _over_time(page, errors, load(run / TRAJECTORIES["slam"]).timestamps[0], spans)
+        _over_time(page, errors, start, spans)
     if "velocity" in scans:
-        _velocities(page, scans, spans)
+        _velocities(page, scans, start, spans)
     if "heatmaps/frames" in scans:
         _heatmaps(page, scans)
     _settings(page, facts)
@@ -143,7 +144,7 @@ def _over_time(page: Page, errors: dict[str, TrajectoryErrors], start: float, sp
     page.plot(figure, height=440)
 
 
-def _velocities(page: Page, scans: dict, spans: Sequence) -> None:
+def _velocities(page: Page, scans: dict, start: float, spans: Sequence) -> None:
     true, covariance = scans.get("truth/velocity"), scans.get("velocity_covariance")
     page.section(
         "Velocity",
@@ -152,7 +153,7 @@ def _velocities(page: Page, scans: dict, spans: Sequence) -> None:
         + (" Shaded: odometry was blind." if spans else ""),
     )  # fmt: skip
     figure = panels("forward, m/s", "left, m/s")
-    time = scans["time"] - scans["time"][0]
+    time = scans["time"] - start
     for k, estimate in enumerate(scans["velocity"].T[:2]):
         shown = estimate
         if covariance is not None:

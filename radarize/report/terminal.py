@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from radarize.console import print_table
-from radarize.evaluation.blindness import Blindness
+from radarize.evaluation.blindness import BlindSpans
 from radarize.report import words
 
 
@@ -14,7 +14,7 @@ def print_metrics(metrics: Mapping[str, object]) -> None:
     for table in words.parts(metrics):
         print_table(*table)
     if "blind" in metrics:
-        found = Blindness.model_validate(metrics["blind"])
+        found = BlindSpans.model_validate(metrics["blind"])
         print(words.blindness(found))
         if found.spans:
             print_table(*words.blind_spans(found))

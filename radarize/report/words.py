@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from radarize.evaluation.blindness import Blindness
+from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.metrics import at
 
 #: What stands where there is no figure.
@@ -11,92 +11,75 @@ NONE = "-"
 
 
 class Figure(NamedTuple):
-    """A figure that `radarize.evaluation.evaluate` makes.
-
-    Attributes:
-        words: what it is.
-        unit, factor: of what is shown.
-        path: where it stands.
-        form: format of the number.
-        meaning: in a sentence, where words do not say it.
-    """
+    """A figure of `radarize.evaluation.evaluate`: words, where it stands, unit and factor, format, meaning."""
 
     words: str
-    unit: str
-    factor: float
-    path: tuple[str, ...]
+    path: str
+    unit: str = ""
+    factor: float = 1
     form: str = ".3g"
     meaning: str = ""
 
-    def text(self, metrics: Mapping[str, object]) -> str:
+    def text(self, metrics: Mapping[str, object], unit: bool = True) -> str:
         """Value and unit."""
-        value = at(metrics, *self.path)
-        return NONE if value is None else f"{self.factor * value:{self.form}} {self.unit}".strip()
+        value = at(metrics, *self.path.split("."))
+        return NONE if value is None else f"{self.factor * value:{self.form}} {self.unit * unit}".strip()
 
 
 _TRAJECTORY = (
-    Figure("ATE position, mean", "m", 1, ("ate", "position", "mean"), ".3f", "distance to the truth after laying both "
-           "trajectories upon each other"),
-    Figure("ATE position, rmse", "m", 1, ("ate", "position", "rmse"), ".3f"),
-    Figure("ATE position, max", "m", 1, ("ate", "position", "max"), ".3f"),
-    Figure("ATE rotation, mean", "rad", 1, ("ate", "rotation", "mean"), ".3f"),
-    Figure("RE position over a frame, mean", "m", 1, ("re", "frame", "position", "mean"), ".4f",
-           "error of the way from pose to pose, no alignment"),
-    Figure("RE rotation over a frame, mean", "rad", 1, ("re", "frame", "rotation", "mean"), ".4f"),
-    Figure("RE position over a second, mean", "m", 1, ("re", "second", "position", "mean"), ".4f"),
-    Figure("RE rotation over a second, mean", "rad", 1, ("re", "second", "rotation", "mean"), ".4f"),
-    Figure("RE position over a metre, mean", "m", 1, ("re", "metre", "position", "mean"), ".4f"),
-    Figure("RE rotation over a metre, mean", "rad", 1, ("re", "metre", "rotation", "mean"), ".4f"),
-    Figure("mean ATE / distance", "%", 100, ("ate_share",), ".2f"),
-    Figure("end drift / distance", "%", 100, ("drift",), ".2f", "how far the ends are apart if the starts agree"),
-    Figure("distance travelled", "m", 1, ("distance",), ".1f"),
+    Figure("ATE position, mean", "ate.position.mean", "m", 1, ".3f",
+           "distance to the truth after laying both trajectories upon each other"),
+    Figure("ATE position, rmse", "ate.position.rmse", "m", 1, ".3f"),
+    Figure("ATE position, max", "ate.position.max", "m", 1, ".3f"),
+    Figure("ATE rotation, mean", "ate.rotation.mean", "rad", 1, ".3f"),
+    *(Figure(f"RE {what} over a {delta}, mean", f"re.{delta}.{what}.mean", unit, 1, ".4f",
+             "error of the way from pose to pose, no alignment" if (delta, unit) == ("frame", "m") else "")
+      for delta in ("frame", "second", "metre") for what, unit in (("position", "m"), ("rotation", "rad"))),
+    Figure("mean ATE / distance", "ate_share", "%", 100, ".2f"),
+    Figure("end drift / distance", "drift", "%", 100, ".2f", "how far the ends are apart if the starts agree"),
+    Figure("distance travelled", "distance", "m", 1, ".1f"),
 )  # fmt: skip
-_OTHERS = {
+_PARTS = {
     "map": (
-        Figure("occupied cells within 10 cm of a wall (precision)", "%", 100, ("precision",)),
-        Figure("visible wall within 10 cm of an occupied cell (recall)", "%", 100, ("recall",)),
-        Figure("F1", "%", 100, ("f1",)),
-        Figure("Chamfer distance", "m", 1, ("chamfer",)),
-        Figure("free space, intersection over union", "%", 100, ("free_iou",)),
+        Figure("occupied cells within 10 cm of a wall (precision)", "precision", "%", 100),
+        Figure("visible wall within 10 cm of an occupied cell (recall)", "recall", "%", 100),
+        Figure("F1", "f1", "%", 100),
+        Figure("Chamfer distance", "chamfer", "m"),
+        Figure("free space, intersection over union", "free_iou", "%", 100),
     ),
     "scans": (
-        Figure("returned bearings within 10 cm of the truth", "%", 100, ("within_10cm",)),
-        Figure("too near by more", "%", 100, ("short",)),
-        Figure("too far by more", "%", 100, ("beyond",)),
-        Figure("bearings in reach that return anything", "%", 100, ("returned",)),
-        Figure("bearings in reach that carve through a surface", "%", 100, ("through",)),
-        Figure("median range error", "m", 1, ("median",)),
+        Figure("returned bearings within 10 cm of the truth", "within_10cm", "%", 100),
+        Figure("too near by more", "short", "%", 100),
+        Figure("too far by more", "beyond", "%", 100),
+        Figure("bearings in reach that return anything", "returned", "%", 100),
+        Figure("bearings in reach that carve through a surface", "through", "%", 100),
+        Figure("median range error", "median", "m"),
     ),
     "velocity": (
-        Figure("median error", "m/s", 1, ("median",)),
-        Figure("90 % within", "m/s", 1, ("p90",)),
-        Figure("forward, rms", "m/s", 1, ("forward",)),
-        Figure("left, rms", "m/s", 1, ("left",)),
-        Figure("frames without an estimate", "%", 100, ("missing",)),
-        Figure("mean along the motion", "m/s", 1, ("bias",)),
-        Figure("mean squared error over covariance (1 if it is honest)", "", 1, ("nees",)),
-        Figure("its median over that of honest ones", "", 1, ("nees_median",)),
+        Figure("median error", "median", "m/s"),
+        Figure("90 % within", "p90", "m/s"),
+        Figure("forward, rms", "forward", "m/s"),
+        Figure("left, rms", "left", "m/s"),
+        Figure("frames without an estimate", "missing", "%", 100),
+        Figure("mean along the motion", "bias", "m/s"),
+        Figure("mean squared error over covariance (1 if it is honest)", "nees"),
+        Figure("its median over that of honest ones", "nees_median"),
     ),
 }
 #: What methods are compared by.
 _BESIDE = (
-    Figure("velocity RMSE", "m/s", 1, ("velocity", "rmse")),
-    Figure("odometry ATE", "m", 1, ("odometry", "ate", "position", "mean")),
-    Figure("odometry ATE", "rad", 1, ("odometry", "ate", "rotation", "mean")),
-    Figure("SLAM ATE", "m", 1, ("slam", "ate", "position", "mean")),
-    Figure("SLAM ATE", "rad", 1, ("slam", "ate", "rotation", "mean")),
-    Figure("bearings within 10 cm", "%", 100, ("scans", "within_10cm")),
-    Figure("map F1", "%", 100, ("map", "f1")),
+    Figure("velocity RMSE", "velocity.rmse", "m/s"),
+    Figure("odometry ATE", "odometry.ate.position.mean", "m"),
+    Figure("odometry ATE", "odometry.ate.rotation.mean", "rad"),
+    Figure("SLAM ATE", "slam.ate.position.mean", "m"),
+    Figure("SLAM ATE", "slam.ate.rotation.mean", "rad"),
+    Figure("bearings within 10 cm", "scans.within_10cm", "%", 100),
+    Figure("map F1", "map.f1", "%", 100),
 )
 
 
 class Table(NamedTuple):
-    """Words in columns.
-
-    Attributes:
-        head, rows: of as many columns each.
-        numbers: columns that hold figures.
-    """
+    """Words in columns; `numbers` are the columns that hold figures."""
 
     head: Sequence[str]
     rows: list[tuple[str, ...]]
@@ -112,7 +95,7 @@ def trajectories(metrics: Mapping[str, object]) -> Table:
 
 def parts(metrics: Mapping[str, object]) -> Iterator[Table]:
     """Errors of a run's map, scans and velocities, as far as they are known."""
-    for name, figures in _OTHERS.items():
+    for name, figures in _PARTS.items():
         if name in metrics:
             yield Table((name, "value"), [(figure.words, figure.text(metrics[name])) for figure in figures])
 
@@ -120,11 +103,11 @@ def parts(metrics: Mapping[str, object]) -> Iterator[Table]:
 def beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> Table:
     """Runs of one recording beside each other, by what they were made with."""
     head = ("method", *(f"{figure.words}, {figure.unit}" for figure in _BESIDE))
-    rows = [(name, *(figure._replace(unit="").text(metrics) for figure in _BESIDE)) for name, metrics in runs]
+    rows = [(name, *(figure.text(metrics, unit=False) for figure in _BESIDE)) for name, metrics in runs]
     return Table(head, rows, range(1, len(head)))
 
 
-def blindness(found: Blindness) -> str:
+def blindness(found: BlindSpans) -> str:
     """A sentence on how much of the way odometry was blind."""
     if not found.spans:
         return "Odometry was blind nowhere."
@@ -134,7 +117,7 @@ def blindness(found: Blindness) -> str:
     )
 
 
-def blind_spans(found: Blindness) -> Table:
+def blind_spans(found: BlindSpans) -> Table:
     """Where odometry was blind."""
     rows = [(f"{s.start_s:.1f}", f"{s.stop_s:.1f}", f"{s.way_m:.2f}", s.why) for s in found.spans]
     return Table(("blind from, s", "to, s", "way, m", "why"), rows, (0, 1, 2))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
+from radarize.evaluation.blindness import BlindSpans
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, RecordingWriter, Stream
 from radarize.report.drawings import canvas, draw_doppler, draw_fan
@@ -161,6 +162,15 @@ def test_where_odometry_was_blind_is_told_and_shaded(tmp_path):
         for plot in ("plot-2", "plot-3"):  # errors, velocities: both of two rows
             shapes = browser.evaluate(f"document.getElementById('{plot}').layout.shapes.map(s => [s.x0, s.x1])")
             assert sorted(map(tuple, shapes)) == [(3.0, 4.5)] * 2 + [(10.0, 11.0)] * 2
+
+
+def test_blind_spans_are_counted_from_the_first_pose():
+    """The run has stamps of its clock."""
+    clock = 1.7e9
+    spans = [span | {"start_s": span["start_s"] + clock, "stop_s": span["stop_s"] + clock} for span in BLIND["spans"]]
+    found = BlindSpans.of({"blind": BLIND | {"spans": spans}}, Path("run.json"), clock)
+    assert found.model_dump() == BLIND
+    assert BlindSpans.of({}, Path("run.json"), clock) is None
 
 
 def test_blindness_is_told_without_truth_too(tmp_path):

@@ -22,10 +22,10 @@ from radarize.evaluation.drawings import LEAKAGE
 from radarize.evaluation.page import COLORS
 from radarize.evaluation.runfiles import read_map, read_scans
 from radarize.evaluation.trajectory import alignment, load, matched, planar
+from radarize.features.maps import MapMaker, maps_of
 from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
 from radarize.replacing import replacing
-from radarize.training.maps import MapMaker, maps_of
 
 _BATCH = 16
 _MAPS = ("range_azimuth", "doppler_azimuth")

@@ -11,8 +11,7 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Generator, Tensor
 
-from radarize.nets.maps import Maps
-from radarize.training.maps import FLOOR
+from radarize.features.maps import FLOOR, Maps
 
 #: A map's cell averages about as many looks: the spread of noise about its mean.
 _LOOKS = 32

@@ -13,20 +13,19 @@ flash would drown the ridge on which the whole static world lies. Decibels are o
 quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of its size.
 """
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, Float16, Int16
+from jaxtyping import Bool, Complex64, Float, Float16, Int16
+from torch import Tensor
 
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.radar.config import RadarConfig
-from radarize.recording import Product, Recording, RecordingWriter, Stream
+from radarize.recording import Recording
+from radarize.stopwatch import stage
 
 #: Maps by name, with what they are.
 MAPS = {
@@ -35,14 +34,13 @@ MAPS = {
     "doppler_azimuth": "power over closing speed and azimuth",
     "doppler_elevation_aware": "power over closing speed and azimuth near the horizon, of antenna pairs",
 }
+#: Maps as networks take them.
+Maps = Float[Tensor, "item frame map row azimuth"]
 #: Columns, rad, positive to the left, ascending.
 AZIMUTHS = np.radians(np.arange(-59.25, 60.0, 1.5))
 #: dB; what is weaker reads this. An ADC's rounding alone gives about as much.
 FLOOR = -30.0
 STEP = 0.25
-#: Truth as large as samples, which recordings without samples do without.
-_LARGE = ("truth/adc_by_cause",)
-_BATCH = 32
 
 
 @dataclass(frozen=True)
@@ -61,7 +59,7 @@ class Axes:
 
 
 class Maker(Protocol):
-    """Makes the maps that a setting's networks see (see `radarize.settings`), of one radar configuration.
+    """Makes the maps that a method's networks see, of one radar configuration.
 
     Attributes:
         maps: by name, what they are.
@@ -99,8 +97,6 @@ class MapMaker:
 
     Args:
         config: radar configuration.
-        device: torch device for the arithmetic.
-        stage: entered with ``"maps"`` whenever maps are made, to time it.
 
     Attributes:
         names: maps that the array can make; without antennas of two heights, only those of the row.
@@ -109,17 +105,9 @@ class MapMaker:
     maps = MAPS
     history = 0
 
-    def __init__(
-        self,
-        config: RadarConfig,
-        device: str = "cpu",
-        stage: Callable[[str], AbstractContextManager] = nullcontext,
-    ):
-        self._stage = stage
-        self.heatmaps = Heatmaps(config, AZIMUTHS, device=device)
+    def __init__(self, config: RadarConfig):
+        self.heatmaps = Heatmaps(config, AZIMUTHS)
         self.names = tuple(n for n in MAPS if self.heatmaps.pairs is not None or "elevation" not in n)
-        self._spectrum: torch.Tensor | None = None
-        self._made: dict[str, np.ndarray] = {}
 
     @staticmethod
     def stride(config: RadarConfig) -> int:
@@ -157,71 +145,25 @@ class MapMaker:
         """
         return self.of(self.heatmaps.spectrum(adc[frames], None if valid is None else valid[frames]), names)
 
-    def of(self, spectrum: torch.Tensor, names: tuple[str, ...] | None = None) -> dict[str, np.ndarray]:
-        """Maps of a spectrum at hand; those of the last one are remembered, for several networks ask for the same."""
-        if spectrum is not self._spectrum:
-            self._spectrum, self._made = spectrum, {}
-        names = names or self.names
-        wanted = [name for name in names if name not in self._made]
-        with self._stage("maps"):
-            self._made |= self._make(spectrum, wanted)
-        return {name: self._made[name] for name in names}
-
-    def _make(self, spectrum: torch.Tensor, names: list[str]) -> dict[str, np.ndarray]:
-        heatmaps = self.heatmaps
-        limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else None
-        makers = {
-            "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
-            "elevation_aware": lambda: heatmaps.elevation_aware_of(spectrum),
-            "doppler_azimuth": lambda: heatmaps.doppler_azimuth_of(limited, "capon"),
-            "doppler_elevation_aware": lambda: heatmaps.doppler_azimuth_of(limited, elevation_aware=True),
-        }
-        return {name: _decibels(makers[name]()) for name in names}
+    def of(
+        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"], names: tuple[str, ...] | None = None
+    ) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
+        """Maps of a spectrum at hand."""
+        heatmaps, names = self.heatmaps, names or self.names
+        with stage("maps"):
+            limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else None
+            makers = {
+                "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
+                "elevation_aware": lambda: heatmaps.elevation_aware_of(spectrum),
+                "doppler_azimuth": lambda: heatmaps.doppler_azimuth_of(limited, "capon"),
+                "doppler_elevation_aware": lambda: heatmaps.doppler_azimuth_of(limited, elevation_aware=True),
+            }
+            return {name: _decibels(makers[name]()) for name in names}
 
 
 def _decibels(power: torch.Tensor) -> np.ndarray:
     level = 10 * torch.log10(power.clamp_min(10 ** (FLOOR / 10)))
     return (torch.round(level / STEP) * STEP).half().cpu().numpy()
-
-
-def keep_maps(source: Path, output: Path) -> Path:
-    """Turn a recording, simulated or real, into one with maps instead of samples, about a tenth of the size.
-
-    Truth and other streams are kept, except I/Q by cause.
-
-    Raises:
-        InputError: unreadable source, or no space for the output.
-    """
-    with Recording(source) as recording:
-        maker = MapMaker(recording.config)
-        streams = {
-            f"maps/{name}": Stream(maker.shape(name), "f2", "dB re 1 count^2", MAPS[name]) for name in maker.names
-        }
-        products = {"maps/azimuths": Product(AZIMUTHS, "rad", "columns of the maps, positive to the left")}
-        others = [n for n in recording.names() if not n.startswith(("radar/", "maps/")) and n not in _LARGE]
-        for name in others:
-            data, about = recording.file[name], recording.describe(name)
-            if "clock" in data.attrs:
-                clock = str(data.attrs["clock"])
-                streams[name] = Stream(
-                    data.shape[1:], data.dtype.str, about["unit"], about["about"], clock, recording.labels(name)
-                )
-            else:
-                products[name] = Product(data[()], about["unit"], about["about"])
-        own = ("format", "radarize_version")
-        attributes = {name: value for name, value in recording.attributes.items() if name not in own}
-        with RecordingWriter(
-            output, recording.config, cfg_text=recording.cfg_text, attributes=attributes, products=products,
-            streams=streams, raw=False,
-        ) as writer:  # fmt: skip
-            for frames, adc in recording.batches(_BATCH):
-                valid = recording.valid(frames.start, frames.stop)
-                for name in others:
-                    if name in streams:
-                        writer.extend(name, recording.rows(name, frames.start, frames.stop))
-                rows = {f"maps/{name}": made for name, made in maker(adc, valid).items()}
-                writer.append(None, recording.times[frames], valid, rows=rows)
-    return output
 
 
 def maps_of(recording: Recording, start: int, stop: int, names: tuple[str, ...], maker: Maker, stride: int = 1) -> dict:

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -11,32 +13,49 @@ import torch
 from jaxtyping import Float, Int
 from torch import Tensor
 
-from radarize.baselines import inertial, panorama, radarhd
 from radarize.errors import InputError
-from radarize.nets.weights import Grid
-from radarize.published import labels
+from radarize.features.grid import Grid
+from radarize.features.maps import Maker, MapMaker, maps_of
 from radarize.recording import Recording
-from radarize.settings import SETTINGS
-from radarize.training.maps import maps_of
 from radarize.tum import planar
 
-#: What labels are made of, by name: path in the recording, and what is made of some of a recording's frames there.
-TRUTH: dict[str, tuple[str, Callable[[Recording, slice], np.ndarray]]] = {
-    "velocity": ("truth/velocity", lambda r, f: r.read("truth/velocity")[f, :2].astype(np.float32)),
-    "yaw": ("truth/pose", lambda r, f: planar(r.read("truth/pose")[f])[:, 2:].astype(np.float32)),
-    "occupancy": ("truth/occupancy", lambda r, f: r.read("truth/occupancy")[f]),
-    "scan": ("truth/scan", radarhd.bins),
-    "pose": ("truth/pose", lambda r, f: r.read("truth/pose")[f]),
-    "displacement": ("truth/pose", inertial.displacement),
-    "published_velocity": ("truth/pose", labels.velocity),
-    "published_occupancy": ("truth/depth", labels.occupancy),
-}
-#: What networks read of a frame besides maps, by name, likewise.
-SENSED: dict[str, tuple[str, Callable[[Recording, slice], np.ndarray]]] = {
-    "panorama": ("radar/adc", panorama.seen),
-    "imu": ("imu/time", inertial.latest),
-    "levelled": ("imu/time", inertial.levelled),
-}
+
+@dataclass(frozen=True)
+class Reading:
+    """What is read of a recording's frames: labels, or what networks see besides maps.
+
+    Attributes:
+        name: of it.
+        where: data set of the recording that it is made of.
+        of: makes it of some of a recording's frames, a row a frame.
+    """
+
+    name: str
+    where: str
+    of: Callable[[Recording, slice], np.ndarray]
+
+
+def _velocity(recording: Recording, frames: slice) -> np.ndarray:
+    return recording.read("truth/velocity")[frames, :2].astype(np.float32)
+
+
+def _yaw(recording: Recording, frames: slice) -> np.ndarray:
+    return planar(recording.read("truth/pose")[frames])[:, 2:].astype(np.float32)
+
+
+def _pose(recording: Recording, frames: slice) -> np.ndarray:
+    return recording.read("truth/pose")[frames]
+
+
+def _occupancy(recording: Recording, frames: slice) -> np.ndarray:
+    return recording.read("truth/occupancy")[frames]
+
+
+#: Truth that several methods learn from: m/s (forward, left); rad; m and quaternion; cells of `radarize.nets.losses`.
+VELOCITY = Reading("velocity", "truth/velocity", _velocity)
+YAW = Reading("yaw", "truth/pose", _yaw)
+POSE = Reading("pose", "truth/pose", _pose)
+OCCUPANCY = Reading("occupancy", "truth/occupancy", _occupancy)
 _BATCH = 32
 
 
@@ -45,11 +64,11 @@ class Table:
 
     Attributes:
         maps: by name, (frame, row, azimuth) float16, dB.
-        truth: by name, (frame, ...), keys of `TRUTH`.
+        truth: labels by name, (frame, ...).
         lengths: frames of each recording.
         grid: of the maps; None without any.
         frame_period: s.
-        sensed: by name, (frame, ...), keys of `SENSED`.
+        sensed: what else networks see by name, (frame, ...).
     """
 
     def __init__(
@@ -69,27 +88,27 @@ class Table:
         cls,
         paths: Sequence[Path],
         maps: Sequence[str],
-        truth: Sequence[str],
+        truth: Sequence[Reading] = (),
+        sensed: Sequence[Reading] = (),
+        maker: type[Maker] = MapMaker,
         workers: int = 1,
         progress: Callable[..., None] = lambda *where: None,
-        setting: str = "corrected",
-        sensed: Sequence[str] = (),
     ) -> "Table":
         """Read recordings of maps, or make the maps of recordings of samples.
 
         Args:
             paths: recordings of one radar configuration.
-            maps, truth: what to read.
+            maps: names of `maker`'s.
+            truth, sensed: what else to read.
+            maker: of the maps.
             workers: processes that read; more than one pays where maps have to be made.
             progress: called with (stage, recordings done, recordings in all).
-            setting: key of `radarize.settings.SETTINGS`, which says which maps there are.
-            sensed: what else to read.
 
         Raises:
             InputError: a recording lacks something, differs from the others in its maps' grid, has truth that is all
                 unknown, or memory does not suffice.
         """
-        lengths, periods, grids = zip(*(_open(path, maps, setting) for path in paths), strict=True)
+        lengths, periods, grids = zip(*(_open(path, maps, maker) for path in paths), strict=True)
         for path, period, grid in zip(paths, periods, grids, strict=True):
             if grid and (difference := grids[0].difference(grid)):
                 raise InputError(f"{path}: has maps of {difference} as in {paths[0].name}, expected one radar's")
@@ -97,19 +116,19 @@ class Table:
                 raise InputError(
                     f"{path}: has frames every {period:g} s, expected {periods[0]:g} s as in {paths[0].name}"
                 )
-        shapes = _shapes(paths[0], maps, setting)
+        shapes = _shapes(paths[0], maps, maker)
         size = 2 * sum(lengths) * sum(rows * columns for rows, columns in shapes.values())
         if size > (free := psutil.virtual_memory().available):
             raise InputError(
                 f"{paths[0].parent}: its maps take {size / 1e9:.1f} GB, expected at most {free / 1e9:.1f} GB"
             )
         joined = {name: np.empty((sum(lengths), *shape), np.float16) for name, shape in shapes.items()}
-        others: dict[str, list[np.ndarray]] = {name: [] for name in (*truth, *sensed)}
-        arguments = [(path, tuple(maps), tuple(others), setting) for path in paths]
+        others: dict[str, list[np.ndarray]] = {reading.name: [] for reading in (*truth, *sensed)}
+        read = partial(_read, maps=tuple(maps), readings=(*truth, *sensed), kind=maker)
         pool = ProcessPoolExecutor(workers, get_context("spawn")) if workers > 1 and len(paths) > 1 else None
         try:
             first = 0
-            for done, (made, rows) in enumerate((pool.map if pool else map)(_read, arguments)):
+            for done, (made, rows) in enumerate((pool.map if pool else map)(read, paths)):
                 for name in maps:
                     joined[name][first : first + lengths[done]] = made[name]
                 for name in others:
@@ -122,11 +141,11 @@ class Table:
         rows = {name: torch.from_numpy(np.concatenate(values)) for name, values in others.items()}
         return cls(
             {name: torch.from_numpy(values) for name, values in joined.items()},
-            {name: rows[name] for name in truth},
+            {reading.name: rows[reading.name] for reading in truth},
             lengths,
             grids[0],
             periods[0],
-            {name: rows[name] for name in sensed},
+            {reading.name: rows[reading.name] for reading in sensed},
         )
 
     def starts(self, reach: int) -> Int[Tensor, "window"]:
@@ -160,34 +179,32 @@ class Table:
         return torch.stack([values[frames] for values in self.maps.values()], dim=2).float()
 
 
-def _shapes(path: Path, maps: Sequence[str], setting: str) -> dict[str, tuple[int, int]]:
+def _shapes(path: Path, maps: Sequence[str], maker: type[Maker]) -> dict[str, tuple[int, int]]:
     with Recording(path) as recording:
-        axes = {name: SETTINGS[setting].maker.axes(recording.config, name) for name in maps}
+        axes = {name: maker.axes(recording.config, name) for name in maps}
     return {name: (own.rows, len(own.azimuths)) for name, own in axes.items()}
 
 
-def _open(path: Path, maps: Sequence[str], setting: str) -> tuple[int, float, Grid | None]:
+def _open(path: Path, maps: Sequence[str], maker: type[Maker]) -> tuple[int, float, Grid | None]:
     """Frames that networks see, their period, and the grid of their maps, if they see any."""
     with Recording(path) as recording:
-        stride = SETTINGS[setting].maker.stride(recording.config)
-        grid = Grid.of(recording.config, maps[0], setting) if maps else None
+        stride = maker.stride(recording.config)
+        grid = Grid.of(recording.config, maps[0], maker) if maps else None
         return -(-len(recording) // stride), stride * recording.config.frame_period, grid
 
 
-def _read(arguments: tuple[Path, tuple[str, ...], tuple[str, ...], str]) -> tuple[dict, dict]:
+def _read(path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker]) -> tuple[dict, dict]:
     """Maps, and all else, of one recording."""
-    path, maps, others, setting = arguments
     with Recording(path) as recording:
-        maker, count = SETTINGS[setting].maker(recording.config), len(recording)
+        maker, count = kind(recording.config), len(recording)
         stride = maker.stride(recording.config)
         size = _BATCH * stride
         starts = range(0, count if maps else 0, size)
         parts = [maps_of(recording, start, min(start + size, count), maps, maker, stride) for start in starts]
         found, frames = {}, slice(0, count, stride)
-        for name in others:
-            where, of = (TRUTH | SENSED)[name]
-            found[name] = of(recording, frames)
+        for reading in readings:
+            rows = found[reading.name] = reading.of(recording, frames)
             # Some may be unknown: a tracking camera is blind now and then.
-            if len(found[name]) < -(-count // stride) or not np.isfinite(found[name]).any():
-                raise InputError(f"{path}: /{where} lacks values or holds no numbers, expected {count} frames")
+            if len(rows) < -(-count // stride) or not np.isfinite(rows).any():
+                raise InputError(f"{path}: /{reading.where} lacks values or holds no numbers, expected {count} frames")
         return {name: np.concatenate([part[name] for part in parts]) for name in maps}, found

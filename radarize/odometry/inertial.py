@@ -1,4 +1,4 @@
-"""What the inertial baselines see of an IMU: 100 Hz samples, on the radar's axes or on level ones.
+"""What inertial odometry sees of an IMU: 100 Hz samples, on the radar's axes or on level ones.
 
 Level axes come from the sensor's own angular velocity, integrated, with gravity pulling them upright slowly: no truth
 and no camera has a say. They start where the sensor looks at first and turn only as the gyroscope's bias makes them.
@@ -10,12 +10,8 @@ from numba import njit
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
-from radarize.baselines.milliego import SAMPLES as BETWEEN
-from radarize.baselines.rnin import LASTS
-from radarize.baselines.rnin import SAMPLES as WINDOW
 from radarize.errors import InputError
 from radarize.recording import Recording
-from radarize.tum import planar
 
 #: s, from sample to sample.
 PERIOD = 0.01
@@ -98,30 +94,6 @@ class Imu:
 def instants(recording: Recording) -> Float[np.ndarray, "frame"]:
     """Burst centres of a recording's frames, s."""
     return recording.times + recording.config.burst_center
-
-
-def latest(recording: Recording, frames: slice) -> Float[np.ndarray, "frame sample 6"]:
-    """What milliEgo reads of the IMU."""
-    return Imu.of(recording).latest(instants(recording)[frames], BETWEEN).astype(np.float16)
-
-
-def levelled(recording: Recording, frames: slice) -> Float[np.ndarray, "frame sample 6"]:
-    """What RNIN reads: the window that ends at a frame."""
-    return Imu.of(recording).levelled(instants(recording)[frames], WINDOW).astype(np.float16)
-
-
-def displacement(recording: Recording, frames: slice) -> Float[np.ndarray, "frame 3"]:
-    """What RNIN should say: how far the sensor truly came in that window, m, on the same level axes."""
-    known = recording.read("truth/time") if recording.has("truth/time") else instants(recording)
-    ends = instants(recording)[frames]
-    poses = recording.read("truth/pose")
-    before, after = (
-        np.column_stack([np.interp(t, known, poses[:, axis]) for axis in range(3)]) for t in (ends - LASTS, ends)
-    )
-    # Level axes differ from the world's by a heading that only the truth can tell.
-    yaw = np.interp(ends - LASTS, known, np.unwrap(planar(poses)[:, 2]))
-    off = Rotation.from_rotvec(np.outer(Imu.of(recording).yaw(ends - LASTS) - yaw, [0, 0, 1]))
-    return off.apply(after - before).astype(np.float32)
 
 
 @njit(cache=True)

@@ -9,6 +9,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from radarize.features.maps import MapMaker
+
+#: s, from one panorama to the next.
+PAIR = 0.2
 #: Rows and columns of a panorama.
 ROWS, COLUMNS = 64, 256
 #: IMU samples from one panorama to the next: specific force and angular velocity.
@@ -50,8 +54,8 @@ class MilliEgoNet(nn.Module):
         width: channels of the first convolution; 64 in the original, with 33.98 M parameters.
     """
 
-    kind = "milliego"
-    inputs = ("panorama", "imu")
+    kind, setting, maker, scaled = "milliego", "corrected", MapMaker, False
+    inputs, outputs = ("panorama", "imu"), ("estimate", "covariance")
 
     def __init__(self, frames: int, maps: Sequence[str] = ("panorama", "imu"), width: int = 64):
         super().__init__()

@@ -3,8 +3,8 @@
 import numpy as np
 from jaxtyping import Float, Int
 
-from radarize.baselines.milliego import COLUMNS, ROWS
 from radarize.heatmaps import Heatmaps
+from radarize.methods.milliego.network import COLUMNS, ROWS
 from radarize.points import DENSE, PointClouds
 from radarize.recording import Recording
 

@@ -15,11 +15,13 @@ and the elevation-aware array is averaged from channels of one loop (zeros would
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float, Float16, Int16
+from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
 
+from radarize.batch import Batch
 from radarize.errors import InputError
+from radarize.features.maps import Axes
 from radarize.radar.config import RadarConfig
-from radarize.training.maps import Axes
+from radarize.stopwatch import stage
 
 #: Bursts of a Doppler-azimuth map, and of the three kinds of range-azimuth maps.
 BURSTS, BUFFERS = 3, (1, 3, 5)
@@ -47,7 +49,6 @@ class PublishedMaps:
 
     Args:
         config: radar configuration.
-        device: torch device for the arithmetic.
 
     Attributes:
         names: of all maps.
@@ -61,15 +62,15 @@ class PublishedMaps:
     unit = "natural logarithm, 0...1"
     history = max(*BUFFERS, BURSTS) - 1
 
-    def __init__(self, config: RadarConfig, device: str = "cpu"):
+    def __init__(self, config: RadarConfig):
         if len(config.tx) * len(config.rx) != 12:
-            raise InputError(f"tx {config.tx} and rx {config.rx} are no 12 channels, which the published setting needs")
-        self.config, self.device, self.names = config, torch.device(device), tuple(self.maps)
+            raise InputError(f"tx {config.tx} and rx {config.rx} are no 12 channels, which the published method needs")
+        self.config, self.names = config, tuple(self.maps)
         # The vector lists TX1, TX2, TX3; the artefact multiplies the first, second, third chirp with it.
         self._calibration = self._tensor(config.calibration.reshape(12, 1))
         slow, (rows, columns) = BURSTS * config.loops, DOPPLER_SIZE
-        self._rows = torch.as_tensor(area_weights(slow, rows), dtype=torch.float32, device=self.device)
-        self._columns = torch.as_tensor(area_weights(len(BEAMS), columns), dtype=torch.float32, device=self.device)
+        self._rows = torch.as_tensor(area_weights(slow, rows), dtype=torch.float32)
+        self._columns = torch.as_tensor(area_weights(len(BEAMS), columns), dtype=torch.float32)
 
     @staticmethod
     def stride(config: RadarConfig) -> int:
@@ -104,9 +105,18 @@ class PublishedMaps:
         Raises:
             InputError: samples that do not fit the configuration.
         """
+        return self.of_frames(adc, np.arange(len(adc))[frames], names)
+
+    def of_frames(
+        self,
+        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        wanted: Int[np.ndarray, "map"],
+        names: tuple[str, ...] | None = None,
+    ) -> dict[str, Float16[np.ndarray, "map row azimuth"]]:
+        """The same, for frames by number."""
         if tuple(adc.shape[1:]) != self.config.frame_shape:
             raise InputError(f"frames have shape {tuple(adc.shape[1:])}, expected {self.config.frame_shape}")
-        names, wanted, channels = names or self.names, np.arange(len(adc))[frames], self.channels(adc)
+        names, channels = names or self.names, self.channels(adc)
         doppler, made = [n for n in names if n in _DOPPLER], {}
         if doppler:
             silence = channels.new_zeros(BURSTS - 1, *channels.shape[1:])
@@ -116,14 +126,14 @@ class PublishedMaps:
             made = {name: torch.stack([pair[k] for pair in found]) for k, name in enumerate(_DOPPLER) if name in names}
         if len(doppler) < len(names):
             made |= self._range_azimuth(channels, wanted)
-        return {name: made[name].half().cpu().numpy() for name in names}
+        return {name: made[name].half().numpy() for name in names}
 
     def channels(
         self, adc: Int16[np.ndarray, "frame loop tx rx sample 2"]
     ) -> Complex64[torch.Tensor, "frame loop 12 sample"]:
         """Calibrated samples of virtual channels in firing order: 0-3 are TX1's, 4-7 TX3's, 8-11 TX2's."""
         fired = [self.config.tx.index(tx) for tx in self.config.tx_order]
-        samples = torch.view_as_complex(torch.as_tensor(adc, device=self.device).float())[:, :, fired]
+        samples = torch.view_as_complex(torch.as_tensor(adc).float())[:, :, fired]
         return samples.flatten(2, 3) * self._calibration
 
     def _doppler_azimuth(self, slow: Complex64[torch.Tensor, "chirp 12 sample"]) -> tuple[torch.Tensor, torch.Tensor]:
@@ -169,7 +179,7 @@ class PublishedMaps:
         return self._tensor(np.exp(-1j * np.pi * np.arange(antennas)[:, None] * np.sin(azimuths)))
 
     def _tensor(self, values: np.ndarray) -> torch.Tensor:
-        return torch.as_tensor(values, device=self.device).to(torch.complex64)
+        return torch.as_tensor(values).to(torch.complex64)
 
 
 def capon(
@@ -181,6 +191,31 @@ def capon(
     regular = covariance + 1e-6 * torch.eye(covariance.shape[-1], dtype=covariance.dtype, device=covariance.device)
     form = ((torch.linalg.inv(regular) @ beams) * beams.conj()).sum(dim=(-3, -2)).real
     return 1 / form
+
+
+class PublishedStream:
+    """Maps of a stream's frames, of 30 a second every second one; odometry and scans share them.
+
+    Args:
+        radar: configuration.
+
+    Raises:
+        InputError: see `PublishedMaps`.
+    """
+
+    def __init__(self, radar: RadarConfig):
+        self._maker = PublishedMaps(radar)
+        self._stride = self._maker.stride(radar)
+        self._buffer: np.ndarray | None = None
+
+    def maps(self, batch: Batch) -> tuple[Int[np.ndarray, "used"], dict[str, Float16[np.ndarray, "used row azimuth"]]]:
+        """Which of the next frames are used, and their maps."""
+        before = 0 if self._buffer is None else len(self._buffer)
+        frames = batch.samples if self._buffer is None else np.concatenate([self._buffer, batch.samples])
+        self._buffer = frames[-self._maker.history :].copy()
+        used = np.flatnonzero(batch.numbers % self._stride == 0)
+        with stage("maps"):
+            return used, self._maker.of_frames(frames, before + used) if len(used) else {}
 
 
 def levels(power: torch.Tensor, span: tuple[float, float]) -> torch.Tensor:

@@ -1,4 +1,4 @@
-"""The artefact's networks: what it adds to ResNet18 and U-Net, and what the networks of `radarize.nets` have more.
+"""The artefact's networks: what it adds to ResNet18 and U-Net.
 
 They see maps of 0...1 as they are, newest frame last, and answer with a number, not a distribution. `estimate` gives a
 covariance all the same, the same for every item: the error on validation data, for what comes after them.
@@ -10,7 +10,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from radarize.nets.maps import Maps
+from radarize.features.maps import Maps
+from radarize.methods.published.maps import PublishedMaps
 from radarize.nets.resnet import Block, ResNet18
 from radarize.nets.unet import UNet
 
@@ -38,19 +39,19 @@ class PublishedMotionNet(nn.Module):
         frames: of a window.
         maps: names of a frame's maps.
         width: of the ResNet.
-        step: is not used; the default setting's networks need to know it.
 
     Attributes:
         kind, dimensions, pool: set by the subclass; the last as of `ResNet18`.
         error: mean squared error on validation data.
     """
 
+    setting, maker, scaled = "published", PublishedMaps, False
+    inputs, outputs = ("maps",), ("estimate", "covariance")
     kind: str
     dimensions: int
-
     pool: bool
 
-    def __init__(self, frames: int, maps: Sequence[str], width: int = 64, step: float | None = None):
+    def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
         super().__init__()
         self.frames, self.maps, self.width = frames, tuple(maps), width
         self.resnet = ResNet18(frames * len(self.maps), self.dimensions, width, pool=self.pool)
@@ -75,7 +76,7 @@ class PublishedRotationNet(PublishedMotionNet):
 
     kind, dimensions, pool = "rotation", 1, False
 
-    def __init__(self, frames: int, maps: Sequence[str], width: int = 64, step: float | None = None):
+    def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
         super().__init__(frames, maps, width)
         for module in self.resnet.modules():
             if isinstance(module, Block):
@@ -93,7 +94,8 @@ class PublishedRotationNet(PublishedMotionNet):
 class PublishedSegmentationNet(nn.Module):
     """Range-azimuth maps of one, three and five frames of both arrays to occupancy, of two classes."""
 
-    kind = "segmentation"
+    kind, setting, maker, scaled = "segmentation", "published", PublishedMaps, False
+    inputs, outputs = ("maps",), ("probability",)
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
         super().__init__()
@@ -107,7 +109,3 @@ class PublishedSegmentationNet(nn.Module):
     def estimate(self, maps: Maps) -> Float[Tensor, "item range bearing"]:
         """Probability that a cell is occupied."""
         return self(maps).softmax(dim=1)[:, 1]
-
-
-#: Networks by the name of their task.
-PUBLISHED_NETS = {net.kind: net for net in (PublishedTranslationNet, PublishedRotationNet, PublishedSegmentationNet)}

@@ -1,5 +1,5 @@
-"""The artefact's trainings, where they differ from `radarize.training.tasks`: plain errors instead of likelihoods, its
-labels, its augmentations."""
+"""The artefact's trainings, where they differ from Radarize's own: plain errors instead of likelihoods, its labels, its
+augmentations."""
 
 import math
 from collections.abc import Iterable
@@ -8,11 +8,18 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Generator, Tensor, nn
 
-from radarize.nets.maps import Maps
-from radarize.published.heatmaps import PublishedMaps
-from radarize.training import augment
-from radarize.training.table import Table
-from radarize.training.tasks import Motion, Rotation, Segmentation, Settings, Translation, first_cell, turns
+from radarize.features import augment
+from radarize.features.maps import Maps
+from radarize.features.table import YAW, Reading, Table
+from radarize.methods.published import labels
+from radarize.methods.published.maps import PublishedMaps
+from radarize.methods.published.networks import (
+    PublishedRotationNet,
+    PublishedSegmentationNet,
+    PublishedTranslationNet,
+)
+from radarize.methods.radarize.training import Rotation, Segmentation, Translation
+from radarize.methods.task import Motion, Settings, first_cell, turns
 
 _DOPPLER, _RANGE, _LEVEL = (
     tuple(name for name in PublishedMaps.maps if name.startswith(f"published_{kind}"))
@@ -23,7 +30,7 @@ _DOPPLER, _RANGE, _LEVEL = (
 class Plain(Motion):
     """Networks without uncertainty, judged by their squared errors."""
 
-    setting, steepest = "published", math.inf
+    steepest = math.inf
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Keep the validation error as everyone's."""
@@ -34,8 +41,8 @@ class Plain(Motion):
 class PublishedTranslation(Plain):
     """Velocity since the frame before, m/s."""
 
-    kind, error, size = Translation.kind, Translation.error, Translation.size
-    maps, truth = _DOPPLER, ("published_velocity",)
+    network, error, size = PublishedTranslationNet, Translation.error, Translation.size
+    maps, truth = _DOPPLER, (Reading("published_velocity", "truth/pose", labels.velocity),)
     defaults = Settings(width=64, frames=1, patience=30)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
@@ -60,8 +67,8 @@ class PublishedTranslation(Plain):
 class PublishedRotation(Plain):
     """Turn over one to four frames of 15 Hz, rad."""
 
-    kind, error, size, reach = Rotation.kind, Rotation.error, Rotation.size, Rotation.reach
-    maps, truth = _RANGE, ("yaw",)
+    network, error, size, reach = PublishedRotationNet, Rotation.error, Rotation.size, Rotation.reach
+    maps, truth = _RANGE, (YAW,)
     optimiser = torch.optim.AdamW
     defaults = Settings(width=64, patience=30)
 
@@ -87,8 +94,8 @@ class PublishedRotation(Plain):
 class PublishedSegmentation(Segmentation):
     """Occupancy of the depth picture's slab."""
 
-    setting, steepest = "published", math.inf
-    maps, truth = _RANGE + _LEVEL, ("published_occupancy",)
+    network, steepest = PublishedSegmentationNet, math.inf
+    maps, truth = _RANGE + _LEVEL, (Reading("published_occupancy", "truth/depth", labels.occupancy),)
     defaults = Settings(width=64, frames=1, epochs=5, batch=48, rate=1e-4, betas=(0.8, 0.9))
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
@@ -119,7 +126,3 @@ def pooled_dice(
     truth = torch.stack([label == 0, label == 1], dim=1).float()
     likely = logits.softmax(dim=1)
     return 1 - 2 * (likely * truth).sum() / (likely.sum() + truth.sum())
-
-
-#: Tasks by name.
-PUBLISHED_TASKS = {task.kind: task() for task in (PublishedTranslation, PublishedRotation, PublishedSegmentation)}

@@ -11,11 +11,9 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn.functional import interpolate, max_pool2d, pad
 
+from radarize.features.maps import AZIMUTHS, MapMaker, Maps
 from radarize.mapping.scans import BEARINGS
-from radarize.nets.maps import Maps
 from radarize.nets.unet import double_convolution
-from radarize.recording import Recording
-from radarize.training.maps import AZIMUTHS
 
 #: Columns that the network sees, and those of its picture, over the field of the scans.
 SEEN, DRAWN = 64, 512
@@ -32,13 +30,6 @@ def columns(count: int) -> Float[np.ndarray, "count"]:
     """Middles of equal columns of the field, rad, positive to the left, ascending."""
     edges = np.linspace(*FIELD, count + 1)
     return (edges[1:] + edges[:-1]) / 2
-
-
-def bins(recording: Recording, frames: slice) -> Float[np.ndarray, "frame bearing"]:
-    """What training draws its pictures from: range bins of the true scan, fractional, -1 where nothing is in reach."""
-    config = recording.config
-    found = (recording.read("truth/scan")[frames] + config.range_bias) / config.range_resolution
-    return np.where(np.isinf(found), -1, found).astype(np.float32)
 
 
 class Up(nn.Module):
@@ -77,7 +68,8 @@ class RadarHdNet(nn.Module):
         width: channels of the first level; 64 in the original, with 17.51 M parameters.
     """
 
-    kind = "radarhd"
+    kind, setting, maker, scaled = "radarhd", "corrected", MapMaker, False
+    inputs, outputs = ("maps",), ("probability",)
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
         super().__init__()

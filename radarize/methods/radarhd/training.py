@@ -1,29 +1,27 @@
-"""The baselines' trainings: their papers' losses, augmentations and hyper-parameters, but for the width.
+"""RadarHD's training: its paper's loss, augmentation and hyper-parameters, but for the width."""
 
-Where the papers tell errors apart only by their squares, uncertainty is learned without touching what is told.
-"""
-
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
-from scipy.spatial.transform import Rotation
+from jaxtyping import Float
 from torch import Generator, Tensor, nn
 from torch.nn.functional import adaptive_max_pool2d, binary_cross_entropy_with_logits
 
-from radarize.baselines.inertial import GRAVITY
-from radarize.baselines.milliego import DEGREES
-from radarize.baselines.radarhd import DRAWN, columns
-from radarize.baselines.rnin import LASTS
+from radarize.features import augment
+from radarize.features.maps import Maps
+from radarize.features.table import Reading
 from radarize.mapping.scans import BEARINGS
-from radarize.nets.maps import Maps
-from radarize.training import augment
-from radarize.training.table import Table
-from radarize.training.tasks import Inputs, Motion, Settings, Task, first_cell
+from radarize.methods.radarhd.network import DRAWN, RadarHdNet, columns
+from radarize.methods.task import Settings, Task, first_cell
+from radarize.recording import Recording
 
-#: s, from one of milliEgo's panoramas to the next.
-PAIR = 0.2
+
+def bins(recording: Recording, frames: slice) -> Float[np.ndarray, "frame bearing"]:
+    """What training draws its pictures from: range bins of the true scan, fractional, -1 where nothing is in reach."""
+    config = recording.config
+    found = (recording.read("truth/scan")[frames] + config.range_bias) / config.range_resolution
+    return np.where(np.isinf(found), -1, found).astype(np.float32)
 
 
 class RadarHd(Task):
@@ -32,7 +30,8 @@ class RadarHd(Task):
     Labels are scans in range bins, -1 where nothing is in reach.
     """
 
-    kind, truth, maps = "radarhd", ("scan",), ("range_azimuth",)
+    network, maps = RadarHdNet, ("range_azimuth",)
+    truth = (Reading("scan", "truth/scan", bins),)
     defaults = Settings(frames=41, epochs=120, batch=6, rate=1e-4)
     share = 1 / 20
     #: Cells of range by which a first surface may be off to count as found: 9 cm.
@@ -100,125 +99,3 @@ def pictured(
     entropy = binary_cross_entropy_with_logits(logits, truth, reduction="none").mean(dim=(1, 2))
     shared, total = (likely * truth).sum(dim=(1, 2)), (likely + truth).sum(dim=(1, 2))
     return 0.9 * entropy + 0.1 * (1 - (2 * shared + 1) / (total + 1))
-
-
-class MilliEgo(Task):
-    """Motions between panoramas 0.2 s apart: translation (m) in the older one's axes, and Euler angles (deg)."""
-
-    kind, sensed, truth = "milliego", ("panorama", "imu"), ("pose",)
-    share = 1 / 5
-    defaults = Settings(width=8, frames=6, epochs=201, batch=32, rate=1e-5, schedule="steps", patience=201)
-
-    def optimise(self, parameters: Iterable[nn.Parameter], settings: Settings) -> torch.optim.Optimizer:
-        return torch.optim.RMSprop(parameters, settings.rate)
-
-    def spacings(self, frame_period: float) -> Sequence[int]:
-        return (max(1, round(PAIR / frame_period)),)
-
-    def inputs(self, table: Table, frames: Int[Tensor, "item frame"]) -> Inputs:
-        return tuple(table.sensed[name][frames].float() for name in self.sensed)
-
-    def label(self, table: Table, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item pair 6"]:
-        poses = table.truth["pose"][frames].numpy()
-        turned = Rotation.from_quat(poses[..., 3:].reshape(-1, 4)).as_matrix().reshape(*poses.shape[:2], 3, 3)
-        back = np.swapaxes(turned[:, :-1], -1, -2)
-        step = (back @ np.diff(poses[..., :3], axis=1)[..., None])[..., 0]
-        turn = Rotation.from_matrix((back @ turned[:, 1:]).reshape(-1, 3, 3)).as_euler("xyz", degrees=True)
-        return torch.from_numpy(np.concatenate([step, turn.reshape(step.shape)], axis=-1)).float()
-
-    def augment(self, inputs: Inputs, label: Tensor, generator: Generator) -> tuple[Inputs, Tensor]:
-        """Half of the items are mirrored, left for right; the original has enough walks to do without."""
-        panorama, imu = inputs
-        left = torch.rand((len(label), 1, 1, 1), generator=generator, device=label.device) < 0.5
-        panorama = torch.where(left, panorama.flip(3), panorama)
-        imu = torch.where(left, imu * imu.new_tensor([1, -1, 1, -1, 1, -1]), imu)
-        return (panorama, imu), torch.where(left[:, 0], label * label.new_tensor([1, -1, 1, -1, 1, -1]), label)
-
-    def loss(self, net: nn.Module, inputs: Inputs, label: Tensor) -> Float[Tensor, "item"]:
-        return _milliego_loss(net(*inputs), label)
-
-    def judge(self, net: nn.Module, inputs: Inputs, label: Tensor) -> Tensor:
-        motion = net(*inputs)
-        error, size = net.planar(motion[:, -1])[0] - _planar(label), _planar(label)
-        numbers = [part.square().sum(dim=1) for each in (error, size) for part in each.split([2, 1], dim=1)]
-        return torch.stack([_milliego_loss(motion, label), *numbers], dim=1)
-
-    def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
-        loss, *squares = means.tolist()
-        names = ("rmse_m", "rmse_rad", "rms_step_m", "rms_turn_rad")
-        return {"loss": loss} | {name: value**0.5 for name, value in zip(names, squares, strict=True)}
-
-    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Inputs, Tensor]]) -> None:
-        """Keep the validation error as everyone's."""
-        errors = [net.estimate(*inputs)[0] - _planar(label) for inputs, label in batches]
-        net.error.copy_(torch.cat(errors).square().mean(dim=0).clamp_min(1e-6))
-
-
-def _planar(label: Float[Tensor, "item pair 6"]) -> Float[Tensor, "item 3"]:
-    """x, y (m) and yaw (rad) of the newest motion."""
-    return torch.cat([label[:, -1, :2], label[:, -1, 5:] / DEGREES], dim=1)
-
-
-def _milliego_loss(motion: Float[Tensor, "item pair 6"], label: Float[Tensor, "item pair 6"]) -> Float[Tensor, "item"]:
-    squared = (motion - label).square().mean(dim=1)
-    return squared[:, :3].mean(dim=1) + 0.001 * squared[:, 3:].mean(dim=1)
-
-
-class Rnin(Motion):
-    """Displacements in consecutive windows of a second, on level axes, m."""
-
-    kind, sensed, truth = "rnin", ("levelled",), ("displacement",)
-    error, size = "rmse_m", "rms_displacement_m"
-    share = 1 / 10
-    defaults = Settings(frames=10, epochs=100, batch=32, rate=1e-4)
-
-    def spacings(self, frame_period: float) -> Sequence[int]:
-        return (max(1, round(LASTS / frame_period)),)
-
-    def inputs(self, table: Table, frames: Int[Tensor, "item window"]) -> Inputs:
-        return table.sensed["levelled"][frames].float()
-
-    def label(self, table: Table, frames: Int[Tensor, "item window"]) -> Float[Tensor, "item window 3"]:
-        return table.truth["displacement"][frames]
-
-    def augment(self, windows: Tensor, label: Tensor, generator: Generator) -> tuple[Inputs, Tensor]:
-        """Any heading, biases of up to 0.1 m/s^2 and 0.002 rad/s, and axes off level by up to 5 deg."""
-        count = len(label)
-        yaw, way, size = (torch.rand(count, generator=generator, device=label.device) for _ in range(3))
-        turn = rotation(torch.tensor([0.0, 0, 1], device=label.device) * 2 * torch.pi * yaw[:, None])
-        axis = torch.stack([torch.cos(2 * torch.pi * way), torch.sin(2 * torch.pi * way), torch.zeros_like(way)], dim=1)
-        tilt = rotation(axis * torch.deg2rad(5 * size)[:, None])
-        bias = 2 * torch.rand((count, 1, 1, 6), generator=generator, device=label.device) - 1
-        bias = bias * bias.new_tensor([0.1] * 3 + [0.002] * 3)
-        gravity = windows.new_tensor([0, 0, GRAVITY])
-        force, angular = (windows + bias).split(3, dim=3)
-        force, angular = (torch.einsum("iab,iwsb->iwsa", tilt @ turn, each) for each in (force + gravity, angular))
-        return torch.cat([force - gravity, angular], dim=3), torch.einsum("iab,iwb->iwa", turn, label)
-
-    def loss(self, net: nn.Module, windows: Tensor, label: Tensor) -> Float[Tensor, "item"]:
-        mean, log_deviation = net(windows)
-        error = (mean - label).detach()
-        likelihood = 0.5 * (error * (-log_deviation).exp()).square() + log_deviation
-        return displaced(mean, label) + likelihood.sum(dim=2).mean(dim=1)
-
-    def judge(self, net: nn.Module, windows: Tensor, label: Tensor) -> Tensor:
-        judged = self._judged(*net.estimate(windows), label[:, -1, :2])
-        judged[:, 0] = displaced(net(windows)[0], label)
-        return judged
-
-
-def displaced(mean: Float[Tensor, "item window 3"], label: Float[Tensor, "item window 3"]) -> Float[Tensor, "item"]:
-    """Squared errors of displacements, and eight times those of the way since the first window."""
-    error = mean - label
-    return (error.square() + 8 * error.cumsum(dim=1).square()).sum(dim=2).mean(dim=1)
-
-
-def rotation(vector: Float[Tensor, "item 3"]) -> Float[Tensor, "item 3 3"]:
-    """Rotation matrices of rotation vectors."""
-    x, y, z = vector.unbind(1)
-    zero = torch.zeros_like(x)
-    return torch.linalg.matrix_exp(torch.stack([zero, -z, y, z, zero, -x, -y, x, zero], dim=1).reshape(-1, 3, 3))
-
-
-#: Tasks by name.
-BASELINE_TASKS = {task.kind: task() for task in (RadarHd, MilliEgo, Rnin)}

@@ -1,11 +1,10 @@
 """Network and least squares together, each by what it says of its own error."""
 
 import numpy as np
-import torch
-from jaxtyping import Complex64
 
+from radarize.batch import Batch
+from radarize.methods.radarize.learned import LearnedVelocity
 from radarize.odometry.doppler import DopplerVelocity, Velocities
-from radarize.odometry.learned import LearnedVelocity
 
 
 class FusedVelocity:
@@ -22,9 +21,9 @@ class FusedVelocity:
     def __init__(self, learned: LearnedVelocity, doppler: DopplerVelocity, gate: float = 9.0):
         self.learned, self.doppler, self.gate = learned, doppler, gate
 
-    def estimate(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Velocities:
+    def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames."""
-        one, other = self.learned.estimate(spectrum), self.doppler.estimate(spectrum)
+        one, other = self.learned.estimate(batch), self.doppler.estimate(batch)
         apart = (one.velocity - other.velocity)[:, :, None]
         total = one.covariance + other.covariance
         distance = (apart.mT @ np.linalg.solve(total, apart))[:, 0, 0]

@@ -5,48 +5,55 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Complex64, Float
+from jaxtyping import Float
 
-from radarize.nets.windows import Windows, silent
+from radarize.batch import Batch
+from radarize.features.windows import silent
+from radarize.methods.radarize.motion import RotationNet, TranslationNet
+from radarize.nets.weights import load
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
 from radarize.odometry.ties import Ties
-from radarize.training.maps import MapMaker
+from radarize.radar.config import RadarConfig
 
 #: m/s and rad, standard deviations of what may have happened meanwhile.
 _ANY_VELOCITY, _ANY_TURN = 2.0, 1.0
 
 
 class LearnedVelocity:
-    """Velocity estimator by `radarize.nets.TranslationNet`.
+    """Velocity estimator by `TranslationNet`.
 
     Args:
-        maker: see `Windows`.
-        weights: file; the shipped ones if None.
+        radar: configuration.
+        weights: file.
+
+    Raises:
+        InputError: no such weights, or they are for another radar.
     """
 
-    def __init__(self, maker: MapMaker, weights: Path | None = None):
-        self._windows = Windows(maker, "translation", weights)
+    def __init__(self, radar: RadarConfig, weights: Path):
+        self._net, header = load(weights, TranslationNet, radar)
+        self._windows = header.windows(radar)
 
     @torch.inference_mode()
-    def estimate(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Velocities:
+    def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames; no echoes are counted."""
-        shown = self._windows.push(spectrum)[0]
-        mean, covariance = self._windows.net.estimate(shown)
+        shown = self._windows.push(batch)[0]
+        mean, covariance = self._net.estimate(shown)
         lost = silent(shown)
         mean[lost], covariance[lost] = 0.0, _ANY_VELOCITY**2 * torch.eye(2)
         return Velocities(mean.double().numpy(), covariance.double().numpy(), np.zeros(len(mean), int))
 
 
 class LearnedRotation:
-    """Rotation estimator by `radarize.nets.RotationNet`: turns over several spacings, reconciled by a filter.
+    """Rotation estimator by `RotationNet`: turns over several spacings, reconciled by a filter.
 
     The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
     one Gaussian state (`Ties`).
 
     Args:
-        maker: see `Windows`.
-        weights: file; the shipped ones if None.
+        radar: configuration.
+        weights: file.
         spacings: of the network's frames, over which turns are measured; some of those it was trained on.
         jerk: rad/s, standard deviation of the change of turning rate from frame to frame.
         fastest: rad/s, standard deviation of the turning rate before anything is known.
@@ -54,27 +61,22 @@ class LearnedRotation:
 
     def __init__(
         self,
-        maker: MapMaker,
-        weights: Path | None = None,
+        radar: RadarConfig,
+        weights: Path,
         spacings: Sequence[int] = (1, 2, 4),
         jerk: float = np.radians(12.0),
         fastest: float = np.radians(60.0),
     ):
-        self._windows = Windows(maker, "rotation", weights)
-        known = self._windows.header.spacings
+        self._net, header = load(weights, RotationNet, radar)
+        self._windows, known = header.windows(radar), header.spacings
         self.spacings = [s for s in spacings if s in known] or list(known)
         size = max(self.spacings) * self._windows.stride + 1
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
         self._yaws = Ties(size, jerk, fastest)
 
-    def estimate(
-        self,
-        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
-        times: Float[np.ndarray, "frame"],
-        velocities: Velocities,
-    ) -> Rotations:
+    def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
-        turns = self.turns(spectrum, times, velocities)
+        times, turns = batch.centers, self.turns(batch, velocities)
         yaw, growth = np.zeros(len(times)), np.zeros(len(times))
         for i in range(len(times)):
             before, known = self._yaws.values[-1], self._yaws.covariance[-1, -1]
@@ -92,17 +94,12 @@ class LearnedRotation:
         return self._windows.stride
 
     @torch.inference_mode()
-    def turns(
-        self,
-        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
-        times: Float[np.ndarray, "frame"],
-        velocities: Velocities,
-    ) -> Float[np.ndarray, "spacing frame 2"]:
+    def turns(self, batch: Batch, velocities: Velocities) -> Float[np.ndarray, "spacing frame 2"]:
         """What the network says of the next frames: turns (rad) over each of `spacings` until them, and variances."""
-        windows = self._windows.push(spectrum, self.spacings)
-        travel = self._travel(np.asarray(times, float), velocities.velocity)
+        windows = self._windows.push(batch, self.spacings)
+        travel = self._travel(batch.centers, velocities.velocity)
         shown = torch.cat(windows)
-        mean, variance = self._windows.net.estimate(shown, torch.from_numpy(travel).float())
+        mean, variance = self._net.estimate(shown, torch.from_numpy(travel).float())
         lost = silent(shown)
         mean[lost], variance[lost] = 0.0, _ANY_TURN**2
         return torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)

@@ -12,12 +12,12 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from radarize.features.maps import AZIMUTHS, MapMaker, Maps
 from radarize.nets.correlation import Correlation
 from radarize.nets.gaussian import Gaussian
-from radarize.nets.maps import Maps, coordinates, level
+from radarize.nets.maps import coordinates, level
 from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
-from radarize.training.maps import AZIMUTHS
 
 
 class MotionNet(nn.Module):
@@ -29,9 +29,12 @@ class MotionNet(nn.Module):
 
     Attributes:
         kind, dimensions, stride: set by the subclass; the stride is that of the ResNet's first convolution.
+        setting, maker, scaled, inputs, outputs: see `radarize.nets.weights.Network`.
         spread: logarithm of what standard deviations are multiplied with.
     """
 
+    setting, maker, scaled = "corrected", MapMaker, True
+    inputs, outputs = ("maps",), ("estimate", "covariance")
     kind: str
     dimensions: int
     stride: tuple[int, int]
@@ -51,7 +54,7 @@ class TranslationNet(MotionNet):
 
     Args:
         frames: of a window.
-        maps: names of a frame's maps, see `radarize.training.maps.MAPS`.
+        maps: names of a frame's maps, see `radarize.features.maps.MAPS`.
         width: of the ResNets.
         step: m/s from row to row.
     """
@@ -116,6 +119,7 @@ class RotationNet(MotionNet):
     """
 
     kind, dimensions, stride = "rotation", 1, (1, 2)
+    inputs = ("maps", "travel")
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 16, step: float = 0.0446):
         correlation = Correlation(len(maps), len(AZIMUTHS))

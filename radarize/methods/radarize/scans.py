@@ -4,11 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Complex64, Float
+from jaxtyping import Float
 
+from radarize.batch import Batch
 from radarize.mapping import echoes
-from radarize.nets.windows import Windows
-from radarize.training.maps import MapMaker
+from radarize.methods.radarize.segmentation import SegmentationNet
+from radarize.nets.weights import load
+from radarize.radar.config import RadarConfig
+from radarize.stopwatch import stage
 
 #: Least probability that a returned range is right.
 LEAST = 0.7
@@ -20,8 +23,8 @@ class Segmentation:
     """Scans of a stream's frames.
 
     Args:
-        maker: of the maps; shared with the odometry's networks, so that maps are made once.
-        weights: file; the shipped ones if None.
+        radar: configuration.
+        weights: file.
         least: least probability that a range is right within `NEAR` cells: higher leaves fewer ghosts and fewer
             bearings.
         first: take the first surface; False: the likeliest occupied cell of each bearing, wherever it is, for
@@ -31,26 +34,24 @@ class Segmentation:
         InputError: no such weights, or they are for another radar.
     """
 
-    def __init__(self, maker: MapMaker, weights: Path | None = None, least: float = LEAST, first: bool = True):
-        self._windows, self._ranges = Windows(maker, "segmentation", weights), maker.heatmaps.ranges
+    def __init__(self, radar: RadarConfig, weights: Path, least: float = LEAST, first: bool = True):
+        self._net, header = load(weights, SegmentationNet, radar)
+        self._windows, self._ranges = header.windows(radar), radar.ranges - radar.range_bias
         self.least, self.first = least, first
 
     @torch.inference_mode()
-    def occupancy(
-        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
-    ) -> Float[np.ndarray, "frame range bearing"]:
+    def occupancy(self, batch: Batch) -> Float[np.ndarray, "frame range bearing"]:
         """Probability that a cell holds a bearing's first surface, if nothing is before it."""
-        return self._windows.net.estimate(self._windows.push(spectrum)[0]).numpy()
+        return self._net.estimate(self._windows.push(batch)[0]).numpy()
 
-    def scan(
-        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
-    ) -> Float[np.ndarray, "frame bearing"]:
+    def scan(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen."""
-        occupancy = self.occupancy(spectrum)
-        if self.first:
-            bins = first_surface(occupancy, self.least)
-        else:
-            bins = echoes.strongest(occupancy >= self.least, occupancy)
+        with stage("scans"):
+            occupancy = self.occupancy(batch)
+            if self.first:
+                bins = first_surface(occupancy, self.least)
+            else:
+                bins = echoes.strongest(occupancy >= self.least, occupancy)
         return np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
 
 

@@ -7,10 +7,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from radarize.features.maps import AZIMUTHS, MapMaker, Maps
 from radarize.mapping.scans import BEARINGS
-from radarize.nets.maps import Maps, coordinates, level
+from radarize.nets.maps import coordinates, level
 from radarize.nets.unet import UNet
-from radarize.training.maps import AZIMUTHS
 
 
 def _resampling() -> Tensor:
@@ -28,7 +28,8 @@ class SegmentationNet(nn.Module):
         width: of the U-Net.
     """
 
-    kind = "segmentation"
+    kind, setting, maker, scaled = "segmentation", "corrected", MapMaker, False
+    inputs, outputs = ("maps",), ("probability",)
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 16):
         super().__init__()

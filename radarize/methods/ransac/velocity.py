@@ -8,12 +8,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import torch
-from jaxtyping import Complex64, Float
+from jaxtyping import Float
 
-from radarize.heatmaps import Heatmaps
+from radarize.batch import Batch
+from radarize.methods.method import Inputs
 from radarize.odometry.doppler import Velocities
-from radarize.points import DENSE, PointClouds
+from radarize.odometry.integration import Odometry
+from radarize.odometry.rotation import MapRotation
 
 #: (m/s)^2, of a velocity that the points do not tell.
 _UNKNOWN = 1.0
@@ -47,23 +48,22 @@ class RansacVelocity:
     """Velocity estimator; stateless between frames.
 
     Args:
-        heatmaps: make the spectra.
         settings: of RANSAC.
         seed: of the triples, one table for all frames.
-
-    Raises:
-        InputError: see `PointClouds`.
     """
 
-    def __init__(self, heatmaps: Heatmaps, settings: RansacSettings | None = None, seed: int = 0):
-        self.settings, self._heatmaps = settings or RansacSettings(), heatmaps
-        self._clouds = PointClouds(heatmaps.config, DENSE)
+    def __init__(self, settings: RansacSettings | None = None, seed: int = 0):
+        self.settings = settings or RansacSettings()
         self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 3))
 
-    def estimate(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Velocities:
-        """Velocities of a batch of frames from their `Heatmaps.spectrum`."""
-        points, frame = self._clouds.of(self._heatmaps, spectrum)
-        found = [self.solve(points[frame == k]) for k in range(len(spectrum))]
+    def estimate(self, batch: Batch) -> Velocities:
+        """Velocities of the next frames.
+
+        Raises:
+            InputError: see `PointClouds`.
+        """
+        points, frame = batch.points
+        found = [self.solve(points[frame == k]) for k in range(len(batch))]
         velocity, covariance, inliers = zip(*found, strict=True)
         return Velocities(np.stack(velocity), np.stack(covariance), np.array(inliers))
 
@@ -92,3 +92,8 @@ class RansacVelocity:
         residual = speed[agree] - direction[agree] @ velocity
         variance = max((residual**2).sum() / (agree.sum() - 3), settings.noise**2)
         return velocity[:2], (variance * np.linalg.inv(normal))[:2, :2], int(agree.sum())
+
+
+def odometry(inputs: Inputs) -> Odometry:
+    """Least squares over a sparse point cloud, in the place of `doppler`'s."""
+    return Odometry(inputs.radar, RansacVelocity(), MapRotation(inputs.signal.heatmaps))

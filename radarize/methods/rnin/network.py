@@ -11,6 +11,8 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn.functional import relu
 
+from radarize.features.maps import MapMaker
+
 #: s, of a window, and its samples.
 LASTS, SAMPLES = 1.0, 100
 
@@ -41,8 +43,8 @@ class RninNet(nn.Module):
         width: channels of the first stage; 64 in the original, with 5.36 M parameters.
     """
 
-    kind = "rnin"
-    inputs = ("windows",)
+    kind, setting, maker, scaled = "rnin", "corrected", MapMaker, False
+    inputs, outputs = ("windows",), ("estimate", "covariance")
 
     def __init__(self, frames: int, maps: Sequence[str] = ("levelled",), width: int = 64):
         super().__init__()

@@ -1,22 +1,20 @@
 """Odometry from scans alone: each is matched with a grid of the last few, where constant velocity puts it."""
 
 from collections import deque
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
-from typing import Protocol
 
 import numpy as np
-import torch
-from jaxtyping import Complex64, Float
 
+from radarize.batch import Batch
 from radarize.mapping.scans import BEARINGS
+from radarize.methods.method import Inputs
 from radarize.odometry.integration import Track, intervals
+from radarize.pipeline import Scanner
 from radarize.pose import between, compose, exponential, transform
-from radarize.radar.config import RadarConfig
 from radarize.slam.config import SlamConfig
 from radarize.slam.grid import OccupancyGrid
 from radarize.slam.matcher import match
 from radarize.slam.node import Node, Scan
+from radarize.stopwatch import stage
 
 #: m/s^1.5 and rad/s^1.5: by how much velocity and rate of turn wander in a second.
 _WANDER = np.array([1.0, 1.0, 2.0])
@@ -24,17 +22,10 @@ _WANDER = np.array([1.0, 1.0, 2.0])
 _ANY_RATE = np.array([1.0, 1.0, 1.0])
 
 
-class Scanner(Protocol):
-    """Scans of a stream's frames."""
-
-    def scan(self, spectrum: torch.Tensor) -> np.ndarray: ...
-
-
 class ScanMatching:
     """Odometry of a stream of frames: a Kalman filter of pose and velocity, whose measurement is the match.
 
     Args:
-        config: radar configuration.
         scanner: makes the scans.
         settings: of node, grid and matcher.
         keys: scans in the grid, each added once the sensor has moved by as much as the settings make a node of.
@@ -43,13 +34,12 @@ class ScanMatching:
 
     def __init__(
         self,
-        config: RadarConfig,
         scanner: Scanner,
         settings: SlamConfig | None = None,
         keys: int = 12,
         sigma: float = 3.0,
     ):
-        self.config, self.scanner, self.sigma = config, scanner, sigma
+        self.scanner, self.sigma = scanner, sigma
         self.settings = settings or SlamConfig.preset("lidar")
         self._keys: deque[tuple[np.ndarray, Node]] = deque(maxlen=keys)
         self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
@@ -58,16 +48,11 @@ class ScanMatching:
         self._rate = np.zeros(3)  # m/s and rad/s, in the sensor's frame
         self._spread = np.diag([*np.zeros(3), *_ANY_RATE**2])  # of pose and rate, in the sensor's frame
 
-    def follow(
-        self,
-        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
-        times: Float[np.ndarray, "frame"],
-        stage: Callable[[str], AbstractContextManager] = nullcontext,
-    ) -> Track:
-        """Poses of the next frames, see `Odometry.follow`."""
-        centers = np.asarray(times, float) + self.config.burst_center
+    def follow(self, batch: Batch) -> Track:
+        """Poses of the next frames."""
+        centers = batch.centers
         steps = intervals(centers, self._time)
-        ranges = self.scanner.scan(spectrum)
+        ranges = batch.made(self.scanner.scan)
         moved = np.zeros((len(centers), 3))
         poses, rates, spreads = moved.copy(), moved.copy(), np.zeros((len(centers), 3, 3))
         with stage("translation"):
@@ -112,3 +97,8 @@ class ScanMatching:
         for pose, key in self._keys:
             ends = transform(pose, key.origins), transform(pose, key.ends)
             self._grid.insert(*ends, key.hits, self.settings.grid, spread=True)
+
+
+def odometry(inputs: Inputs, scanner: Scanner) -> ScanMatching:
+    """By the pipeline's scans."""
+    return ScanMatching(scanner)

@@ -10,7 +10,7 @@ from radarize.baselines.inertial import Imu
 from radarize.baselines.milliego import MilliEgoNet
 from radarize.baselines.rnin import RninNet
 from radarize.errors import InputError
-from radarize.methods import Inputs, Weights
+from radarize.methods.registry import Inputs, Weights
 from radarize.nets.weights import Header, save
 from radarize.odometry.integration import Track
 from radarize.pose import between

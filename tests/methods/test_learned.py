@@ -11,7 +11,7 @@ from radarize.odometry.doppler import Velocities
 from radarize.odometry.fused import FusedVelocity
 from radarize.odometry.learned import LearnedRotation, LearnedVelocity
 from radarize.radar.presets import PRESETS
-from radarize.training.maps import MapMaker
+from radarize.features.maps import MapMaker
 
 CONFIG = PRESETS["radarize"]
 SLOW = CONFIG.model_copy(update={"frame_period": 2 * CONFIG.frame_period})

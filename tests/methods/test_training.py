@@ -15,8 +15,8 @@ from radarize.mapping.scans import BEARINGS
 from radarize.nets.export import export_onnx
 from radarize.nets.weights import Grid, Header, build, example, load, save
 from radarize.recording import Recording, RecordingWriter, Stream
-from radarize.training.maps import AZIMUTHS
-from radarize.training.table import Table
+from radarize.features.maps import AZIMUTHS
+from radarize.features.table import Table
 from radarize.training.team import Team
 from radarize.training.train import train
 from radarize.training.trainer import Trainer

@@ -6,7 +6,7 @@ import pytest
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS, HeatmapScans
-from radarize.methods import BEST, CLASSICAL, ODOMETRY, SCANS, Inputs, Method, Weights, best_methods
+from radarize.methods.registry import BEST, CLASSICAL, ODOMETRY, SCANS, Inputs, Method, Weights, best_methods
 from radarize.pipeline import Pipeline
 from radarize.radar.presets import PRESETS
 

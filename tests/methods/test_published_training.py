@@ -18,7 +18,7 @@ from radarize.published.tasks import PUBLISHED_TASKS, pooled_dice
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
 from radarize.run import run
-from radarize.training.table import Table
+from radarize.features.table import Table
 from radarize.tum import read_tum
 
 pytestmark = pytest.mark.usefixtures("one_thread")

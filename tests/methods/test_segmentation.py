@@ -8,7 +8,7 @@ from radarize.mapping.scans import BEARINGS
 from radarize.mapping.segmentation import NEAR, Segmentation, first_surface
 from radarize.nets.weights import Grid, Header, build, example, save
 from radarize.radar.presets import PRESETS
-from radarize.training.maps import MapMaker
+from radarize.features.maps import MapMaker
 
 CONFIG = PRESETS["radarize"]
 

@@ -6,9 +6,9 @@ import torch
 from ridges import CONFIG, ridge, walls
 
 from radarize.mapping.scans import BEARINGS
-from radarize.training import augment
-from radarize.training.losses import FREE, SURFACE, UNKNOWN
-from radarize.training.maps import AZIMUTHS, FLOOR
+from radarize.features import augment
+from radarize.nets.losses import FREE, SURFACE, UNKNOWN
+from radarize.features.maps import AZIMUTHS, FLOOR
 from radarize.training.tasks import TASKS
 
 VELOCITY = np.array([[0.7, 0.4]])

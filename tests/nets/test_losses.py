@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from radarize.nets.gaussian import Gaussian
-from radarize.training.losses import FREE, SURFACE, UNKNOWN, cyclic, surfaces
+from radarize.nets.losses import FREE, SURFACE, UNKNOWN, cyclic, surfaces
 
 
 def test_cyclic():

@@ -80,12 +80,12 @@ class Pipeline:
         with self._stopwatch.running():
             track = batch.made(self.odometry.follow)
             used = np.isin(batch.centers, track.time)
-            ranges = batch.made(self.scanner.scan)[used].astype(np.float32)
+            ranges = batch.made(self.scanner.scan)[used]
             with stage("slam"):
                 for time, pose, covariance, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):
                     self.slam.add_odometry(time, pose, covariance)
                     self.slam.add_scan(time, BEARINGS, scan)
-            return Result(batch.numbers[used], track, ranges)
+            return Result(batch.numbers[used], track, ranges.astype(np.float32))
 
     def follow(self, batches: Iterable[Batch]) -> Iterator[Result]:
         """Push all of a stream's batches that hold frames, then finish."""

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from walks_known import RATE, attitude, imu, pose, walk
 
-from radarize.baselines.inertial import GRAVITY, PERIOD, Imu, displacement, instants
 from radarize.errors import InputError
+from radarize.methods.rnin.training import displacement
+from radarize.odometry.inertial import GRAVITY, PERIOD, Imu, instants
 from radarize.recording import Recording
 
 

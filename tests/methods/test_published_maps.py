@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
-from radarize.published.heatmaps import BEAMS, BEARINGS, PublishedMaps, area_weights
+from radarize.methods.published.maps import BEAMS, BEARINGS, PublishedMaps, area_weights
 from radarize.radar.presets import PRESETS
 from tests.echoes import record
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from radarize.baselines.inertial import GRAVITY
+from radarize.odometry.inertial import GRAVITY
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter, Stream
 

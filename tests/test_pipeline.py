@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from radarize.batch import Intake
+from radarize.cli import app
+from radarize.console import run as command
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate
 from radarize.methods.configuration import Configuration
@@ -216,7 +218,11 @@ def test_a_configuration_changes_the_run(walk, finished, tmp_path):
     """What is set is used, and told; what is not set is as always."""
     (tmp_path / "mine.yaml").write_text("slam:\n  grid:\n    map_resolution: 0.1\nscans:\n  min_range: 2.0\n")
     mine = Configuration.load(tmp_path / "mine.yaml")
-    out = run(walk, tmp_path / "run", odometry="doppler", scans="first-echo", configuration=mine)
+    out = tmp_path / "run"
+    methods = ["--odometry", "doppler", "--scans", "first-echo"]
+    with pytest.raises(SystemExit) as ended:
+        command(app, "radarize", ["run", str(walk), "-o", str(out), *methods, "--config", str(tmp_path / "mine.yaml")])
+    assert ended.value.code == 0
     told = json.loads((out / "run.json").read_text())["configuration"]
     assert told == json.loads(mine.model_dump_json())
     assert told["slam"]["grid"]["map_resolution"] == 0.1 and told["scans"]["min_range"] == 2.0

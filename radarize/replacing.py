@@ -28,3 +28,14 @@ def replacing(path: str | Path) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
         raise
+
+
+def write_whole(path: Path, text: str) -> Path:
+    """Write a text file under a temporary name and rename it when it is whole.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+    return path

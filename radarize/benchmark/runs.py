@@ -16,13 +16,13 @@ from radarize.benchmark.networks import Networks
 from radarize.benchmark.steps import Report
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate, trajectory_errors
-from radarize.evaluation.runfiles import read_scans
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import missed, sources
 from radarize.methods import ODOMETRY, SCANS
 from radarize.pipeline import BATCH, Pipeline
 from radarize.recording import Recording
 from radarize.run import run_each
+from radarize.runfolder import RunFolder
 from radarize.slam import log
 from radarize.slam.config import LoopConfig, SlamConfig
 
@@ -168,7 +168,7 @@ def figures(run: Path, recording: Path) -> dict[str, object]:
     found["quantiles"] = {
         name: np.quantile(each.position_errors, levels).round(4).tolist() for name, each in errors.items()
     }
-    scans = read_scans(run / "scans.h5")
+    scans = RunFolder(run).scans
     if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
         true = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
         found["missed"] = missed(scans["ranges"], true)

@@ -10,7 +10,6 @@ from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
-from radarize.evaluation.runfiles import read_map
 from radarize.exporters import export
 from radarize.heatmaps import Heatmaps
 from radarize.importers.companions import depth_picture
@@ -18,6 +17,7 @@ from radarize.mapping.scans import BEARINGS
 from radarize.pose import compose, exponential
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
+from radarize.runfolder import OccupancyMap
 from radarize.slam.config import SlamConfig
 from radarize.slam.log import run as slam
 from radarize.tum import planar, planar_poses, write_tum
@@ -239,7 +239,7 @@ def test_a_failure_leaves_nothing(recording, tmp_path):
 def test_maps_and_trajectories(recording, run, tmp_path):
     written = export(run, "map", tmp_path / "floor.pgm")
     assert written.name == "floor.yaml" and yaml.safe_load(written.read_text())["image"] == "floor.pgm"
-    assert np.array_equal(read_map(written).pixels, read_map(run / "map.yaml").pixels)
+    assert np.array_equal(OccupancyMap.read(written).pixels, OccupancyMap.read(run / "map.yaml").pixels)
     export(run, "tum", tmp_path / "slam.tum")
     assert np.loadtxt(tmp_path / "slam.tum") == pytest.approx(np.loadtxt(run / "trajectory.tum"), abs=1e-8)
     export(recording, "tum", tmp_path / "truth.tum")

@@ -16,8 +16,8 @@ from radarize.published import labels
 from radarize.published.tasks import pooled_dice
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
-from radarize.training.losses import SURFACE, surfaces
-from radarize.training.maps import MapMaker, maps_of
+from radarize.nets.losses import SURFACE, surfaces
+from radarize.features.maps import MapMaker, maps_of
 from radarize.training.tasks import first_cell
 from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene

@@ -12,7 +12,7 @@ from radarize.evaluation.motion import turn_errors, velocity_errors
 from radarize.evaluation.scans import true_ranges
 from radarize.mapping.scans import BEARINGS
 from radarize.mapping.segmentation import LEAST, NEAR, Segmentation, likeliest
-from radarize.methods import BEST, Inputs, Weights
+from radarize.methods.registry import BEST, Inputs, Weights
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.learned import LearnedRotation, LearnedVelocity
 from radarize.pipeline import BATCH

@@ -22,6 +22,7 @@ CommandPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of th
 DataPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of its samples.")]
 Duration = Annotated[float | None, typer.Option(min=0.0, help="End after so many seconds.")]
 FrameCount = Annotated[int | None, typer.Option(min=1, help="End after so many frames.")]
+Reading = Literal["corrected", "published"]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 
@@ -164,8 +165,7 @@ def live(
     from radarize.capture.live import Live, prepare
     from radarize.capture.page import Page
     from radarize.capture.replay import Replay
-    from radarize.methods import best_methods
-    from radarize.pipeline import Pipeline
+    from radarize.methods.registry import Inputs, best_methods
     from radarize.recording import RecordingWriter
 
     if replay and (config or port):
@@ -176,8 +176,8 @@ def live(
     writer = None
     with until_interrupted() as stopping, ExitStack() as stack:
         with working("warming up"):
-            pipeline = prepare(radar, lambda: Pipeline(radar, **chosen))
-        live = Live(pipeline, stack.enter_context(Page(address)))
+            inputs = prepare(Inputs(radar), chosen)
+        live = Live(inputs, chosen, stack.enter_context(Page(address)))
         report = stack.enter_context(progress("live"))
         stack.enter_context(stream)
         print(f"page: {live.page.url}", flush=True)
@@ -231,22 +231,41 @@ def run_(
     scans: Annotated[
         str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
     ] = None,
-    settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected, or published.")] = None,
+    settings: Annotated[
+        Reading, typer.Option(help="Reading of the paper: published is --odometry published --scans published.")
+    ] = "corrected",
     weights: Annotated[
         Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
     ] = None,
+    config: Annotated[Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")] = None,
 ):
     """Estimate trajectory and map of a recording."""
+    from radarize.methods.configuration import Configuration
     from radarize.run import run
 
-    choices = {"odometry": odometry, "scans": scans, "settings": settings, "weights": weights}
-    given = {name: value for name, value in choices.items() if value is not None}
+    if settings == "published":
+        for option, value in (("--odometry", odometry), ("--scans", scans)):
+            if value not in (None, "published"):
+                raise InputError(f"{option} is {value!r}, expected none with --settings published, which has its own")
+        odometry = scans = "published"
+    configuration = Configuration() if config is None else Configuration.load(config)
     try:
         with progress("run") as report:
-            written = run(recording, output, **given, progress=report)
+            written = run(
+                recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,
+                progress=report,
+            )  # fmt: skip
     except KeyboardInterrupt:
         raise InputError(f"stopped; {output} is not a whole run, the recording is untouched") from None
     print(written)
+
+
+@app.command("config")
+def config_():
+    """Print all settings of the pipeline as YAML, with what they mean: `radarize config > mine.yaml`."""
+    from radarize.methods.configuration import Configuration
+
+    print(Configuration().text(), end="")
 
 
 @app.command()
@@ -270,7 +289,7 @@ def train(
     workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where a training was stopped.")] = False,
     onnx: Annotated[bool, typer.Option("--onnx", help="Write the network as ONNX as well.")] = False,
-    settings: Annotated[str, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
+    settings: Annotated[Reading, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
 ):
     """Train a network on recordings; figures in brackets are the three tasks' defaults.
 
@@ -278,19 +297,21 @@ def train(
     """
     from dataclasses import replace
 
-    from radarize.training.train import find_task, train
+    from radarize.methods.registry import find_task
+    from radarize.training.train import train
 
     choices = {
         "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
         "patience": patience, "precision": precision, "seed": seed,
     }  # fmt: skip
     given = {name: value for name, value in choices.items() if value is not None}
-    hyper = replace(find_task(task, settings).defaults, **given)
+    task = f"published-{task}" if settings == "published" and not task.startswith("published-") else task
+    hyper = replace(find_task(task).defaults, **given)
     try:
         with progress("train") as report:
             written = train(
                 task, data, output, split=split, settings=hyper, device=device, workers=workers, resume=resume,
-                onnx=onnx, setting=settings, progress=report, say=lambda line: typer.echo(line, err=True),
+                onnx=onnx, progress=report, say=lambda line: typer.echo(line, err=True),
             )  # fmt: skip
     except KeyboardInterrupt:
         raise InputError("stopped; with --resume the same command goes on after the last whole epoch") from None

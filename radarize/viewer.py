@@ -22,11 +22,11 @@ from radarize.evaluation.drawings import LEAKAGE
 from radarize.evaluation.evaluate import trajectories
 from radarize.evaluation.page import COLORS
 from radarize.evaluation.trajectory import alignment, matched, planar, trajectory
+from radarize.features.maps import MapMaker, maps_of
 from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
 from radarize.replacing import replacing
 from radarize.runfolder import RunFolder
-from radarize.training.maps import MapMaker, maps_of
 
 _BATCH = 16
 _MAPS = ("range_azimuth", "doppler_azimuth")

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import radarize
+from radarize.batch import BATCH, Intake
 from radarize.benchmark.dataset import Case
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.steps import Report
@@ -18,8 +19,7 @@ from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate, trajectory_errors
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import missed, sources
-from radarize.methods import ODOMETRY, SCANS
-from radarize.pipeline import BATCH, Pipeline
+from radarize.methods.registry import ODOMETRY, SCANS, Inputs, Workshop
 from radarize.recording import Recording
 from radarize.run import run_each
 from radarize.runfolder import RunFolder
@@ -67,7 +67,7 @@ class _Step:
             "frames": self.case.frames,
             "bytes": self.case.path.stat().st_size,
             "networks": self.networks.digests(self.pair.networks),
-            "code": code(ODOMETRY[self.pair.odometry].make, SCANS[self.pair.scans].make),
+            "code": code(ODOMETRY[self.pair.odometry].maker, SCANS[self.pair.scans].maker),
         }
 
 
@@ -211,20 +211,23 @@ def measure(
         ``stages``: ms per frame by name, ``whole``: ms per frame, reading included; ``frames``.
     """
 
-    def pipeline() -> Pipeline:
-        return Pipeline(source.config, pair.scans, pair.odometry, networks.weights, source)
+    inputs = Inputs(source.config, weights=networks.weights, recording=source)
 
-    pipeline().push(source.adc(0, BATCH), source.times[:BATCH])  # compiles
-    timed = pipeline()
+    def pipeline() -> tuple[Pipeline, Intake]:
+        return Workshop(inputs).pipeline(pair.odometry, pair.scans), Intake(inputs.signal)
+
+    warm, intake = pipeline()
+    warm.push(intake.take(source.adc(0, BATCH), source.times[:BATCH]))  # compiles
+    timed, intake = pipeline()
     start = time.perf_counter()
     for first in range(0, frames, BATCH):
         stop = min(first + BATCH, frames)
-        timed.push(source.adc(first, stop), source.times[first:stop], source.valid(first, stop))
+        timed.push(intake.take(source.adc(first, stop), source.times[first:stop], source.valid(first, stop)))
         report(stop / frames)
     timed.finish()
     whole = 1e3 * (time.perf_counter() - start) / frames
     return {
-        "stages": {name: 1e3 * seconds / frames for name, seconds in timed.stage_seconds.items()},
+        "stages": {name: 1e3 * seconds / frames for name, seconds in timed.seconds.items()},
         "whole": whole,
         "frames": frames,
     }

@@ -10,9 +10,9 @@ import torch
 from torch.utils.data import Dataset
 
 from radarize.errors import InputError
+from radarize.features.maps import MAPS, MapMaker, maps_of
 from radarize.pose import wrap
 from radarize.recording import Recording
-from radarize.training.maps import MAPS, MapMaker, maps_of
 from radarize.tum import planar
 
 #: Truth by the name of a field, as the path in the recording and the columns of it.

@@ -18,7 +18,7 @@ from radarize.benchmark.run import benchmark
 from radarize.benchmark.runs import Pair, Run, code
 from radarize.console import run as command_line
 from radarize.errors import InputError
-from radarize.methods import ODOMETRY, SCANS
+from radarize.methods.registry import ODOMETRY, SCANS
 from radarize.recording import Recording
 from tests.benchmark import toys as toy_file
 from tests.benchmark.rooms import ROOMS, write_rooms

@@ -5,7 +5,7 @@ from contextlib import nullcontext
 import numpy as np
 
 from radarize.mapping.scans import BEARINGS
-from radarize.methods import ODOMETRY, SCANS, Inputs, Method
+from radarize.methods.registry import ODOMETRY, SCANS, Inputs, Method
 from radarize.odometry.integration import Track
 from radarize.pose import between
 from radarize.tum import planar

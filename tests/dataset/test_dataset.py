@@ -14,7 +14,7 @@ from fakes import FakeSpecification, fake
 
 from radarize.errors import InputError
 from radarize.recording import Recording
-from radarize.training.maps import MAPS
+from radarize.features.maps import MAPS
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
 from radarsim.planner import plan_motion

@@ -11,7 +11,7 @@ from radarize.nets.gaussian import Gaussian
 from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
 from radarize.nets.unet import UNet
-from radarize.training.maps import AZIMUTHS
+from radarize.features.maps import AZIMUTHS
 
 
 def parameters(net: torch.nn.Module) -> int:

@@ -18,7 +18,7 @@ from radarize.errors import InputError
 from radarize.nets.weights import load, read
 from radarize.recording import Recording
 from radarize.training import losses
-from radarize.training.table import Table
+from radarize.features.table import Table
 from radarize.training.tasks import TASKS
 from radarize.training.team import Team
 from radarize.training.train import train

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 import radarize
+from radarize import log
 from radarize.batch import BATCH, Intake
 from radarize.benchmark.dataset import Case
 from radarize.benchmark.networks import Networks
@@ -23,7 +24,6 @@ from radarize.methods.registry import ODOMETRY, SCANS, Inputs, Workshop
 from radarize.recording import Recording
 from radarize.run import run_each
 from radarize.runfolder import RunFolder
-from radarize.slam import log
 from radarize.slam.config import LoopConfig, SlamConfig
 
 #: Folder in a run's with the back end's result where no loops were closed.

@@ -11,5 +11,6 @@ metrics.json          figures against the truth, once `radarize evaluate` has ma
 
 from radarize.runfolder.occupancy import OccupancyMap
 from radarize.runfolder.reader import RunFolder, Scans
+from radarize.runfolder.writer import RunWriter
 
-__all__ = ["OccupancyMap", "RunFolder", "Scans"]
+__all__ = ["OccupancyMap", "RunFolder", "RunWriter", "Scans"]

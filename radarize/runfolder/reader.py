@@ -2,7 +2,7 @@
 size for."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
@@ -46,6 +46,11 @@ SHAPES = {
     "heatmaps/elevation_aware": "picture range azimuth",
     "heatmaps/doppler_azimuth": "picture speed azimuth",
 }
+#: Files of a run; the first is there in a whole one.
+FILES = (
+    *("trajectory.tum", "odometry.tum", "reference.tum", "map.pgm", "map.yaml", "scans.h5", "run.json"),
+    "metrics.json",
+)
 _NEEDED = ("time", "ranges", "azimuths")
 #: Those that say when and where the others are.
 _AXES = ("time", "azimuths", "truth/scan_azimuths", "heatmaps/ranges", "heatmaps/azimuths", "heatmaps/velocities")
@@ -180,6 +185,14 @@ class Scans(Mapping[str, np.ndarray]):
 
     def __len__(self) -> int:
         return len(self._names)
+
+    def copy(self, file: h5py.File, without: Collection[str]) -> None:
+        """Copy the data sets into another file, but for some."""
+        with self._open() as source:
+            for name in self._names:
+                if name not in without:
+                    dataset(source, name, self.path, _PACKED, _AHEAD)
+                    source.copy(name, file, name)
 
     @contextmanager
     def _open(self) -> Iterator[h5py.File]:

@@ -71,7 +71,8 @@ class Odometry:
         left = np.maximum(right - 1, 0)
         inside = (after > 0) & (after <= last)
         share = (time - times[left]) / np.where(inside, times[right] - times[left], 1.0)
-        return np.where(inside[..., None], interpolate(poses[left], poses[right], share), poses[np.minimum(after, last)])
+        between_entries = interpolate(poses[left], poses[right], share)
+        return np.where(inside[..., None], between_entries, poses[np.minimum(after, last)])
 
     def motion(self, start: float, end: float) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
         """Motion from start to end (s) in the frame at the start, and its covariance in the frame at the end.

@@ -13,13 +13,13 @@ from radarize.errors import InputError
 from radarize.exporters import export
 from radarize.heatmaps import Heatmaps
 from radarize.importers.companions import depth_picture
+from radarize.log import run as slam
 from radarize.mapping.scans import BEARINGS
 from radarize.pose import compose, exponential
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
 from radarize.runfolder import OccupancyMap
 from radarize.slam.config import SlamConfig
-from radarize.slam.log import run as slam
 from radarize.tum import planar, planar_poses, write_tum
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 4})
@@ -152,7 +152,7 @@ def test_odometry_and_its_transform(bag):
 def test_covariance_adds_up_as_in_a_simulation():
     """Many walks whose steps err as their covariance says: positions spread as the bag claims."""
     from radarize.exporters.ros2 import _odometry
-    from radarize.slam.log import Log
+    from radarize.log import Log
 
     rng, error = np.random.default_rng(1), np.diag([0.01, 0.02, 0.01]) ** 2
     log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), np.tile(error, (COUNT, 1, 1)))

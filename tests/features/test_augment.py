@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 import torch
+from radarize.training.tasks import TASKS
 from ridges import CONFIG, ridge, walls
 
-from radarize.mapping.scans import BEARINGS
 from radarize.features import augment
-from radarize.nets.losses import FREE, SURFACE, UNKNOWN
 from radarize.features.maps import AZIMUTHS, FLOOR
-from radarize.training.tasks import TASKS
+from radarize.mapping.scans import BEARINGS
+from radarize.nets.losses import FREE, SURFACE, UNKNOWN
 
 VELOCITY = np.array([[0.7, 0.4]])
 

@@ -6,11 +6,11 @@ import torch
 from walks import CONFIG, walk
 
 from radarize.errors import InputError
+from radarize.features.keeping import keep_maps
+from radarize.features.maps import AZIMUTHS, FLOOR, MAPS, STEP, MapMaker, maps_of
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
-from radarize.features.keeping import keep_maps
-from radarize.features.maps import AZIMUTHS, FLOOR, MAPS, STEP, MapMaker, maps_of
 
 
 def test_maps_are_the_heat_maps_in_rounded_decibels(tmp_path):

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from radarize.baselines.inertial import GRAVITY, PERIOD, Imu, displacement, instants
 from walks_known import RATE, attitude, imu, pose, walk
 
-from radarize.baselines.inertial import GRAVITY, PERIOD, Imu, displacement, instants
 from radarize.errors import InputError
 from radarize.recording import Recording
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import torch
-from walks_known import CONFIG, RATE, attitude, pose, walk
-
 from radarize.baselines import odometry
 from radarize.baselines.inertial import Imu
 from radarize.baselines.milliego import MilliEgoNet
 from radarize.baselines.rnin import RninNet
+from walks_known import CONFIG, RATE, attitude, pose, walk
+
 from radarize.errors import InputError
 from radarize.methods.registry import Inputs, Weights
 from radarize.nets.weights import Header, save

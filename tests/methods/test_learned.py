@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 import torch
-
-from radarize.errors import InputError
-from radarize.nets.weights import Grid, Header, build, example, save
 from radarize.nets.windows import Windows
-from radarize.odometry.doppler import Velocities
 from radarize.odometry.fused import FusedVelocity
 from radarize.odometry.learned import LearnedRotation, LearnedVelocity
-from radarize.radar.presets import PRESETS
+
+from radarize.errors import InputError
 from radarize.features.maps import MapMaker
+from radarize.nets.weights import Grid, Header, build, example, save
+from radarize.odometry.doppler import Velocities
+from radarize.radar.presets import PRESETS
 
 CONFIG = PRESETS["radarize"]
 SLOW = CONFIG.model_copy(update={"frame_period": 2 * CONFIG.frame_period})

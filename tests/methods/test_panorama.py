@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from walks_known import walk
-
 from radarize.baselines.milliego import COLUMNS, ROWS
 from radarize.baselines.panorama import panoramas, seen
+from walks_known import walk
+
 from radarize.heatmaps import Heatmaps
 from radarize.points import DENSE, PointClouds
 from radarize.recording import Recording

@@ -5,20 +5,20 @@ import json
 import numpy as np
 import pytest
 import torch
+from radarize.published import labels
+from radarize.published.chain import Chain, first_occupied
+from radarize.published.heatmaps import PublishedMaps
+from radarize.published.tasks import PUBLISHED_TASKS, pooled_dice
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from radarize.cli import app
 from radarize.errors import InputError
+from radarize.features.table import Table
 from radarize.nets.weights import Grid, Header, build, example, load, save
-from radarize.published import labels
-from radarize.published.chain import Chain, first_occupied
-from radarize.published.heatmaps import PublishedMaps
-from radarize.published.tasks import PUBLISHED_TASKS, pooled_dice
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
 from radarize.run import run
-from radarize.features.table import Table
 from radarize.tum import read_tum
 
 pytestmark = pytest.mark.usefixtures("one_thread")

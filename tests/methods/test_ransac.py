@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-
 from radarize.baselines.ransac import RansacSettings, RansacVelocity
+
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
 

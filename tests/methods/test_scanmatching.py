@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 import torch
+from radarize.odometry.scanmatching import ScanMatching
 
 from radarize.errors import InputError
 from radarize.mapping.scans import BEARINGS
-from radarize.odometry.scanmatching import ScanMatching
 from radarize.pose import between
 from radarize.radar.presets import PRESETS
 from radarize.slam.config import SlamConfig

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import torch
-
-from radarize.mapping.scans import BEARINGS
 from radarize.mapping.segmentation import NEAR, Segmentation, first_surface
+
+from radarize.features.maps import MapMaker
+from radarize.mapping.scans import BEARINGS
 from radarize.nets.weights import Grid, Header, build, example, save
 from radarize.radar.presets import PRESETS
-from radarize.features.maps import MapMaker
 
 CONFIG = PRESETS["radarize"]
 

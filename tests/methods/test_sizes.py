@@ -2,7 +2,6 @@
 
 import pytest
 import torch
-
 from radarize.baselines.milliego import MilliEgoNet
 from radarize.baselines.radarhd import RadarHdNet
 from radarize.baselines.rnin import RninNet

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from radarize.baselines.radarhd import DRAWN, bins, columns
+from radarize.baselines.tasks import BASELINE_TASKS, displaced, drawn, pictured, rotation
 from scipy.spatial.transform import Rotation
 from walks_known import CONFIG, walk
 
-from radarize.baselines.radarhd import DRAWN, bins, columns
-from radarize.baselines.tasks import BASELINE_TASKS, displaced, drawn, pictured, rotation
 from radarize.errors import InputError
+from radarize.features.maps import AZIMUTHS
+from radarize.features.table import Table
 from radarize.mapping.scans import BEARINGS
 from radarize.nets.export import export_onnx
 from radarize.nets.weights import Grid, Header, build, example, load, save
 from radarize.recording import Recording, RecordingWriter, Stream
-from radarize.features.maps import AZIMUTHS
-from radarize.features.table import Table
 from radarize.training.team import Team
 from radarize.training.train import train
 from radarize.training.trainer import Trainer

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import torch
 
+from radarize.features.maps import AZIMUTHS
 from radarize.mapping.scans import BEARINGS
 from radarize.nets import NETS, RotationNet, SegmentationNet, TranslationNet
 from radarize.nets.correlation import Correlation
@@ -11,7 +12,6 @@ from radarize.nets.gaussian import Gaussian
 from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
 from radarize.nets.unet import UNet
-from radarize.features.maps import AZIMUTHS
 
 
 def parameters(net: torch.nn.Module) -> int:

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from radarize.training.tasks import TASKS
 from ridges import CONFIG, data_set, write
 from typer.testing import CliRunner
 
 from radarize.cli import app
 from radarize.errors import InputError
+from radarize.features.table import Table
 from radarize.nets.weights import load, read
 from radarize.recording import Recording
 from radarize.training import losses
-from radarize.features.table import Table
-from radarize.training.tasks import TASKS
 from radarize.training.team import Team
 from radarize.training.train import train
 

@@ -8,10 +8,10 @@ import pytest
 
 from radarize.console import run as run_app
 from radarize.errors import InputError
+from radarize.log import Log, run
 from radarize.pose import between
 from radarize.runfolder import OccupancyMap
 from radarize.slam.config import SlamConfig
-from radarize.slam.log import Log, run
 from radarize.tum import planar_poses, read_tum, write_tum
 from tests.slam.world import box, scan
 

@@ -120,6 +120,7 @@ def test_memory_does_not_grow_with_what_is_written(tmp_path):
             batch.track.time[:] += 1.0
             writer.add(Result(16 * k + np.arange(16), batch.track, batch.ranges))
             if k in (50, 299):
+                gc.collect()
                 taken.append(tracemalloc.get_traced_memory()[0])
         tracemalloc.stop()
     assert taken[1] - taken[0] < 50e3  # scans of the 4,000 frames take 2 MB, of an hour 52

@@ -53,9 +53,10 @@ def test_help_is_instant(name):
 @pytest.mark.parametrize(
     "command",
     ["radarize import", "radarize info", "radarize run", "radarize slam", "radarize train", "radarize evaluate",
-     "radarize report", "radarize benchmark", "radarize export", "radarize view", "radarsim simulate",
-     "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene", "radarsim scene info",
-     "radarsim scene preview", "radarsim scene import", "radarsim export", "radarsim emulate", "radarsim doctor"],
+     "radarize config", "radarize report", "radarize benchmark", "radarize export", "radarize view",
+     "radarsim simulate", "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene",
+     "radarsim scene info", "radarsim scene preview", "radarsim scene import", "radarsim export", "radarsim emulate",
+     "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
     code, out, _ = call(capsys, command, "--help")

@@ -1,7 +1,7 @@
 """How alike a recording and its twin are, frame by frame: the same radar on the same walk, in the real place and in a
 model of it (`radarsim twin`).
 
-Maps are those that networks see (`radarize.training.maps`), in dB over their own median, so that the receiver's gain,
+Maps are those that networks see (`radarize.features.maps`), in dB over their own median, so that the receiver's gain,
 which is a figure of its own, and the noise of empty cells drop out. Velocities and scans are made without networks, of
 single frames (Doppler least squares; Capon's maps, first echo), so that any radar has them.
 """

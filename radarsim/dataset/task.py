@@ -128,7 +128,6 @@ class Task:
         if threads:
             _use_threads(threads)
         from radarize.features.keeping import keep_maps
-from radarize.features.maps import 
         from radarsim.accompany import accompany
         from radarsim.scene.scene import Scene
         from radarsim.simulate import simulate

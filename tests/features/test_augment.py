@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 import torch
-from radarize.training.tasks import TASKS
-from ridges import CONFIG, ridge, walls
 
 from radarize.features import augment
 from radarize.features.maps import AZIMUTHS, FLOOR
 from radarize.mapping.scans import BEARINGS
+from radarize.methods.registry import find_task
 from radarize.nets.losses import FREE, SURFACE, UNKNOWN
+from tests.training.ridges import CONFIG, ridge, walls
 
 VELOCITY = np.array([[0.7, 0.4]])
 
@@ -47,7 +47,7 @@ def test_signs_of_all_tasks():
     count = 64
     maps = items(ridge(np.repeat(VELOCITY, count, axis=0))).repeat(1, 1, 2, 1, 1)
     label = torch.tensor(VELOCITY, dtype=torch.float32).repeat(count, 1)
-    found, velocity = TASKS["translation"].augment(maps, label, generator)
+    found, velocity = find_task("translation").augment(maps, label, generator)
     assert len(np.unique(velocity.numpy().round(4), axis=0)) == 4
     for shown, v in zip(found[:, 0, 0], velocity, strict=True):
         signs = [(a, b) for a in (1, -1) for b in (1, -1)]
@@ -56,7 +56,7 @@ def test_signs_of_all_tasks():
 
     maps = torch.zeros(count, 2, 1, 16, 40)
     maps[:, 0, :, 8, 25], maps[:, 1, :, 8, 20] = 60, 60  # the echo moves to the right: the sensor turns to the left
-    found, turn = TASKS["rotation"].augment(maps, torch.tensor([[0.2, 0.3, 0.1]]).repeat(count, 1), generator)
+    found, turn = find_task("rotation").augment(maps, torch.tensor([[0.2, 0.3, 0.1]]).repeat(count, 1), generator)
     moved = found[:, 0, 0, 8].argmax(dim=1) - found[:, 1, 0, 8].argmax(dim=1)
     assert torch.equal(moved.sign(), turn[:, 0].sign().long()) and len(turn[:, 0].unique()) == 2
     assert torch.allclose(turn[:, 1:].abs(), torch.tensor([0.3, 0.1]), atol=0.05)  # told with some doubt
@@ -64,7 +64,7 @@ def test_signs_of_all_tasks():
 
     shown, label = walls(count, np.random.default_rng(0))
     label = torch.as_tensor(label)
-    found, changed = TASKS["segmentation"].augment(items(shown).repeat(1, 1, 2, 1, 1), label, generator)
+    found, changed = find_task("segmentation").augment(items(shown).repeat(1, 1, 2, 1, 1), label, generator)
     flipped = torch.tensor([not torch.equal(a, b) for a, b in zip(changed, label, strict=True)])
     assert 10 < flipped.sum() < count - 10
     column = int(np.argmin(np.abs(AZIMUTHS - BEARINGS[84])))

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 import torch
-from walks import CONFIG, walk
 
+from radarize.batch import Signal
 from radarize.errors import InputError
 from radarize.features.keeping import keep_maps
 from radarize.features.maps import AZIMUTHS, FLOOR, MAPS, STEP, MapMaker, maps_of
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording
+from radarize.recording import Recording, RecordingWriter
+from tests.batches import of_spectrum
+from tests.training.walks import CONFIG, walk
 
 
 def test_maps_are_the_heat_maps_in_rounded_decibels(tmp_path):
@@ -55,15 +57,22 @@ def test_no_flash_drowns_the_ridge():
     assert angles.abs().max() < 1e-5
 
 
-def test_maps_of_the_same_spectrum_are_made_once(tmp_path):
+def test_maps_of_a_batch_are_made_once(tmp_path, monkeypatch):
+    """Those that were asked for, when they are first asked for."""
     with Recording(walk(tmp_path / "a.h5")) as recording:
         adc = recording.adc(0, 4)
-    maker = MapMaker(CONFIG)
-    one, other = (maker.heatmaps.spectrum(adc[k : k + 2]) for k in (0, 2))
-    first = maker.of(one, ("range_azimuth",))["range_azimuth"]
-    assert maker.of(one)["range_azimuth"] is first
-    assert not np.array_equal(maker.of(other)["range_azimuth"], first)
-    assert np.array_equal(maker.of(one)["range_azimuth"], first)
+    signal, made, of = Signal(CONFIG), [], MapMaker.of
+    monkeypatch.setattr(MapMaker, "of", lambda self, spectrum, names: made.append(names) or of(self, spectrum, names))
+    spectra = [signal.heatmaps.spectrum(adc[k : k + 2]) for k in (0, 2)]
+    one, other = (of_spectrum(signal, spectrum, np.arange(2)) for spectrum in spectra)
+    first = one.maps(("range_azimuth",))["range_azimuth"]
+    names = ("elevation_aware", "range_azimuth")
+    both = one.maps(names)
+    assert tuple(both) == names and both["range_azimuth"] is first
+    assert made == [("range_azimuth",), ("elevation_aware",)]
+    assert np.array_equal(first, of(signal.maker, spectra[0], ("range_azimuth",))["range_azimuth"])
+    assert not np.array_equal(other.maps(("range_azimuth",))["range_azimuth"], first)
+    assert one.maps(("range_azimuth",))["range_azimuth"] is first and len(made) == 3
 
 
 def test_lost_frames_read_the_floor():
@@ -98,8 +107,6 @@ def test_stored_maps_take_a_tenth(tmp_path):
     config = PRESETS["radarize"]
     rng = np.random.default_rng(0)
     adc = rng.normal(0, 60, (8, *config.frame_shape)).astype(np.int16)
-    from radarize.recording import RecordingWriter
-
     with RecordingWriter(tmp_path / "a.h5", config) as writer:
         writer.append(adc, np.arange(8) / 30)
     keep_maps(tmp_path / "a.h5", tmp_path / "b.h5")

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from radarize.baselines.inertial import GRAVITY, PERIOD, Imu, displacement, instants
 from walks_known import RATE, attitude, imu, pose, walk
 
 from radarize.errors import InputError
+from radarize.methods.rnin.training import displacement
+from radarize.odometry.inertial import GRAVITY, PERIOD, Imu, instants
 from radarize.recording import Recording
 
 

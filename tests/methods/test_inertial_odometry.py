@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 import torch
-from radarize.baselines import odometry
-from radarize.baselines.inertial import Imu
-from radarize.baselines.milliego import MilliEgoNet
-from radarize.baselines.rnin import RninNet
 from walks_known import CONFIG, RATE, attitude, pose, walk
 
 from radarize.errors import InputError
-from radarize.methods.registry import Inputs, Weights
+from radarize.methods.milliego.network import MilliEgoNet
+from radarize.methods.registry import Inputs, Weights, Workshop
+from radarize.methods.rnin.network import RninNet
 from radarize.nets.weights import Header, save
+from radarize.odometry.inertial import Imu
 from radarize.odometry.integration import Track
 from radarize.pose import between
 from radarize.recording import Recording
 from radarize.tum import planar
+from tests.batches import batch
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
@@ -38,11 +38,11 @@ def weights(tmp_path):
 
 
 def follow(name: str, recording: Recording, weights: Weights, cuts: list[int]) -> Track:
-    inputs = Inputs(recording.config, weights, recording=recording)
-    follower, first, parts = inputs.odometry(name), 0, []
+    inputs = Inputs(recording.config, weights=weights, recording=recording)
+    follower, first, parts = Workshop(inputs).odometry(name, "threshold"), 0, []
     for count in cuts:
-        spectrum = inputs.heatmaps.spectrum(recording.adc(first, first + count))
-        parts.append(follower.follow(spectrum, recording.times[first : first + count]))
+        adc, times = recording.adc(first, first + count), recording.times[first : first + count]
+        parts.append(follower.follow(batch(inputs.signal, adc, times)))
         first += count
     return Track(*(np.concatenate(each) for each in zip(*(vars(part).values() for part in parts), strict=True)))
 
@@ -77,7 +77,8 @@ def test_truth_told_is_truth_followed(name, recording, weights, monkeypatch):
         cos, sin = np.cos(off), np.sin(off)
         turned = np.column_stack([cos * moved[:, 0] - sin * moved[:, 1], sin * moved[:, 0] + cos * moved[:, 1]])
         net = Truth(turned, 1e-4 * np.eye(2))
-    monkeypatch.setattr(odometry, "load", lambda path: (net, Header(kind=name, frames=3, maps=(), width=4, grid=None)))
+    header = Header(kind=name, frames=3, maps=(), width=4, grid=None)
+    monkeypatch.setattr(f"radarize.methods.{name}.odometry.load", lambda path, network: (net, header))
     track, truth = follow(name, recording, weights, [16] * 5 + [10]), true_track()
     # The first displacement comes when there is a frame to tell it from: until then nothing is known but rest.
     late = slice(45, None)
@@ -98,7 +99,7 @@ def test_batches_do_not_matter(name, recording, weights):
 
 def test_what_is_missing_is_named(recording, weights, tmp_path):
     with pytest.raises(InputError, match="odometry is 'rnin', which reads a recording's IMU; a live radar has none"):
-        Inputs(CONFIG, weights).odometry("rnin")
+        Workshop(Inputs(CONFIG, weights=weights)).odometry("rnin", "threshold")
     with Recording(walk(tmp_path / "b.h5", 3, with_imu=False)) as without:
         with pytest.raises(InputError, match="b.h5: has no /imu/time"):
-            Inputs(CONFIG, weights, recording=without).odometry("milliego")
+            Workshop(Inputs(CONFIG, weights=weights, recording=without)).odometry("milliego", "threshold")

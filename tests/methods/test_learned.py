@@ -3,18 +3,22 @@
 import numpy as np
 import pytest
 import torch
-from radarize.nets.windows import Windows
-from radarize.odometry.fused import FusedVelocity
-from radarize.odometry.learned import LearnedRotation, LearnedVelocity
 
+from radarize.batch import Signal
 from radarize.errors import InputError
-from radarize.features.maps import MapMaker
-from radarize.nets.weights import Grid, Header, build, example, save
+from radarize.features.grid import Grid
+from radarize.methods.radarize.fused import FusedVelocity
+from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
+from radarize.methods.radarize.motion import RotationNet, TranslationNet
+from radarize.nets.weights import Header, build, example, load, save
 from radarize.odometry.doppler import Velocities
 from radarize.radar.presets import PRESETS
+from tests.batches import of_spectrum, parts
 
 CONFIG = PRESETS["radarize"]
 SLOW = CONFIG.model_copy(update={"frame_period": 2 * CONFIG.frame_period})
+SIGNAL = Signal(CONFIG)
+NETS = {net.kind: net for net in (TranslationNet, RotationNet)}
 MAPS = {"translation": ("doppler_azimuth", "doppler_elevation_aware"), "rotation": ("range_azimuth",)}
 
 
@@ -24,8 +28,8 @@ def weights(folder, kind: str, **about):
     fields = {"spacings": (1, 2, 3, 4)} if kind == "rotation" else {}
     header = Header(kind=kind, frames=2, maps=maps, width=2, grid=Grid.of(SLOW, maps[0]), **(fields | about))
     torch.manual_seed(0)
-    net = build(header)
-    net(*example(header))
+    net = build(NETS[kind], header)
+    net(*example(net, header))
     return save(net.eval(), header, folder / f"{kind}.safetensors")
 
 
@@ -39,14 +43,13 @@ def spectra(frames: int) -> torch.Tensor:
 
 def test_windows_are_frames_of_the_trained_rate(tmp_path):
     """Every second one of a radar twice as fast, however the stream is cut; before its beginning, its first."""
-    everything = spectra(12)
-    maker = MapMaker(CONFIG)
-    level = torch.from_numpy(maker.of(everything, ("range_azimuth",))["range_azimuth"]).float().mean(dim=(1, 2))
+    everything, times = spectra(12), np.arange(12) * CONFIG.frame_period
+    level = torch.from_numpy(SIGNAL.maker.of(everything, ("range_azimuth",))["range_azimuth"]).float().mean(dim=(1, 2))
     for cuts in ([12], [5, 7], [1] * 12):
-        windows = Windows(maker, "rotation", weights(tmp_path, "rotation"))
-        parts = [windows.push(part, (1, 4)) for part in everything.split(cuts)]
+        windows = load(weights(tmp_path, "rotation"), RotationNet, CONFIG)[1].windows(CONFIG)
+        pushed = [windows.push(part, (1, 4)) for part in parts(SIGNAL, everything, times, cuts)]
         for k, spacing in enumerate((1, 4)):
-            shown = torch.cat([part[k] for part in parts]).mean(dim=(2, 3, 4))
+            shown = torch.cat([part[k] for part in pushed]).mean(dim=(2, 3, 4))
             expected = [(max(0, frame - 2 * spacing), frame) for frame in range(12)]
             assert torch.allclose(shown, level[torch.tensor(expected)], atol=0.01)
 
@@ -54,19 +57,18 @@ def test_windows_are_frames_of_the_trained_rate(tmp_path):
 def test_a_radar_of_another_rate_is_refused(tmp_path):
     odd = CONFIG.model_copy(update={"frame_period": 0.05})
     with pytest.raises(InputError, match="frame period 0.05 instead of 0.066666 or a part"):
-        Windows(MapMaker(odd), "rotation", weights(tmp_path, "rotation"))
+        load(weights(tmp_path, "rotation"), RotationNet, odd)
 
 
 def test_batches_do_not_matter(tmp_path):
     everything, times = spectra(10), np.arange(10) * CONFIG.frame_period
     results = []
     for cuts in ([10], [3, 1, 6]):
-        maker = MapMaker(CONFIG)
-        velocity = LearnedVelocity(maker, weights(tmp_path, "translation"))
-        rotation = LearnedRotation(maker, weights(tmp_path, "rotation"))
-        parts = list(zip(everything.split(cuts), np.split(times, np.cumsum(cuts)[:-1]), strict=True))
-        v = [velocity.estimate(part) for part, _ in parts]
-        r = [rotation.estimate(part, when, found) for (part, when), found in zip(parts, v, strict=True)]
+        velocity = LearnedVelocity(CONFIG, weights(tmp_path, "translation"))
+        rotation = LearnedRotation(CONFIG, weights(tmp_path, "rotation"))
+        batches = parts(SIGNAL, everything, times, cuts)
+        v = [velocity.estimate(part) for part in batches]
+        r = [rotation.estimate(part, found) for part, found in zip(batches, v, strict=True)]
         results.append(
             [np.concatenate(x) for x in ([p.velocity for p in v], [p.covariance for p in v], [p.yaw for p in r])]
         )
@@ -76,11 +78,11 @@ def test_batches_do_not_matter(tmp_path):
 
 def test_silence_says_nothing(tmp_path):
     """A lost frame is no motion of its own: neither network has seen one that should have been believed."""
-    maker, times = MapMaker(CONFIG), np.arange(4) * CONFIG.frame_period
-    nothing = torch.zeros(4, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)
-    found = LearnedVelocity(maker, weights(tmp_path, "translation")).estimate(nothing)
+    zeros = torch.zeros(4, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)
+    nothing = of_spectrum(SIGNAL, zeros, np.arange(4) * CONFIG.frame_period)
+    found = LearnedVelocity(CONFIG, weights(tmp_path, "translation")).estimate(nothing)
     assert (found.velocity == 0).all() and np.allclose(found.covariance, 4 * np.eye(2))
-    turns = LearnedRotation(maker, weights(tmp_path, "rotation")).estimate(nothing, times, found)
+    turns = LearnedRotation(CONFIG, weights(tmp_path, "rotation")).estimate(nothing, found)
     assert np.allclose(turns.yaw, 0)
 
 
@@ -102,16 +104,17 @@ def test_turns_of_several_spacings_make_one_yaw(tmp_path, monkeypatch):
     times = np.arange(count) * CONFIG.frame_period
     truth = np.cumsum(np.radians(40) * np.sin(times) * CONFIG.frame_period)
     ends, honest, chained = [], [], []
-    path = weights(tmp_path, "rotation")
+    path, frames = weights(tmp_path, "rotation"), of_spectrum(SIGNAL, torch.zeros(count), times)
     for seed in range(40):
         rng = np.random.default_rng(seed)
-        rotation = LearnedRotation(MapMaker(CONFIG), path)
-        rotation._windows.net = Oracle(truth, noise, rng)
-        monkeypatch.setattr("radarize.odometry.learned.silent", lambda shown: torch.zeros(len(shown), dtype=torch.bool))
+        rotation = LearnedRotation(CONFIG, path)
+        rotation._net = Oracle(truth, noise, rng)
+        seen = "radarize.methods.radarize.learned.silent"
+        monkeypatch.setattr(seen, lambda shown: torch.zeros(len(shown), dtype=torch.bool))
         at = torch.arange(count)
         shown = [torch.stack([(at - stride * s).clamp_min(0), at], dim=1) for s in rotation.spacings]
-        monkeypatch.setattr(rotation._windows, "push", lambda spectrum, spacings, shown=shown: shown)
-        found = rotation.estimate(None, times, Velocities(*np.zeros((3, count, 2))))
+        monkeypatch.setattr(rotation._windows, "push", lambda batch, spacings, shown=shown: shown)
+        found = rotation.estimate(frames, Velocities(*np.zeros((3, count, 2))))
         error = np.cumsum(found.yaw)[-1] - (truth[-1] - truth[0])
         ends.append(error)
         honest.append(error**2 / found.variance.sum())
@@ -126,7 +129,7 @@ class Says:
     def __init__(self, velocity, covariance):
         self.answer = Velocities(np.array([velocity]), np.array([covariance]), np.array([3]))
 
-    def estimate(self, spectrum):
+    def estimate(self, batch):
         return self.answer
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from radarize.baselines.milliego import COLUMNS, ROWS
-from radarize.baselines.panorama import panoramas, seen
 from walks_known import walk
 
 from radarize.heatmaps import Heatmaps
+from radarize.methods.milliego.network import COLUMNS, ROWS
+from radarize.methods.milliego.panorama import panoramas, seen
 from radarize.points import DENSE, PointClouds
 from radarize.recording import Recording
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from radarize.published.heatmaps import BEAMS, BEARINGS, PublishedMaps, area_weights
 
 from radarize.errors import InputError
+from radarize.methods.published.maps import BEAMS, BEARINGS, PublishedMaps, area_weights
 from radarize.radar.presets import PRESETS
 from tests.echoes import record
 

@@ -5,25 +5,33 @@ import json
 import numpy as np
 import pytest
 import torch
-from radarize.published import labels
-from radarize.published.chain import Chain, first_occupied
-from radarize.published.heatmaps import PublishedMaps
-from radarize.published.tasks import PUBLISHED_TASKS, pooled_dice
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from radarize.batch import Intake, Signal
 from radarize.cli import app
 from radarize.errors import InputError
+from radarize.features.grid import Grid
 from radarize.features.table import Table
-from radarize.nets.weights import Grid, Header, build, example, load, save
+from radarize.mapping.scans import BEARINGS
+from radarize.methods.published import labels
+from radarize.methods.published.maps import PublishedMaps, PublishedStream
+from radarize.methods.published.odometry import PublishedOdometry
+from radarize.methods.published.scans import PublishedScans, first_occupied
+from radarize.methods.published.training import pooled_dice
+from radarize.methods.registry import Inputs, Weights, Workshop, find_task
+from radarize.nets.weights import Header, build, example, header_of, load, save
+from radarize.pipeline import Pipeline
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
 from radarize.run import run
 from radarize.tum import read_tum
+from tests.batches import stream
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 8})
+TASKS = {kind: find_task(f"published-{kind}") for kind in ("translation", "rotation", "segmentation")}
 PINHOLE = (30.0, 30.0, 29.5, 9.5)
 TURN = 0.02
 
@@ -58,7 +66,8 @@ def data(tmp_path_factory):
 
 def test_velocity_is_a_finite_difference_at_the_end_of_its_interval(data):
     """On a circle: the chord, seen from the heading before, is turned by half of the turn to the left."""
-    table = Table.read([data / "0.h5"], ("published_range_azimuth_1",), ("published_velocity",), setting="published")
+    (velocity,) = TASKS["translation"].truth
+    table = Table.read([data / "0.h5"], ("published_range_azimuth_1",), (velocity,), maker=PublishedMaps)
     assert table.lengths == [12] and table.grid.frame_period == pytest.approx(2 * CONFIG.frame_period)
     step = 2 * TURN
     speed = 2 * np.sin(step / 2) / (2 * CONFIG.frame_period)
@@ -115,7 +124,7 @@ class Told(torch.nn.Module):
 
 
 def test_losses():
-    translation, rotation = PUBLISHED_TASKS["translation"], PUBLISHED_TASKS["rotation"]
+    translation, rotation = TASKS["translation"], TASKS["rotation"]
     maps, label = torch.zeros(2, 1, 2, 4, 4), torch.tensor([[1.0, 0.0], [0.0, 2.0]])
     said = torch.tensor([[1.0, 1.0], [2.0, 2.0]])
     assert translation.loss(Told(said), maps, label).tolist() == pytest.approx([(5 / 4) ** 0.5] * 2)
@@ -130,41 +139,41 @@ def test_augmentations():
     generator = torch.Generator().manual_seed(0)
     maps = torch.rand(64, 2, 3, 6, 8, generator=generator)
     for kind, axis in (("translation", 3), ("rotation", 1)):
-        found, label = PUBLISHED_TASKS[kind].augment(maps, torch.ones(64, 1), generator)
+        found, label = TASKS[kind].augment(maps, torch.ones(64, 1), generator)
         signs = [torch.equal(a, b.flip(axis - 1)) for a, b in zip(found, maps, strict=True)]
         assert torch.equal(label[:, 0], torch.tensor([-1.0 if back else 1.0 for back in signs]))
         assert 16 < sum(signs) < 48
     label = torch.randint(0, 2, (64, 6, 8), generator=generator, dtype=torch.uint8)
-    found, mirrored = PUBLISHED_TASKS["segmentation"].augment(maps, label, generator)
+    found, mirrored = TASKS["segmentation"].augment(maps, label, generator)
     flipped = [torch.equal(a, b.flip(3)) for a, b in zip(found, maps, strict=True)]
     assert [torch.equal(a, b.flip(1)) for a, b in zip(mirrored, label, strict=True)] == flipped and 16 < sum(flipped)
 
 
-def networks(folder, width=2, config=CONFIG):
+def networks(folder, width=2, config=CONFIG, name="published-{}.safetensors"):
     """Random ones of all kinds, as files."""
-    for kind, task in PUBLISHED_TASKS.items():
+    for kind, task in TASKS.items():
         header = Header(
             kind=kind, setting="published", frames=task.defaults.frames, maps=task.maps, width=width,
-            grid=Grid.of(config, task.maps[0], "published"),
+            grid=Grid.of(config, task.maps[0], PublishedMaps),
         )  # fmt: skip
         torch.manual_seed(3)
-        net = build(header)
-        net(example(header)[0] / 10)  # moves the batch normalisation's statistics
-        save(net.eval(), header, folder / f"{kind}.safetensors")
+        net = build(task.network, header)
+        net(example(net, header)[0] / 10)  # moves the batch normalisation's statistics
+        save(net.eval(), header, folder / name.format(kind))
     return folder
 
 
 def test_sizes():
     """The paper's widths: ResNet18 has 11.2 million parameters, U-Net 31."""
     counts = {}
-    for kind, task in PUBLISHED_TASKS.items():
-        net = task.net(task.defaults, Grid.of(PRESETS["radarize"], task.maps[0], "published"))
+    for kind, task in TASKS.items():
+        net = task.net(task.defaults, Grid.of(PRESETS["radarize"], task.maps[0], PublishedMaps))
         counts[kind] = sum(values.numel() for values in net.parameters()) / 1e6
         assert len(task.maps) * task.defaults.frames == {"translation": 2, "rotation": 6, "segmentation": 6}[kind]
     assert counts["translation"] == pytest.approx(11.2, abs=0.1)
     assert counts["rotation"] == pytest.approx(11.2, abs=0.2)
     assert counts["segmentation"] == pytest.approx(31, abs=0.3)
-    found = {kind: task.optimiser.__name__ for kind, task in PUBLISHED_TASKS.items()}
+    found = {kind: task.optimiser.__name__ for kind, task in TASKS.items()}
     assert found == {"translation": "Adam", "rotation": "AdamW", "segmentation": "Adam"}
 
 
@@ -174,7 +183,7 @@ def test_the_chain_is_four_interleaved_ones_and_euler_steps(data, tmp_path):
     with Recording(data / "0.h5") as recording:
         adc, times = recording.adc(0, 24), recording.times
     maps = PublishedMaps(CONFIG)(adc, frames=slice(0, None, 2))
-    nets = {kind: load(weights / f"{kind}.safetensors")[0] for kind in PUBLISHED_TASKS}
+    nets = {kind: load(weights / f"published-{kind}.safetensors", task.network)[0] for kind, task in TASKS.items()}
 
     def seen(kind):
         return torch.stack([torch.from_numpy(maps[name]).float() for name in nets[kind].maps], dim=1)
@@ -194,14 +203,33 @@ def test_the_chain_is_four_interleaved_ones_and_euler_steps(data, tmp_path):
         step = 2 * CONFIG.frame_period * velocity[n]
         place[n] = place[n - 1] + [c * step[0] - s * step[1], s * step[0] + c * step[1]]
 
+    likely = nets["segmentation"].estimate(seen("segmentation")[:, None]).detach().numpy()
+    scans = np.full((24, len(BEARINGS)), np.inf)
+    scans[::2] = first_occupied(likely)
+    signal = Signal(CONFIG)
     for size in (1, 5, 24):
-        chain = Chain(CONFIG, weights, headings)
-        parts = [chain.push(adc[k : k + size], times[k : k + size]) for k in range(0, 24, size)]
-        poses = np.concatenate([track.pose for track, _ in parts])
-        assert np.concatenate([track.time for track, _ in parts]) == pytest.approx(times[::2] + CONFIG.burst_center)
+        maps = PublishedStream(CONFIG)
+        odometry = PublishedOdometry(maps, nets["translation"], nets["rotation"], headings)
+        scanner = PublishedScans(maps, nets["segmentation"])
+        batches = list(stream(Intake(signal), adc, times, size=size))
+        followed = [odometry.follow(one) for one in batches]
+        poses = np.concatenate([track.pose for track in followed])
+        assert np.concatenate([track.time for track in followed]) == pytest.approx(times[::2] + CONFIG.burst_center)
         assert poses[:, :2] == pytest.approx(place, abs=1e-5)
         assert np.exp(1j * poses[:, 2]) == pytest.approx(np.exp(1j * np.array(yaw)), abs=1e-5)
-        assert np.concatenate([scan for _, scan in parts]).shape == (12, 88)
+        # Of the same batches, whose maps are made once.
+        assert np.concatenate([scanner.scan(one) for one in batches]) == pytest.approx(scans, abs=1e-5)
+
+
+def test_a_pipeline_keeps_what_was_used(data, tmp_path):
+    """Every second frame; scans and poses of the rest are none."""
+    inputs = Inputs(CONFIG, weights=Weights(networks(tmp_path)))
+    pipeline, intake = Workshop(inputs).pipeline("published", "published"), Intake(inputs.signal)
+    with Recording(data / "0.h5") as recording:
+        results = list(pipeline.follow(stream(intake, recording.adc(0, 9), recording.times[:9], size=1)))
+    assert isinstance(pipeline, Pipeline) and [len(result.frames) for result in results] == [1, 0, 1, 0, 1, 0, 1, 0, 1]
+    assert np.concatenate([result.frames for result in results]).tolist() == [0, 2, 4, 6, 8]
+    assert sum(len(result.track.pose) for result in results) == sum(len(result.ranges) for result in results) == 5
 
 
 def test_scans_are_the_first_occupied_cells():
@@ -213,19 +241,21 @@ def test_scans_are_the_first_occupied_cells():
 
 def test_from_data_to_a_run(data, tmp_path):
     """`radarize train` of all three and `radarize run` with what they wrote; nothing is learned from so little."""
-    for kind in PUBLISHED_TASKS:
-        arguments = ["train", kind, "--settings", "published", "--data", str(data), "--width", "2", "--epochs", "1"]
+    for kind in TASKS:
+        named = ["train", f"published-{kind}"] if kind == "rotation" else ["train", kind, "--settings", "published"]
+        arguments = [*named, "--data", str(data), "--width", "2", "--epochs", "1"]
         arguments += ["--batch", "4", "-o", str(tmp_path / f"{kind}.safetensors"), "--device", "cpu"]
         done = CliRunner().invoke(app, arguments)
         assert done.exit_code == 0, done.output
-        header = load(tmp_path / f"{kind}.safetensors", CONFIG)[1]
+        header = load(tmp_path / f"{kind}.safetensors", TASKS[kind].network, CONFIG)[1]
         assert header.setting == "published" and header.grid.frame_period == pytest.approx(2 / 30, rel=1e-3)
-    assert load(tmp_path / "rotation.safetensors")[1].spacings == (1, 2, 3, 4)
+    assert header_of(tmp_path / "rotation.safetensors").spacings == (1, 2, 3, 4)
     output = tmp_path / "run"
     arguments = ["run", str(data / "0.h5"), "-o", str(output), "--settings", "published", "--weights", str(tmp_path)]
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 0, done.output
-    assert json.loads((output / "run.json").read_text())["methods"]["settings"] == "published"
+    methods = json.loads((output / "run.json").read_text())["methods"]
+    assert methods == {"odometry": "published", "scans": "published"}
     times, poses = read_tum(output / "odometry.tum")
     assert len(times) == 12
     yaw = 2 * np.arctan2(poses[:4, 5], poses[:4, 6])
@@ -233,15 +263,28 @@ def test_from_data_to_a_run(data, tmp_path):
     assert CliRunner().invoke(app, ["evaluate", str(output)]).exit_code == 0
 
 
+def test_weights_go_by_either_name(data, tmp_path):
+    """As tasks are called now, or as they once were; where both are, by the new one."""
+    workshop = Workshop(Inputs(CONFIG, weights=Weights(networks(tmp_path, name="{}.safetensors"))))
+    old = workshop.odometry("published", "published")
+    networks(tmp_path, width=4)
+    new = Workshop(Inputs(CONFIG, weights=Weights(tmp_path))).odometry("published", "published")
+    assert (old._translation.width, new._translation.width) == (2, 4)
+
+
 def test_what_does_not_fit_is_refused(data, tmp_path):
-    with pytest.raises(InputError, match="settings is 'published', which comes without weights"):
-        run(data / "0.h5", tmp_path / "run", settings="published")
-    with pytest.raises(InputError, match="odometry is 'doppler', expected none with settings published"):
-        run(data / "0.h5", tmp_path / "run", settings="published", weights=tmp_path, odometry="doppler")
+    for choice in ({"odometry": "published"}, {"scans": "published"}, {"odometry": "published", "scans": "published"}):
+        with pytest.raises(InputError, match="published odometry and scans come without weights"):
+            run(data / "0.h5", tmp_path / "run", **({"odometry": "doppler", "scans": "threshold"} | choice))
+    arguments = ["run", str(data / "0.h5"), "-o", str(tmp_path / "run"), "--settings", "published"]
+    done = CliRunner().invoke(app, [*arguments, "--odometry", "doppler"])
+    assert isinstance(done.exception, InputError)
+    assert "--odometry is 'doppler', expected none with --settings published" in str(done.exception)
     with pytest.raises(InputError, match="translation.safetensors: no such file"):
-        run(data / "0.h5", tmp_path / "run", settings="published", weights=tmp_path)
+        run(data / "0.h5", tmp_path / "run", odometry="published", scans="published", weights=tmp_path)
     networks(tmp_path)
     with pytest.raises(InputError, match="does not fit this radar, whose maps have rows 64 instead of 96"):
-        Chain(CONFIG.model_copy(update={"samples": 64}), tmp_path)
+        other = Inputs(CONFIG.model_copy(update={"samples": 64}), weights=Weights(tmp_path))
+        Workshop(other).odometry("published", "published")
     done = CliRunner().invoke(app, ["train", "translation", "--settings", "old", "--data", ".", "-o", "a.safetensors"])
     assert done.exit_code != 0

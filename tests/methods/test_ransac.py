@@ -2,17 +2,13 @@
 
 import numpy as np
 import pytest
-from radarize.baselines.ransac import RansacSettings, RansacVelocity
 
-from radarize.heatmaps import Heatmaps
-from radarize.radar.presets import PRESETS
-
-CONFIG = PRESETS["radarize"]
+from radarize.methods.ransac.velocity import RansacSettings, RansacVelocity
 
 
 @pytest.fixture(scope="module")
 def estimator():
-    return RansacVelocity(Heatmaps(CONFIG))
+    return RansacVelocity()
 
 
 def cloud(rng: np.random.Generator, velocity: np.ndarray, count: int = 40, wrong: int = 0) -> np.ndarray:

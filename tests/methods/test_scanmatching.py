@@ -2,27 +2,26 @@
 
 import numpy as np
 import pytest
-import torch
-from radarize.odometry.scanmatching import ScanMatching
 
+from radarize.batch import Batch, Signal
 from radarize.errors import InputError
 from radarize.mapping.scans import BEARINGS
+from radarize.methods.scan_matching.odometry import ScanMatching
 from radarize.pose import between
 from radarize.radar.presets import PRESETS
 from radarize.slam.config import SlamConfig
 from tests.slam.world import ate, box, scan, walk
 
 CONFIG = PRESETS["radarize"]
-
-
+SIGNAL = Signal(CONFIG)
 FAR = SlamConfig.preset("lidar")
 
 
 class Says:
-    """Scans that are given as the spectrum."""
+    """Scans that are given as the samples."""
 
-    def scan(self, spectrum: torch.Tensor) -> np.ndarray:
-        return spectrum.numpy()
+    def scan(self, batch: Batch) -> np.ndarray:
+        return batch.samples
 
 
 ROOM = np.concatenate(
@@ -37,13 +36,13 @@ def way():
     rng = np.random.default_rng(0)
     scans = np.array([scan(ROOM, pose, BEARINGS, 6.0) for pose in poses])
     scans += rng.normal(0, 0.02, scans.shape)
-    return poses, np.arange(len(poses)) * CONFIG.frame_period, torch.from_numpy(scans)
+    return poses, np.arange(len(poses)) * CONFIG.frame_period, scans
 
 
 def test_follows_walls(way):
     poses, times, scans = way
-    matching = ScanMatching(CONFIG, Says(), FAR)
-    parts = [matching.follow(scans[i : i + 16], times[i : i + 16]) for i in range(0, len(times), 16)]
+    matching = ScanMatching(Says(), FAR)
+    parts = [matching.follow(Batch(SIGNAL, scans[i : i + 16], times[i : i + 16])) for i in range(0, len(times), 16)]
     pose, rate = (np.concatenate([getattr(part, name) for part in parts]) for name in ("pose", "velocity"))
     assert ate(poses, pose) < 0.03
     assert abs(np.rad2deg(between(poses[0], poses[-1])[2] - pose[-1, 2])) < 2
@@ -57,18 +56,18 @@ def test_follows_walls(way):
 
 def test_batches_do_not_matter(way):
     _, times, scans = way
-    whole = ScanMatching(CONFIG, Says()).follow(scans[:50], times[:50])
-    matching = ScanMatching(CONFIG, Says())
-    parts = [matching.follow(scans[i : i + 7], times[i : i + 7]).pose for i in range(0, 50, 7)]
+    whole = ScanMatching(Says()).follow(Batch(SIGNAL, scans[:50], times[:50]))
+    matching = ScanMatching(Says())
+    parts = [matching.follow(Batch(SIGNAL, scans[i : i + 7], times[i : i + 7])).pose for i in range(0, 50, 7)]
     assert np.array_equal(np.concatenate(parts)[:50], whole.pose)
 
 
 def test_nothing_to_see_keeps_the_motion(way):
     """Blind for half a second: motion goes on as it was, and is known less well."""
     poses, times, scans = way
-    matching = ScanMatching(CONFIG, Says(), FAR)
-    before = matching.follow(scans[:100], times[:100])
-    blind = matching.follow(torch.full_like(scans[100:115], np.inf), times[100:115])
+    matching = ScanMatching(Says(), FAR)
+    before = matching.follow(Batch(SIGNAL, scans[:100], times[:100]))
+    blind = matching.follow(Batch(SIGNAL, np.full_like(scans[100:115], np.inf), times[100:115]))
     assert np.allclose(blind.velocity, before.velocity[-1])
     assert blind.covariance[-1, 0, 0] > before.covariance[-1, 0, 0]
     assert np.allclose(between(before.pose[-1], blind.pose[-1])[:2], [15 * 0.025, 0], atol=0.05)
@@ -77,4 +76,4 @@ def test_nothing_to_see_keeps_the_motion(way):
 def test_stamps_must_ascend(way):
     _, _, scans = way
     with pytest.raises(InputError, match="expected ascending times"):
-        ScanMatching(CONFIG, Says()).follow(scans[:3], np.array([0.0, 0.1, 0.1]))
+        ScanMatching(Says()).follow(Batch(SIGNAL, scans[:3], np.array([0.0, 0.1, 0.1])))

@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 import torch
-from radarize.mapping.segmentation import NEAR, Segmentation, first_surface
 
-from radarize.features.maps import MapMaker
+from radarize.batch import Signal
+from radarize.features.grid import Grid
 from radarize.mapping.scans import BEARINGS
-from radarize.nets.weights import Grid, Header, build, example, save
+from radarize.methods.radarize.scans import NEAR, Segmentation, first_surface
+from radarize.methods.radarize.segmentation import SegmentationNet
+from radarize.nets.weights import Header, build, example, save
 from radarize.radar.presets import PRESETS
+from tests.batches import of_spectrum
 
 CONFIG = PRESETS["radarize"]
 
@@ -45,25 +48,27 @@ def test_ghosts_behind_a_surface_and_guesses_are_not_returned(tmp_path):
         kind="segmentation", frames=1, maps=("range_azimuth", "elevation_aware"), width=2,
         grid=Grid.of(CONFIG, "range_azimuth"),
     )  # fmt: skip
-    net = build(header)
-    net(*example(header))
-    maker = MapMaker(CONFIG)
-    scans = Segmentation(maker, save(net.eval(), header, tmp_path / "s.safetensors"))
-    spectrum = torch.zeros(2, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)
-    assert scans.scan(spectrum).shape == (2, len(BEARINGS))
+    net = build(SegmentationNet, header)
+    net(*example(net, header))
+    signal = Signal(CONFIG)
+    ranges = signal.heatmaps.ranges
+    scans = Segmentation(CONFIG, save(net.eval(), header, tmp_path / "s.safetensors"))
+    zeros = torch.zeros(2, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)
+    batch = of_spectrum(signal, zeros, np.arange(2) * CONFIG.frame_period)
+    assert scans.scan(batch).shape == (2, len(BEARINGS))
 
     likely = np.full((1, CONFIG.samples, len(BEARINGS)), 1e-4)
     likely[0, 29:32, 10] = 0.4, 0.8, 0.5  # a surface
     likely[0, 60, 10] = 0.99  # a ghost behind it
     likely[0, 40, 20] = 0.45  # a guess
-    scans._windows.net = Says(likely)
-    found = scans.scan(spectrum)
-    step = maker.heatmaps.ranges[1] - maker.heatmaps.ranges[0]
-    assert np.allclose(found[:, 10], maker.heatmaps.ranges[30], atol=step / 2)
+    scans._net = Says(likely)
+    found = scans.scan(batch)
+    step = ranges[1] - ranges[0]
+    assert np.allclose(found[:, 10], ranges[30], atol=step / 2)
     assert np.isinf(found[:, 20]).all() and np.isfinite(found).sum() == 2
     scans.least = 0.4
-    assert np.allclose(scans.scan(spectrum)[:, 20], maker.heatmaps.ranges[40], atol=step / 2)
-    alone = Segmentation(maker, tmp_path / "s.safetensors", first=False)
-    alone._windows.net = Says(likely)
-    found = alone.scan(spectrum)
-    assert np.allclose(found[:, 10], maker.heatmaps.ranges[60], atol=step / 2) and np.isfinite(found).sum() == 2
+    assert np.allclose(scans.scan(batch)[:, 20], ranges[40], atol=step / 2)
+    alone = Segmentation(CONFIG, tmp_path / "s.safetensors", first=False)
+    alone._net = Says(likely)
+    found = alone.scan(batch)
+    assert np.allclose(found[:, 10], ranges[60], atol=step / 2) and np.isfinite(found).sum() == 2

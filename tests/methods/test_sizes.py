@@ -2,9 +2,10 @@
 
 import pytest
 import torch
-from radarize.baselines.milliego import MilliEgoNet
-from radarize.baselines.radarhd import RadarHdNet
-from radarize.baselines.rnin import RninNet
+
+from radarize.methods.milliego.network import MilliEgoNet
+from radarize.methods.radarhd.network import RadarHdNet
+from radarize.methods.rnin.network import RninNet
 
 
 def parameters(net: torch.nn.Module) -> int:

@@ -5,17 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from radarize.baselines.radarhd import DRAWN, bins, columns
-from radarize.baselines.tasks import BASELINE_TASKS, displaced, drawn, pictured, rotation
 from scipy.spatial.transform import Rotation
 from walks_known import CONFIG, walk
 
 from radarize.errors import InputError
+from radarize.features.grid import Grid
 from radarize.features.maps import AZIMUTHS
 from radarize.features.table import Table
 from radarize.mapping.scans import BEARINGS
+from radarize.methods.radarhd.network import DRAWN, columns
+from radarize.methods.radarhd.training import bins, drawn, pictured
+from radarize.methods.registry import find_task
+from radarize.methods.rnin.network import RninNet
+from radarize.methods.rnin.training import displaced, rotation
 from radarize.nets.export import export_onnx
-from radarize.nets.weights import Grid, Header, build, example, load, save
+from radarize.nets.weights import Header, build, example, load, save
 from radarize.recording import Recording, RecordingWriter, Stream
 from radarize.training.team import Team
 from radarize.training.train import train
@@ -25,10 +29,11 @@ pytestmark = pytest.mark.usefixtures("one_thread")
 
 ROWS, PERIOD = 16, 1 / 15
 GRID = Grid(rows=ROWS, step=0.2, azimuths=80, field=float(AZIMUTHS[-1] - AZIMUTHS[0]), frame_period=PERIOD)
+TASKS = {kind: find_task(kind) for kind in ("radarhd", "milliego", "rnin")}
 QUICK = {
-    "radarhd": replace(BASELINE_TASKS["radarhd"].defaults, width=4, frames=3, epochs=6, batch=8, rate=5e-3),
-    "milliego": replace(BASELINE_TASKS["milliego"].defaults, width=4, frames=3, epochs=6, batch=8, rate=5e-4),
-    "rnin": replace(BASELINE_TASKS["rnin"].defaults, width=4, frames=3, epochs=10, batch=8, rate=3e-3),
+    "radarhd": replace(TASKS["radarhd"].defaults, width=4, frames=3, epochs=6, batch=8, rate=5e-3),
+    "milliego": replace(TASKS["milliego"].defaults, width=4, frames=3, epochs=6, batch=8, rate=5e-4),
+    "rnin": replace(TASKS["rnin"].defaults, width=4, frames=3, epochs=10, batch=8, rate=3e-3),
 }
 ALONE = Team(0, 1, torch.device("cpu"))
 
@@ -68,10 +73,10 @@ def table(kind: str, seed: int, frames: int) -> Table:
                  {"panorama": tensor(panorama), "imu": tensor(sensed).half()})  # fmt: skip
 
 
-@pytest.mark.parametrize("kind", BASELINE_TASKS)
+@pytest.mark.parametrize("kind", TASKS)
 def test_networks_learn(kind, monkeypatch):
     torch.manual_seed(0)  # of dropout
-    task = BASELINE_TASKS[kind]
+    task = TASKS[kind]
     monkeypatch.setattr(type(task), "spacings", lambda self, period: (3,) if kind == "milliego" else (1,))
     monkeypatch.setattr(type(task), "share", 1.0)
     trainer = Trainer(task, QUICK[kind], table(kind, 0, 400 if kind == "milliego" else 240), table(kind, 1, 120), ALONE)
@@ -88,7 +93,7 @@ def test_networks_learn(kind, monkeypatch):
 
 
 def test_labels_of_milliego_are_motions_seen_from_the_older_frame():
-    task, rng = BASELINE_TASKS["milliego"], np.random.default_rng(0)
+    task, rng = TASKS["milliego"], np.random.default_rng(0)
     place, turned = rng.normal(0, 1, (5, 3)), Rotation.random(5, random_state=0)
     poses = np.column_stack([place, turned.as_quat()])
     some = Table({}, {"pose": torch.from_numpy(poses)}, [5], None, PERIOD)
@@ -104,7 +109,7 @@ def test_mirrored_and_turned_items_are_consistent():
     generator = torch.Generator().manual_seed(0)
     label = torch.randn(64, 3, 3, generator=generator)
     windows = torch.cat([label, torch.zeros_like(label)], dim=2)[:, :, None].expand(-1, -1, 100, -1)
-    found, told = BASELINE_TASKS["rnin"].augment(windows, label, generator)
+    found, told = TASKS["rnin"].augment(windows, label, generator)
     off = (found[..., :3] - told[:, :, None]).norm(dim=3)
     assert off.max() < 0.18 + 2 * np.sin(np.radians(5)) * (9.81 + 5)  # bias, and gravity on tilted axes
     assert told.norm(dim=2) == pytest.approx(label.norm(dim=2), abs=1e-4)
@@ -148,15 +153,15 @@ def test_bins_of_a_recording(tmp_path):
         assert bins(recording, slice(None))[0] == pytest.approx([1.1 / biased.range_resolution, -1])
 
 
-@pytest.mark.parametrize("kind", BASELINE_TASKS)
+@pytest.mark.parametrize("kind", TASKS)
 def test_files_come_back_and_onnx_says_the_same(kind, tmp_path):
-    task = BASELINE_TASKS[kind]
+    task = TASKS[kind]
     grid = GRID if task.maps else None
     header = Header(kind=kind, frames=3, maps=task.reads, width=4, grid=grid)
     torch.manual_seed(0)
-    net = build(header).eval()
-    again, read = load(save(net, header, tmp_path / "net.safetensors"))
-    inputs = example(header)
+    net = build(task.network, header).eval()
+    again, read = load(save(net, header, tmp_path / "net.safetensors"), task.network)
+    inputs = example(again, header)
     expected = again.estimate(*inputs)
     expected = expected if isinstance(expected, tuple) else (expected,)
     assert read == header
@@ -174,7 +179,7 @@ def test_trained_from_recordings_and_resumed(tmp_path):
         walk(tmp_path / "data" / f"{k}.h5", frames=150)
     settings = replace(QUICK["rnin"], frames=2, epochs=2, batch=8)
     whole = train("rnin", tmp_path / "data", tmp_path / "net.safetensors", settings=settings)
-    net, header = load(whole, CONFIG)
+    net, header = load(whole, RninNet, CONFIG)
     assert header.grid is None and header.maps == ("levelled",) and header.spacings == (30,)
     assert torch.isfinite(net.estimate(torch.zeros(1, 2, 100, 6))[0]).all()
     walk(tmp_path / "data" / "3.h5", frames=150, with_imu=False)

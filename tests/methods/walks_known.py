@@ -3,9 +3,9 @@
 from pathlib import Path
 
 import numpy as np
-from radarize.baselines.inertial import GRAVITY
 from scipy.spatial.transform import Rotation
 
+from radarize.odometry.inertial import GRAVITY
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter, Stream
 

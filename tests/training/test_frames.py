@@ -11,10 +11,10 @@ from torch.utils.data import DataLoader
 from walks import CONFIG, TURN, VELOCITY, walk
 
 from radarize.errors import InputError
+from radarize.features.keeping import keep_maps
+from radarize.features.maps import MAPS, STEP
 from radarize.recording import Recording
 from radarize.training.dataset import DEFAULT, Frames
-from radarize.features.keeping import keep_maps
-from radarize.features.maps import MAPS, STEP, 
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "learning.md"
 

@@ -17,13 +17,13 @@ from benchmarks.results import FOLDER, publish
 from radarize.console import progress
 from radarize.errors import InputError
 from radarize.evaluation.likeness import frechet_distance, patch_statistics
+from radarize.features.maps import MapMaker, maps_of
 from radarize.importers import import_recording
 from radarize.methods.registry import best_methods
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.run import run
 from radarize.training.dataset import recordings
-from radarize.features.maps import MapMaker, maps_of
 from radarsim.calibrate import calibrate
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.planner import plan_motion

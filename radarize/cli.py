@@ -11,7 +11,7 @@ from radarize.errors import InputError
 app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
 
 RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="A recording.")]
-RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
 Beside = Annotated[list[Path] | None, typer.Option(help="Another run of the same recording; may be repeated.")]
 RadarFile = Annotated[str | None, typer.Option("--config", help="A .cfg or a preset's name.")]
 PortName = Annotated[str | None, typer.Option("--port", help="The radar's serial command port.")]
@@ -189,7 +189,7 @@ def live(
         warnings = stream.troubles() + live.losses.warnings()
         if writer:
             writer.annotate(warnings="; ".join(warnings))
-    for words in warnings:
+    for words in (*warnings, *filter(None, [live.blindness.warning])):
         typer.echo(f"warning: {words}", err=True)
     print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
 
@@ -242,6 +242,7 @@ def run_(
     """Estimate trajectory and map of a recording."""
     from radarize.methods.configuration import Configuration
     from radarize.run import run
+    from radarize.runfolder import RunFolder
 
     if settings == "published":
         for option, value in (("--odometry", odometry), ("--scans", scans)):
@@ -256,7 +257,9 @@ def run_(
                 progress=report,
             )  # fmt: skip
     except KeyboardInterrupt:
-        raise InputError(f"stopped; {output} is not a whole run, the recording is untouched") from None
+        raise InputError(f"stopped; {output} is as it was before, and so is the recording") from None
+    for words in RunFolder(written).facts["warnings"]:
+        typer.echo(f"warning: {words}", err=True)
     print(written)
 
 
@@ -333,8 +336,8 @@ def slam(
 
     SCANS holds ranges (scan, beam), angle_min, angle_increment, range_max and, unless one a second, times.
     """
+    from radarize.log import run
     from radarize.slam.config import SlamConfig
-    from radarize.slam.log import run
 
     name = preset or ("radar" if scans.is_dir() else "lidar")
     settings = SlamConfig.load(config, name) if config else SlamConfig.preset(name)
@@ -344,7 +347,7 @@ def slam(
 
 @app.command()
 def evaluate(
-    run: RunFolder,
+    run: RunPath,
     beside: Beside = None,
     reference: Annotated[Path | None, typer.Option(help="True poses (TUM); by default the run's own.")] = None,
     as_json: AsJson = False,

@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 
 import radarize
+from radarize import log
 from radarize.batch import BATCH, Intake
 from radarize.benchmark.dataset import Case
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.steps import Report
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate, trajectory_errors
-from radarize.evaluation.runfiles import read_scans
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import missed, sources
 from radarize.methods.registry import ODOMETRY, SCANS, Inputs, Workshop
 from radarize.recording import Recording
 from radarize.run import run_each
-from radarize.slam import log
+from radarize.runfolder import RunFolder
 from radarize.slam.config import LoopConfig, SlamConfig
 
 #: Folder in a run's with the back end's result where no loops were closed.
@@ -168,7 +168,7 @@ def figures(run: Path, recording: Path) -> dict[str, object]:
     found["quantiles"] = {
         name: np.quantile(each.position_errors, levels).round(4).tolist() for name, each in errors.items()
     }
-    scans = read_scans(run / "scans.h5")
+    scans = RunFolder(run).scans
     if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
         true = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
         found["missed"] = missed(scans["ranges"], true)

@@ -12,6 +12,7 @@ from radarize.capture.page import Page
 from radarize.capture.stream import Stream, follow
 from radarize.capture.view import View
 from radarize.methods.registry import Inputs, Workshop
+from radarize.odometry.blindness import Blindness
 from radarize.recording import Losses, RecordingWriter
 
 #: s between pictures of a frame, and of the map; redrawing the map takes at most this share of the time.
@@ -29,6 +30,7 @@ class Live:
     Attributes:
         pipeline: the pipeline.
         losses: of the frames that came.
+        blindness: of the odometry.
         busy: s spent on the frames so far, showing them included.
     """
 
@@ -36,7 +38,7 @@ class Live:
         self.pipeline, self.page = Workshop(inputs).pipeline(**methods), page
         self.intake = Intake(inputs.signal)
         self.view = View(self.pipeline, inputs.signal)
-        self.losses = Losses()
+        self.losses, self.blindness = Losses(), Blindness()
         self.busy = 0.0
         self._frame_due = self._map_due = 0.0
 
@@ -66,7 +68,9 @@ class Live:
             start = time.monotonic()
             adc, stamps, valid = came["adc"], came["time"], came["valid"]
             if batch := self.intake.take(adc, stamps, valid):
-                self.view.add(self.pipeline.push(batch))
+                result = self.pipeline.push(batch)
+                self.blindness.add(result.frames, result.track)
+                self.view.add(result)
             self.losses.add(valid)
             if writer:
                 writer.append(adc, stamps, valid)

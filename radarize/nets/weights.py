@@ -134,9 +134,11 @@ def load(path: Path, network: type[Network], config: RadarConfig | None = None) 
             f"({network.setting})"
         )
     try:
+        with torch.device("meta"):  # sizes that the header makes up take no memory
+            build(network, header).load_state_dict(tensors)
         net = build(network, header)
         net.load_state_dict(tensors)
-    except (ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError, OverflowError) as error:
         raise _misfit(path, error) from error
     if config is not None:
         _check(header, config, path, network.maker)
@@ -207,10 +209,13 @@ def read(path: Path, tensors: bool = True) -> tuple[dict[str, Float[Tensor, "...
     if not Path(path).is_file():
         raise InputError(f"{path}: no such file, expected weights (.safetensors)")
     try:
+        with Path(path).open("rb") as file:
+            if (size := int.from_bytes(file.read(8), "little")) > _HEADER:
+                raise ValueError(f"its header has {size} bytes, expected at most {_HEADER}")
         with safe_open(path, "pt") as file:
             about = json.loads((file.metadata() or {})["radarize"])
             return {name: file.get_tensor(name) for name in (file.keys() if tensors else ())}, about
-    except (OSError, SafetensorError, KeyError, ValueError) as error:
+    except (OSError, SafetensorError, KeyError, ValueError, RecursionError) as error:
         reason = "has no header of radarize" if isinstance(error, KeyError) else str(error)
         raise InputError(f"{path}: is no file of weights of this project ({reason})") from error
 

@@ -1,23 +1,27 @@
 """Plain files in and out: scans and odometry of any sensor, and the folder that a session leaves behind."""
 
-import json
-import shutil
+import math
 import zipfile
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-import h5py
 import numpy as np
 from jaxtyping import Float
 
-from radarize import __version__
 from radarize.errors import InputError
-from radarize.replacing import replacing
+from radarize.npyfile import npy_header
+from radarize.recording.damage import reading
+from radarize.runfolder import RunFolder, RunWriter
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
-from radarize.tum import planar, planar_poses, read_tum, write_tum
+from radarize.tum import planar, planar_poses, read_tum
+
+#: Of a ``.npz``; times need not be there.
+_FIELDS = ("ranges", "angle_min", "angle_increment", "range_max", "times")
+#: Bytes of numbers that one of a ``.npz`` may unpack to, and bytes that any may.
+_PACKED, _ALWAYS = 100, 16 << 20
 
 
 @dataclass(frozen=True)
@@ -52,16 +56,19 @@ class Log:
         Raises:
             InputError: a file or field is missing or is not as described.
         """
-        scans = Path(scans)
+        scans, moved, covariances = Path(scans), odometry and read_tum(odometry), None
         if scans.is_dir():
-            times, azimuths, ranges, covariances = _run_scans(scans / "scans.h5")
-            odometry = odometry or scans / "odometry.tum"
+            run = RunFolder(scans)
+            moved = moved or run.odometry
+            if not run.scans:
+                raise InputError(f"{scans}: has no scans.h5, expected a run with scans")
+            times, azimuths, ranges = (run.scans[name].astype(float) for name in ("time", "azimuths", "ranges"))
+            covariances = run.scans.get("step_covariance")
         else:
             times, azimuths, ranges = _npz_scans(scans)
-            covariances = None
-        if odometry is None:
+        if moved is None:
             return cls(times, azimuths, ranges, np.zeros(0), np.zeros((0, 3)))
-        stamps, poses = read_tum(odometry)
+        stamps, poses = moved
         if covariances is not None and len(covariances) != len(stamps):
             covariances = None  # the odometry is another one
         return cls(times, azimuths, ranges, stamps, planar(poses), covariances)
@@ -115,46 +122,38 @@ def run(
     scans, output = Path(scans), Path(output)
     if scans.is_dir() and output.resolve() == scans.resolve():
         raise InputError(f"{output}: is the run to be read, expected another folder to write")
-    log = Log.read(scans, odometry)
-    if reference is None and scans.is_dir() and (scans / "reference.tum").is_file():
-        reference = scans / "reference.tum"
-    truth = None if reference is None else read_tum(reference)
+    log, truth = Log.read(scans, odometry), None if reference is None else read_tum(reference)
+    source = RunFolder(scans) if scans.is_dir() else None
+    if truth is None and source is not None:
+        truth = source.reference
     slam = Slam(config)
     log.feed(slam, progress)
-    times, poses = slam.trajectory()
-    write_tum(output / "trajectory.tum", times, planar_poses(poses))
-    if len(log.odometry):
-        write_tum(output / "odometry.tum", log.odometry_times, planar_poses(log.odometry))
-    if truth is not None:
-        write_tum(output / "reference.tum", *truth)
-    slam.map().save(output / "map")
-    _write_scans(output / "scans.h5", scans, log, slam)
-    facts = {
-        "scans": scans.name,
-        "odometry": None if odometry is None else Path(odometry).name,
-        "slam_settings": config.model_dump(),
-        "nodes": len(slam.nodes),
-        "submaps": len(slam.submaps),
-        "skipped": slam.skipped,
-        "closures": int(slam.graph.accepted.sum()),
-        "closures_rejected": int((~slam.graph.accepted).sum()),
-        "radarize_version": __version__,
-    }
-    (output / "run.json").write_text(json.dumps(facts, indent=2))
-    return output
+    with RunWriter(output) as writer:
+        kept = {"trajectory_covariance": (slam.covariances(), "m^2, m rad, rad^2")}
+        if source is not None:
+            writer.inherit(source.scans, without=tuple(kept))
+        else:
+            kept |= {"time": (log.times, "s"), "azimuths": (log.azimuths, "rad"), "ranges": (log.ranges, "m")}
+        for name, (data, unit) in kept.items():
+            writer.put(name, data, unit)
+        if len(log.odometry):
+            writer.write_poses("odometry", (log.odometry_times, planar_poses(log.odometry)))
+        if truth is not None:
+            writer.write_poses("reference", truth)
+        named = None if odometry is None else Path(odometry).name
+        return writer.finish(slam, {"scans": scans.name, "odometry": named, "slam_settings": config.model_dump()})
 
 
 def _npz_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    try:
+    found: dict[str, np.ndarray] = {}
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected scans (.npz) or the folder of a run")
+    with reading(f"{path}: is no .npz of numbers, expected ranges, angle_min, angle_increment and range_max"):
+        with zipfile.ZipFile(path) as archive:
+            _check_size(archive, path)
         with np.load(path, allow_pickle=False) as file:
-            if not hasattr(file, "files"):
-                raise ValueError("a single array")
-            found = {name: np.asarray(file[name], float) for name in file.files}
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, zipfile.BadZipFile, EOFError) as error:
-        raise InputError(f"{path}: is no .npz of numbers ({error}), expected ranges, angle_min...") from error
-    for name in ("ranges", "angle_min", "angle_increment", "range_max"):
+            found = {name: np.asarray(file[name], float) for name in _FIELDS if name in file}
+    for name in _FIELDS[:4]:
         if name not in found:
             raise InputError(f"{path}: has no {name}, expected ranges, angle_min, angle_increment and range_max")
     ranges = found["ranges"]
@@ -170,32 +169,15 @@ def _npz_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return times, azimuths, np.where(ranges >= found["range_max"].item(), np.inf, ranges)
 
 
-def _run_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
-    try:
-        with h5py.File(path, "r") as file:
-            for name in ("time", "ranges", "azimuths"):
-                if name not in file:
-                    raise InputError(f"{path}: has no /{name}, expected /time, /ranges and /azimuths")
-            spread = file["step_covariance"][()] if "step_covariance" in file else None
-            times, azimuths, ranges = (file[name][()].astype(float) for name in ("time", "azimuths", "ranges"))
-    except OSError as error:
-        raise InputError(f"{path}: is no readable HDF5 file ({str(error).splitlines()[0]})") from error
-    if ranges.shape != (len(times), len(azimuths)):
-        raise InputError(f"{path}: /ranges has shape {ranges.shape}, expected {(len(times), len(azimuths))}")
-    return times, azimuths, ranges, spread
-
-
-def _write_scans(path: Path, source: Path, log: Log, slam: Slam) -> None:
-    with replacing(path) as part:
-        if source.is_dir():
-            shutil.copyfile(source / "scans.h5", part)
-        _add_scans(part, log, slam)
-
-
-def _add_scans(path: Path, log: Log, slam: Slam) -> None:
-    with h5py.File(path, "a") as file:
-        values = {"time": log.times, "azimuths": log.azimuths, "ranges": log.ranges}
-        for name, data in {**values, "trajectory_covariance": slam.covariances()}.items():
-            if name in file:
-                del file[name]
-            file.create_dataset(name, data=data)
+def _check_size(archive: zipfile.ZipFile, path: Path) -> None:
+    """Whether a log unpacks to no more than scans can."""
+    entries, size = 0, path.stat().st_size
+    for name in _FIELDS:
+        if f"{name}.npy" in archive.namelist():
+            with archive.open(f"{name}.npy") as packed:
+                shape, _, stored = npy_header(packed, f"{path}: {name}")
+            if stored.kind not in "biuf":
+                raise ValueError(f"{name} holds {str(stored)[:40]}")
+            entries += math.prod(shape)
+    if 8 * entries > _PACKED * size + _ALWAYS:
+        raise InputError(f"{path}: declares {entries} numbers, but has {size} bytes")

@@ -8,10 +8,10 @@ import pytest
 
 from radarize.console import run as run_app
 from radarize.errors import InputError
-from radarize.evaluation.runfiles import read_map
+from radarize.log import Log, run
 from radarize.pose import between
+from radarize.runfolder import OccupancyMap
 from radarize.slam.config import SlamConfig
-from radarize.slam.log import Log, run
 from radarize.tum import planar_poses, read_tum, write_tum
 from tests.slam.world import box, scan
 
@@ -39,7 +39,7 @@ def test_what_is_written(tmp_path, capsys):
     times, poses = read_tum(tmp_path / "RUN" / "trajectory.tum")
     np.testing.assert_allclose(times, np.arange(15.0))
     assert np.hypot(*(poses[:, :2] - POSES[:, :2]).T).max() < 0.03
-    grid = read_map(tmp_path / "RUN" / "map.yaml")
+    grid = OccupancyMap.read(tmp_path / "RUN" / "map.yaml")
     assert grid.occupied.sum() > 100 and grid.free.sum() > 1000 and (grid.pixels == 205).any()
     with h5py.File(tmp_path / "RUN" / "scans.h5") as file:
         assert file["trajectory_covariance"].shape == (15, 3, 3)

@@ -96,7 +96,7 @@ def import_(
 
     radar, cfg_text = None, ""
     if config is not None:
-        from radarize.radar.cfg import load_config
+        from radarize.radar.presets import load_config
 
         radar, cfg_text = load_config(config)
     with keeping(output), progress("import") as report:
@@ -198,7 +198,7 @@ def _sensor(config: str | None, port: str | None, baud: int, *network):
     """The sensor that the options of `capture` and `live` describe."""
     from radarize.capture.board import Network
     from radarize.capture.sensor import Sensor
-    from radarize.radar.cfg import load_config
+    from radarize.radar.presets import load_config
 
     for name, value in (("--config", config), ("--port", port)):
         if value is None:

@@ -18,9 +18,9 @@ from radarize.importers import studio as studio_format
 from radarize.importers.capture import Batch, Capture
 from radarize.importers.parameters import configure
 from radarize.importers.poses import pose_products
-from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import range_balance
+from radarize.radar.presets import load_config
 from radarize.recording import RecordingWriter
 
 #: From this many dB on, the samples themselves say which of I and Q comes first.

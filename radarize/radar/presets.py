@@ -1,6 +1,11 @@
-"""Radar configurations by name."""
+"""Radar configurations by name: of a preset, or of a file."""
 
+from pathlib import Path
+
+from radarize.errors import InputError
+from radarize.radar.cfg import parse_cfg, read_text, write_cfg
 from radarize.radar.config import RadarConfig
+from radarize.radar.studio import load_studio
 
 PRESETS: dict[str, RadarConfig] = {
     # The paper's `1843_v1`: 4 GHz, 30 frames/s, 1.89 m/s, 4.28 m.
@@ -43,3 +48,26 @@ PRESETS: dict[str, RadarConfig] = {
         tx_order=(0, 2),
     ),
 }
+
+
+def load_config(source: str | Path | RadarConfig) -> tuple[RadarConfig, str]:
+    """A configuration by preset name, from a ``.cfg`` or ``.mmwave.json`` file, or as it is given.
+
+    Returns the configuration and the text it was read from (``write_cfg`` of it where there is none).
+
+    Raises:
+        InputError: no such preset or file, or its content cannot be used.
+    """
+    config = source if isinstance(source, RadarConfig) else PRESETS.get(str(source))
+    if config is not None:
+        return config, write_cfg(config)
+    path = Path(source)
+    if not path.is_file():
+        raise InputError(
+            f"{source}: no such radar configuration, expected a .cfg or .mmwave.json file or one of the presets "
+            f"{', '.join(PRESETS)}"
+        )
+    if path.suffix.lower() == ".json":
+        return load_studio(path)
+    text = read_text(path)
+    return parse_cfg(text, name=str(path)), text

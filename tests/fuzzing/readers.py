@@ -24,12 +24,12 @@ import radarize.importers.bag  # noqa: F401 -- imported at first use, and what i
 from radarize.contents import contents
 from radarize.errors import InputError
 from radarize.importers import import_recording
-from radarize.radar.cfg import load_config, write_cfg
+from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import FrameAssembler, decode, encode, packets
 from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings, read_packet_settings
 from radarize.radar.limits import check_limits
-from radarize.radar.presets import PRESETS
+from radarize.radar.presets import PRESETS, load_config
 from radarize.recording import Product, Recording, RecordingWriter, Stream
 from radarize.tum import read_tum
 from tests.fuzzing.damage import damaged, misspelled

@@ -82,7 +82,7 @@ def test_a_capture_of_commands_alone_has_no_frame(recordings, tmp_path):
 
 def test_the_public_capture_has_less_than_a_frame_of_a_foreign_cfg(recordings, tmp_path):
     folder = recordings / "iwr1843-pcap"
-    from radarize.radar.cfg import load_config
+    from radarize.radar.presets import load_config
 
     config, _ = load_config(folder / "xwr18xx_profile_2023_01_01T00_00_00_000.cfg")
     with pytest.raises(InputError, match=f"holds 16384 bytes .* expected at least one frame of {config.frame_bytes}"):

@@ -89,22 +89,15 @@ def import_(
         "adc_start_time": adc_start_time,
         "ramp_end_time": ramp_end_time,
         "frame_period": frame_period,
-        "start_time": start_time,
     }
     overrides = {name: value for name, value in fields.items() if value is not None}
-    from radarize.importers import import_recording
+    from radarize.importers import Given, import_recording
+    from radarize.radar.presets import load_config
 
-    radar, cfg_text = None, ""
-    if config is not None:
-        from radarize.radar.presets import load_config
-
-        radar, cfg_text = load_config(config)
+    radar, text = load_config(config) if config is not None else (None, "")
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency)
     with keeping(output), progress("import") as report:
-        written = import_recording(
-            source, output, config=radar, cfg_text=cfg_text, poses=poses, shape=shape, variable=variable,
-            latency=latency, overrides=overrides, progress=report,
-        )  # fmt: skip
-    _tell(written)
+        _tell(import_recording(source, output, given, progress=report))
 
 
 def _tell(written: Path) -> None:

@@ -30,13 +30,6 @@ class Surface(NamedTuple):
     resolution: float
 
 
-class Prior(NamedTuple):
-    """An expected pose, and the inverse of its covariance in its own frame."""
-
-    pose: np.ndarray
-    weight: np.ndarray
-
-
 @dataclass(frozen=True)
 class Match:
     """Result of a match.
@@ -78,7 +71,8 @@ def match(
             Surface(grid.probability, grid.unit, grid.origin[0], grid.origin[1], grid.resolution),
             np.ascontiguousarray(points, float),
             np.asarray(guess, float),
-            Prior(np.asarray(guess if prior is None else prior, float), weight),
+            np.asarray(guess if prior is None else prior, float),
+            weight,
             1 / sigma**2,
             iterations,
         )
@@ -117,7 +111,7 @@ def interpolate(probability: np.ndarray, x: float, y: float, unit: float = 1.0) 
 
 
 @numba.njit(cache=True, nogil=True)
-def _cost(surface, points, pose, prior, weight, hessian, gradient):
+def _cost(surface, points, pose, prior, prior_weight, weight, hessian, gradient):
     # Fills the Gauss-Newton system at the pose; returns the cost and the mean occupancy.
     hessian[:] = 0
     gradient[:] = 0
@@ -144,21 +138,23 @@ def _cost(surface, points, pose, prior, weight, hessian, gradient):
         hessian[2, 2] += weight * jt * jt
     hessian[1, 0], hessian[2, 0], hessian[2, 1] = hessian[0, 1], hessian[0, 2], hessian[1, 2]
     score = total / max(len(points), 1)
-    c0, s0 = np.cos(prior.pose[2]), np.sin(prior.pose[2])
+    c0, s0 = np.cos(prior[2]), np.sin(prior[2])
     turn = np.array([[c0, s0, 0.0], [-s0, c0, 0.0], [0.0, 0.0, 1.0]])
-    difference = pose - prior.pose
+    difference = pose - prior
     difference[2] = (difference[2] + np.pi) % (2 * np.pi) - np.pi
     error = turn @ difference
-    return cost + error @ prior.weight @ error, score, turn.T @ (prior.weight @ error), turn.T @ prior.weight @ turn
+    return cost + error @ prior_weight @ error, score, turn.T @ (prior_weight @ error), turn.T @ prior_weight @ turn
 
 
 @numba.njit(cache=True, nogil=True)
-def _refine(surface, points, guess, prior, weight, iterations):
+def _refine(surface, points, guess, prior, prior_weight, weight, iterations):
     # Levenberg's damping: steps that raise the cost are taken back and shortened.
     pose = guess.copy()
     hessian, gradient = np.empty((3, 3)), np.empty(3)
     trial_hessian, trial_gradient = np.empty((3, 3)), np.empty(3)
-    cost, score, prior_gradient, prior_hessian = _cost(surface, points, pose, prior, weight, hessian, gradient)
+    cost, score, prior_gradient, prior_hessian = _cost(
+        surface, points, pose, prior, prior_weight, weight, hessian, gradient
+    )
     damping = 1e-3
     for _ in range(iterations):
         full = hessian + prior_hessian
@@ -167,7 +163,7 @@ def _refine(surface, points, guess, prior, weight, iterations):
         step = -np.linalg.solve(full, gradient + prior_gradient)
         trial = pose + step
         new_cost, new_score, new_prior_gradient, new_prior_hessian = _cost(
-            surface, points, trial, prior, weight, trial_hessian, trial_gradient
+            surface, points, trial, prior, prior_weight, weight, trial_hessian, trial_gradient
         )
         if new_cost < cost:
             small = np.abs(step[0]) + np.abs(step[1]) < 1e-4 and np.abs(step[2]) < 1e-5

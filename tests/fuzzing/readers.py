@@ -23,7 +23,7 @@ from scipy.io import savemat
 import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
 from radarize.contents import contents
 from radarize.errors import InputError
-from radarize.importers import import_recording
+from radarize.importers import Given, import_recording
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import FrameAssembler, decode, encode, packets
@@ -124,7 +124,7 @@ def _importing(**more) -> Callable[[Path], None]:
     """Imports a file, and reads what came of it."""
 
     def read(path: Path) -> None:
-        use(import_recording(path, path.with_name("out.h5"), **({"config": CONFIG} | more)))
+        use(import_recording(path, path.with_name("out.h5"), Given(**({"config": CONFIG} | more))))
 
     return read
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from radarize.console import keeping, new_app, progress, run, until_interrupted, working
+from radarize.console import new_app, progress, run, until_interrupted, working
 from radarize.errors import InputError
 
 app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
@@ -93,6 +93,7 @@ def import_(
     overrides = {name: value for name, value in fields.items() if value is not None}
     from radarize.importers import Given, import_recording
     from radarize.radar.presets import load_config
+    from radarize.recording import keeping
 
     radar, text = load_config(config) if config is not None else (None, "")
     given = Given(radar, text, overrides, start_time, poses, shape, variable, latency)

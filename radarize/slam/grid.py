@@ -113,11 +113,11 @@ class OccupancyGrid:
         """What `probability` counts in."""
         return 1 / 255 if self.probability.dtype == np.uint8 else 1.0
 
-    def image(self, occupied: float = 0.65, free: float = 0.35) -> UInt8[np.ndarray, "row column"]:
+    def image(self) -> UInt8[np.ndarray, "row column"]:
         """The map_server picture, y up: 0 occupied, 254 free, 205 unknown."""
         picture = np.full(self.probability.shape, 205, np.uint8)
-        picture[self.probability >= occupied] = 0
-        picture[(self.probability > 0) & (self.probability <= free)] = 254
+        picture[self.probability >= 0.65] = 0
+        picture[(self.probability > 0) & (self.probability <= 0.35)] = 254
         return picture[::-1]
 
     def save(self, path: str | Path) -> None:

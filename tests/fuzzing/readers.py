@@ -26,7 +26,7 @@ from radarize.errors import InputError
 from radarize.importers import Given, import_recording
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import FrameAssembler, decode, encode, packets
+from radarize.radar.dca1000 import FrameAssembler, decode, encode
 from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings, read_packet_settings
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import PRESETS, load_config
@@ -36,6 +36,7 @@ from tests.fuzzing.damage import damaged, misspelled
 from tests.fuzzing.hdf5 import EDITS, altered
 from tests.importers.ros import write_published
 from tests.importers.test_import_pcap import pcap, udp
+from tests.packets import packets
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 #: A reader may take so much processor time (s), and memory (bytes): buffers of a fixed size, and so many times the

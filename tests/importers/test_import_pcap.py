@@ -7,8 +7,9 @@ import pytest
 from radarize.errors import InputError
 from radarize.importers import Given, import_recording
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import Packet, encode, packets
+from radarize.radar.dca1000 import Packet, encode
 from radarize.recording import Recording
+from tests.packets import packets
 
 PUBLIC = {"samples": 256, "loops": 16, "rx": 1}
 CONFIG = RadarConfig(

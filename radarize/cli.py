@@ -76,20 +76,11 @@ def import_(
 ):
     """Make a recording from a capture of a real radar."""
     fields = {
-        "samples": samples,
-        "loops": loops,
-        "rx": _antennas(rx, "--rx"),
-        "tx": _antennas(tx, "--tx"),
-        "iq_order": iq_order,
-        "board": board,
-        "start_frequency": start_frequency,
-        "slope": slope,
-        "sample_rate": sample_rate,
-        "idle_time": idle_time,
-        "adc_start_time": adc_start_time,
-        "ramp_end_time": ramp_end_time,
-        "frame_period": frame_period,
-    }
+        "samples": samples, "loops": loops, "rx": _antennas(rx, "--rx"), "tx": _antennas(tx, "--tx"),
+        "iq_order": iq_order, "board": board, "start_frequency": start_frequency, "slope": slope,
+        "sample_rate": sample_rate, "idle_time": idle_time, "adc_start_time": adc_start_time,
+        "ramp_end_time": ramp_end_time, "frame_period": frame_period,
+    }  # fmt: skip
     overrides = {name: value for name, value in fields.items() if value is not None}
     from radarize.importers import Given, import_recording
     from radarize.radar.presets import load_config

@@ -10,7 +10,7 @@ from radarize.benchmark.runs import Pair, Run, Timing
 from radarize.benchmark.steps import Step, perform
 from radarize.benchmark.table import Table
 from radarize.errors import InputError
-from radarize.methods import BEST, ODOMETRY, SCANS, best_methods
+from radarize.methods.registry import BEST, ODOMETRY, SCANS, best_methods
 from radarize.report.page import Page
 
 

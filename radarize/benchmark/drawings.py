@@ -6,6 +6,7 @@ from radarize.benchmark.benchmark import Study
 from radarize.benchmark.runs import Pair
 from radarize.report import comparison
 from radarize.report.page import COLORS, OTHERS, Page
+from radarize.runfolder import RunFolder
 
 #: Recordings whose maps are shown.
 _MAPS = 4
@@ -38,7 +39,7 @@ def _draw(study: Study, page: Page, which: str, name: Callable[[Pair], str], par
     errors: dict[str, dict] = {method: {} for method in runs}
     for method, found in runs.items():
         for run in found:
-            folders.setdefault(run.case.name, {})[method] = study.output / run.place
+            folders.setdefault(run.case.name, {})[method] = RunFolder(study.output / run.place)
             result = study.results[run]
             errors[method][run.case.name] = result["quantiles"][which], result[which]["ate"]["position"]["mean"]
     for part in parts.split():

@@ -6,7 +6,7 @@ from radarize.benchmark.benchmark import Study
 from radarize.benchmark.results import Results
 from radarize.benchmark.table import cell
 from radarize.errors import InputError
-from radarize.evaluation.runfiles import read_json
+from radarize.jsonfile import read_json
 from radarize.report.page import Link, Page
 
 

@@ -8,7 +8,7 @@ from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Table, at, mean
 from radarize.evaluation.stress import FIGURES, SOURCES
-from radarize.methods import CLASSICAL, ODOMETRY, SCANS
+from radarize.methods.registry import CLASSICAL, ODOMETRY, SCANS
 from radarize.report.curves import curves
 from radarize.report.page import Page
 

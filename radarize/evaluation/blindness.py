@@ -1,12 +1,11 @@
 """Where odometry of a run was blind, as the run tells itself."""
 
-from collections.abc import Mapping
-from pathlib import Path
 from typing import Annotated
 
 from pydantic import BaseModel, Field, ValidationError
 
 from radarize.errors import InputError
+from radarize.runfolder import RunFolder
 
 Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
@@ -28,25 +27,21 @@ class BlindSpans(BaseModel):
     spans: list[Span]
 
     @classmethod
-    def of(cls, facts: Mapping[str, object], path: Path, start: float) -> "BlindSpans | None":
-        """What ``run.json`` says; None where it does not, as runs of old.
-
-        Args:
-            facts: content of the file.
-            path: of the file, for errors.
-            start: stamp that the spans are counted from, s.
+    def of(cls, run: RunFolder) -> "BlindSpans | None":
+        """What ``run.json`` says, in s since the first pose; None where it does not, as runs of old.
 
         Raises:
             InputError: it says something else.
         """
-        if "blind" not in facts:
+        if "blind" not in run.facts:
             return None
         try:
-            found = cls.model_validate(facts["blind"])
+            found = cls.model_validate(run.facts["blind"])
         except ValidationError as error:
             problem = error.errors()[0]
-            field = ".".join(map(str, ("blind", *problem["loc"])))
-            raise InputError(f"{path}: {field} is {str(problem['input'])[:60]!r}: {problem['msg'].lower()}") from error
+            field, value = ".".join(map(str, ("blind", *problem["loc"]))), str(problem["input"])[:60]
+            raise InputError(f"{run.path / 'run.json'}: {field} is {value!r}: {problem['msg'].lower()}") from error
+        start = float(run.trajectory[0][0])
         for span in found.spans:
             span.start_s, span.stop_s = span.start_s - start, span.stop_s - start
         return found

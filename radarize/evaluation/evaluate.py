@@ -1,25 +1,26 @@
 """A whole run against the truth: trajectories, map, scans, velocities."""
 
-import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from evo.core.trajectory import PoseTrajectory3D
 
 from radarize.errors import InputError
 from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.motion import velocity_errors
-from radarize.evaluation.runfiles import read_json, read_map, read_scans, write_whole
 from radarize.evaluation.scans import scan_errors, true_ranges
 from radarize.evaluation.trajectory import Association, load, matched, trajectory, yaws
+from radarize.runfolder import RunFolder
 
 #: Trajectories of a run by what the metrics call them, the best last.
-TRAJECTORIES = {"odometry": "odometry.tum", "slam": "trajectory.tum"}
+TRAJECTORIES = ("odometry", "slam")
 
 
 def trajectory_errors(
-    run: Path, reference: Path | None = None, association: Association = "interpolate"
+    run: Path | RunFolder, reference: Path | None = None, association: Association = "interpolate"
 ) -> dict[str, TrajectoryErrors]:
     """Errors of the run's trajectories, by ``odometry`` and ``slam``.
 
@@ -31,20 +32,24 @@ def trajectory_errors(
     Raises:
         InputError: not a run, no reference, or nothing that matches.
     """
-    if not (run / TRAJECTORIES["slam"]).is_file():
-        raise InputError(f"{run}: has no trajectory.tum, expected a folder that radarize run wrote")
-    path = reference or run / "reference.tum"
+    run = run if isinstance(run, RunFolder) else RunFolder(run)
+    path = reference or run.path / "reference.tum"
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected true poses (TUM); --reference names another file")
     truth = load(path)
     return {
-        name: evaluate_trajectory(load(run / file), truth, association=association, names=(str(run / file), str(path)))
-        for name, file in TRAJECTORIES.items()
-        if (run / file).is_file()
+        name: evaluate_trajectory(each, truth, association=association, names=(f"{run.path}: {name}", str(path)))
+        for name, each in trajectories(run).items()
     }
 
 
-def true_scans(scans: dict[str, np.ndarray], truth: TrajectoryErrors) -> tuple[np.ndarray, ...] | None:
+def trajectories(run: RunFolder) -> dict[str, PoseTrajectory3D]:
+    """Of odometry, if there is any, and of SLAM."""
+    found = {"odometry": run.odometry, "slam": run.trajectory}
+    return {name: trajectory(*poses) for name, poses in found.items() if poses is not None}
+
+
+def true_scans(scans: Mapping[str, np.ndarray], truth: TrajectoryErrors) -> tuple[np.ndarray, ...] | None:
     """Positions, yaw, azimuths and ranges of what the radar could return, in the reference's frame; None if unknown."""
     if "truth/scan" not in scans or "truth/scan_azimuths" not in scans:
         return None
@@ -58,53 +63,41 @@ def true_scans(scans: dict[str, np.ndarray], truth: TrajectoryErrors) -> tuple[n
 
 
 def evaluate(
-    run: Path, reference: Path | None = None, errors: dict[str, TrajectoryErrors] | None = None
+    run: Path | RunFolder, reference: Path | None = None, errors: dict[str, TrajectoryErrors] | None = None
 ) -> dict[str, object]:
-    """Compare a run with the truth. Nothing is written, see `write_metrics`.
+    """Compare a run with the truth. Nothing is written, see `RunFolder.write_metrics`.
 
     Args:
-        run: folder of a run.
+        run: a run, or its folder.
         reference: TUM file of the truth; by default the run's ``reference.tum``.
         errors: of its trajectories (`trajectory_errors`), where they are at hand.
 
     Returns:
         ``slam`` and ``odometry``: `TrajectoryErrors.summary`. Where the run knows the truth about them, ``map``:
         `map_errors`, ``scans``: `scan_errors`, ``velocity``: `velocity_errors`. Numbers that do not exist are None.
-        Where the run tells it, ``blind``: `BlindSpans` since its first pose.
+        Where the run tells it, ``blind``: `BlindSpans`.
 
     Raises:
         InputError: not a run, no truth, or nothing that matches.
     """
-    run = Path(run)
+    run = run if isinstance(run, RunFolder) else RunFolder(run)
     errors = errors or trajectory_errors(run, reference)
     metrics: dict[str, object] = {name: item.summary() for name, item in errors.items()}
     metrics["reference"] = Path(reference).name if reference else "reference.tum"
-    if (run / "scans.h5").is_file():
-        scans = read_scans(run / "scans.h5")
-        if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
-            there = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
-            metrics["scans"] = scan_errors(scans["ranges"], there)
-        if {"velocity", "truth/velocity"} <= scans.keys():
-            metrics["velocity"] = velocity_errors(
-                scans["velocity"][:, :2], scans["truth/velocity"][:, :2], scans.get("velocity_covariance")
-            )
-        if "truth/floor_plan" in scans and (run / "map.yaml").is_file():
-            best = errors["slam"]
-            true, grid = true_scans(scans, best), read_map(run / "map.yaml")
-            seen = None if true is None else scan_endpoints(*true)
-            metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
-            if true is not None:
-                metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
-    start = load(run / TRAJECTORIES["slam"]).timestamps[0]
-    if blind := BlindSpans.of(read_json(run / "run.json"), run / "run.json", start):
+    scans, grid, best = run.scans, run.map, errors["slam"]
+    if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
+        there = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
+        metrics["scans"] = scan_errors(scans["ranges"], there)
+    if {"velocity", "truth/velocity"} <= scans.keys():
+        metrics["velocity"] = velocity_errors(
+            scans["velocity"][:, :2], scans["truth/velocity"][:, :2], scans.get("velocity_covariance")
+        )
+    if "truth/floor_plan" in scans and grid is not None:
+        true = true_scans(scans, best)
+        seen = None if true is None else scan_endpoints(*true)
+        metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
+        if true is not None:
+            metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
+    if blind := BlindSpans.of(run):
         metrics["blind"] = blind.model_dump()
     return without_nan(metrics)
-
-
-def write_metrics(run: Path, metrics: dict[str, object]) -> None:
-    """Write what `evaluate` returned as ``metrics.json`` into a run.
-
-    Raises:
-        InputError: it cannot be written.
-    """
-    write_whole(Path(run) / "metrics.json", json.dumps(metrics, indent=2) + "\n")

@@ -23,6 +23,7 @@ from jaxtyping import Complex64, Float, Float32
 from numba import njit
 from torch.nn.functional import avg_pool1d
 
+from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import Velocities
 
@@ -97,7 +98,7 @@ class MapRotation:
         s = self.settings = settings or RotationSettings()
         sines = np.linspace(-s.field, s.field, s.columns)
         self._sines = sines
-        self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(sines), heatmaps.loading, heatmaps.device)
+        self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(sines), heatmaps.settings)
         self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
         self._ranges = heatmaps.ranges[self._first :]
         side = 2 * int((self._ranges[-1] + 2.0) / s.cell)
@@ -122,33 +123,22 @@ class MapRotation:
         level = level - level.median(dim=1, keepdim=True).values
         level = level.clamp(0, s.contrast)
         surroundings = _box_mean(_box_mean(level, s.texture[1]).mT, s.texture[0]).mT
-        return (level - surroundings).contiguous().cpu().numpy(), self._elevation(spectrum).cpu().numpy()
+        return (level - surroundings).contiguous().numpy(), self._elevation(spectrum).numpy()
 
     def _elevation(self, spectrum: torch.Tensor) -> torch.Tensor:
         if self._heatmaps.pairs is None:
             return torch.zeros(len(spectrum), len(self._ranges), self.settings.columns)
         u_z, coherence = self._heatmaps.elevation_of(spectrum[:, self._first :])
-        limit = torch.as_tensor(0.9 * np.cos(self._heatmaps.azimuths), dtype=u_z.dtype, device=u_z.device)
+        limit = torch.as_tensor(0.9 * np.cos(self._heatmaps.azimuths), dtype=u_z.dtype)
         return torch.clamp(u_z, -limit, limit) * coherence
 
-    def estimate(
-        self,
-        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
-        times: Float[np.ndarray, "frame"],
-        velocities: Velocities,
-    ) -> Rotations:
-        """Yaw increments of the next frames.
-
-        Args:
-            spectrum: `Heatmaps.spectrum` of the frames.
-            times: burst centres, s.
-            velocities: velocities there.
-        """
-        prior = None if self._prior is None else self._prior.estimate(spectrum, times, velocities)
-        result = np.zeros((3, len(times)))
-        for i, (feature, u_z) in enumerate(zip(*self.features(spectrum), strict=True)):
+    def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
+        """Yaw increments of the next frames, given their velocities."""
+        prior = None if self._prior is None else self._prior.estimate(batch, velocities)
+        result = np.zeros((3, len(batch)))
+        for i, (feature, u_z) in enumerate(zip(*self.features(batch.spectrum), strict=True)):
             turn = None if prior is None else (prior.yaw[i], prior.variance[i])
-            result[:, i] = self._push(feature, u_z, float(times[i]), velocities.velocity[i], turn)
+            result[:, i] = self._push(feature, u_z, float(batch.centers[i]), velocities.velocity[i], turn)
         return Rotations(*result)
 
     def _push(

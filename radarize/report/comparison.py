@@ -4,32 +4,31 @@ Runs are folders by recording and method; `colors` has one for each method.
 """
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import numpy as np
 
-from radarize.evaluation.evaluate import TRAJECTORIES
-from radarize.evaluation.runfiles import read_map, read_scans
-from radarize.evaluation.trajectory import fitted, load, moved
+from radarize.evaluation.evaluate import trajectories
+from radarize.evaluation.trajectory import fitted, moved, trajectory
 from radarize.report.drawings import canvas
 from radarize.report.page import COLORS, INK, Page
 from radarize.report.plots import from_above, line, panels, plain, walls
+from radarize.runfolder import RunFolder
 
 #: Poses of a trajectory that are drawn, and errors of a distribution.
 _POSES, _ERRORS = 240, 200
-Runs = Mapping[str, Mapping[str, Path]]
+Runs = Mapping[str, Mapping[str, RunFolder]]
 
 
 def draw_trajectories(page: Page, runs: Runs, colors: Mapping[str, str], which: str) -> None:
-    """Trajectories (of `TRAJECTORIES`) from above, laid upon the truth, of one recording at a time."""
+    """Trajectories (``odometry`` or ``slam``) from above, laid upon the truth, of one recording at a time."""
     page.section(
         "Trajectories",
         "From above, each laid upon the truth. The menu chooses a recording; click a name to hide or show a method.",
     )
     figure, owners = from_above(), []
     for recording, folders in runs.items():
-        truth = load(next(iter(folders.values())) / "reference.tum")
-        paths = {method: load(folder / TRAJECTORIES[which]) for method, folder in folders.items()}
+        truth = trajectory(*next(iter(folders.values())).reference)
+        paths = {method: trajectories(folder)[which] for method, folder in folders.items()}
         paths = {method: moved(path, *fitted(path, truth)) for method, path in paths.items()}
         for method, path in {"truth": truth, **paths}.items():
             color, dash = (COLORS["good"], "dot") if path is truth else (colors[method], "solid")
@@ -83,7 +82,7 @@ def draw_maps(page: Page, runs: Runs, colors: Mapping[str, str]) -> None:
     )
     for recording, folders in runs.items():
         first = next(iter(folders.values()))
-        plan, truth = read_scans(first / "scans.h5").get("truth/floor_plan"), load(first / "reference.tum")
+        plan, truth = first.scans.get("truth/floor_plan"), trajectory(*first.reference)
         path = truth.positions_xyz[:, :2]
         columns = min(1 + len(folders), 4)
         figure, axes = canvas(columns, -(-(1 + len(folders)) // columns), height=3.0)
@@ -96,8 +95,8 @@ def draw_maps(page: Page, runs: Runs, colors: Mapping[str, str]) -> None:
             if plan is not None:
                 axis.plot(*walls(plan).T, color=INK, lw=0.4 if method else 0.8, alpha=0.9)
             if method:
-                grid = read_map(folders[method] / "map.yaml")
-                turn, shift = fitted(load(folders[method] / TRAJECTORIES["slam"]), truth)
+                grid = folders[method].map
+                turn, shift = fitted(trajectory(*folders[method].trajectory), truth)
                 cells = grid.centers(grid.occupied) @ turn[:2, :2].T + shift[:2]
                 axis.plot(*cells.T, ",", color=colors[method])
         axes.flat[0].plot(*path.T, color=COLORS["good"], lw=1)

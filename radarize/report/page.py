@@ -12,7 +12,7 @@ from typing import NamedTuple
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
-from radarize.evaluation.runfiles import write_whole
+from radarize.replacing import write_whole
 
 #: Readable on light and dark ground alike: axes and text of plots, and one colour per meaning.
 INK, GRID = "#7d8590", "rgba(125,133,144,0.22)"

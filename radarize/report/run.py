@@ -7,14 +7,13 @@ import numpy as np
 
 from radarize.errors import InputError
 from radarize.evaluation.blindness import BlindSpans
-from radarize.evaluation.evaluate import TRAJECTORIES, evaluate, trajectory_errors
+from radarize.evaluation.evaluate import evaluate, trajectories, trajectory_errors
 from radarize.evaluation.metrics import TrajectoryErrors
-from radarize.evaluation.runfiles import read_json, read_map, read_scans
-from radarize.evaluation.trajectory import load
 from radarize.report import words
 from radarize.report.drawings import canvas, draw_doppler, draw_fan, draw_scan
 from radarize.report.page import COLORS, INK, Page
 from radarize.report.plots import band, from_above, line, panels, shade, walls
+from radarize.runfolder import RunFolder, Scans
 
 #: Frames whose heat maps are shown.
 _FRAMES = 4
@@ -35,52 +34,46 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     Raises:
         InputError: not a run, or a damaged one.
     """
-    run = Path(run)
-    facts = read_json(run / "run.json")
-    scans = read_scans(run / "scans.h5") if (run / "scans.h5").is_file() else {}
-    if not (run / "trajectory.tum").is_file():
-        raise InputError(f"{run}: has no trajectory.tum, expected a folder that radarize run wrote")
-    errors = trajectory_errors(run) if (run / "reference.tum").is_file() else {}
-    metrics = evaluate(run, errors=errors) if errors else {}
-    start = load(run / TRAJECTORIES["slam"]).timestamps[0]
-    blind = BlindSpans.of(facts, run / "run.json", start)
+    folder, others = RunFolder(run), [RunFolder(other) for other in beside]
+    errors = trajectory_errors(folder) if folder.has("reference.tum") else {}
+    metrics = evaluate(folder, errors=errors) if errors else {}
+    blind = BlindSpans.of(folder)
 
-    page = Page(f"Run {run.resolve().name}", _about(facts, errors))
+    page = Page(f"Run {folder.path.resolve().name}", _about(folder, errors))
     if errors:
         _result(page, metrics)
     if blind:
         page.text(words.blindness(blind))
         if blind.spans:
             page.table(*words.blind_spans(blind), sortable=True)
-    if errors and beside:
+    if errors and others:
         page.section("Beside other methods", "The same recording; odometry and SLAM against the truth.")
-        rows = [(methods(run), metrics), *((methods(other), evaluate(other)) for other in beside)]
+        rows = [(methods(folder), metrics), *((methods(other), evaluate(other)) for other in others)]
         page.table(*words.beside(rows), sortable=True)
-    _plan(page, run, scans, errors, beside)
+    _plan(page, folder, errors, others)
     spans = blind.spans if blind else []
+    start = folder.trajectory[0][0]
     if errors:
         _over_time(page, errors, start, spans)
-    if "velocity" in scans:
-        _velocities(page, scans, start, spans)
-    if "heatmaps/frames" in scans:
-        _heatmaps(page, scans)
-    _settings(page, facts)
-    return page.write(Path(output) if output else run / "report.html")
+    if "velocity" in folder.scans:
+        _velocities(page, folder.scans, start, spans)
+    if "heatmaps/frames" in folder.scans:
+        _heatmaps(page, folder.scans)
+    _settings(page, folder.facts)
+    return page.write(Path(output) if output else folder.path / "report.html")
 
 
-def methods(run: Path) -> str:
+def methods(run: RunFolder) -> str:
     """What a run was made with, in short."""
-    used = read_json(Path(run) / "run.json").get("methods", {})
-    return " + ".join(str(used[name]) for name in ("odometry", "scans") if name in used) or Path(run).name
+    return " + ".join(run.methods[name] for name in ("odometry", "scans") if name in run.methods) or run.path.name
 
 
-def _about(facts: dict, errors: dict[str, TrajectoryErrors]) -> str:
-    parts = [f"Radar-only SLAM on {facts['recording']}" if "recording" in facts else "Radar-only SLAM"]
+def _about(run: RunFolder, errors: dict[str, TrajectoryErrors]) -> str:
+    parts = [f"Radar-only SLAM on {run.facts['recording']}" if "recording" in run.facts else "Radar-only SLAM"]
     if errors:
         parts.append(f"{errors['slam'].distance:.1f} m in {errors['slam'].duration:.0f} s")
-    used = facts.get("methods")
-    if isinstance(used, dict):
-        parts.append(", ".join(f"{name} {value}" for name, value in used.items()))
+    if run.methods:
+        parts.append(", ".join(f"{name} {value}" for name, value in run.methods.items()))
     return " · ".join(parts)
 
 
@@ -99,7 +92,7 @@ def _result(page: Page, metrics: dict) -> None:
     page.columns({table.head[0]: dict(table.rows) for table in words.parts(metrics)}, numbers=(1,))
 
 
-def _plan(page: Page, run: Path, scans: dict, errors: dict[str, TrajectoryErrors], beside: Sequence[Path]) -> None:
+def _plan(page: Page, run: RunFolder, errors: dict[str, TrajectoryErrors], beside: Sequence[RunFolder]) -> None:
     """Trajectories, map and floor plan from above, in the truth's frame if there is one."""
     page.section(
         "Trajectory and map",
@@ -108,18 +101,15 @@ def _plan(page: Page, run: Path, scans: dict, errors: dict[str, TrajectoryErrors
     )
     figure = from_above()
     turn, shift = (errors["slam"].turn, errors["slam"].shift) if errors else (np.eye(3), np.zeros(3))
-    if errors and "truth/floor_plan" in scans:
-        line(figure, walls(scans["truth/floor_plan"]), "floor plan", COLORS["truth"], 1.2)
-    if (run / "map.yaml").is_file():
-        grid = read_map(run / "map.yaml")
+    if errors and "truth/floor_plan" in run.scans:
+        line(figure, walls(run.scans["truth/floor_plan"]), "floor plan", COLORS["truth"], 1.2)
+    if (grid := run.map) is not None:
         cells = grid.centers(grid.occupied) @ turn[:2, :2].T + shift[:2]
         marker = {"color": COLORS["map"], "size": 3, "symbol": "square"}
         line(figure, cells, "map", COLORS["map"], mode="markers", marker=marker)
-    for name, file in TRAJECTORIES.items():
-        if errors and name in errors:
-            line(figure, errors[name].estimate.positions_xyz, _NAMES[name], COLORS[name], 2.4)
-        elif (run / file).is_file():
-            line(figure, load(run / file).positions_xyz, _NAMES[name], COLORS[name], 2.4)
+    for name, path in trajectories(run).items():
+        path = errors[name].estimate if errors else path
+        line(figure, path.positions_xyz, _NAMES[name], COLORS[name], 2.4)
     if errors:
         for other in beside:
             path = trajectory_errors(other)["odometry"].estimate.positions_xyz
@@ -144,7 +134,7 @@ def _over_time(page: Page, errors: dict[str, TrajectoryErrors], start: float, sp
     page.plot(figure, height=440)
 
 
-def _velocities(page: Page, scans: dict, start: float, spans: Sequence) -> None:
+def _velocities(page: Page, scans: Scans, start: float, spans: Sequence) -> None:
     true, covariance = scans.get("truth/velocity"), scans.get("velocity_covariance")
     page.section(
         "Velocity",
@@ -172,7 +162,7 @@ def _velocities(page: Page, scans: dict, start: float, spans: Sequence) -> None:
     page.plot(figure, height=440)
 
 
-def _heatmaps(page: Page, scans: dict) -> None:
+def _heatmaps(page: Page, scans: Scans) -> None:
     true_velocity = scans.get("truth/velocity")
     page.section(
         "Heat maps and scans",

@@ -3,17 +3,25 @@
 import numpy as np
 import pytest
 
+from radarize.batch import Signal
 from radarize.errors import InputError
-from radarize.heatmaps import Heatmaps
-from radarize.odometry.doppler import Velocities
+from radarize.odometry.doppler import DopplerVelocity, Velocities
 from radarize.odometry.integration import Odometry, VelocityFilter
 from radarize.odometry.rotation import MapRotation, Rotations
 from radarize.pose import compose, exponential
 from radarize.radar.presets import PRESETS
+from tests.batches import batch
 from tests.echoes import record
 from tests.rooms import antenna_gain, furnished_room, walk
 
 CONFIG = PRESETS["radarize"]
+SIGNAL = Signal(CONFIG)
+
+
+def classical(velocity=None, rotation=None) -> Odometry:
+    """Least squares and a local map, unless told otherwise."""
+    heatmaps = SIGNAL.heatmaps
+    return Odometry(CONFIG, velocity or DopplerVelocity(heatmaps), rotation or MapRotation(heatmaps))
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +41,8 @@ def walked():
 @pytest.fixture(scope="module")
 def track(walked):
     adc, stamps, _ = walked
-    odometry = Odometry(CONFIG)
-    return [odometry.push(adc[i : i + 50], stamps[i : i + 50]) for i in range(0, len(adc), 50)]
+    odometry = classical()
+    return [odometry.follow(batch(SIGNAL, adc[i : i + 50], stamps[i : i + 50])) for i in range(0, len(adc), 50)]
 
 
 def test_walk(walked, track):
@@ -65,8 +73,8 @@ def test_covariance_of_steps(walked, track):
 
 def test_batch_size_does_not_matter(walked, track):
     adc, stamps, _ = walked
-    odometry = Odometry(CONFIG)
-    parts = [odometry.push(adc[i : i + 7], stamps[i : i + 7]) for i in range(0, 42, 7)]
+    odometry = classical()
+    parts = [odometry.follow(batch(SIGNAL, adc[i : i + 7], stamps[i : i + 7])) for i in range(0, 42, 7)]
     np.testing.assert_allclose(np.concatenate([p.pose for p in parts]), track[0].pose[:42], atol=1e-4)
 
 
@@ -79,7 +87,7 @@ def test_standing_still_does_not_turn():
         return np.broadcast_to([3.0, 2.0, 0.0], (*t.shape, 3)), np.zeros(t.shape)
 
     adc = record(CONFIG, still, points, amplitudes, stamps, rng, 20.0, block=16, gain=antenna_gain)
-    result = Odometry(CONFIG).push(adc, stamps)
+    result = classical().follow(batch(SIGNAL, adc, stamps))
     assert np.abs(result.pose[:, :2]).max() < 1e-3
     assert np.abs(np.degrees(result.pose[:, 2])).max() < 0.5  # of a map match; it does not add up
 
@@ -94,7 +102,7 @@ def test_turning_on_the_spot_either_way():
             return np.broadcast_to([3.0, 2.0, 0.0], (*t.shape, 3)), rate * t
 
         adc = record(CONFIG, turning, points, amplitudes, stamps, rng, 20.0, block=16, gain=antenna_gain)
-        result = Odometry(CONFIG).push(adc, stamps)
+        result = classical().follow(batch(SIGNAL, adc, stamps))
         expected = rate * (stamps[-1] - stamps[0])
         assert result.pose[-1, 2] == pytest.approx(expected, rel=0.06)
 
@@ -104,7 +112,7 @@ def test_lost_frames_are_bridged(walked):
     adc, valid = adc[:80].copy(), np.ones((80, *CONFIG.frame_shape[:2]), bool)
     adc[40:43], valid[40:43] = 0, False
     adc[60, 10:20], valid[60, 10:20] = 0, False
-    result = Odometry(CONFIG).push(adc, stamps[:80], valid)
+    result = classical().follow(batch(SIGNAL, adc, stamps[:80], valid))
     assert np.isfinite(result.pose).all() and np.isfinite(result.covariance).all()
     assert np.linalg.norm(result.pose[-1, :2] - truth[79, :2]) < 0.06
     assert result.covariance[42, 2, 2] > 2 * result.covariance[39, 2, 2]
@@ -112,21 +120,21 @@ def test_lost_frames_are_bridged(walked):
 
 def test_times_must_ascend(walked):
     adc, stamps, _ = walked
-    odometry = Odometry(CONFIG)
-    odometry.push(adc[:2], stamps[:2])
+    odometry = classical()
+    odometry.follow(batch(SIGNAL, adc[:2], stamps[:2]))
     with pytest.raises(InputError, match="ascending"):
-        odometry.push(adc[:2], stamps[:2])
+        odometry.follow(batch(SIGNAL, adc[:2], stamps[:2]))
 
 
 def test_estimators_can_be_swapped(walked):
     adc, stamps, _ = walked
 
     class Forward:
-        def estimate(self, spectrum):
-            n = len(spectrum)
+        def estimate(self, batch):
+            n = len(batch)
             return Velocities(np.tile([1.0, 0.0], (n, 1)), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.ones(n, int))
 
-    result = Odometry(CONFIG, velocity=Forward(), rotation=MapRotation(Heatmaps(CONFIG))).push(adc[:20], stamps[:20])
+    result = classical(velocity=Forward()).follow(batch(SIGNAL, adc[:20], stamps[:20]))
     np.testing.assert_allclose(result.velocity[5:], np.tile([1.0, 0.0], (15, 1)), atol=0.02)
 
 
@@ -159,10 +167,10 @@ def test_a_turn_that_nothing_is_seen_of_is_claimed():
         return np.zeros((*t.shape, 3)), np.zeros(t.shape)
 
     class Sure:
-        def estimate(self, spectrum, times, velocities):
-            return Rotations(np.zeros(len(times)), np.full(len(times), 1e-8), np.zeros(len(times)))
+        def estimate(self, batch, velocities):
+            return Rotations(np.zeros(len(batch)), np.full(len(batch), 1e-8), np.zeros(len(batch)))
 
     adc = record(CONFIG, nowhere, np.array([[2.0, 0.0, 0.0]]), np.zeros(1), stamps, rng, 20.0, block=16)
-    result = Odometry(CONFIG, rotation=MapRotation(Heatmaps(CONFIG), prior=Sure())).push(adc, stamps)
+    result = classical(rotation=MapRotation(SIGNAL.heatmaps, prior=Sure())).follow(batch(SIGNAL, adc, stamps))
     # People turn by 20 deg in a second, and more; and it is noise, so some frames match by chance.
     assert np.sqrt(result.covariance[1:, 2, 2].sum()) > np.radians(15)

@@ -14,6 +14,7 @@ from radarize.recording import Product, RecordingWriter, Stream
 from radarize.report.drawings import canvas, draw_doppler, draw_fan
 from radarize.report.recording import report_recording
 from radarize.report.run import report_run
+from radarize.runfolder import RunFolder
 from tests.capture.browser import CHROMIUM, Browser
 from tests.evaluation.fake_run import write_run
 
@@ -164,13 +165,14 @@ def test_where_odometry_was_blind_is_told_and_shaded(tmp_path):
             assert sorted(map(tuple, shapes)) == [(3.0, 4.5)] * 2 + [(10.0, 11.0)] * 2
 
 
-def test_blind_spans_are_counted_from_the_first_pose():
+def test_blind_spans_are_counted_from_the_first_pose(tmp_path):
     """The run has stamps of its clock."""
-    clock = 1.7e9
+    clock, run = 1.7e9, write_run(tmp_path / "run")
+    poses = np.loadtxt(run / "trajectory.tum")
+    np.savetxt(run / "trajectory.tum", poses + [clock, *[0] * 7], fmt="%.9f")
+    assert BlindSpans.of(RunFolder(run)) is None
     spans = [span | {"start_s": span["start_s"] + clock, "stop_s": span["stop_s"] + clock} for span in BLIND["spans"]]
-    found = BlindSpans.of({"blind": BLIND | {"spans": spans}}, Path("run.json"), clock)
-    assert found.model_dump() == BLIND
-    assert BlindSpans.of({}, Path("run.json"), clock) is None
+    assert BlindSpans.of(RunFolder(tell(run, blind=BLIND | {"spans": spans}))).model_dump() == BLIND
 
 
 def test_blindness_is_told_without_truth_too(tmp_path):

@@ -33,7 +33,7 @@ def specification(name: str, path: Path) -> None:
     data, kept = yaml.safe_load((folder / f"{name}.yaml").read_text()), DATASETS[name]
     groups = {group["building"]: group for group in reversed(data["recordings"])}
     data["recordings"] = [
-        groups[building] | {"platform": platforms, "count": 1, "duration": SECONDS}
+        groups[building] | {"platform": [*platforms], "count": 1, "duration": SECONDS}
         | ({"floors": [0]} if "floors" in groups[building] else {})
         for building, platforms in kept.items()
     ]  # fmt: skip
@@ -46,7 +46,7 @@ def specification(name: str, path: Path) -> None:
         for key in {"building": ("held_out",), "platform": ("test",)}.get(split["kind"], ()):
             split.pop(key, None)
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(yaml.safe_dump(data | {"recordings": [g | {"platform": [*g["platform"]]} for g in data["recordings"]]}))
+    path.write_text(yaml.safe_dump(data))
 
 
 def _plan(path: Path) -> None:

@@ -1,7 +1,7 @@
 """Every command of README and docs, in order, as a reader types them, where no kernel has been compiled yet.
 
-What is typed is what the pages say (`pages.py`), but for `TYPED_INSTEAD`: everything shorter, and hardware virtual. Each
-page begins with what README left behind. A command that is new on a page runs here by itself, or fails.
+What is typed is what the pages say (`pages.py`), but for `TYPED_INSTEAD`: everything shorter, and hardware virtual.
+Each page begins with what README left behind. A command that is new on a page runs here by itself, or fails.
 """
 
 import json

@@ -12,7 +12,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -88,7 +87,7 @@ class Reader:
 
     def type(self, command: Command) -> str | None:
         """Run a command; what it said if it failed."""
-        start, before = time.monotonic(), self.log.stat().st_size if self.log.exists() else 0
+        before = self.log.stat().st_size if self.log.exists() else 0
         if command.script:
             (self.folder / "script.py").write_text(command.text)
             words = ["python", "script.py"]
@@ -108,8 +107,8 @@ class Reader:
                 self.prepare(name)
         order = {"words": words, "folder": str(self.folder), "log": str(self.log)}
         print(json.dumps(order), file=self.shell.stdin, flush=True)
-        code = int(self.shell.stdout.readline())
-        self.took[" ".join(words)] = time.monotonic() - start
+        code, used = self.shell.stdout.readline().split()
+        code, self.took[" ".join(words)] = int(code), float(used)
         missing = [word for option, word in zip(words, words[1:], strict=False) if option in ("-o", "--out")]
         missing = [name for name in missing if not [*self.folder.glob(f"{name}*")]]
         if code == 0 and not missing:
@@ -168,7 +167,7 @@ def read(page: str, folder: Path, caches: Path) -> list[str]:
         failures = [reader.type(command) for command in commands(page) if not reason_not_to(command)]
     finally:
         reader.leave()
-        print("\n".join(f"{seconds:6.1f} s  {words}" for words, seconds in reader.took.items()))
+        print("processor time", *(f"{s:6.1f} s  {words}" for words, s in reader.took.items()), sep="\n")
     return [failure for failure in failures if failure]
 
 

@@ -27,6 +27,20 @@ class Sleep:
 
 
 @dataclass(frozen=True)
+class Wait:
+    """Reports half of itself, and lasts until a file is there."""
+
+    path: Path
+
+    def __call__(self, report) -> str:
+        deadline = time.monotonic() + 120
+        while not self.path.exists() and time.monotonic() < deadline:
+            report(0.5)
+            time.sleep(0.1)
+        return os.getcwd()
+
+
+@dataclass(frozen=True)
 class Fall:
     """Ends its process, as often as it is told to."""
 
@@ -48,10 +62,6 @@ def refuse(report) -> None:
 
 def stumble(report) -> None:
     raise ZeroDivisionError("odd")
-
-
-def where(report) -> str:
-    return os.getcwd()
 
 
 @numba.njit(parallel=True)

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import plotly.graph_objects as go
 
-from radarize.benchmark.benchmark import Study
 from radarize.benchmark.runs import Pair, Run
+from radarize.benchmark.study import Study
 from radarize.evaluation.drawings import canvas
 from radarize.evaluation.evaluate import TRAJECTORIES
 from radarize.evaluation.page import COLORS, INK, Page

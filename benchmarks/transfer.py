@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 from benchmarks.results import FOLDER, Data, Walk, publish
 from radarize.console import progress
 from radarize.errors import InputError
-from radarize.evaluation.likeness import frechet_distance, patch_statistics
 from radarize.importers import import_recording
 from radarize.methods import best_methods
 from radarize.radar.config import RadarConfig
@@ -29,6 +28,7 @@ from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.simulate import Simulator
+from radarsim.twin.likeness import frechet_distance, patch_statistics
 
 CAPTURES = Path(__file__).parents[2] / "shared" / "recordings"
 SCENES = ("office", "visitors", "buildings/b")

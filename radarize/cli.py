@@ -386,6 +386,7 @@ def benchmark(
     epochs: Annotated[int | None, typer.Option(min=1, help="Of that training, at most.")] = None,
     protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; by default one per core.")] = None,
+    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Use a Ray cluster instead (auto: this one).")] = None,
 ):
     """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
     import os
@@ -404,7 +405,7 @@ def benchmark(
     from radarize.benchmark.study import Options
 
     chosen = [method for word in methods or () for method in word.split(",")]
-    options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)))
+    options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
     try:
         with progress("benchmark") as report:
             published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))

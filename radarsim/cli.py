@@ -145,10 +145,10 @@ def twin(
     seed: Annotated[int, typer.Option(min=0, help="Of speckle and noise.")] = 0,
 ):
     """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
-    from radarize.evaluation.twin_report import report_twin
     from radarize.recording import Recording
     from radarsim.motion import Mounting
-    from radarsim.twin import make_twin
+    from radarsim.twin.report import report_twin
+    from radarsim.twin.twin import make_twin
 
     places = [Mounting.parse(text) if text else None for text in (origin, mounting, at)]
     with keeping(output), progress("twin") as report:

@@ -56,7 +56,7 @@ def benchmark(
             say(f"{each}: left out, {error}")
     if not studies:
         raise InputError(f"{data}: is fit for no benchmark")
-    carry_out(list(studies.values()), options.workers, progress)
+    carry_out(list(studies.values()), progress)
     published = {each: _publish(each, study) for each, study in studies.items()}
     write_index(output)
     return published

@@ -30,6 +30,7 @@ class Options:
         epochs: of these trainings, at most; their defaults if None.
         protocol: a key of `PROTOCOLS`; all if None.
         workers: processes.
+        ray: address of a Ray cluster to use instead.
         command: that the results name.
     """
 
@@ -39,6 +40,7 @@ class Options:
     epochs: int | None = None
     protocol: str | None = None
     workers: int = 1
+    ray: str | None = None
     command: str = field(default_factory=lambda: command("radarize"))
 
     def check(self) -> None:
@@ -261,8 +263,8 @@ class Study:
         return reason
 
 
-def carry_out(studies: Sequence[Study], workers: int, progress: Callable[[int, int], None]) -> None:
-    """Do what studies need, each step once for all of them, and give them what was found.
+def carry_out(studies: Sequence[Study], progress: Callable[[int, int], None]) -> None:
+    """Do what studies of the same options need, each step once for all of them, and give them what was found.
 
     Raises:
         InputError: nothing could be done.
@@ -270,7 +272,8 @@ def carry_out(studies: Sequence[Study], workers: int, progress: Callable[[int, i
     steps = [step for study in studies for step in study.steps]
     # Networks before runs, and runs before timings, which want quiet cores.
     steps.sort(key=lambda step: (Training, Run, Timing).index(type(step)))
-    results = perform(steps, studies[0].output, workers, progress)
+    options = studies[0].options
+    results = perform(steps, studies[0].output, options.workers, progress, options.ray)
     for study in studies:
         study.results = results
     done = [found for step, found in results.items() if not isinstance(step, Training)]

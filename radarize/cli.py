@@ -329,15 +329,20 @@ def evaluate(
     as_json: AsJson = False,
 ):
     """Compare a run with the truth; writes metrics.json."""
-    from radarize.evaluation import comparison
-    from radarize.evaluation.evaluate import evaluate, show
+    from radarize.evaluation.evaluate import evaluate, write_metrics
+    from radarize.report.run import methods
+    from radarize.report.terminal import print_beside, print_metrics
 
     with working("evaluating"):
         metrics = evaluate(run, reference)
-        rows = comparison.compare([run, *beside], reference) if beside else []
-    _print_json(metrics) if as_json else show(metrics)
-    if rows and not as_json:
-        comparison.show(rows)
+        others = [(methods(other), evaluate(other, reference)) for other in beside or ()]
+        write_metrics(run, metrics)
+    if as_json:
+        _print_json(metrics)
+        return
+    print_metrics(metrics)
+    if others:
+        print_beside([(methods(run), metrics), *others])
 
 
 @app.command()
@@ -364,7 +369,8 @@ def report(
     beside: Beside = None,
 ):
     """Draw a run or a recording as one HTML page."""
-    from radarize.evaluation.report import report_recording, report_run
+    from radarize.report.recording import report_recording
+    from radarize.report.run import report_run
 
     with working("drawing"):
         written = report_run(source, output, beside or ()) if source.is_dir() else report_recording(source, output)
@@ -386,7 +392,7 @@ def benchmark(
     epochs: Annotated[int | None, typer.Option(min=1, help="Of that training, at most.")] = None,
     protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; by default one per core.")] = None,
-    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Use a Ray cluster instead (auto: this one).")] = None,
+    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
 ):
     """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
     import os

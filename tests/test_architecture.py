@@ -32,7 +32,7 @@ def test_the_simulator_takes_only_sensor_and_files_from_the_pipeline():
     modules = ("radar", *files, "heatmaps", "points", "training.maps")
     allowed = {f"radarize.{name}" for name in modules} | {"radarize"}
     # Twins are compared by what the pipeline makes of them, and drawn as runs are.
-    judging = ("mapping.scans", "odometry.doppler", "evaluation.drawings", "evaluation.page", "evaluation.runfiles")
+    judging = ("mapping.scans", "odometry.doppler", "report.drawings", "report.page", "evaluation.runfiles")
     of_twins = {f"radarize.{name}" for name in judging}
     guilty = {
         (f, n)

@@ -6,8 +6,8 @@ from radarize.benchmark.results import Results
 from radarize.benchmark.study import Study
 from radarize.benchmark.table import cell
 from radarize.errors import InputError
-from radarize.evaluation.page import Page
 from radarize.evaluation.runfiles import read_json
+from radarize.report.page import Link, Page
 
 
 def write_page(study: Study, results: Results, path: Path) -> Path:
@@ -20,7 +20,7 @@ def write_page(study: Study, results: Results, path: Path) -> Path:
     for table in results.tables:
         page.section(table.title)
         if table.rows:
-            rows = [tuple(cell(value) for value in row.values()) for row in table.rows]
+            rows = [tuple(map(cell, row)) for row in table.frame.itertuples(index=False)]
             page.table(tuple(table.frame), rows, table.numbers(), sortable=True)
         for note in table.notes:
             page.text(note)
@@ -48,6 +48,6 @@ def write_index(folder: Path) -> Path:
             continue
         if "tables" in about:
             made = about.get("machine", {})
-            rows.append((about["title"], path.name, made.get("commit", "-"), made.get("processor", "-")))
-    page.links(("benchmark", "commit", "processor"), rows)
+            rows.append((Link(about["title"], path.name), made.get("commit", "-"), made.get("processor", "-")))
+    page.table(("benchmark", "commit", "processor"), rows)
     return page.write(folder / "index.html")

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from matplotlib import pyplot
+
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.page import write_index, write_page
 from radarize.benchmark.registry import BENCHMARKS
@@ -67,6 +69,7 @@ def _publish(name: str, study: Study) -> Results:
     if (figure := study.benchmark.picture(results.tables)) is not None:
         with replacing(study.output / f"{name}.png") as part:
             figure.savefig(part, format="png", dpi=70, bbox_inches="tight")
+        pyplot.close(figure)
         results.notes.append(f"![Curves]({name}.png)")
     results.write(study.output, name)
     write_page(study, results, study.output / f"{name}.html")

@@ -11,7 +11,7 @@ from radarize.benchmark.identity import of_code, of_file
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.steps import Report
 from radarize.errors import InputError
-from radarize.evaluation.evaluate import evaluate, trajectory_errors
+from radarize.evaluation.evaluate import evaluate, trajectory_errors, write_metrics
 from radarize.evaluation.runfiles import read_scans
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import missed, sources
@@ -134,6 +134,7 @@ def figures(run: Path, recording: Path) -> dict[str, object]:
         InputError: no truth.
     """
     found = evaluate(run)
+    write_metrics(run, found)
     settings = SlamConfig.preset("radar")
     log.run(run, None, run / OPEN, config=settings.model_copy(update={"loop": LoopConfig(enabled=False)}))
     errors = trajectory_errors(run, association="nearest")

@@ -10,9 +10,10 @@ from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.study import Chosen, Study
 from radarize.benchmark.table import Table
-from radarize.evaluation.page import Page
-from radarize.evaluation.stress import FIGURES, SOURCES, curves
+from radarize.evaluation.stress import FIGURES, SOURCES
 from radarize.methods import CLASSICAL, ODOMETRY, SCANS
+from radarize.report.curves import curves
+from radarize.report.page import Page
 
 #: Where figures of `radarize.evaluation.stress` stand in `Study.of`.
 PLACES = {

@@ -4,9 +4,9 @@ import numpy as np
 from jaxtyping import Float, Shaped
 from scipy.spatial.transform import Rotation
 
-from radarize.evaluation.drawings import canvas
-from radarize.evaluation.page import COLORS, Page
 from radarize.recording import Recording
+from radarize.report.drawings import canvas
+from radarize.report.page import COLORS, Page
 
 #: Value of cells that no cause fills (/truth/cause).
 _NONE = 255

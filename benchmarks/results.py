@@ -33,7 +33,7 @@ def publish(
         notes: sentences below the table.
         beside: whose figures stand beside ours.
     """
-    table = Table.of(title, rows, notes, beside)
+    table = Table(title, list(rows), list(notes), tuple(beside))
     results = Results(title, [table], data, networks, command(f"python -m benchmarks.{name}"))
     print(results.write(FOLDER, name).read_text())
 

@@ -55,4 +55,4 @@ def tables(study: Study) -> list[Table]:
         if shares.notna().any():
             parts = ", ".join(f"{FIGURES[name][0]} {100 * share:.1f}" for name, share in shares.items())
             notes.append(f"{pair.scans}: wrong returns, % of all, come from {parts}.")
-    return [Table.of("Scans and maps", rows, notes)]
+    return [Table("Scans and maps", rows, notes)]

@@ -72,7 +72,7 @@ def steps_table(study: Study) -> Table:
             if len(here):
                 label = {"odometry": pair.odometry, "on": name, "recordings": len(here)}
                 rows.append(label | row(here, [frames[run] for run in here["run"]]))
-    return Table.of("Steps and trajectories, by platform and building", rows, NOTES)
+    return Table("Steps and trajectories, by platform and building", rows, list(NOTES))
 
 
 def row(runs: pd.DataFrame, found: Sequence[Followed]) -> dict[str, object]:

@@ -5,23 +5,23 @@ settings), what networks they were taken with, and what made it (command, versio
 that are refused.
 """
 
-import json
 import os
 import platform
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from radarize import __version__
 from radarize.benchmark.choices import helped
 from radarize.benchmark.table import Table
 from radarize.errors import InputError
-from radarize.evaluation.runfiles import read_json, write_whole
+from radarize.evaluation.runfiles import write_whole
 from radarize.nets.weights import read
 from radarize.recording import Recording
 from radarize.tum import planar
@@ -34,19 +34,19 @@ class Walk:
     Attributes:
         scene: that it went through.
         seed: that it was drawn from; None of a real one.
-        metres: in the plane; NaN where no true poses tell.
+        metres: in the plane; None where no true poses tell.
         simulated: or real.
     """
 
     scene: str
     seed: int | None
-    metres: float
+    metres: float | None
     simulated: bool
 
     @classmethod
     def of(cls, recording: Recording) -> "Walk":
         """As a recording says."""
-        about, metres = recording.attributes, float("nan")
+        about, metres = recording.attributes, None
         if recording.has("truth/pose"):
             places = planar(recording.read("truth/pose"))[:, :2]
             metres = float(np.linalg.norm(np.diff(places[np.isfinite(places).all(axis=1)], axis=0), axis=1).sum())
@@ -86,7 +86,7 @@ class Data:
         """Name, n, path, simulated or real, seed, and what of it helped to choose settings."""
         parts = [self.name, f"{len(self.walks)} recordings" if self.walks else "no recordings"]
         if self.walks:
-            known = [walk.metres for walk in self.walks if walk.metres == walk.metres]
+            known = [walk.metres for walk in self.walks if walk.metres is not None]
             without = len(self.walks) - len(known)
             parts.append(f"{sum(known):.0f} m walked" + (f" ({without} without true poses)" if without else ""))
             simulated = sum(walk.simulated for walk in self.walks)
@@ -191,7 +191,7 @@ class Results:
     """
 
     title: str
-    tables: Sequence[Table]
+    tables: list[Table]
     data: Data
     networks: tuple[Network, ...]
     command: str
@@ -225,36 +225,16 @@ class Results:
         facts = [f"**{name}**: {words}." for name, words in self.facts.items()]
         return "\n".join([*parts, "".join(f"- {line}\n" for line in (*self.notes, *facts))])
 
-    @property
-    def json(self) -> dict[str, object]:
-        """As JSON has it."""
-        walks = [asdict(walk) | {"metres": None if np.isnan(walk.metres) else walk.metres} for walk in self.data.walks]
-        return {
-            "title": self.title,
-            "tables": [table.json for table in self.tables],
-            "data": {"name": self.data.name, "walks": walks, "seed": self.data.seed},
-            "networks": [asdict(network) for network in self.networks],
-            "command": self.command,
-            "notes": self.notes,
-            "machine": self.machine,
-        }
-
     @classmethod
     def read(cls, path: Path) -> "Results":
         """Of what `write` wrote.
 
         Raises:
-            InputError: it is of another layout.
+            InputError: unreadable, or of another layout.
         """
-        about = read_json(path)
         try:
-            of = about.pop("data")
-            walks = [Walk(**walk | {"metres": float(np.nan if walk["metres"] is None else walk["metres"])})
-                     for walk in of.pop("walks")]  # fmt: skip
-            tables = [Table.read(table) for table in about.pop("tables")]
-            networks = tuple(Network(**network) for network in about.pop("networks"))
-            return cls(tables=tables, data=Data(walks=tuple(walks), **of), networks=networks, **about)
-        except (KeyError, TypeError, ValueError) as error:
+            return TypeAdapter(cls).validate_json(path.read_bytes())
+        except (OSError, ValueError) as error:
             raise InputError(f"{path}: is no page of results as this version writes them ({error})") from error
 
     def write(self, folder: Path, name: str) -> Path:
@@ -264,5 +244,6 @@ class Results:
             InputError: they cannot be written.
         """
         folder.mkdir(parents=True, exist_ok=True)
-        write_whole(folder / f"{name}.json", json.dumps(self.json, indent=1) + "\n")
+        content = TypeAdapter(Results).dump_json(self, indent=1).decode()
+        write_whole(folder / f"{name}.json", content + "\n")
         return write_whole(folder / f"{name}.md", self.markdown())

@@ -61,4 +61,4 @@ def tables(study: Study) -> list[Table]:
         rows.append(paper | dict(zip(DEVICE_STAGES, figures, strict=True)))
     first = study.timings[0].case
     notes = [f"{min(first.frames, TIMED)} frames of {first.name}, in batches of {BATCH}, with all cores.", *NOTES]
-    return [Table.of("Run time per frame", rows, notes, [PAPER])]
+    return [Table("Run time per frame", rows, notes, (PAPER,))]

@@ -57,5 +57,5 @@ def building_tables(study: Study) -> list[Table]:
             protocol.loops,
             "Buildings are this data set's, not those of the paper that go by the same letter.",
         ]
-        found.append(Table.of(f"SLAM in each building, {protocol.title}", rows, notes, [PAPER]))
+        found.append(Table(f"SLAM in each building, {protocol.title}", rows, notes, (PAPER,)))
     return found

@@ -1,8 +1,7 @@
 """Tables: named columns, as Markdown, as JSON and on a page."""
 
-import json
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -41,7 +40,7 @@ class Table:
 
     Attributes:
         title: heading.
-        frame: values, numbers or text; None or NaN where there is none.
+        rows: column to value, number or text; None or NaN where there is none.
         notes: sentences below.
         beside: whose figures stand beside ours.
 
@@ -50,44 +49,23 @@ class Table:
     """
 
     title: str
-    frame: pd.DataFrame
+    rows: list[dict[str, Any]]
     notes: list[str] = field(default_factory=list)
     beside: tuple[Beside, ...] = ()
 
     def __post_init__(self):
-        words = [*self.frame.columns, *self.frame.iloc[:, :1].to_numpy().ravel()]
+        words = [word for row in self.rows for word in (*row, next(iter(row.values())))]
         if PAPER not in self.beside and any(str(word).startswith(PAPER.name) for word in words):
             raise ValueError(f"{self.title}: shows figures of the {PAPER.name}, expected `beside` to say so")
 
-    @classmethod
-    def of(
-        cls, title: str, rows: Iterable[Mapping[str, object]], notes: Sequence[str] = (), beside: Sequence[Beside] = ()
-    ) -> "Table":
-        """Of a mapping a row, with the columns of the first."""
-        rows = list(rows)
-        frame = pd.DataFrame(rows, columns=list(rows[0]) if rows else None, dtype=object)
-        return cls(title, frame, list(notes), tuple(beside))
-
     @property
-    def rows(self) -> list[dict[str, object]]:
-        """A mapping a row."""
-        return self.frame.to_dict("records")
-
-    @property
-    def json(self) -> dict[str, object]:
-        """As JSON has it."""
-        rows = json.loads(self.frame.to_json(orient="records", double_precision=15))
-        beside = [asdict(each) for each in self.beside]
-        return {"title": self.title, "rows": rows, "notes": self.notes, "beside": beside}
-
-    @classmethod
-    def read(cls, about: dict) -> "Table":
-        """Of what `json` gave."""
-        return cls.of(about["title"], about["rows"], about["notes"], [Beside(**each) for each in about["beside"]])
+    def frame(self) -> pd.DataFrame:
+        """The same, with the columns of the first row."""
+        return pd.DataFrame(self.rows, columns=list(self.rows[0]) if self.rows else None, dtype=object)
 
     def markdown(self, level: int = 2) -> str:
         """The table as text, with a heading of a level."""
-        if self.frame.empty:
+        if not self.rows:
             return f"{'#' * level} {self.title}\n\nNone of it could run.\n"
         columns = list(self.frame)
         lines = [f"{'#' * level} {self.title}", "", "| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]

@@ -36,7 +36,7 @@ def _table(
         runs = study.of(pair, once=False)
         figures = protocol.average(runs, pair, trajectory)
         rows.append({**label, "recordings": runs["run"].nunique(), **figures, **beside(paper.get(pair))})
-    table = Table.of(f"{about}, {protocol.title}", rows, [protocol.note], [PAPER])
+    table = Table(f"{about}, {protocol.title}", rows, [protocol.note], (PAPER,))
     pairs = list(labels)
     if study.chosen.partner in pairs and len(pairs) > 1:
         ours = pairs.index(study.chosen.partner)

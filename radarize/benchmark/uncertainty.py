@@ -29,7 +29,7 @@ def tables(study: Study) -> list[Table]:
         for pair, followed in found.items():
             if here := [followed[case] for case in members if case in followed]:
                 rows.append({"odometry": pair.odometry, "on": name, "recordings": len(here), **_row(here)})
-    return [Table.of("Claimed uncertainty against errors", rows, NOTES)]
+    return [Table("Claimed uncertainty against errors", rows, list(NOTES))]
 
 
 def _row(found: list[Followed]) -> dict[str, float]:

@@ -72,7 +72,8 @@ class Panels:
 
     def table(self, rows: pd.DataFrame, title: str) -> Table:
         """Figures by what was varied and by line."""
-        return Table(title, pd.concat([rows[[self.panel, self.over, self.line]], in_words(rows)], axis=1))
+        labels = rows[[self.panel, self.over, self.line]]
+        return Table(title, pd.concat([labels, in_words(rows)], axis=1).to_dict("records"))
 
     def picture(self, tables: Sequence[Table]) -> Figure | None:
         """Curves of the last table; None without any. Values that are no numbers have none."""
@@ -145,7 +146,9 @@ def stress_tables(study: Study) -> list[Table]:
         "it or before it."
     )
     return [
-        Table("Ranking under multipath, fewest ghosts first", pd.concat(ranking).reset_index(), [note]),
+        Table(
+            "Ranking under multipath, fewest ghosts first", pd.concat(ranking).reset_index().to_dict("records"), [note]
+        ),
         STRESS.table(rows, "By place and severity"),
     ]
 

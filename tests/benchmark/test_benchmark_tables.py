@@ -107,7 +107,7 @@ def test_stages_add_up_as_in_the_paper():
 
 MACHINE = {"processor": "abacus", "cores": "2", "version": "0", "commit": "abc (clean)"}
 NETWORK = Network("rotation", 1234567, "training", "random-0", 5)
-TABLE = Table.of("One", [{"who": "a", "x": 0.12345, "n": 3}, {"who": "b", "x": np.nan, "n": None}], ["A note."])
+TABLE = Table("One", [{"who": "a", "x": 0.12345, "n": 3}, {"who": "b", "x": np.nan, "n": None}], ["A note."])
 RESULTS = Results("Two", [TABLE], Data("d", (Walk("office", 7, 12.3, True),), 5), (NETWORK,), "c", ["Of all."], MACHINE)
 
 
@@ -136,8 +136,8 @@ def test_results_without_their_origin_are_refused(missing):
 @pytest.mark.parametrize("row", [{"who": "ours", "paper: ATE m": 1.0}, {"who": "paper, RTX 3090", "ms": 1.0}])
 def test_the_papers_figures_say_that_they_are_of_real_recordings(row):
     with pytest.raises(ValueError, match="figures of the paper"):
-        Table.of("T", [row])
-    results = replace(RESULTS, tables=[Table.of("T", [row], beside=[PAPER])])
+        Table("T", [row])
+    results = replace(RESULTS, tables=[Table("T", [row], beside=(PAPER,))])
     assert "**Beside**: paper: real recordings of its authors" in results.markdown()
     assert "all simulated" in results.facts["Data"]
 
@@ -152,7 +152,7 @@ def test_a_page_of_another_layout_is_refused(tmp_path):
 def test_a_recording_tells_its_way_and_whether_it_is_real(rooms):
     (walk, *_) = (case.walk for case in rooms.cases)
     assert walk.scene == "A_0" and walk.seed is None and not walk.simulated and 0 < walk.metres < 1
-    data = Data("d", (walk, replace(walk, simulated=True, metres=np.nan)))
+    data = Data("d", (walk, replace(walk, simulated=True, metres=None)))
     assert "2 recordings, 0 m walked (1 without true poses), 1 simulated, 1 real" in data.sentence
 
 
@@ -187,8 +187,8 @@ def test_a_commit_is_of_the_sources_that_run(tmp_path):
 def test_ahead_or_where_not():
     rows = [{"who": "ours", "ATE m": 1.0, "RE m": 2.0}, {"who": "b", "ATE m": 3.0, "RE m": 1.5}]
     rows.append({"who": "c", "ATE m": None, "RE m": np.nan})
-    assert Table.of("T", rows).ahead(0, "ours") == "ours is behind in RE m (2, best 1.5)."
-    assert Table.of("T", [rows[0] | {"RE m": 1.0}, *rows[1:]]).ahead(0, "ours") == (
+    assert Table("T", rows).ahead(0, "ours") == "ours is behind in RE m (2, best 1.5)."
+    assert Table("T", [rows[0] | {"RE m": 1.0}, *rows[1:]]).ahead(0, "ours") == (
         "ours has the least error in every column."
     )
 

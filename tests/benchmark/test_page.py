@@ -68,5 +68,5 @@ def test_the_index_leads_to_the_pages(folder, tmp_path):
         browser.wait("document.querySelector('h1')?.textContent === 'Scans and maps'")
         browser.wait("document.querySelectorAll('table.sortable').length === 1")
         text = browser.evaluate("document.body.innerText")
-        assert "does not fit this radar" in text and "Data: rooms, 3 recordings" in text and "metre" in text
+        assert "does not fit this radar" in text and "Data: rooms, 2 recordings" in text and "metre" in text
         assert browser.errors == []

@@ -13,7 +13,7 @@ import numpy as np
 import psutil
 from jaxtyping import Bool
 
-from benchmarks.results import publish, surroundings
+from benchmarks.results import Data, publish, surroundings
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import MAX_PAYLOAD
 from radarize.radar.presets import load_config
@@ -128,14 +128,19 @@ def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: in
     }
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("--seconds", type=float, default=300.0, help="length of the capture")
+    found.add_argument("--config", default="radarize", help="preset or .cfg")
+    found.add_argument("--seed", type=int, default=0)
+    found.add_argument("--bad-seconds", type=float, default=60.0, help="length of another one over a bad network")
+    return found
+
+
 def main() -> None:
     """The table."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=300.0, help="length of the capture")
-    parser.add_argument("--config", default="radarize", help="preset or .cfg")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--bad-seconds", type=float, default=60.0, help="length of another one over a bad network")
-    arguments = parser.parse_args()
+    arguments = parser().parse_args()
     config, _ = load_config(arguments.config)
     runs = [(arguments.seconds, {})]
     if arguments.bad_seconds:
@@ -152,7 +157,8 @@ def main() -> None:
     ]
     notes.append(surroundings())
     notes += [f"{row['configuration']}: {said}." for row, said in zip(rows, heard, strict=True) if said]
-    publish("capture_speed", "Capture at the virtual radar", rows, seed=arguments.seed, notes=notes)
+    data = Data("simulated noise, played by `radarsim emulate`", (), arguments.seed)
+    publish("capture_speed", "Capture at the virtual radar", rows, data=data, networks=(), notes=notes)
 
 
 if __name__ == "__main__":

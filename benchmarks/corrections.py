@@ -11,7 +11,7 @@ from radarize.published import labels
 from radarize.published.tasks import pooled_dice
 from radarize.training.tasks import first_cell
 
-from benchmarks.results import publish
+from benchmarks.results import Data, publish
 from radarize.features.maps import MapMaker, maps_of
 from radarize.heatmaps import Heatmaps
 from radarize.nets import SegmentationNet
@@ -299,13 +299,18 @@ def row(correction: str, measure: str, unit: str, without, with_) -> dict:
     return {"correction": correction, "measured": measure, "without": values[0], "with": values[1], "unit": unit}
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("recording", nargs="?", type=Path, help="a handheld walk with occupancy; else one is simulated")
+    found.add_argument("--duration", type=float, default=15.0, help="of the simulated walk, s")
+    found.add_argument("--steps", type=int, default=60, help="of the small segmentation trainings")
+    found.add_argument("--seed", type=int, default=0)
+    return found
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("recording", nargs="?", type=Path, help="a handheld walk with occupancy; else one is simulated")
-    parser.add_argument("--duration", type=float, default=15.0, help="of the simulated walk, s")
-    parser.add_argument("--steps", type=int, default=60, help="of the small segmentation trainings")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    options = parser().parse_args()
     rng = np.random.default_rng(options.seed)
     with tempfile.TemporaryDirectory() as folder:
         path = options.recording or simulate(
@@ -317,11 +322,13 @@ def main() -> None:
             rows += [*ego_velocity(source), *centred(source), *grids(source)]
             rows.append(balanced(source, options.steps, options.seed))
         rows.append(levelled(Scene.load(SCENE), options.duration, options.seed))
+        data = Data.of(f"point targets, {path.stem}", [path], options.seed)
     publish(
         "corrections",
         "What each correction of the published pipeline is worth",
         rows,
-        seed=options.seed,
+        data=data,
+        networks=(),
         notes=[
             "Each line is the default pipeline without and with one correction. Errors are root mean squares unless "
             "said otherwise; point targets are at 2.5 m, 20 counts of noise under 1000 of signal.",

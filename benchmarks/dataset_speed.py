@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from benchmarks.results import publish
+from benchmarks.results import Data, publish
 from radarize.jobs import perform
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
@@ -111,14 +111,19 @@ def shortened(tasks: Iterable[Task], seconds: float, storage: str) -> list[Task]
     ]
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("--every", type=int, default=10, help=f"one in so many recordings of {BIG} is made")
+    found.add_argument("--seconds", type=float, default=60.0, help="of each at most")
+    found.add_argument("--frames", type=int, default=240, help="of the comparison with the simulation alone")
+    found.add_argument("--few", type=int, default=4, help="recordings by which workers and storage are compared")
+    found.add_argument("--seed", type=int, default=0)
+    return found
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--every", type=int, default=10, help=f"one in so many recordings of {BIG} is made")
-    parser.add_argument("--seconds", type=float, default=60.0, help="of each at most")
-    parser.add_argument("--frames", type=int, default=240, help="of the comparison with the simulation alone")
-    parser.add_argument("--few", type=int, default=4, help="recordings by which workers and storage are compared")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    options = parser().parse_args()
     cores = len(os.sched_getaffinity(0))
     tasks = Specification.load(BIG).tasks
     sample = tasks[:: options.every]
@@ -160,6 +165,7 @@ def main() -> None:
                 }
             )
         heat, measured = list(runs.values())[-2:]
+        data = Data.of(f"sample of {BIG}", sorted((folder / "3").glob("*.h5")), options.seed)
     total = sum(task.frames for task in tasks)
     hours = (total * measured.frame + len(tasks) * measured.overhead) / cores / 3600
     extra = (share["all truth sensors"] + share["writing all"]) / share["simulation"]
@@ -167,7 +173,8 @@ def main() -> None:
         "dataset_speed",
         "Data sets: speed and size",
         rows,
-        seed=options.seed,
+        data=data,
+        networks=(),
         notes=[
             f"All truth sensors and writing cost {extra:.2f} of the simulation (target: at most 0.33).",
             f"{BIG} on this machine, projected from {len(sample)} of its {len(tasks)} recordings, "

@@ -18,7 +18,7 @@ from pathlib import Path
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from rich.progress import track
 
-from benchmarks.results import publish, surroundings
+from benchmarks.results import Data, publish, surroundings
 from tests.fuzzing.readers import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, READERS, attempt
 
 #: Inputs by reader, at --scale 1: more than 100,000 in all.
@@ -75,13 +75,18 @@ def try_all(name: str, count: int, first: int, folder: Path, answer: Connection)
     )
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("--scale", type=float, default=1.0, help="times the usual number of inputs")
+    found.add_argument("--seed", type=int, default=0)
+    found.add_argument("--reader", choices=list(READERS), help="this one alone, without a table")
+    return found
+
+
 def main() -> None:
     """The table; ends at the first input that a reader fails on."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scale", type=float, default=1.0, help="times the usual number of inputs")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--reader", choices=list(READERS), help="this one alone, without a table")
-    options = parser.parse_args()
+    options = parser().parse_args()
     context, rows = get_context("spawn"), []
     for name in track([options.reader] if options.reader else list(INPUTS), "readers"):
         folder = Path(tempfile.mkdtemp(prefix="fuzzing-"))
@@ -106,7 +111,8 @@ def main() -> None:
         "fuzzing",
         "Damaged and hostile input",
         [*rows, {"reader": "all", **total, **most}],
-        seed=options.seed,
+        data=Data(f"{total['inputs']} damaged inputs", (), options.seed),
+        networks=(),
         notes=[
             "Valid files after bit flips, cuts, splices and edits of fields, or random bytes, drawn by hypothesis. "
             "None raised anything but a refusal in one sentence, crashed or hung.",

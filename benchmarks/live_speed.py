@@ -12,11 +12,13 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.results import publish, surroundings
+from benchmarks.results import Data, publish, surroundings
+from radarize.benchmark.networks import Networks
+from radarize.benchmark.runs import Pair
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
-from radarize.methods.registry import BEST, CLASSICAL, best_methods
+from radarize.methods.registry import CLASSICAL, best_methods
 from radarize.pipeline import Pipeline
 from radarsim.simulate import simulate
 
@@ -63,23 +65,30 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     }
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("recording", nargs="?", type=Path, help="a recording; by default one is simulated")
+    found.add_argument("--duration", type=float, default=20.0)
+    found.add_argument("--seed", type=int, default=0)
+    return found
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("recording", nargs="?", type=Path, help="a recording; by default one is simulated")
-    parser.add_argument("--duration", type=float, default=20.0)
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    options = parser().parse_args()
     with tempfile.TemporaryDirectory() as folder:
         path = options.recording or simulate(
             "office", Path(folder) / "office.h5", duration=options.duration, seed=options.seed
         )
-        chosen = best_methods(Replay(path).config)[0]
-        rows = [measure(path, methods) for methods in (CLASSICAL, BEST) if methods is CLASSICAL or chosen is BEST]
+        chosen = dict.fromkeys((Pair(**CLASSICAL), Pair(**best_methods(Replay(path).config)[0])))
+        rows = [measure(path, {"odometry": pair.odometry, "scans": pair.scans}) for pair in chosen]
+        data = Data.of(path.stem, [path], options.seed)
     publish(
         "live_speed",
         "radarize live on a replay in real time, preset radarize",
         rows,
-        seed=options.seed,
+        data=data,
+        networks=Networks().used([kind for pair in chosen for kind in pair.networks]),
         notes=[
             "A browser's stream of events is read all the time. Dropped frames are whole ones that found no room "
             "because this machine was too slow for them; processor time is that of the main process.",

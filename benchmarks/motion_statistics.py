@@ -6,26 +6,27 @@ import time
 import numpy as np
 from rich.progress import track
 
-from benchmarks.results import publish
+from benchmarks.results import Data, Walk, publish
+from radarize.benchmark.table import PAPER
 from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
 from radarsim.scene.scene import Scene
 from radarsim.statistics import Statistics
 
 DURATION = 60.0
-#: A. Sie et al., "Radarize" (MobiSys 2024), on platforms and data set; the gaps it leaves are "-".
-PAPER = {
+#: What the paper says of its platforms and data set; the gaps it leaves are "-".
+THEIRS = {
     "handheld": {"distance": "over 50", "top": "up to 1.6", "ways": "forward, backward, sideways, fast turns"},
     "cart": {"distance": "over 50", "top": "up to 1.6", "ways": "mostly constant, slow turns; forward and backward"},
     "robot": {"distance": "about 20", "top": "up to 0.5", "ways": "forward and backward"},
 }
 
 
-def walks(count: int, seed: int) -> tuple[dict[str, list[Statistics]], list[float]]:
-    """Statistics by platform of one walk each through `count` buildings, and the CPU times of planning, s."""
+def walks(count: int, seed: int) -> tuple[dict[str, list[Statistics]], list[Walk], list[float]]:
+    """Statistics by platform of one walk each through some buildings, the walks, and the CPU times of planning, s."""
     rng = np.random.default_rng(seed)
     found: dict[str, list[Statistics]] = {name: [] for name in PLATFORMS}
-    times = []
+    times, made = [], []
     for number in track(range(count), "buildings"):
         building = {"kind": "ABCD"[number % 4], "seed": int(rng.integers(10_000)), "floor": int(rng.integers(4))}
         scene = Scene.of({"building": building}, f"{building['kind']}{building['seed']}")
@@ -34,7 +35,8 @@ def walks(count: int, seed: int) -> tuple[dict[str, list[Statistics]], list[floa
             motion = plan_motion(scene, platform, DURATION, np.random.default_rng(building["seed"]))
             times.append(time.process_time() - start)
             statistics.append(motion.statistics(scene))
-    return found, times
+            made.append(Walk(scene.name, building["seed"], statistics[-1].distance, simulated=True))
+    return found, made, times
 
 
 def row(platform: str, found: list[Statistics]) -> dict[str, object]:
@@ -43,7 +45,7 @@ def row(platform: str, found: list[Statistics]) -> dict[str, object]:
     def mean(name: str) -> float:
         return float(np.mean([getattr(one, name) for one in found]))
 
-    paper = PAPER[platform]
+    paper = THEIRS[platform]
     ways = ("forward", "backward", "sideways", "standing")
     distances = [one.distance for one in found]
     return {
@@ -63,18 +65,25 @@ def row(platform: str, found: list[Statistics]) -> dict[str, object]:
     }
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("--buildings", type=int, default=20)
+    found.add_argument("--seed", type=int, default=0)
+    return found
+
+
 def main() -> None:
     """Walk and publish."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--buildings", type=int, default=20)
-    parser.add_argument("--seed", type=int, default=0)
-    arguments = parser.parse_args()
-    found, times = walks(arguments.buildings, arguments.seed)
+    arguments = parser().parse_args()
+    found, made, times = walks(arguments.buildings, arguments.seed)
     publish(
         "motion_statistics",
         f"How the platforms move in {DURATION:.0f} s, and in the paper's data set",
         [row(platform, statistics) for platform, statistics in found.items()],
-        seed=arguments.seed,
+        data=Data("planned walks", tuple(made), arguments.seed),
+        networks=(),
+        beside=[PAPER],
         notes=[
             "One walk per platform through each building of styles A to D; distance is the sensor's, over the ground.",
             "The paper gives its means over trajectories of about a minute: over 50 m by hand and on the cart, about "

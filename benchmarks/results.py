@@ -1,15 +1,46 @@
-"""Where benchmarks put their figures: one JSON and one Markdown table each, with machine, command and seed."""
+"""Where the scripts put their figures: a page each, with all that `radarize.benchmark.results` wants it to say."""
 
 import os
 import resource
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from radarize.benchmark.results import Results, command, machine
-from radarize.benchmark.table import Table
-
-__all__ = ["FOLDER", "machine", "memory_mb", "peak_memory_mb", "publish", "surroundings"]
+from radarize.benchmark.results import Data, Network, Results, Walk, command, machine
+from radarize.benchmark.table import Beside, Table
+from radarsim.motion import Motion
 
 FOLDER = Path(__file__).parent / "results"
+machine()  # as things are now: sources may change while a script runs
+
+
+def publish(
+    name: str,
+    title: str,
+    rows: Sequence[Mapping[str, object]],
+    *,
+    data: Data,
+    networks: tuple[Network, ...],
+    notes: Sequence[str],
+    beside: Sequence[Beside] = (),
+) -> None:
+    """Write and print a table.
+
+    Args:
+        name: of the script, and of the files in ``benchmarks/results``.
+        title: heading.
+        rows: a mapping a row, same keys.
+        data, networks: that the figures are of.
+        notes: sentences below the table.
+        beside: whose figures stand beside ours.
+    """
+    table = Table(title, list(rows), list(notes), tuple(beside))
+    results = Results(title, [table], data, networks, command(f"python -m benchmarks.{name}"))
+    print(results.write(FOLDER, name).read_text())
+
+
+def walked(scene: str, seed: int, motion: Motion) -> Walk:
+    """A simulated walk of which no recording was made."""
+    return Walk(scene, seed, motion.statistics().distance, simulated=True)
 
 
 def peak_memory_mb() -> float:
@@ -30,17 +61,3 @@ def surroundings() -> str:
     return (
         f"Other work on the machine: load average {os.getloadavg()[2]:.1f}; priority of this measurement: {priority}."
     )
-
-
-def publish(name: str, title: str, rows: list[dict[str, object]], *, seed: int | None, notes: list[str]) -> None:
-    """Write and print a table.
-
-    Args:
-        name: of the files in ``benchmarks/results``.
-        title: heading.
-        rows: one dictionary a row, same keys.
-        seed: that everything was drawn from.
-        notes: sentences below the table.
-    """
-    results = Results(title, [Table(title, rows, notes)], [], command(f"python -m benchmarks.{name}"), seed)
-    print(results.write(FOLDER, name).read_text())

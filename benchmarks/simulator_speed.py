@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.results import memory_mb, peak_memory_mb, publish
+from benchmarks.results import Data, memory_mb, peak_memory_mb, publish, walked
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.physics.pathsolver import DEPTH, RAYS
@@ -149,20 +149,26 @@ def density_error(name: str, draws: int, seed: int, frames: int = 8, factor: int
     )
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor"], help="the first in detail")
-    parser.add_argument("--frames", type=int, default=240)
-    parser.add_argument("--naive-frames", type=int, default=2)
-    parser.add_argument("--sionna-frames", type=int, default=20)
-    parser.add_argument("--memory-frames", type=int, default=0, help="frames of a long run that watches memory")
-    parser.add_argument("--draws", type=int, default=0, help="worlds compared with as many of ten times the scatterers")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor"], help="the first in detail")
+    found.add_argument("--frames", type=int, default=240)
+    found.add_argument("--naive-frames", type=int, default=2)
+    found.add_argument("--sionna-frames", type=int, default=20)
+    found.add_argument("--memory-frames", type=int, default=0, help="frames of a long run that watches memory")
+    found.add_argument("--draws", type=int, default=0, help="worlds compared with as many of ten times the scatterers")
+    found.add_argument("--seed", type=int, default=0)
+    return found
 
-    rows, notes = [], []
+
+def main() -> None:
+    options = parser().parse_args()
+
+    rows, notes, walks = [], [], []
     for name in options.scenes:
         found, *rest = pace(name, options.frames, options.seed)
+        walks.append(walked(name, options.seed, rest[0].motion))
         if not rows:
             main_pace, simulator, times = found, *rest
         rows.append(row(f"{name}: radarsim", found.frame, main_pace, found.echoes, "int16 I/Q with noise"))
@@ -210,7 +216,8 @@ def main() -> None:
     if options.draws:
         off = density_error(first, options.draws, options.seed)
         notes.append(f"{first}: diffuse power per cell against ten times the scatterers {off}.")
-    publish("simulator_speed", "Simulator speed, preset radarize", rows, seed=options.seed, notes=notes)
+    data = Data("handheld walks", tuple(walks), options.seed)
+    publish("simulator_speed", "Simulator speed, preset radarize", rows, data=data, networks=(), notes=notes)
 
 
 def row(way: str, seconds: float, ours: Pace, echoes: float, gives: str) -> dict[str, object]:

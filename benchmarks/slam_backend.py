@@ -8,17 +8,25 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import memory_mb, publish
+from benchmarks.results import Data, Walk, memory_mb, publish
+from radarize.benchmark.networks import Networks
+from radarize.benchmark.runs import Pair
+from radarize.benchmark.table import Beside
 from radarize.console import progress
+from radarize.jsonfile import read_json
 from radarize.log import Log
+from radarize.methods.registry import BEST
 from radarize.pose import between, compose, wrap
+from radarize.run import run
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.slam.posegraph import PoseGraph
 from radarize.tum import planar, read_tum
+from radarsim.simulate import simulate
 
 RADISH = Path(__file__).parents[2] / "shared" / "recordings" / "radish"
 #: Cartographer on the same files, its best settings: mean ATE in m and rad, and s.
+THEIRS = Beside("Cartographer", "lidar logs, the very same files", simulated=False)
 CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "orebro": (0.149, 0.0138, 19)}
 #: Recordings made where none are given: scene, platform, duration in s, seed.
 RECORDINGS = [("office", "handheld", 110, 11), ("office", "cart", 110, 12), ("floor", "handheld", 120, 3),
@@ -178,9 +186,6 @@ def graph_rows(seed: int) -> list[dict[str, object]]:
 
 def simulated(folder: Path) -> Path:
     """Make recordings, run the pipeline on them, and keep the runs; what is there already is left as it is."""
-    from radarize.run import run
-    from radarsim.simulate import simulate
-
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "plain.yaml").write_text(PLAIN)
     t = np.arange(0, 41.01, 0.05)
@@ -203,34 +208,42 @@ def simulated(folder: Path) -> Path:
     return folder
 
 
-def radar_rows(folder: Path) -> list[dict[str, object]]:
-    """Every run in a folder, its own odometry and scans."""
-    rows = []
+def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
+    """Every run in a folder, its own odometry and scans; and what it is of."""
+    rows, walks = [], []
     for path in sorted(p.parent for p in folder.glob("*/reference.tum")):
         log = Log.read(path)
         times, truth = read_tum(path / "reference.tum")
         truth = planar(truth)[np.abs(times[None] - log.times[:, None]).argmin(axis=1)]
         entry = row(f"radar, {path.name}", log, truth, SlamConfig.preset("radar"))
+        about = read_json(path / "run.json")["recording_attributes"]
+        walks.append(Walk(about.get("scene", "-"), about.get("seed"), entry["path m"], "engine" in about))
         rows.append({**entry, "to beat": "half of odometry" if entry["loop m"] >= 80 else "1.05 x odometry"})
         rows.append(row(f"radar, {path.name}, {CLASSIC}", log, truth, SlamConfig.preset("cartographer")))
-    return rows
+    return rows, walks
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("--data", type=Path, help="folder of runs (radarize run -o); by default some are made")
+    found.add_argument("--record", action="store_true", help="make those that --data lacks, and keep them")
+    found.add_argument("--no-radar", action="store_true")
+    found.add_argument("--seeds", type=int, default=3, help="of disturbances, for each log")
+    found.add_argument("--seed", type=int, default=7)
+    return found
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--data", type=Path, help="folder of runs (radarize run -o); by default some are made")
-    parser.add_argument("--record", action="store_true", help="make those that --data lacks, and keep them")
-    parser.add_argument("--no-radar", action="store_true")
-    parser.add_argument("--seeds", type=int, default=3, help="of disturbances, for each log")
-    parser.add_argument("--seed", type=int, default=7)
-    options = parser.parse_args()
-    lidar_preset, rows, notes = SlamConfig.preset("lidar"), [], []
+    options = parser().parse_args()
+    lidar_preset, rows, walks, notes = SlamConfig.preset("lidar"), [], [], []
     warm, _ = lidar("orebro")
     play(replace(warm, times=warm.times[:60], ranges=warm.ranges[:60]), lidar_preset)
     for name, (metres, radians, seconds) in CARTOGRAPHER.items():
         log, truth = lidar(name)
         target = f"{metres} m, {radians} rad, {seconds} s"
         rows.append(row(f"lidar, {name}", log, truth, lidar_preset, target))
+        walks.append(Walk(name, None, rows[-1]["path m"], simulated=False))
         rows.append(row(f"lidar, {name}, {CLASSIC}", log, truth, SlamConfig.preset("cartographer")))
         disturbed: dict[str, list[float]] = {"odometry noise x 2": [], "a third of the scans lost": []}
         for seed in range(options.seeds):
@@ -256,13 +269,16 @@ def main() -> None:
     if not options.no_radar:
         with tempfile.TemporaryDirectory() as folder:
             data = options.data or Path(folder)
-            rows += radar_rows(simulated(data) if options.record or not options.data else data)
+            found, simulations = radar_rows(simulated(data) if options.record or not options.data else data)
+            rows, walks = rows + found, walks + simulations
     columns = dict.fromkeys(key for entry in rows for key in entry)
     publish(
         "slam_backend",
         "SLAM back end",
         [{column: entry.get(column, "-") for column in columns} for entry in rows],
-        seed=options.seed,
+        data=Data("lidar logs of Radish and radar walks", tuple(walks), options.seed),
+        networks=() if options.no_radar else Networks().used(Pair(**BEST).networks),
+        beside=[THEIRS],
         notes=[
             "Mean errors after alignment; closures: believed / found. One preset for all logs, one for all radar runs. "
             "Lidar's targets are Cartographer's on the same files, with its best settings.",

@@ -7,13 +7,13 @@ are about each map's mean, as the networks see them.
 
 import argparse
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.results import FOLDER, publish
+from benchmarks.results import FOLDER, Data, Walk, publish
 from radarize.console import progress
 from radarize.errors import InputError
 from radarize.features.maps import MapMaker, maps_of
@@ -158,13 +158,18 @@ def draw(shown: dict[str, dict[str, dict[str, np.ndarray]]], path: Path) -> None
     figure.savefig(path, dpi=80)
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("--captures", type=Path, default=CAPTURES, help="folder of the public captures")
+    found.add_argument("--data", type=Path, help="a data set that networks were trained on, to compare with as well")
+    found.add_argument("--places", type=int, default=8, help="in each scene")
+    found.add_argument("--seed", type=int, default=0)
+    return found
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--captures", type=Path, default=CAPTURES, help="folder of the public captures")
-    parser.add_argument("--data", type=Path, help="a data set that networks were trained on, to compare with as well")
-    parser.add_argument("--places", type=int, default=8, help="in each scene")
-    parser.add_argument("--seed", type=int, default=0)
-    options = parser.parse_args()
+    options = parser().parse_args()
     rows, notes, shown = [], [], {}
     with tempfile.TemporaryDirectory() as temporary, progress("captures") as report:
         found = captures(options.captures, Path(temporary))
@@ -199,12 +204,15 @@ def main() -> None:
                 rows.append(row)
             notes.append(f"{capture}: {refusal(path)}")
         report(2 * len(found), 2 * len(found))
+        real = Data.of("public captures and simulated frames", list(found.values()), options.seed)
+        stands = [Walk(name, options.seed, 0.0, simulated=True) for name in SCENES]
     draw(shown, FOLDER / "transfer.png")
     publish(
         "transfer",
         "Real captures beside simulated frames, as the networks see them",
         rows,
-        seed=options.seed,
+        data=replace(real, walks=(*real.walks, *stands)),
+        networks=(),
         notes=[
             "Fréchet distance of patch statistics (8 x 8 cells: quantiles of levels about the map's mean, steps "
             f"along rows and columns) of the real frame from {len(SCENES) * options.places} simulated ones of the same "

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from benchmarks.results import publish
+from benchmarks.results import Data, publish
 from radarize.console import progress
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene
@@ -63,11 +63,16 @@ def row(name: str, found: Comparison) -> dict[str, object]:
     return {"twin": name, **medians, "Fréchet distance dB": found.frechet["range_azimuth"][0]}
 
 
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("--duration", type=float, default=20.0, help="of the walk, s")
+    found.add_argument("--seed", type=int, default=3)
+    return found
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--duration", type=float, default=20.0, help="of the walk, s")
-    parser.add_argument("--seed", type=int, default=3)
-    options = parser.parse_args()
+    options = parser().parse_args()
     place = Scene.load("office")
 
     def all_of(material: str) -> Scene:
@@ -94,11 +99,13 @@ def main() -> None:
             made = make_twin(recording, scene, folder / f"twin{k}.h5", every=3, seed=seed)
             rows.append(row(name, compare(real, made)))
         report(len(twins), len(twins))
+        data = Data.of("a walk in the place of the real one, and twins", [real, *folder.glob("twin*.h5")], options.seed)
     publish(
         "twin",
         "Twins of a simulated walk, each with one error",
         rows,
-        seed=options.seed,
+        data=data,
+        networks=(),
         notes=[
             f"A cart in the office for {options.duration:g} s plays the real recording. Every third frame, medians "
             "over frames; MS-SSIM and correlations are 1 for equal maps; Fréchet's distance is of patch statistics of "

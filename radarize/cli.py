@@ -403,11 +403,12 @@ def benchmark(
     epochs: Annotated[int | None, typer.Option(min=1, help="Of that training, at most.")] = None,
     protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; by default one per core.")] = None,
+    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
 ):
     """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
     import os
 
-    from radarize.benchmark.benchmarks import BENCHMARKS
+    from radarize.benchmark.registry import BENCHMARKS
 
     if name == "list":
         width = max(map(len, BENCHMARKS))
@@ -417,17 +418,14 @@ def benchmark(
     for option, value in (("--data", data), ("--out", out)):
         if value is None:
             raise InputError(f"{option} is missing, expected a folder")
-    from radarize.benchmark.results import command
     from radarize.benchmark.run import benchmark as compare
+    from radarize.benchmark.study import Options
 
     chosen = [method for word in methods or () for method in word.split(",")]
+    options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
     try:
         with progress("benchmark") as report:
-            published = compare(
-                name, data, out, methods=chosen, weights=weights, trained=train, epochs=epochs, protocol=protocol,
-                workers=workers or len(os.sched_getaffinity(0)), command=command("radarize"), progress=report,
-                say=lambda line: typer.echo(line, err=True),
-            )  # fmt: skip
+            published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
     except KeyboardInterrupt:
         raise InputError(f"stopped; what has ended is kept in {out}, and the same command goes on after it") from None
     for each in published:

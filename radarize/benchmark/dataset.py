@@ -1,8 +1,10 @@
 """What methods are compared on: a folder of recordings, and which of them test in each split."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from radarize.benchmark.results import Data, Walk
 from radarize.errors import InputError
 from radarize.jsonfile import read_json
 from radarize.radar.config import RadarConfig
@@ -23,6 +25,7 @@ class Case:
         frames: how many it has.
         config: of its radar.
         attributes: all that it says of itself.
+        walk: of the sensor.
     """
 
     name: str
@@ -32,6 +35,7 @@ class Case:
     frames: int = field(compare=False)
     config: RadarConfig = field(compare=False, repr=False)
     attributes: dict = field(compare=False, repr=False)
+    walk: Walk = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, path: Path, name: str | None = None) -> "Case":
@@ -42,8 +46,9 @@ class Case:
         """
         with Recording(path) as recording:
             about, frames, config = recording.attributes, len(recording), recording.config
+            walk = Walk.of(recording)
         building = str(about.get("scene", "-")).split("_")[0]
-        return cls(name or path.stem, path, building, str(about.get("platform", "-")), frames, config, about)
+        return cls(name or path.stem, path, building, str(about.get("platform", "-")), frames, config, about, walk)
 
 
 @dataclass(frozen=True)
@@ -77,10 +82,11 @@ class DataSet:
             read_json(folder / "dataset.json"),
         )
 
-    @property
-    def seed(self) -> int | None:
-        """That the data set was drawn from, if it says so."""
-        return self.index.get("specification", {}).get("seed")
+    def data(self, cases: Iterable[Case]) -> Data:
+        """What figures of some of the recordings are of."""
+        about = self.index.get("specification", {})
+        name = about.get("name", self.folder.resolve().name)
+        return Data(name, tuple(case.walk for case in cases), about.get("seed"))
 
     def splits(self, kind: str) -> dict[str, list[Case]]:
         """Recordings that test in each split of a kind.
@@ -121,8 +127,9 @@ class DataSet:
         ]
 
 
-def groups(cases: list[Case]) -> dict[str, list[Case]]:
+def groups(cases: Iterable[Case]) -> dict[str, list[Case]]:
     """Recordings by platform, then by building, then all."""
+    cases = list(cases)
     names = [*PLATFORMS, *dict.fromkeys(case.building for case in cases)]
     found = {name: [case for case in cases if name in (case.platform, case.building)] for name in names if name != "-"}
-    return {name: members for name, members in found.items() if members} | {"all": list(cases)}
+    return {name: members for name, members in found.items() if members} | {"all": cases}

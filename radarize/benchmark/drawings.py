@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from radarize.benchmark.benchmark import Study
 from radarize.benchmark.runs import Pair
+from radarize.benchmark.study import Study
 from radarize.report import comparison
 from radarize.report.page import COLORS, OTHERS, Page
 from radarize.runfolder import RunFolder

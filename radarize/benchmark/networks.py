@@ -1,15 +1,24 @@
 """The networks that methods are run with: those that are shipped, a folder of the user's, or trained for a split."""
 
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
-from hashlib import sha256
+import json
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
+from radarize.benchmark.identity import of_code, of_file
+from radarize.benchmark.results import Network
 from radarize.benchmark.steps import Report
 from radarize.errors import InputError
+from radarize.jsonfile import read_json
 from radarize.methods.registry import Weights, find_task
+from radarize.methods.task import Settings
+from radarize.replacing import write_whole
 from radarize.training.dataset import recordings
 from radarize.training.train import train
+
+#: File with what a training began with, so that no other goes on from its checkpoint.
+BEGUN = "begun.json"
 
 
 @dataclass(frozen=True)
@@ -29,21 +38,17 @@ class Networks:
         """For methods."""
         return Weights(self.folder)
 
-    def digests(self, kinds: tuple[str, ...]) -> dict[str, str]:
+    def identity(self, kinds: Iterable[str]) -> dict[str, str]:
         """What tells the files of some kinds from others."""
-        return {kind: _digest(self.weights.of(kind)) for kind in kinds}
+        return {kind: of_file(self.weights.of(kind)) for kind in kinds}
 
-
-def _digest(path: Path) -> str:
-    if not path.is_file():
-        return "none"
-    about = path.stat()
-    return _digest_of(path, about.st_size, about.st_mtime_ns)
-
-
-@lru_cache
-def _digest_of(path: Path, size: int, changed: int) -> str:
-    return sha256(path.read_bytes()).hexdigest()[:16]
+    def used(self, kinds: Iterable[str]) -> tuple[Network, ...]:
+        """What the files of some kinds say of themselves, those that can be read."""
+        found = []
+        for kind in kinds:
+            with suppress(InputError):  # a method that needs it says why it could not run
+                found.append(Network.of(self.weights.of(kind)))
+        return tuple(found)
 
 
 @dataclass(frozen=True)
@@ -72,35 +77,46 @@ class Training:
     @property
     def frames(self) -> int:
         """An epoch over ten frames takes about as long as a run over two."""
-        count = len(recordings(self.data, self.split, "train"))
-        return self._epochs * count * 120
+        return self.settings.epochs * len(self._members("train")) * 120
 
     @property
-    def _epochs(self) -> int:
-        return self.epochs or find_task(self.kind).defaults.epochs
+    def settings(self) -> Settings:
+        """The task's own, but for what is asked for; few epochs are for the schedule that makes the most of them."""
+        own = replace(find_task(self.kind).defaults, seed=self.seed)
+        return replace(own, epochs=self.epochs, schedule="cosine") if self.epochs else own
 
     def identity(self) -> dict[str, object]:
-        members = {part: [path.name for path in recordings(self.data, self.split, part)] for part in ("train",)}
-        return {"split": self.split, "kind": self.kind, "epochs": self._epochs, "seed": self.seed, **members}
+        """All that the network depends on: sources, settings, and what is in the recordings."""
+        found = {
+            "split": self.split,
+            "kind": self.kind,
+            "settings": asdict(self.settings),
+            "code": of_code(),
+            **{part: {path.name: of_file(path) for path in self._members(part)} for part in ("train", "validation")},
+        }
+        return json.loads(json.dumps(found))  # as it will be read again
+
+    def _members(self, part: str) -> list[Path]:
+        """Recordings of a part; none where the training is to say why there are none."""
+        try:
+            return recordings(self.data, self.split, part)
+        except InputError:
+            return []
 
     def do(self, folder: Path, report: Report) -> dict[str, object]:
-        settings = find_task(self.kind).defaults
-        if self.epochs:
-            # Few epochs are for the schedule that makes the most of them.
-            settings = replace(settings, epochs=self.epochs, schedule="cosine")
         lines: list[str] = []
 
         def say(line: str) -> None:
             lines.append(line)
-            report(min(len(lines) / self._epochs, 1.0))
+            report(min(len(lines) / self.settings.epochs, 1.0))
 
-        output = folder.with_name(f"{self.kind}.safetensors")
-        output.parent.mkdir(parents=True, exist_ok=True)
+        output, begun = folder.with_name(f"{self.kind}.safetensors"), folder / BEGUN
+        folder.mkdir(parents=True, exist_ok=True)
+        if not begun.is_file() or read_json(begun) != self.identity():
+            output.with_suffix(".checkpoint").unlink(missing_ok=True)
+            write_whole(begun, json.dumps(self.identity(), indent=1))
         try:
-            train(
-                self.kind, self.data, output, split=self.split, settings=replace(settings, seed=self.seed), resume=True,
-                say=say,
-            )  # fmt: skip
+            train(self.kind, self.data, output, split=self.split, settings=self.settings, resume=True, say=say)
         except InputError as error:
             raise InputError(f"{self.kind} could not be trained: {error}") from error
         return {"log": lines}

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from radarize.benchmark.benchmark import Study
 from radarize.benchmark.results import Results
+from radarize.benchmark.study import Study
 from radarize.benchmark.table import cell
 from radarize.errors import InputError
 from radarize.jsonfile import read_json
@@ -20,16 +20,16 @@ def write_page(study: Study, results: Results, path: Path) -> Path:
     for table in results.tables:
         page.section(table.title)
         if table.rows:
-            head = tuple(table.rows[0])
-            rows = [tuple(cell(value) for value in row.values()) for row in table.rows]
-            page.table(head, rows, table.numbers(), sortable=True)
+            rows = [tuple(map(cell, row)) for row in table.frame.itertuples(index=False)]
+            page.table(tuple(table.frame), rows, table.numbers(), sortable=True)
         for note in table.notes:
             page.text(note)
     study.benchmark.draw(study, page)
     page.section("Data, networks, machine")
     for note in results.notes:
         page.text(note)
-    page.columns({"Made by": {"command": results.command, "seed": results.seed, **results.machine}})
+    for name, words in results.facts.items():
+        page.text(f"{name}: {words}.")
     return page.write(path)
 
 

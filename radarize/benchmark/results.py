@@ -1,22 +1,140 @@
-"""What is published of a comparison: tables as JSON and Markdown, with command, version, commit, seed and machine."""
+"""What is published of a comparison: tables as JSON and Markdown, and beside them all that tells what they are worth.
 
-import json
+A page says by construction what its figures are of (data, walks, simulated or real, which of it helped to choose
+settings), what networks they were taken with, and what made it (command, version, commit, machine): results without
+that are refused.
+"""
+
 import os
 import platform
 import subprocess
 import sys
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
+import numpy as np
+from pydantic import TypeAdapter
+
 from radarize import __version__
+from radarize.benchmark.choices import helped
 from radarize.benchmark.table import Table
-from radarize.evaluation.metrics import without_nan
+from radarize.errors import InputError
+from radarize.nets.weights import read
+from radarize.recording import Recording
 from radarize.replacing import write_whole
+from radarize.tum import planar
 
 
+@dataclass(frozen=True)
+class Walk:
+    """A recording, or a part of one, that figures are of.
+
+    Attributes:
+        scene: that it went through.
+        seed: that it was drawn from; None of a real one.
+        metres: in the plane; None where no true poses tell.
+        simulated: or real.
+    """
+
+    scene: str
+    seed: int | None
+    metres: float | None
+    simulated: bool
+
+    @classmethod
+    def of(cls, recording: Recording) -> "Walk":
+        """As a recording says."""
+        about, metres = recording.attributes, None
+        if recording.has("truth/pose"):
+            places = planar(recording.read("truth/pose"))[:, :2]
+            metres = float(np.linalg.norm(np.diff(places[np.isfinite(places).all(axis=1)], axis=0), axis=1).sum())
+        simulated = str(about.get("source", "")).startswith("radarsim")
+        return cls(str(about.get("scene", "-")), int(about["seed"]) if "seed" in about else None, metres, simulated)
+
+
+@dataclass(frozen=True)
+class Data:
+    """What figures are of.
+
+    Attributes:
+        name: of the data set, or what else it is in words.
+        walks: recordings; none where figures are of no walks.
+        seed: that all of it was drawn from; None if it does not say.
+    """
+
+    name: str
+    walks: tuple[Walk, ...]
+    seed: int | None = None
+
+    @classmethod
+    def of(cls, name: str, paths: Sequence[Path], seed: int | None = None) -> "Data":
+        """Of recordings.
+
+        Raises:
+            InputError: unreadable ones.
+        """
+        walks = []
+        for path in paths:
+            with Recording(path) as recording:
+                walks.append(Walk.of(recording))
+        return cls(name, tuple(walks), seed)
+
+    @property
+    def sentence(self) -> str:
+        """Name, n, path, simulated or real, seed, and what of it helped to choose settings."""
+        parts = [self.name, f"{len(self.walks)} recordings" if self.walks else "no recordings"]
+        if self.walks:
+            known = [walk.metres for walk in self.walks if walk.metres is not None]
+            without = len(self.walks) - len(known)
+            parts.append(f"{sum(known):.0f} m walked" + (f" ({without} without true poses)" if without else ""))
+            simulated = sum(walk.simulated for walk in self.walks)
+            kinds = {len(self.walks): "all simulated", 0: "all real"}
+            parts.append(kinds.get(simulated, f"{simulated} simulated, {len(self.walks) - simulated} real"))
+        parts += [] if self.seed is None else [f"seed {self.seed}"]
+        return "; ".join([", ".join(parts), *helped(self.walks)])
+
+
+@dataclass(frozen=True)
+class Network:
+    """A trained network that figures were taken with.
+
+    Attributes:
+        kind: of network.
+        parameters: how many.
+        data, split: that it was trained on; epochs: of the training.
+    """
+
+    kind: str
+    parameters: int
+    data: str
+    split: str | None
+    epochs: int
+
+    @classmethod
+    def of(cls, path: Path) -> "Network":
+        """As a file of weights says.
+
+        Raises:
+            InputError: unreadable.
+        """
+        tensors, about = read(path)
+        # What normalisation counts while it is trained is in the file, too.
+        counted = [v.numel() for name, v in tensors.items() if "running_" not in name and "num_batches" not in name]
+        names = ("kind", "data", "split", "epochs")
+        kind, data, split, epochs = (about.get(name) for name in names)
+        return cls(str(kind), sum(counted), str(data or "-"), split, int(epochs or 0))
+
+    @property
+    def sentence(self) -> str:
+        split = "" if self.split is None else f" ({self.split})"
+        return f"{self.kind}, {self.parameters:,} parameters, trained on {self.data}{split}, {self.epochs} epochs"
+
+
+@cache
 def machine() -> dict[str, str]:
-    """Processor, cores and software that figures were taken with."""
+    """Processor, cores and software that figures are taken with; of the first call, for sources may change later."""
     try:
         model = next(x for x in Path("/proc/cpuinfo").read_text().splitlines() if x.startswith("model name"))
         model = model.split(":", 1)[1].strip()
@@ -27,23 +145,27 @@ def machine() -> dict[str, str]:
         "cores": str(len(os.sched_getaffinity(0))),
         "python": platform.python_version(),
         "version": __version__,
-        "commit": _commit(),
+        "commit": commit(Path(__file__)),
     }
 
 
-def _commit() -> str:
-    """Of the sources that run, if they are a clone."""
-    try:
-        found = subprocess.run(
-            ["git", "rev-parse", "--short", "HEAD"],
-            cwd=Path(__file__).parent,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-    except OSError:
-        return "unknown"
-    return found.stdout.strip() or "unknown"
+def commit(source: Path) -> str:
+    """Of the checkout that a source file is of, and whether its sources are those of the commit."""
+
+    def git(*words: str) -> str | None:
+        try:
+            done = subprocess.run(("git", *words), cwd=root, capture_output=True, text=True, check=False)
+        except OSError:
+            return None
+        return done.stdout.strip() if done.returncode == 0 else None
+
+    root = source.parent
+    if not git("ls-files", "--error-unmatch", source.name):  # installed, perhaps below another project's checkout
+        return "not a checkout"
+    root = Path(git("rev-parse", "--show-toplevel"))
+    changed = git("status", "--porcelain", "--", ":!benchmarks/results", ":!docs", ":!*.md").splitlines()
+    state = f"{len(changed)} files changed since" if changed else "clean"
+    return f"{git('rev-parse', '--short', 'HEAD')} ({state})"
 
 
 def command(name: str) -> str:
@@ -58,32 +180,62 @@ class Results:
     Attributes:
         title: heading.
         tables: one or several.
-        notes: what holds for all of them.
+        data: what they are of.
+        networks: that they were taken with.
         command: that makes them.
-        seed: that everything was drawn from; None if the data does not say.
+        notes: what holds for all of them.
         machine: see `machine`.
+
+    Raises:
+        ValueError: anything of that is missing.
     """
 
     title: str
-    tables: Sequence[Table]
-    notes: list[str]
+    tables: list[Table]
+    data: Data
+    networks: tuple[Network, ...]
     command: str
-    seed: int | None
+    notes: list[str] = field(default_factory=list)
     machine: dict[str, str] = field(default_factory=machine)
 
+    def __post_init__(self):
+        for name, kind in (("data", Data), ("networks", tuple), ("command", str)):
+            if not isinstance(getattr(self, name), kind):
+                raise ValueError(f"{self.title}: has no {name}, expected a page that says what it is of")
+        if missing := {"processor", "cores", "version", "commit"} - self.machine.keys():
+            raise ValueError(f"{self.title}: its machine lacks {', '.join(sorted(missing))}")
+
     @property
-    def made(self) -> str:
-        """Command, seed and machine in a line."""
-        seed = "" if self.seed is None else f" seed {self.seed};"
-        return f"`{self.command}`,{seed} " + ", ".join(f"{name} {value}" for name, value in self.machine.items()) + "."
+    def facts(self) -> dict[str, str]:
+        """What the figures are worth, by name."""
+        beside = dict.fromkeys(each for table in self.tables for each in table.beside)
+        return {
+            "Data": self.data.sentence,
+            **({"Beside": "; ".join(each.sentence for each in beside)} if beside else {}),
+            "Networks": "; ".join(network.sentence for network in self.networks) or "none",
+            "Command": f"`{self.command}`",
+            "Machine": ", ".join(f"{name} {value}" for name, value in self.machine.items()),
+        }
 
     def markdown(self) -> str:
         """The whole as text; a single table of the same title has no heading of its own."""
         lone = len(self.tables) == 1 and self.tables[0].title == self.title
-        tables = [table.markdown(1 if lone else 2) for table in self.tables]
-        notes = "".join(f"- {note}\n" for note in self.notes)
-        parts = [*([] if lone else [f"# {self.title}\n"]), *tables, *([notes] if notes else []), f"{self.made}\n"]
-        return "\n".join(parts)
+        parts = [table.markdown(1 if lone else 2) for table in self.tables]
+        parts = parts if lone else [f"# {self.title}\n", *parts]
+        facts = [f"**{name}**: {words}." for name, words in self.facts.items()]
+        return "\n".join([*parts, "".join(f"- {line}\n" for line in (*self.notes, *facts))])
+
+    @classmethod
+    def read(cls, path: Path) -> "Results":
+        """Of what `write` wrote.
+
+        Raises:
+            InputError: unreadable, or of another layout.
+        """
+        try:
+            return TypeAdapter(cls).validate_json(path.read_bytes())
+        except (OSError, ValueError) as error:
+            raise InputError(f"{path}: is no page of results as this version writes them ({error})") from error
 
     def write(self, folder: Path, name: str) -> Path:
         """Write NAME.json and NAME.md, and return the latter's path.
@@ -92,5 +244,6 @@ class Results:
             InputError: they cannot be written.
         """
         folder.mkdir(parents=True, exist_ok=True)
-        write_whole(folder / f"{name}.json", json.dumps(without_nan(asdict(self)), indent=2) + "\n")
+        content = TypeAdapter(Results).dump_json(self, indent=1).decode()
+        write_whole(folder / f"{name}.json", content + "\n")
         return write_whole(folder / f"{name}.md", self.markdown())

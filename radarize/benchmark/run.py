@@ -1,15 +1,17 @@
 """`radarize benchmark`: compare methods on a folder of recordings and publish what came of it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 
-from radarize.benchmark.benchmark import Study, carry_out
-from radarize.benchmark.benchmarks import BENCHMARKS
+from matplotlib import pyplot
+
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.page import write_index, write_page
-from radarize.benchmark.protocol import PROTOCOLS
-from radarize.benchmark.results import Results
+from radarize.benchmark.registry import BENCHMARKS
+from radarize.benchmark.results import Results, machine
+from radarize.benchmark.study import Options, Study, carry_out
 from radarize.errors import InputError
+from radarize.replacing import replacing
 
 #: All that the data is fit for.
 ALL = "all"
@@ -19,15 +21,8 @@ def benchmark(
     name: str,
     data: Path,
     output: Path,
+    options: Options = Options(),  # noqa: B008
     *,
-    methods: Sequence[str] = (),
-    weights: Path | None = None,
-    trained: bool = False,
-    epochs: int | None = None,
-    protocol: str | None = None,
-    workers: int = 1,
-    command: str = "",
-    title: str | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
     say: Callable[[str], None] = lambda line: None,
 ) -> dict[str, Results]:
@@ -36,15 +31,9 @@ def benchmark(
     Args:
         name: a key of `BENCHMARKS`, or ``all``.
         data: folder of recordings.
-        output: folder to write: NAME.json, NAME.md and NAME.html for each benchmark, index.html over all; ``runs``,
-            ``timings`` and ``weights``, which are used again.
-        methods: keys of `radarize.methods.ODOMETRY` and `SCANS`; all of a sort of which none is named.
-        weights: folder of the networks' weights; the shipped ones if None.
-        trained: train networks on each split instead.
-        epochs: of these trainings, at most; their defaults if None.
-        protocol: a key of `PROTOCOLS`; both if None.
-        workers: processes.
-        command: that the results name; title: of them, by default the benchmark's.
+        output: folder to write: NAME.json, NAME.md and NAME.html for each benchmark (NAME.png where it has curves),
+            index.html over all; ``runs``, ``timings`` and ``weights``, which are used again.
+        options: what is compared, and with what.
         progress: called with (frames done, frames in all).
         say: takes a line on each benchmark that the data is not fit for.
 
@@ -56,56 +45,32 @@ def benchmark(
     """
     if name != ALL and name not in BENCHMARKS:
         raise InputError(f"benchmark is {name!r}, expected one of: {', '.join((*BENCHMARKS, ALL))}")
-    if protocol is not None and protocol not in PROTOCOLS:
-        raise InputError(f"protocol is {protocol!r}, expected one of: {', '.join(PROTOCOLS)}")
-    if weights is not None and not weights.is_dir():
-        raise InputError(f"weights is {weights}, expected a folder that holds the networks' weights")
-    if trained and weights is not None:
-        raise InputError(f"weights {weights} are given with --train, expected one of the two")
+    options.check()
+    machine()  # as things are now: sources may change while it runs
     found, output = DataSet.load(data), Path(output)
     studies: dict[str, Study] = {}
     for each in BENCHMARKS if name == ALL else (name,):
         try:
-            studies[each] = Study.plan(
-                BENCHMARKS[each],
-                found,
-                output,
-                methods,
-                weights,
-                trained,
-                epochs,
-                (protocol,) if protocol else tuple(PROTOCOLS),
-            )
+            studies[each] = Study.plan(BENCHMARKS[each], found, output, options)
         except InputError as error:
             if name != ALL:
                 raise
             say(f"{each}: left out, {error}")
     if not studies:
         raise InputError(f"{data}: is fit for no benchmark")
-    carry_out(list(studies.values()), workers, progress)
-    published = {}
-    for each, study in studies.items():
-        published[each] = Results(
-            title or study.benchmark.title, study.benchmark.tables(study), _notes(study), command, found.seed
-        )
-        published[each].write(output, each)
-        write_page(study, published[each], output / f"{each}.html")
+    carry_out(list(studies.values()), progress)
+    published = {each: _publish(each, study) for each, study in studies.items()}
     write_index(output)
     return published
 
 
-def _notes(study: Study) -> list[str]:
-    """What holds for all tables: data, networks, what is missing."""
-    recordings = len({case.name for cases in study.splits.values() for case in cases})
-    name = study.data.index.get("specification", {}).get("name", study.data.folder.resolve().name)
-    if study.trainings:
-        epochs = study.trainings[0].epochs
-        networks = "each split's networks were trained on its own training part" + (
-            f" (epochs: {epochs})" if epochs else ""
-        )
-    else:
-        label = next(iter(study.networks.values())).label
-        own = " (--train makes networks of each split's own)" if study.benchmark.split else ""
-        networks = f"{label} weights for all of them{own}"
-    splits = ", ".join(study.splits)
-    return [f"Data set {name}: {recordings} recordings test ({splits}); {networks}.", *study.shortfalls]
+def _publish(name: str, study: Study) -> Results:
+    results = study.publish()
+    if (figure := study.benchmark.picture(results.tables)) is not None:
+        with replacing(study.output / f"{name}.png") as part:
+            figure.savefig(part, format="png", dpi=70, bbox_inches="tight")
+        pyplot.close(figure)
+        results.notes.append(f"![Curves]({name}.png)")
+    results.write(study.output, name)
+    write_page(study, results, study.output / f"{name}.html")
+    return results

@@ -1,19 +1,15 @@
 """A recording by a pair of methods: the run, and its figures; and how long each stage takes."""
 
-import hashlib
-import inspect
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 
-import radarize
 from radarize import log
 from radarize.batch import BATCH, Intake
 from radarize.benchmark.dataset import Case
+from radarize.benchmark.identity import of_code, of_file
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.steps import Report
 from radarize.errors import InputError
@@ -65,10 +61,9 @@ class _Step:
 
     def identity(self) -> dict[str, object]:
         return {
-            "frames": self.case.frames,
-            "bytes": self.case.path.stat().st_size,
-            "networks": self.networks.digests(self.pair.networks),
-            "code": code(ODOMETRY[self.pair.odometry].maker, SCANS[self.pair.scans].maker),
+            "recording": of_file(self.case.path),
+            "networks": self.networks.identity(self.pair.networks),
+            "code": of_code(ODOMETRY[self.pair.odometry].maker, SCANS[self.pair.scans].maker),
         }
 
 
@@ -122,26 +117,6 @@ class Run(_Step):
                 found[folder] = str(error)
             report(share + (1 - share) * len(found) / len(places))
         return found
-
-
-@cache
-def code(*makers: Callable) -> str:
-    """What tells this package's sources, and the files that methods of one's own are in, from others."""
-    found = _package().copy()
-    for maker in makers:
-        try:
-            own = inspect.getsourcefile(maker.func if isinstance(maker, partial) else maker)
-        except TypeError:  # made in an interpreter
-            continue
-        if own and Path(own).is_file():
-            found.update(Path(own).read_bytes())
-    return found.hexdigest()[:16]
-
-
-@cache
-def _package() -> "hashlib._Hash":
-    """Of this package's sources, read once for all methods."""
-    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(Path(radarize.__file__).parent.rglob("*.py"))))
 
 
 def figures(run: Path, recording: Path) -> dict[str, object]:
@@ -224,8 +199,7 @@ def measure(
     start = time.perf_counter()
     for first in range(0, frames, BATCH):
         stop = min(first + BATCH, frames)
-        if batch := intake.take(source.adc(first, stop), source.times[first:stop], source.valid(first, stop)):
-            timed.push(batch)
+        timed.push(intake.take(source.adc(first, stop), source.times[first:stop], source.valid(first, stop)))
         report(stop / frames)
     timed.finish()
     whole = 1e3 * (time.perf_counter() - start) / frames

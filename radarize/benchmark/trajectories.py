@@ -1,21 +1,20 @@
 """Tables of trajectory errors, a row a method, by each protocol."""
 
-from radarize.benchmark.benchmark import Study
-from radarize.benchmark.protocol import PROTOCOLS
-from radarize.benchmark.runs import Pair
-from radarize.benchmark.table import Table, ahead
+import pandas as pd
 
-#: Odometry that is this project's; what is compared with the paper's own.
-OURS = ("fused", "learned")
+from radarize.benchmark.protocol import Protocol
+from radarize.benchmark.runs import Pair
+from radarize.benchmark.study import Study
+from radarize.benchmark.table import PAPER, Table
+
+#: What the paper says beside: ATE in m and rad, RE between frames in m.
 PAPER_COLUMNS = ("paper: ATE m", "paper: ATE rad", "paper: RE frame m")
+#: By method.
+Figures = dict[Pair, tuple[float, ...]]
 
 
 def trajectory_tables(
-    study: Study,
-    trajectory: str,
-    labels: dict[Pair, dict[str, object]],
-    paper: dict[Pair, tuple[float, ...]],
-    about: str = "",
+    study: Study, trajectory: str, labels: dict[Pair, dict[str, object]], paper: Figures, about: str
 ) -> list[Table]:
     """A table for each protocol of a study.
 
@@ -23,32 +22,40 @@ def trajectory_tables(
         study: carried out.
         trajectory: ``odometry`` or ``slam``.
         labels: first columns of a pair's row; pairs that are not in it have none.
-        paper: its figures of a pair: ATE in m and rad, RE between frames in m.
-        about: what the titles begin with; by default the trajectory.
+        paper: its figures of a pair.
+        about: what the titles begin with.
     """
-    found = []
-    for name in study.protocols:
-        protocol = PROTOCOLS[name]
-        rows = []
-        for pair, label in labels.items():
-            which = trajectory
-            if trajectory == "slam" and not protocol.equal_loops and pair.odometry not in OURS:
-                which = "open"
-            figures = protocol.average(study, pair, which)
-            beside = dict(zip(PAPER_COLUMNS, paper.get(pair, (None,) * len(PAPER_COLUMNS)), strict=True))
-            rows.append({**label, "recordings": len(study.once(pair)), **figures, **beside})
-        notes = list(protocol.notes)
-        ours = [k for k, pair in enumerate(labels) if pair == study.chosen.partner]
-        if ours and len(rows) > 1:
-            notes.append(
-                ahead(
-                    rows,
-                    ours[0],
-                    " + ".join(map(str, list(labels.values())[ours[0]].values())),
-                    [column for column in rows[0] if column.startswith(("ATE", "RE"))],
-                )
-            )
-        if any(pair.odometry == "rnin" for pair in labels):
-            notes.append("Turns of rnin are those of the IMU's gyroscope, which from frame to frame no radar reaches.")
-        found.append(Table(f"{about or trajectory.capitalize()}, {protocol.title}", rows, notes))
-    return found
+    return [_table(study, protocol, trajectory, labels, paper, about) for protocol in study.options.protocols]
+
+
+def _table(
+    study: Study, protocol: Protocol, trajectory: str, labels: dict[Pair, dict[str, object]], paper: Figures, about: str
+) -> Table:
+    rows = []
+    for pair, label in labels.items():
+        runs = study.of(pair, once=False)
+        figures = protocol.average(runs, pair, trajectory)
+        rows.append({**label, "recordings": runs["run"].nunique(), **figures, **beside(paper.get(pair))})
+    table = Table(f"{about}, {protocol.title}", rows, [protocol.note], (PAPER,))
+    pairs = list(labels)
+    if study.chosen.partner in pairs and len(pairs) > 1:
+        ours = pairs.index(study.chosen.partner)
+        table.notes.append(table.ahead(ours, " + ".join(map(str, labels[pairs[ours]].values()))))
+    if any(pair.odometry == "rnin" for pair in pairs):
+        table.notes.append(
+            "Turns of rnin are those of the IMU's gyroscope, which from frame to frame no radar reaches."
+        )
+    if trajectory == "slam":
+        table.notes.append(protocol.loops)
+    return table
+
+
+def beside(paper: tuple[float, ...] | None) -> dict[str, float | None]:
+    """The paper's columns, empty where it says nothing."""
+    return dict(zip(PAPER_COLUMNS, paper or (None,) * len(PAPER_COLUMNS), strict=True))
+
+
+def split_rows(study: Study, pair: Pair) -> dict[str, pd.DataFrame]:
+    """Runs of a pair by split, then those of all."""
+    runs = study.of(pair, once=False)
+    return {split: runs[runs["split"] == split] for split in study.splits} | {"mean": runs}

@@ -69,6 +69,10 @@ class Header(BaseModel):
         return Windows(self.maps, self.frames, self.stride(config), max(self.spacings))
 
 
+#: Bytes of a file's header: ours have some thousands.
+_HEADER = 1 << 20
+
+
 class Network(Protocol):
     """What a class of networks says of itself; made from frames of a window, names of its inputs and width, and `step`
     if it is `scaled`.

@@ -2,26 +2,30 @@
 
 import json
 import re
+import shutil
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
+import h5py
 import numpy as np
 import pytest
 
 from radarize import cli
-from radarize.benchmark import networks
-from radarize.benchmark.benchmark import Study
-from radarize.benchmark.benchmarks import BENCHMARKS
+from radarize.benchmark import identity, networks
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.protocol import PROTOCOLS
+from radarize.benchmark.registry import BENCHMARKS
 from radarize.benchmark.run import benchmark
-from radarize.benchmark.runs import Pair, Run, code
+from radarize.benchmark.steps import kept, perform
+from radarize.benchmark.study import Options, Study
 from radarize.console import run as command_line
 from radarize.errors import InputError
 from radarize.methods.registry import ODOMETRY, SCANS
 from radarize.recording import Recording
 from tests.benchmark import toys as toy_file
-from tests.benchmark.rooms import ROOMS, write_rooms
+from tests.benchmark.rooms import ROOMS, write_room, write_rooms
 from tests.benchmark.toys import add
 
 
@@ -38,7 +42,7 @@ def rooms(tmp_path_factory) -> Path:
 def test_a_method_of_ones_own_is_in_every_table(rooms, toys, tmp_path):
     assert len(Path(toy_file.__file__).read_text().splitlines()) < 60  # two methods, and imports
     moved = []
-    found = benchmark("all", rooms, tmp_path, methods=toys, progress=lambda done, total: moved.append((done, total)))
+    found = benchmark("all", rooms, tmp_path, Options(toys), progress=lambda done, total: moved.append((done, total)))
     assert set(found) == set(BENCHMARKS)
     for name, results in found.items():
         text = (tmp_path / f"{name}.md").read_text()
@@ -62,7 +66,7 @@ def ate(run: Path) -> float:
 
 
 def test_means_are_over_trajectories_then_splits_or_each_once(rooms, toys, tmp_path):
-    found = benchmark("odometry", rooms, tmp_path, methods=toys)["odometry"]
+    found = benchmark("odometry", rooms, tmp_path, Options(toys))["odometry"]
     one, other = (ate(tmp_path / "runs" / name / "scaled+metre") for name in ("A_handheld", "A_cart"))
     assert abs(one - other) > 1e-4
     paper, mended = (table.rows[0]["ATE m"] for table in found.tables[:2])
@@ -74,12 +78,12 @@ def test_means_are_over_trajectories_then_splits_or_each_once(rooms, toys, tmp_p
     speeds = [np.linalg.norm(Recording(rooms / f"{name}.h5").read("truth/velocity"), axis=1) for name in ROOMS][:2]
     expected = np.mean([[-speed[0], *(0.1 * speed[1:])] for speed in speeds])
     assert steps["all"]["bias"] == pytest.approx(expected, rel=0.05)
-    only = benchmark("odometry", rooms, tmp_path, methods=toys, protocol="mended")["odometry"]
+    only = benchmark("odometry", rooms, tmp_path, Options(toys, protocol="mended"))["odometry"]
     assert [table.title for table in only.tables] == ["Odometry, slips mended", found.tables[2].title]
 
 
 def test_what_cannot_run_is_a_dash_with_a_reason(rooms, toys, tmp_path):
-    found = benchmark("odometry", rooms, tmp_path, methods=[*toys, "learned"])["odometry"]
+    found = benchmark("odometry", rooms, tmp_path, Options([*toys, "learned"]))["odometry"]
     rows = {row["odometry"]: row for row in found.tables[0].rows}
     assert np.isnan(rows["learned"]["ATE m"]) and rows["learned"]["recordings"] == 0
     assert "| learned | 0 | - | - |" in (tmp_path / "odometry.md").read_text()
@@ -88,12 +92,12 @@ def test_what_cannot_run_is_a_dash_with_a_reason(rooms, toys, tmp_path):
 
 
 def test_runs_are_done_once(rooms, toys, tmp_path, monkeypatch):
-    benchmark("odometry", rooms, tmp_path, methods=toys)
+    benchmark("odometry", rooms, tmp_path, Options(toys))
     monkeypatch.setattr("radarize.benchmark.runs.run_each", None)  # would break whatever runs now
-    benchmark("odometry", rooms, tmp_path, methods=toys)
-    with pytest.raises(TypeError):
-        benchmark("buildings", rooms, tmp_path, methods=toys)  # B_robot is new
-    benchmark("mapping", rooms, tmp_path, methods=toys)
+    benchmark("odometry", rooms, tmp_path, Options(toys))
+    found = benchmark("buildings", rooms, tmp_path, Options(toys))["buildings"]  # B_robot is new
+    assert any("scaled+metre: - on 1 of 3 recordings" in note for note in found.notes)
+    benchmark("mapping", rooms, tmp_path, Options(toys))
 
 
 def test_a_changed_method_is_run_again(tmp_path, monkeypatch):
@@ -103,13 +107,27 @@ def test_a_changed_method_is_run_again(tmp_path, monkeypatch):
     own.write_text("def make(inputs):\n    return 1\n")
     from own_method import make
 
+    code = identity.of_code
     before = code(make, partial(make, None))
-    assert before != code(ODOMETRY["doppler"].maker)  # of the package
+    assert before != code(ODOMETRY["doppler"].make)  # of the package
     code.cache_clear()
     assert before == code(make, partial(make, None))
     own.write_text("def make(inputs):\n    return 2\n")
     code.cache_clear()
     assert before != code(make, partial(make, None))
+
+
+def test_a_remade_recording_is_run_again(toys, tmp_path):
+    """Of the same name and size: what is in it differs."""
+    path = write_room(tmp_path / "data" / "A_cart.h5", 60, 0, scene="A_0", platform="cart")
+    benchmark("odometry", tmp_path / "data", tmp_path, Options(toys))
+    study = Study.plan(BENCHMARKS["odometry"], DataSet.load(path.parent), tmp_path, Options(toys))
+    ((_, run),) = study.runs
+    assert kept(run, tmp_path)
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    assert not kept(run, tmp_path)
 
 
 def test_networks_are_trained_on_each_split(rooms, toys, monkeypatch, tmp_path):
@@ -124,9 +142,9 @@ def test_networks_are_trained_on_each_split(rooms, toys, monkeypatch, tmp_path):
 
     monkeypatch.setattr(networks, "train", train)
     choices = {"methods": [*toys, "learned"], "trained": True, "epochs": 2}
-    monkeypatch.setattr("radarize.benchmark.benchmark.BEST", {"odometry": "scaled", "scans": "metre"})
+    monkeypatch.setattr("radarize.benchmark.study.BEST", {"odometry": "scaled", "scans": "metre"})
     for _ in range(2):
-        found = benchmark("buildings", rooms, tmp_path, **choices)["buildings"]
+        found = benchmark("buildings", rooms, tmp_path, Options(**choices))["buildings"]
     kinds = [(kind, split) for split in ("building-A", "building-B") for kind in ("translation", "rotation")]
     # What could not be done is tried again, what could is not.
     assert [(kind, split) for kind, split, *_ in asked] == [*kinds, *(pair for pair in kinds if pair[0] == "rotation")]
@@ -138,17 +156,78 @@ def test_networks_are_trained_on_each_split(rooms, toys, monkeypatch, tmp_path):
     assert sorted(path.name for path in (tmp_path / "runs").glob("*/*")) == ["scaled+metre"] * 3
 
 
-def test_slam_of_baselines_is_open_in_the_papers_protocol(rooms, toys, tmp_path):
-    study = Study.plan(BENCHMARKS["slam"], DataSet.load(rooms), tmp_path, toys)
-    pair = Pair("scaled", "metre")
-    for run in study.runs:
-        errors = {name: {"ate": {"position": {"mean": k}, "rotation": {"mean": k}}, "re": {}} for k, name in
-                  enumerate(("odometry", "slam", "open"))}  # fmt: skip
-        study.results[run] = {**errors, "nearest": {name: each for name, each in errors.items()}}
-    tables = BENCHMARKS["slam"].tables(study)
-    assert [table.rows[0]["ATE m"] for table in tables] == [2, 1]
-    assert PROTOCOLS["paper"].average(study, pair, "odometry")["ATE m"] == 0
-    assert isinstance(study.runs[0], Run)
+@pytest.fixture
+def training(rooms, tmp_path, monkeypatch):
+    """Networks of a split, trained by something that leaves a checkpoint; whether each was begun anew."""
+    data = tmp_path / "data"
+    shutil.copytree(rooms, data)
+    begun = []
+
+    def train(kind, data, output, **choices):
+        begun.append(not output.with_suffix(".checkpoint").exists())
+        output.with_suffix(".checkpoint").touch()
+        output.touch()
+
+    def go(**changed) -> int:
+        step = networks.Training("building-A", "translation", data, **changed)
+        count = len(begun)
+        perform([step], tmp_path, 1, lambda *where: None)
+        return len(begun) - count
+
+    monkeypatch.setattr(networks, "train", train)
+    return data, begun, go
+
+
+def test_a_training_is_done_again_when_anything_has_changed(training, monkeypatch):
+    data, begun, go = training
+    assert [go(), go()] == [1, 0]
+    with h5py.File(data / "B_robot.h5", "r+") as file:  # trains
+        file["radar/adc"][0] += 1
+    assert [go(), go()] == [1, 0]
+    with h5py.File(data / "A_cart.h5", "r+") as file:  # tests
+        file["radar/adc"][0] += 1
+    assert go() == 0
+    assert [go(epochs=3), go(epochs=3), go(epochs=3, seed=1)] == [1, 0, 1]
+    monkeypatch.setattr(networks, "of_code", lambda: "other sources")
+    assert [go(), go()] == [1, 0]
+    settings = networks.find_task("translation").defaults
+    monkeypatch.setattr(networks, "find_task", lambda kind: SimpleNamespace(defaults=replace(settings, rate=0.5)))
+    assert [go(), go()] == [1, 0]
+    assert all(begun)  # no training goes on from the checkpoint of another
+
+
+def test_an_interrupted_training_goes_on(training, monkeypatch):
+    _, begun, go = training
+    train = networks.train
+
+    def stopped(*arguments, **choices):
+        train(*arguments, **choices)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(networks, "train", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        go()
+    monkeypatch.setattr(networks, "train", train)
+    go()
+    assert begun == [True, False]
+
+
+def test_a_protocol_means_the_same_in_every_table(rooms, toys, tmp_path, monkeypatch):
+    """In the paper's, loops are closed for its own method and no other, whatever else is compared."""
+    monkeypatch.setitem(ODOMETRY, "learned", ODOMETRY["scaled"])
+    pairs = {"scaled": [3, 2], "learned": [2, 2]}  # open and closed, in the order of `PROTOCOLS`
+    for name in ("slam", "buildings"):
+        study = Study.plan(BENCHMARKS[name], DataSet.load(rooms), tmp_path, Options([*toys, "learned"]))
+        for _, run in study.runs:
+            means = {"odometry": 1, "slam": 2, "open": 3}
+            errors = {which: {"ate": {"position": {"mean": k}}} for which, k in means.items()}
+            study.results[run] = {**errors, "nearest": errors}
+        for odometry, expected in pairs.items():
+            tables = [table.frame[table.frame["odometry"] == odometry] for table in BENCHMARKS[name].tables(study)]
+            assert [set(table["ATE m"]) for table in tables] == [{value} for value in expected], (name, odometry)
+        for table, protocol in zip(BENCHMARKS[name].tables(study), PROTOCOLS.values(), strict=True):
+            assert protocol.loops in table.notes
+    assert "Loops are closed for fused, learned, published alone" in PROTOCOLS["paper"].loops
 
 
 @pytest.mark.parametrize(
@@ -163,7 +242,7 @@ def test_slam_of_baselines_is_open_in_the_papers_protocol(rooms, toys, tmp_path)
 )
 def test_bad_input_is_one_sentence(rooms, tmp_path, name, choices, expected):
     with pytest.raises(InputError, match=expected.replace(".", r"\.")):
-        benchmark(name, rooms, tmp_path / "out", **choices)
+        benchmark(name, rooms, tmp_path / "out", Options(**choices))
 
 
 def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):
@@ -175,11 +254,11 @@ def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):
     with pytest.raises(InputError, match="no recording has attributes ablation and value"):
         benchmark("ablation", lone, tmp_path)
     with pytest.raises(InputError, match="no split of kind building, expected one to train on"):
-        benchmark("buildings", lone, tmp_path, trained=True)
+        benchmark("buildings", lone, tmp_path, Options(trained=True))
     with pytest.raises(
         InputError, match="nothing could be compared: .*translation.safetensors: does not fit this radar"
     ):
-        benchmark("odometry", lone, tmp_path, methods=["learned"])
+        benchmark("odometry", lone, tmp_path, Options(["learned"]))
 
 
 def test_the_how_tos_method_runs(rooms, tmp_path, monkeypatch):

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from radarize.benchmark.run import benchmark
+from radarize.benchmark.study import Options
 from tests.benchmark.rooms import write_rooms
 from tests.benchmark.toys import add
 from tests.capture.browser import CHROMIUM, Browser
@@ -21,7 +22,7 @@ def folder(tmp_path_factory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         methods = [*add(patch), "doppler", "segmentation"]
         for name in ("buildings", "mapping"):
-            benchmark(name, data, output, methods=methods)
+            benchmark(name, data, output, Options(methods))
     return output
 
 
@@ -67,5 +68,5 @@ def test_the_index_leads_to_the_pages(folder, tmp_path):
         browser.wait("document.querySelector('h1')?.textContent === 'Scans and maps'")
         browser.wait("document.querySelectorAll('table.sortable').length === 1")
         text = browser.evaluate("document.body.innerText")
-        assert "does not fit this radar" in text and "Data set rooms" in text and "metre" in text
+        assert "does not fit this radar" in text and "Data: rooms, 2 recordings" in text and "metre" in text
         assert browser.errors == []

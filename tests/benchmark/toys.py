@@ -38,7 +38,7 @@ def add(monkeypatch) -> list[str]:
     monkeypatch.setitem(ODOMETRY, "scaled", Method("a tenth too long", Scaled))
     monkeypatch.setitem(SCANS, "metre", Method("a metre", lambda inputs: Metre()))
     chosen = {"odometry": "scaled", "scans": "metre"}
-    monkeypatch.setattr("radarize.benchmark.benchmark.best_methods", lambda config: (chosen, ""))
+    monkeypatch.setattr("radarize.benchmark.study.best_methods", lambda config: (chosen, ""))
     for module in ("runtime", "varied"):
         monkeypatch.setattr(f"radarize.benchmark.{module}.CLASSICAL", chosen)
     return ["scaled", "metre"]

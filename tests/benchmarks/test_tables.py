@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import evaluation, transfer
-from radarize.benchmark.odometry import Followed, row
+from benchmarks import transfer
+from radarize.benchmark.dataset import DataSet
+from radarize.benchmark.followed import Followed
 from radarize.benchmark.runs import figures
+from radarize.evaluation.motion import velocity_errors
 from radarize.run import run
 from radarsim.simulate import simulate
 
@@ -26,21 +28,25 @@ def judged(recording, tmp_path_factory) -> tuple[Path, dict]:
     return folder, figures(folder, recording)
 
 
-def test_a_recording_says_what_it_is_of(recording):
-    with evaluation.cases(recording.parent) as found:
-        assert [(case.path, case.building, case.platform) for case in found] == [(recording, "office", "handheld")]
+def test_a_recording_says_what_it_is_of(recording, judged):
+    (case,) = DataSet.load(recording.parent).cases
+    assert (case.path, case.building, case.platform) == (recording, "office", "handheld")
+    assert (case.walk.scene, case.walk.seed, case.walk.simulated) == ("office", 4, True)
+    assert case.walk.metres == pytest.approx(judged[1]["odometry"]["distance"], rel=0.05)
 
 
 def test_frames_of_a_run_tell_what_its_metrics_tell(judged):
     folder, found = judged
-    followed = Followed.read(folder, found["odometry"])
-    figures = row([followed])
-    assert figures["velocity RMSE m/s"] == pytest.approx(found["velocity"]["rmse"], rel=1e-5)
-    assert figures["ATE m"] == found["odometry"]["ate"]["position"]["mean"]
-    assert len(followed.steps) == len(followed.velocity) - 1
+    followed = Followed.read(folder)
+    velocity = velocity_errors(followed.velocity, followed.true_velocity, followed.covariance)
+    assert velocity["rmse"] == pytest.approx(found["velocity"]["rmse"], rel=1e-5)
     # Errors of single steps and of windows of eight are those of the same path.
-    path = np.cumsum([0, *followed.steps])
-    np.testing.assert_allclose(followed.turns, path[8:] - path[:-8], atol=1e-6)
+    steps, _ = followed.turned(0)
+    assert len(steps) == len(followed.velocity) - 1
+    path = np.cumsum([0, *steps])
+    windows, claims = followed.turned(8 * followed.period)
+    np.testing.assert_allclose(windows, path[8:] - path[:-8], atol=1e-6)
+    np.testing.assert_allclose(claims[0], followed.variance[1:9].sum())
     assert found["quantiles"]["odometry"][-1] == pytest.approx(found["odometry"]["ate"]["position"]["max"], abs=1e-4)
 
 

@@ -4,9 +4,9 @@ A new one is a file with a `pairs` and a `tables`, and an entry here; new method
 entries in `radarize.methods`.
 """
 
-from radarize.benchmark import mapping, odometry, runtime, slam, varied
-from radarize.benchmark.benchmark import Benchmark
+from radarize.benchmark import mapping, odometry, runtime, slam, uncertainty, varied
 from radarize.benchmark.drawings import draw_maps, draw_odometry, draw_slam
+from radarize.benchmark.study import Benchmark
 
 BENCHMARKS: dict[str, Benchmark] = {
     "odometry": Benchmark(
@@ -41,6 +41,13 @@ BENCHMARKS: dict[str, Benchmark] = {
         "building",
         draw=draw_slam,
     ),
+    "uncertainty": Benchmark(
+        "Claimed uncertainty",
+        "Squared errors of velocities and turns over the variances that odometry claims; 1 if it knows itself.",
+        odometry.pairs,
+        uncertainty.tables,
+        "random",
+    ),
     "runtime": Benchmark(
         "Run time",
         "Milliseconds per frame of every stage (the paper's table 6).",
@@ -61,15 +68,17 @@ BENCHMARKS: dict[str, Benchmark] = {
         "Ghosts, missed surfaces, maps and odometry as multipath becomes severe (data set `stress`).",
         varied.stress_pairs,
         varied.stress_tables,
-        lacks=varied.lacks_stress,
-        draw=varied.draw_stress,
+        lacks=varied.STRESS.lacks,
+        draw=varied.STRESS.draw,
+        picture=varied.STRESS.picture,
     ),
     "ablation": Benchmark(
         "Ablations",
         "Which radar would do better: classical methods over values of its parameters (data sets `ablation/...`).",
         varied.classical_pairs,
         varied.ablation_tables,
-        lacks=varied.lacks_ablation,
-        draw=varied.draw_ablation,
+        lacks=varied.ABLATION.lacks,
+        draw=varied.ABLATION.draw,
+        picture=varied.ABLATION.picture,
     ),
 }

@@ -1,0 +1,111 @@
+"""Whether the networks themselves know how wrong they are: turns between maps, and ranges of a claimed probability.
+
+`radarize benchmark uncertainty` says the same of odometry, which is made of them.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.results import publish
+from radarize.batch import BATCH, Intake
+from radarize.benchmark.dataset import Case, DataSet, groups
+from radarize.benchmark.networks import Networks
+from radarize.console import progress
+from radarize.evaluation.scans import true_ranges
+from radarize.mapping.scans import BEARINGS
+from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
+from radarize.methods.radarize.scans import LEAST, NEAR, Segmentation, likeliest
+from radarize.methods.registry import Inputs
+from radarize.pose import wrap
+from radarize.recording import Recording
+from radarize.tum import planar
+
+#: Claimed probabilities of a range, from each to the next.
+CLAIMS = (LEAST, 0.8, 0.9, 0.97, 1.0)
+KINDS = ("translation", "rotation", "segmentation")
+
+
+def judge(case: Case, networks: Networks) -> tuple[dict[str, float], np.ndarray]:
+    """Claims and errors on one recording.
+
+    Returns:
+        Mean of squared error over claimed variance, by the span of a turn; and by class of `CLAIMS` how many ranges
+        there are, the sum of their claimed probabilities, and how many are right.
+    """
+    with Recording(case.path) as recording:
+        inputs = Inputs(recording.config, weights=networks.weights, recording=recording)
+        intake = Intake(inputs.signal)
+        velocity, rotation = (
+            network(inputs.radar, inputs.weights.of(kind))
+            for network, kind in ((LearnedVelocity, "translation"), (LearnedRotation, "rotation"))
+        )
+        scans = Segmentation(inputs.radar, inputs.weights.of("segmentation"))
+        turns, ranges = [], []
+        for frames, adc in recording.batches(BATCH):
+            batch = intake.take(adc, recording.times[frames], recording.valid(frames.start, frames.stop))
+            turns.append(rotation.turns(batch, velocity.estimate(batch)))
+            ranges.append(likeliest(scans.occupancy(batch)))
+        yaw = planar(recording.read("truth/pose"))[:, 2]
+        true = true_ranges(BEARINGS, recording.read("truth/scan"), recording.read("truth/scan_azimuths"))
+    spans = {}
+    for spacing, told in zip(rotation.spacings, np.concatenate(turns, axis=1), strict=True):
+        back = spacing * rotation.stride
+        error = wrap(told[back:, 0] - wrap(yaw[back:] - yaw[:-back]))
+        spans[f"turn over {back * case.config.frame_period:.2f} s"] = float(np.mean(error**2 / told[back:, 1]))
+    bins, claimed = (np.concatenate(part) for part in zip(*ranges, strict=True))
+    step = inputs.signal.heatmaps.ranges[1] - inputs.signal.heatmaps.ranges[0]
+    right = np.abs(inputs.signal.heatmaps.ranges[0] + bins * step - true) <= (NEAR + 0.5) * step
+    classes = np.where(claimed >= LEAST, np.digitize(claimed, CLAIMS[1:-1]), -1)
+    chosen = [classes == k for k in range(len(CLAIMS) - 1)]
+    return spans, np.array([[one.sum(), claimed[one].sum(), right[one].sum()] for one in chosen])
+
+
+def row(name: str, found: list[tuple[dict[str, float], np.ndarray]]) -> dict[str, object]:
+    """Means over recordings; ranges of all together."""
+    spans, counts = [one for one, _ in found], sum(counts for _, counts in found)
+    return {
+        "on": name,
+        "recordings": len(found),
+        **{span: float(np.mean([one[span] for one in spans])) for span in spans[0]},
+        **{
+            f"ranges of {100 * low:.0f} to {100 * high:.0f} %": f"{100 * claimed / n:.1f}: {100 * right / n:.1f}"
+            for low, high, (n, claimed, right) in zip(CLAIMS[:-1], CLAIMS[1:], counts.clip(1e-9), strict=True)
+        },
+    }
+
+
+def parser() -> argparse.ArgumentParser:
+    """The command line."""
+    found = argparse.ArgumentParser(description=__doc__)
+    found.add_argument("--data", type=Path, required=True, help="folder of recordings")
+    found.add_argument("--weights", type=Path, metavar="DIR", help="of the networks; by default the shipped ones")
+    return found
+
+
+def main() -> None:
+    options = parser().parse_args()
+    data = DataSet.load(options.data)
+    networks = Networks("given", options.weights) if options.weights else Networks()
+    judged = {}
+    with progress("recordings") as report:
+        for case in data.cases:
+            report(len(judged), len(data.cases))
+            judged[case] = judge(case, networks)
+    publish(
+        "claims",
+        "What networks claim against what they err",
+        [row(name, [judged[case] for case in members]) for name, members in groups(data.cases).items()],
+        data=data.data(data.cases),
+        networks=networks.used(KINDS),
+        notes=[
+            "Turns: squared error of what the network says of two maps so far apart over the variance that it claims; "
+            "1 if that is right. To reach: 0.8 to 1.25.",
+            f"Ranges, by the probability claimed: its mean, %: share within {NEAR} cells of the true surface, %.",
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,70 @@
+"""Which recordings helped to choose settings: figures on these flatter, and every page of results says so.
+
+Networks are not among them: each file of weights says what it was trained on. Whoever chooses a setting by looking at
+recordings enters them here.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+
+class Walk(Protocol):
+    """A recording's scene and seed, by which it is known wherever it lies."""
+
+    scene: str
+    seed: int | None
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Settings, and what they were chosen on.
+
+    Attributes:
+        settings: in words.
+        recordings: seeds by scene; None: whatever its seed.
+        looked_at: so many of them at most, if nobody knows any more which; 0: all.
+    """
+
+    settings: str
+    recordings: dict[str, tuple[int | None, ...]]
+    looked_at: int = 0
+
+    def among(self, walks: Sequence[Walk]) -> int:
+        """How many of some recordings may have been looked at."""
+        hits = sum(bool({walk.seed, None} & {*self.recordings.get(walk.scene, ())}) for walk in walks)
+        return min(hits, self.looked_at or hits)
+
+
+#: The recordings of `radarsim dataset evaluation`.
+EVALUATION = {
+    "A_0": (3843186689914928031, 780396667974010872, 6012359190105836070),
+    "B_0": (556999854290578444, 3965592381051175602, 4509946747521611137),
+    "C_0": (320473786174684946, 8865018802045166952, 60825445440634261),
+    "D_0": (8193936916513206940, 687363756677759437, 1271877811012469606),
+    "office": (1929245240579931105, 3971611656923845614, 7440840146975223735),
+}
+#: Radar walks of `benchmarks.slam_backend`.
+BACK_END = {"plain": (1,), "office": (11, 12), "floor": (3, 4, 2, 5), "corridor": (3, 1)}
+
+CHOICES = (
+    Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
+    Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),
+    Choice("scans and the back end's preset radar", {"office": (7,)}),
+    Choice("the back end's preset radar", BACK_END, looked_at=3),
+    Choice("the back end's preset lidar", {"intel": (None,), "csail": (None,), "orebro": (None,)}),
+)
+
+
+def helped(walks: Sequence[Walk]) -> list[str]:
+    """Sentences on which of some recordings helped to choose settings."""
+    found = []
+    for choice in CHOICES:
+        if count := choice.among(walks):
+            most = "at most " if choice.looked_at else ""
+            found.append(f"{most}{count} of {len(walks)} helped to choose {choice.settings}")
+    scenes = {scene for choice in CHOICES for scene in choice.recordings} & {walk.scene for walk in walks}
+    if not found and walks:
+        found = ["none helped to choose settings"]
+        found += [f"other walks through {', '.join(sorted(scenes))} did"] if scenes else []
+    return found

@@ -1,0 +1,75 @@
+"""Odometry frame by frame: velocities and turns of a run beside the truth, and what it claims to know of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize.evaluation.motion import turn_errors
+from radarize.pose import wrap
+from radarize.runfolder import RunFolder
+from radarize.tum import planar
+
+
+@dataclass(frozen=True)
+class Followed:
+    """One recording by one method.
+
+    Attributes:
+        velocity, true_velocity: m/s, sensor frame; covariance: claimed, m^2/s^2.
+        turns: from the frame before, rad; variance: claimed, rad^2.
+        true_yaw: rad.
+        period: s, from frame to frame.
+    """
+
+    velocity: Float[np.ndarray, "frame 2"]
+    covariance: Float[np.ndarray, "frame 2 2"]
+    true_velocity: Float[np.ndarray, "frame 2"]
+    turns: Float[np.ndarray, "frame"]
+    variance: Float[np.ndarray, "frame"]
+    true_yaw: Float[np.ndarray, "frame"]
+    period: float
+
+    @classmethod
+    def read(cls, run: Path) -> "Followed":
+        """From a run's folder.
+
+        Raises:
+            InputError: a damaged file.
+        """
+        folder = RunFolder(run)
+        scans, (times, poses) = folder.scans, folder.odometry
+        yaw, true_times = planar(poses)[:, 2], scans["truth/time"]
+        # Truth has a pose for every frame, a run one for every frame that was not lost.
+        rows = ... if len(times) == len(true_times) else np.abs(true_times[:, None] - times).argmin(axis=0)
+        return cls(
+            scans["velocity"],
+            scans["velocity_covariance"],
+            scans["truth/velocity"][:, :2],
+            wrap(np.diff(yaw, prepend=yaw[0])),
+            scans["step_covariance"][:, 2, 2],
+            planar(scans["truth/pose"])[rows, 2],
+            float(np.median(np.diff(times))),
+        )
+
+    def turned(self, seconds: float) -> tuple[Float[np.ndarray, "window"], Float[np.ndarray, "window"]]:
+        """Errors of the yaw over all windows of a span (one frame at least), rad, and the claims of their frames, added
+        up as if independent, rad^2.
+        """
+        window = max(round(seconds / self.period), 1)
+        claimed = np.concatenate([[0.0], np.cumsum(self.variance[1:])])
+        return turn_errors(self.turns, self.true_yaw, window), claimed[window:] - claimed[:-window]
+
+
+def joined(found: Sequence[Followed]) -> dict[str, np.ndarray]:
+    """Frames of several recordings, one after the other, by attribute."""
+    names = [each.name for each in fields(Followed) if each.name != "period"]
+    return {name: np.concatenate([getattr(one, name) for one in found]) for name in names}
+
+
+def turned(found: Sequence[Followed], seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """`Followed.turned` of several recordings, one after the other."""
+    errors, claims = zip(*(one.turned(seconds) for one in found), strict=True)
+    return np.concatenate(errors), np.concatenate(claims)

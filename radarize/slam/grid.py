@@ -93,8 +93,8 @@ class OccupancyGrid:
         rows, columns = map(float, shape)
         if rows * columns > _MOST:
             raise InputError(
-                f"a map of {columns * self.resolution:.0f} x {rows * self.resolution:.0f} m would be needed, expected at "
-                f"most {_MOST} cells of {self.resolution:g} m: poses or ranges are no metres"
+                f"a map of {columns * self.resolution:.0f} x {rows * self.resolution:.0f} m would be needed, expected "
+                f"at most {_MOST} cells of {self.resolution:g} m: poses or ranges are no metres"
             )
 
     def crop(self, margin: int = 0) -> "OccupancyGrid":

@@ -396,7 +396,7 @@ def bags(kind: str) -> Reader:
     return Reader(damaged(seeds), _file(f"a.{kind}"), _importing())
 
 
-# --- runs and weights ---------------------------------------------------------------------------------------------------
+# --- runs and weights -------------------------------------------------------------------------------------------------
 @functools.cache
 def _run() -> dict[str, bytes]:
     """The files of a run that knows the truth."""

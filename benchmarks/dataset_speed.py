@@ -13,9 +13,10 @@ import numpy as np
 import psutil
 
 from benchmarks.results import publish
+from radarize.jobs import perform
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
-from radarsim.dataset.local import work
+from radarsim.dataset.run import making
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task
 from radarsim.planner import plan_motion
@@ -80,12 +81,12 @@ def run(tasks: list[Task], folder: Path, workers: int) -> Run:
     """Make recordings on local processes."""
     folder.mkdir()
     begin, first, last, memory = time.perf_counter(), {}, {}, 0.0
-    for event in work(tasks, folder, workers):
-        if event.error:
-            raise SystemExit(event.error)
-        if event.motion is None:
-            last[event.task.name] = time.perf_counter(), event.frames
-            first.setdefault(event.task.name, last[event.task.name])
+    for news in perform(making(tasks, folder), workers):
+        if news.error:
+            raise SystemExit(news.error)
+        if not news.ended:
+            last[news.name] = time.perf_counter(), news.done
+            first.setdefault(news.name, last[news.name])
         memory = max(memory, *(process.memory_info().rss / 1e6 for process in _workers()))
     wall = time.perf_counter() - begin
     span = sum(last[name][0] - first[name][0] for name in first)

@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.results import publish
 from radarize.console import progress
-from radarize.evaluation.twin import Comparison, compare
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene
 from radarsim.simulate import simulate
-from radarsim.twin import make_twin
+from radarsim.twin.comparison import Comparison, compare
+from radarsim.twin.twin import make_twin
 
 #: Takes a recording's poses and the open file; returns other poses.
 Change = Callable[[np.ndarray, h5py.File], np.ndarray]

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from radarize.console import keeping, new_app, progress, run, until_interrupted, working
+from radarize.console import new_app, progress, run, until_interrupted, working
 from radarize.errors import InputError
 
 app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
@@ -77,35 +77,20 @@ def import_(
 ):
     """Make a recording from a capture of a real radar."""
     fields = {
-        "samples": samples,
-        "loops": loops,
-        "rx": _antennas(rx, "--rx"),
-        "tx": _antennas(tx, "--tx"),
-        "iq_order": iq_order,
-        "board": board,
-        "start_frequency": start_frequency,
-        "slope": slope,
-        "sample_rate": sample_rate,
-        "idle_time": idle_time,
-        "adc_start_time": adc_start_time,
-        "ramp_end_time": ramp_end_time,
-        "frame_period": frame_period,
-        "start_time": start_time,
-    }
+        "samples": samples, "loops": loops, "rx": _antennas(rx, "--rx"), "tx": _antennas(tx, "--tx"),
+        "iq_order": iq_order, "board": board, "start_frequency": start_frequency, "slope": slope,
+        "sample_rate": sample_rate, "idle_time": idle_time, "adc_start_time": adc_start_time,
+        "ramp_end_time": ramp_end_time, "frame_period": frame_period,
+    }  # fmt: skip
     overrides = {name: value for name, value in fields.items() if value is not None}
-    from radarize.importers import import_recording
+    from radarize.importers import Given, import_recording
+    from radarize.radar.presets import load_config
+    from radarize.recording import keeping
 
-    radar, cfg_text = None, ""
-    if config is not None:
-        from radarize.radar.cfg import load_config
-
-        radar, cfg_text = load_config(config)
+    radar, text = load_config(config) if config is not None else (None, "")
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency)
     with keeping(output), progress("import") as report:
-        written = import_recording(
-            source, output, config=radar, cfg_text=cfg_text, poses=poses, shape=shape, variable=variable,
-            latency=latency, overrides=overrides, progress=report,
-        )  # fmt: skip
-    _tell(written)
+        _tell(import_recording(source, output, given, progress=report))
 
 
 def _tell(written: Path) -> None:
@@ -198,7 +183,7 @@ def _sensor(config: str | None, port: str | None, baud: int, *network):
     """The sensor that the options of `capture` and `live` describe."""
     from radarize.capture.board import Network
     from radarize.capture.sensor import Sensor
-    from radarize.radar.cfg import load_config
+    from radarize.radar.presets import load_config
 
     for name, value in (("--config", config), ("--port", port)):
         if value is None:
@@ -353,15 +338,22 @@ def evaluate(
     as_json: AsJson = False,
 ):
     """Compare a run with the truth; writes metrics.json."""
-    from radarize.evaluation import comparison
-    from radarize.evaluation.evaluate import evaluate, show
+    from radarize.evaluation.evaluate import evaluate
+    from radarize.report.run import methods
+    from radarize.report.terminal import print_beside, print_metrics
+    from radarize.runfolder import RunFolder
 
     with working("evaluating"):
-        metrics = evaluate(run, reference)
-        rows = comparison.compare([run, *beside], reference) if beside else []
-    _print_json(metrics) if as_json else show(metrics)
-    if rows and not as_json:
-        comparison.show(rows)
+        folder, others = RunFolder(run), [RunFolder(other) for other in beside or ()]
+        metrics = evaluate(folder, reference)
+        compared = [(methods(other), evaluate(other, reference)) for other in others]
+        folder.write_metrics(metrics)
+    if as_json:
+        _print_json(metrics)
+        return
+    print_metrics(metrics)
+    if compared:
+        print_beside([(methods(folder), metrics), *compared])
 
 
 @app.command()
@@ -388,7 +380,8 @@ def report(
     beside: Beside = None,
 ):
     """Draw a run or a recording as one HTML page."""
-    from radarize.evaluation.report import report_recording, report_run
+    from radarize.report.recording import report_recording
+    from radarize.report.run import report_run
 
     with working("drawing"):
         written = report_run(source, output, beside or ()) if source.is_dir() else report_recording(source, output)

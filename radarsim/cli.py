@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from radarize.console import keeping, new_app, progress, run, working
+from radarize.console import new_app, progress, run, working
 from radarize.errors import InputError
 
 app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as raw int16 I/Q.")
@@ -53,7 +53,7 @@ def simulate(
     ] = "",
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth."""
-    from radarize.recording import Recording
+    from radarize.recording import Recording, keeping
     from radarsim.motion import Mounting
     from radarsim.simulate import simulate
     from radarsim.statistics import Statistics
@@ -145,10 +145,10 @@ def twin(
     seed: Annotated[int, typer.Option(min=0, help="Of speckle and noise.")] = 0,
 ):
     """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
-    from radarize.evaluation.twin_report import report_twin
-    from radarize.recording import Recording
+    from radarize.recording import Recording, keeping
     from radarsim.motion import Mounting
-    from radarsim.twin import make_twin
+    from radarsim.twin.report import report_twin
+    from radarsim.twin.twin import make_twin
 
     places = [Mounting.parse(text) if text else None for text in (origin, mounting, at)]
     with keeping(output), progress("twin") as report:

@@ -3,7 +3,18 @@
 from collections.abc import Callable
 from functools import cache, wraps
 
+import numba
 from threadpoolctl import ThreadpoolController
+
+from radarsim import llvm
+
+
+def share_with_drjit() -> None:
+    """Give Dr.Jit as many threads as Numba has here, this process's share of the cores (`radarize.jobs`)."""
+    llvm.require()
+    import drjit
+
+    drjit.set_thread_count(numba.get_num_threads())
 
 
 @cache

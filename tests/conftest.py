@@ -1,4 +1,6 @@
+import os
 import signal
+import sys
 from pathlib import Path
 
 import pytest
@@ -25,3 +27,23 @@ def one_thread():
     torch.set_num_threads(1)
     yield
     torch.set_num_threads(before)
+
+
+@pytest.fixture(scope="module")
+def cluster(request):
+    """Address of a Ray cluster: two nodes of one core each on this machine, which can import what the test can."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        patch.setenv("PYTHONPATH", os.pathsep.join([str(request.path.parent), *sys.path]))
+        yield from _two_nodes()
+
+
+def _two_nodes():
+    import ray
+    from ray.cluster_utils import Cluster
+
+    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
+    nodes.add_node(num_cpus=1)
+    yield nodes.address
+    ray.shutdown()
+    nodes.shutdown()

@@ -10,7 +10,7 @@ from radarize.points import PointClouds
 from radarize.radar.presets import PRESETS
 from tests.batches import batch, stream
 
-CONFIG = PRESETS["radarize"].model_copy(update={"loops": 8})
+CONFIG = PRESETS["radarize"].model_copy(update={"loops": 16})
 FRAMES = 12
 
 
@@ -51,7 +51,7 @@ def test_what_is_made_is_made_once(signal, adc, monkeypatch):
 
 
 def test_what_was_lost_is_told_to_the_spectrum(signal, adc):
-    valid = np.ones((3, 8, 3), bool)
+    valid = np.ones((3, 16, 3), bool)
     valid[1, 2:] = False
     found = batch(signal, adc[:3], np.arange(3), valid).spectrum
     assert torch.equal(found, signal.heatmaps.spectrum(adc[:3], valid))
@@ -61,12 +61,12 @@ def test_what_was_lost_is_told_to_the_spectrum(signal, adc):
 @pytest.mark.parametrize("size", [1, 5, FRAMES])
 def test_gaps_are_since_the_frame_before_whatever_was_lost(signal, adc, size):
     """Silent, lost, or nearly lost frames are left out; numbers go on counting them, and gaps bridge them."""
-    adc, valid = adc.copy(), np.ones((FRAMES, 8, 3), bool)
+    adc, valid = adc.copy(), np.ones((FRAMES, 16, 3), bool)
     stamps = 10.0 + np.cumsum(np.linspace(0.03, 0.06, FRAMES))
     adc[0] = 0
     valid[4:7] = False
-    valid[9].flat[round(24 * LEAST_SHARE) - 1 :] = False
-    valid[10].flat[round(24 * LEAST_SHARE) :] = False
+    valid[9].flat[round(48 * LEAST_SHARE) - 1 :] = False
+    valid[10].flat[round(48 * LEAST_SHARE) :] = False
     intake = Intake(signal)
     batches = list(stream(intake, adc, stamps, valid, size))
     used = np.array([1, 2, 3, 7, 8, 10, 11])

@@ -153,8 +153,8 @@ def test_an_interrupt_says_what_was_kept(capsys, monkeypatch, tmp_path):
 def test_import_hands_over_what_was_typed(capsys, monkeypatch, tmp_path):
     seen = {}
 
-    def record(source, output, **options):
-        seen.update(options, source=source)
+    def record(source, output, given, progress):
+        seen.update(vars(given), source=source)
         return small_recording(output)
 
     monkeypatch.setattr("radarize.importers.import_recording", record)
@@ -164,10 +164,11 @@ def test_import_hands_over_what_was_typed(capsys, monkeypatch, tmp_path):
     assert seen["overrides"] == {
         "samples": 256, "loops": 16, "rx": 1, "tx": (0, 2, 1), "iq_order": "qqii", "slope": 80e12, "frame_period": 0.1,
     }  # fmt: skip
-    assert seen["config"] is None and seen["poses"] is None
-    axes = ["--shape", "loop,virtual,sample", "--variable", "adc", "--latency", "0.03"]
+    assert seen["config"] is None and seen["poses"] is None and seen["start_time"] is None
+    axes = ["--shape", "loop,virtual,sample", "--variable", "adc", "--latency", "0.03", "--start-time", "5"]
     call(capsys, "radarize import", "a.npz", "-o", tmp_path / "a.h5", "--config", "radarize", *axes)
-    assert (seen["shape"], seen["variable"], seen["latency"]) == ("loop,virtual,sample", "adc", 0.03)
+    assert (seen["shape"], seen["variable"]) == ("loop,virtual,sample", "adc")
+    assert (seen["latency"], seen["start_time"]) == (0.03, 5.0)
     assert seen["config"] == PRESETS["radarize"] and "profileCfg" in seen["cfg_text"]
 
 
@@ -181,6 +182,19 @@ def test_info(capsys, tmp_path):
     assert found["data_sets"]["radar/time"]["unit"] == "s" and found["attributes"]["scene"] == "nowhere"
     code, out, _ = call(capsys, "radarize info", path)
     assert code == 0 and "2 frames" in out and "range_resolution" in out and "nowhere" in out
+
+
+def test_info_shows_attributes_as_they_are(capsys, tmp_path):
+    """What looks like markup, an emoji or a terminal's command is data."""
+    odd = {"[imu]": "a [bold]plate[/bold]", "closing": "[/x]", "smile": ":smile:", "red": "\x1b[31mred"}
+    path, config = tmp_path / "[b]odd[imu].h5", PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
+    with RecordingWriter(path, config, attributes=odd) as writer:
+        writer.append(np.zeros((1, *config.frame_shape), np.int16), np.zeros(1))
+    code, out, err = call(capsys, "radarize info", path)
+    assert (code, err) == (0, "")
+    for words in (path.name, "[imu]", "a [bold]plate[/bold]", "[/x]", ":smile:", "\\x1b[31mred"):
+        assert words in out
+    assert "\x1b" not in out
 
 
 def test_a_full_disk_is_one_sentence(tmp_path):

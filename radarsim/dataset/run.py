@@ -3,17 +3,23 @@
 import fcntl
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
+
+import psutil
 
 from radarize import __version__
 from radarize.errors import InputError
+from radarize.jobs import Job, Report, perform
 from radarize.replacing import replacing
 from radarsim.dataset.specification import Specification
-from radarsim.dataset.task import Event, Stale, Task
+from radarsim.dataset.task import Stale, Task
 
+#: A worker's memory at its peak, bytes (benchmarks/dataset_speed.py measures it).
+MEMORY = 1.5e9
 #: The expanded specification beside the recordings: parameters of each, and the members of every split.
 INDEX = "dataset.json"
 
@@ -71,21 +77,22 @@ def make(
         total = sum(task.frames for task in tasks)
         done = {task.name: task.frames for task in finished}
         progress(sum(done.values()), total)
+        frames = {task.name: task.frames for task in todo}
         try:
-            for event in _crew(todo, folder, workers, ray):
-                name = event.task.name
-                if event.error is not None:
-                    outcome.failed[name] = event.error
+            for news in perform(making(todo, folder), workers or default_workers(), ray):
+                name = news.name
+                if news.error is not None:
+                    outcome.failed[name] = news.error
                     done.pop(name, None)
-                    if "no space left" in event.error:
+                    if "no space left" in news.error:
                         raise InputError(f"no space left on the device; {_finished(outcome, tasks, folder)}")
-                    say(f"failed: {event.error}")
-                elif event.motion is not None:
+                    say(f"failed: {news.error}")
+                elif news.ended:
                     outcome.made.append(name)
-                    done[name] = event.task.frames
-                    say(f"{name}: {event.motion}")
+                    done[name] = frames[name]
+                    say(f"{name}: {news.result}")
                 else:
-                    done[name] = event.frames
+                    done[name] = int(news.done)
                 progress(sum(done.values()), total)
         except KeyboardInterrupt:
             raise InputError(f"stopped; {_finished(outcome, tasks, folder)}") from None
@@ -95,16 +102,18 @@ def make(
     return outcome
 
 
-def _crew(todo: list[Task], folder: Path, workers: int | None, ray: str | None) -> Iterator[Event]:
-    if not todo:
-        return iter(())
-    if ray is not None:
-        from radarsim.dataset.cluster import work
+def default_workers() -> int:
+    """One per core, as far as memory goes: processes share no locks, so two of one thread outrun one of two."""
+    return max(1, min(len(os.sched_getaffinity(0)), int(psutil.virtual_memory().available / MEMORY)))
 
-        return work(todo, folder, ray)
-    from radarsim.dataset.local import work
 
-    return work(todo, folder, workers)
+def making(tasks: Iterable[Task], folder: Path) -> dict[str, Job]:
+    """Jobs that make recordings, report frames, and end with statistics of the motion, one line."""
+    return {task.name: partial(_make, task, folder) for task in tasks}
+
+
+def _make(task: Task, folder: Path, report: Report) -> str:
+    return task.make(folder, lambda done, _: report(done))
 
 
 @contextmanager

@@ -1,7 +1,6 @@
 """One recording of a data set: what it must be, whether it is there already, and how it is made."""
 
 import json
-import os
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
@@ -110,13 +109,12 @@ class Task:
                 raise Stale(f"{self.name} has {key} {_short(made.get(key))}, now {_short(wanted)}")
         return complete and frames == self.frames
 
-    def make(self, folder: Path, threads: int | None = None, progress: Callable[[int, int], None] | None = None) -> str:
+    def make(self, folder: Path, progress: Callable[[int, int], None] | None = None) -> str:
         """Simulate the recording, or what it lacks of sensors beside the radar; it appears under its name when it is
         whole.
 
         Args:
             folder: where.
-            threads: bound on those of the libraries that simulate; the first call of a process decides.
             progress: called with (frames done, frames in all).
 
         Returns:
@@ -125,14 +123,14 @@ class Task:
         Raises:
             InputError: with the task's name.
         """
-        if threads:
-            _use_threads(threads)
         from radarize.features.keeping import keep_maps
         from radarsim.accompany import accompany
         from radarsim.scene.scene import Scene
         from radarsim.simulate import simulate
         from radarsim.statistics import Statistics
+        from radarsim.threads import share_with_drjit
 
+        share_with_drjit()
         final = self.path(folder)
         late = self._late(folder)
         path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
@@ -200,23 +198,6 @@ class Task:
         return self.building if self.floor is None else f"{self.building}_{self.floor}"
 
 
-@dataclass(frozen=True)
-class Event:
-    """What a worker reports.
-
-    Attributes:
-        task: which it works on.
-        frames: made so far.
-        motion: its statistics, one line, once the recording is finished.
-        error: why it failed, one sentence.
-    """
-
-    task: Task
-    frames: int = 0
-    motion: str | None = None
-    error: str | None = None
-
-
 def _can_follow(made: list[str], wanted: list[str]) -> bool:
     """Whether a recording with some sensors can be given the others without the radar."""
     from radarsim.sensors.suite import SENSORS
@@ -234,14 +215,3 @@ def _digest(path: Path) -> str:
 def _short(value: object) -> str:
     text = json.dumps(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
-
-
-def _use_threads(count: int) -> None:
-    for name in ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = str(count)
-    from radarsim import llvm
-
-    llvm.require()
-    import drjit
-
-    drjit.set_thread_count(count)

@@ -24,7 +24,7 @@ class FakeTask(Task):
 
     trouble: str = ""
 
-    def make(self, folder: Path, threads=None, progress=None) -> str:
+    def make(self, folder: Path, progress=None) -> str:
         if self.trouble == "fails":
             raise InputError(f"{self.name}: no room to move")
         if self.trouble == "breaks":

@@ -10,10 +10,10 @@ import pytest
 from fakes import FakeSpecification, fake
 
 from radarize.errors import InputError
+from radarize.jobs import News
 from radarize.recording import Recording
 from radarsim.dataset import run
 from radarsim.dataset.run import make
-from radarsim.dataset.task import Event
 
 
 def made(folder: Path) -> dict[str, bytes]:
@@ -87,12 +87,12 @@ def test_a_full_disk_ends_the_run(tmp_path):
 
 
 def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
-    def interrupted(todo, folder, workers, ray):
-        yield Event(todo[0], 4, motion="1 m")
-        (folder / "b.h5.part").touch()
+    def interrupted(jobs, workers, ray):
+        yield News(next(iter(jobs)), ended=True, result="1 m")
+        (tmp_path / "b.h5.part").touch()
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(run, "_crew", interrupted)
+    monkeypatch.setattr(run, "perform", interrupted)
     with pytest.raises(InputError, match="stopped; 1 of 2 recordings are finished in .*; the same command goes on"):
         make(FakeSpecification(fake("a"), fake("b")), tmp_path, say=lambda line: None)
     assert not made(tmp_path)

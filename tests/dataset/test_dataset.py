@@ -1,6 +1,5 @@
 """Real recordings of a data set: killed and resumed, on local processes and on a Ray cluster, the same bytes."""
 
-import os
 import signal
 import subprocess
 import sys
@@ -138,26 +137,6 @@ def test_killed_and_resumed(specification, undisturbed, tmp_path):
     assert (tmp_path / "office_cart_00.h5").stat().st_mtime_ns == stamp
     found = contents(tmp_path)
     assert found.pop("dataset.json") and found == undisturbed
-
-
-@pytest.fixture(scope="module")
-def cluster():
-    """Two nodes of one core each on this machine, which can import what this process can."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-        patch.setenv("PYTHONPATH", os.pathsep.join([str(Path(__file__).parent), *sys.path]))
-        yield from _two_nodes()
-
-
-def _two_nodes():
-    import ray
-    from ray.cluster_utils import Cluster
-
-    nodes = Cluster(initialize_head=True, head_node_args={"num_cpus": 1})
-    nodes.add_node(num_cpus=1)
-    yield nodes.address
-    ray.shutdown()
-    nodes.shutdown()
 
 
 def test_a_ray_cluster_makes_the_same_bytes(cluster, specification, undisturbed, tmp_path):

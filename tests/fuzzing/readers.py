@@ -23,20 +23,20 @@ from scipy.io import savemat
 import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
 from radarize.contents import contents
 from radarize.errors import InputError
-from radarize.evaluation.comparison import methods
+from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.evaluate import evaluate
 from radarize.features.grid import Grid
-from radarize.importers import import_recording
+from radarize.importers import Given, import_recording
 from radarize.log import Log
 from radarize.methods.radarize.motion import RotationNet
 from radarize.nets.weights import Header, build, save
 from radarize.nets.weights import load as load_weights
-from radarize.radar.cfg import load_config, write_cfg
+from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import FrameAssembler, decode, encode, packets
+from radarize.radar.dca1000 import FrameAssembler, decode, encode
 from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings, read_packet_settings
 from radarize.radar.limits import check_limits
-from radarize.radar.presets import PRESETS
+from radarize.radar.presets import PRESETS, load_config
 from radarize.recording import Product, Recording, RecordingWriter, Stream
 from radarize.runfolder import RunFolder
 from radarize.runfolder.reader import SHAPES
@@ -46,6 +46,7 @@ from tests.fuzzing.damage import damaged, misspelled
 from tests.fuzzing.hdf5 import RECORDING, altered, edits
 from tests.importers.ros import write_published
 from tests.importers.test_import_pcap import pcap, udp
+from tests.packets import packets
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 #: A reader may take so much processor time (s), and memory (bytes): buffers of a fixed size, and so many times the
@@ -134,7 +135,7 @@ def _importing(**more) -> Callable[[Path], None]:
     """Imports a file, and reads what came of it."""
 
     def read(path: Path) -> None:
-        use(import_recording(path, path.with_name("out.h5"), **({"config": CONFIG} | more)))
+        use(import_recording(path, path.with_name("out.h5"), Given(**({"config": CONFIG} | more))))
 
     return read
 
@@ -402,7 +403,8 @@ def _run() -> dict[str, bytes]:
     """The files of a run that knows the truth."""
     with tempfile.TemporaryDirectory() as name:
         folder = write_run(Path(name) / "RUN", walked=2.0)
-        evaluate(folder)
+        run = RunFolder(folder)
+        run.write_metrics(evaluate(run))
         return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
@@ -410,7 +412,7 @@ def use_run(folder: Path) -> None:
     """Read all of a run."""
     Log.read(folder)
     run = RunFolder(folder)
-    methods(run)
+    BlindSpans.of(run)
     for part in ("facts", "methods", "metrics", "trajectory", "odometry", "reference", "map"):
         getattr(run, part)
     if run.map is not None:

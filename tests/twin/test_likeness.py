@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.evaluation.likeness import (
+from radarsim.twin.likeness import (
     DEPTH,
     PATCH,
     SCALES,

@@ -15,13 +15,13 @@ import torch
 from jaxtyping import Float, Int
 
 from radarize.errors import InputError
-from radarize.evaluation.likeness import correlation, foreground, frechet_distance, patch_statistics, similarity
 from radarize.features.maps import MapMaker
 from radarize.mapping.scans import ScanConfig, make_scans
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.config import RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
 from radarize.recording import Recording
+from radarsim.twin.likeness import correlation, foreground, frechet_distance, patch_statistics, similarity
 
 #: What is compared of every frame, with unit and meaning. Those of maps end in the map's name.
 FIGURES = {

@@ -14,16 +14,15 @@ from scipy.spatial.transform import Rotation
 from benchmarks import transfer
 from benchmarks.twin import altered, shaken
 from radarize.errors import InputError
-from radarize.evaluation.twin import compare
-from radarize.evaluation.twin_report import report_twin
-from radarize.radar.cfg import load_config
-from radarize.radar.presets import PRESETS
+from radarize.radar.presets import PRESETS, load_config
 from radarize.recording import Recording, RecordingWriter
 from radarsim.motion import Mounting
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene
 from radarsim.simulate import simulate
-from radarsim.twin import make_twin
+from radarsim.twin.comparison import compare
+from radarsim.twin.report import report_twin
+from radarsim.twin.twin import make_twin
 
 
 def room(name: str, x: float, y: float, things: list[dict]) -> Scene:

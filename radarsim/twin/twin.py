@@ -1,7 +1,7 @@
 """The twin of a recording: what the simulator makes of the same walk, in a model of the same place.
 
 Frame by frame the twin has the recording's stamps, lost chirps, radar configuration and poses; what it has of its own
-is the world: surfaces of the scene in place of the real ones, and other speckle and noise. `radarize.evaluation.twin`
+is the world: surfaces of the scene in place of the real ones, and other speckle and noise. `radarsim.twin.comparison`
 tells how alike the two are.
 """
 

@@ -1,0 +1,40 @@
+"""A job, what one hears of it, and how it is tried."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from radarize.errors import InputError
+
+#: Takes how far a job is, in units of its own.
+Report = Callable[[float], None]
+Job = Callable[[Report], object]
+
+
+@dataclass(frozen=True)
+class News:
+    """What is heard of a job.
+
+    Attributes:
+        name: of the job.
+        done: what it reported last.
+        ended: no more is heard of it.
+        result: of a job that ended well.
+        error: why it failed, one sentence.
+    """
+
+    name: str
+    done: float = 0.0
+    ended: bool = False
+    result: object = None
+    error: str | None = None
+
+
+def attempt(name: str, job: Job, report: Report) -> News:
+    """Do a job here; a failure is news, too."""
+    try:
+        return News(name, ended=True, result=job(report))
+    except InputError as error:
+        return News(name, ended=True, error=str(error))
+    except Exception as error:  # one broken job must not end the others
+        line = (str(error).strip().splitlines() or [""])[0]
+        return News(name, ended=True, error=f"{name}: internal error, {type(error).__name__}: {line}")

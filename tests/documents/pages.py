@@ -1,0 +1,59 @@
+"""What README and docs tell a reader to type."""
+
+import re
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+#: In the order in which one reads them.
+PAGES = ("README.md", "docs/simulating.md", "docs/radar.md", "docs/learning.md", "docs/comparing.md", "docs/physics.md")
+_FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
+_OWN = re.compile(r"`((?:radarize|radarsim|torchrun|make|python) [^`]+)`")
+#: First line of the block that is no command: the tree of the house.
+_TREE = "radarize/ "
+
+
+@dataclass(frozen=True)
+class Command:
+    """A line to type, or a script.
+
+    Attributes:
+        text: the line, without its comment; of a script all of it.
+        script: it is Python.
+    """
+
+    text: str
+    script: bool = False
+
+
+def commands(page: str) -> list[Command]:
+    """Commands of a page: those of its code blocks in order, then those within sentences that no block has."""
+    text = (ROOT / page).read_text()
+    found = [command for block in _FENCE.finditer(text) for command in _of(block)]
+    known = {command.text for command in found}
+    sentences = [Command(" ".join(words.split())) for words in _OWN.findall(_FENCE.sub("", text))]
+    return found + [command for command in dict.fromkeys(sentences) if command.text not in known]
+
+
+def _of(block: re.Match) -> Iterator[Command]:
+    indent, language, body = block.groups()
+    if language == "python":
+        yield Command("\n".join(line.removeprefix(indent) for line in body.splitlines()), script=True)
+    elif language in ("", "sh") and not body.startswith(_TREE):
+        for line in body.splitlines():
+            for part in re.split(r"\s+#\s", line)[0].split("&&"):
+                if part.strip():
+                    yield from _expanded(part.strip())
+
+
+def _expanded(line: str) -> Iterator[Command]:
+    """`make demo` as what it runs."""
+    if line != "make demo":
+        yield Command(line)
+        return
+    recipe = subprocess.run(["make", "-n", "-C", ROOT, "demo"], capture_output=True, text=True, check=True).stdout
+    for line in recipe.splitlines():
+        if line.startswith(".venv/bin/"):
+            yield Command(line.removeprefix(".venv/bin/"))

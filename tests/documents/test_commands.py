@@ -1,0 +1,200 @@
+"""Every command of README and docs, in order, as a reader types them, where no kernel has been compiled yet.
+
+What is typed is what the pages say (`pages.py`), but for `TYPED_INSTEAD`: everything shorter, and hardware virtual.
+Each page begins with what README left behind. A command that is new on a page runs here by itself, or fails.
+"""
+
+import json
+import os
+import re
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from given import DATASETS, GIVEN, specification
+from pages import PAGES, ROOT, Command, commands
+
+from tests.virtual import free_ports
+
+WALK = "--duration 1.5"
+#: What is typed instead: pattern, replacement; in this order, each on what the one before left.
+TYPED_INSTEAD = (
+    # Shorter.
+    (r"--duration \d+", WALK),
+    (r"^(radarsim simulate (?!.*--(?:duration|waypoints|trajectory|engine)).*)$", rf"\1 {WALK}"),
+    (r"^(radarsim simulate .*--engine sionna)$", r"\1 --duration 0.2"),
+    (r"^radarsim dataset (\S+)", r"radarsim dataset short/\1.yaml"),
+    (r"--epochs \d+", "--epochs 1"),
+    (r"^((?:radarize|torchrun .* -m radarize\.cli) train (?!.*--epochs).*)$", r"\1 --epochs 1"),
+    (r"--width 64", "--width 8"),
+    (r"--nproc-per-node 4", "--nproc-per-node 1"),
+    (r"^(radarize (?:capture|live) .*)$", r"\1 --duration 0.5"),
+    # A cluster: tests/jobs and tests/dataset have one.
+    (r" --ray auto", ""),
+    # The virtual radar in place of a real one, on ports that are free, its recording left alone.
+    (r"--port \S+( --host \S+ --dca \S+)?", "--port {tty} --host 127.0.0.1 --dca 127.0.0.2 {ports}"),
+    (r"^(radarize (?:capture|live) .*)-o walk\.h5", r"\1-o captured.h5"),
+    (r"^(radarize live .*)$", r"\1 --address 127.0.0.1:0"),
+    (r"^(radarsim emulate \S+) --port-link \S+", r"\1 --port-link {tty} {ports} --loop"),
+    # A window needs a screen.
+    (r"^(radarize view .*)$", r"\1 --save view.rrd"),
+    # Places of the readers' own: where the room has none.
+    (r"--origin '[^']*'", "--origin '0 0 0 0 0 0'"),
+    (r"--at '[^']*'", "--at '9 6 1 0 0 0'"),
+)
+#: What is not typed at all, and why.
+NOT_TYPED = {
+    r"make test": "this is part of it",
+    r"sudo .*": "changes the machine's network and groups",
+    r"building: .*": "a line of a scene file, as scenes/buildings have it",
+    r"scene = Scene\.of.*": "Python; tests/scene/test_buildings.py has it",
+    r"radarsim doctor": "compiles what the others compile, too; tests/test_setup.py runs it",
+    r"python -m benchmarks\..*": "draws the page's own pictures, by the checkout's benchmarks",
+}
+
+
+def typed(command: str) -> str:
+    for pattern, replacement in TYPED_INSTEAD:
+        command = re.sub(pattern, replacement, command)
+    return command
+
+
+def reason_not_to(command: Command) -> str | None:
+    return next((why for pattern, why in NOT_TYPED.items() if re.fullmatch(pattern, command.text)), None)
+
+
+class Reader:
+    """Somebody who types commands in a folder.
+
+    Args:
+        folder: where.
+        caches: folder of compiled kernels.
+    """
+
+    def __init__(self, folder: Path, caches: Path):
+        self.folder, self.log = folder, folder / "log.txt"
+        self.environment = os.environ | {"NUMBA_CACHE_DIR": str(caches), "PYTHONPATH": str(ROOT)}
+        shell = [sys.executable, Path(__file__).parent / "shell.py"]
+        self.shell = subprocess.Popen(
+            shell, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=self.environment
+        )
+        self.ports, self.radar = free_ports(), None
+        self.took: dict[str, float] = {}
+
+    def type(self, command: Command) -> str | None:
+        """Run a command; what it said if it failed."""
+        before = self.log.stat().st_size if self.log.exists() else 0
+        if command.script:
+            (self.folder / "script.py").write_text(command.text)
+            words = ["python", "script.py"]
+        else:
+            ports = "--command-port {} --data-port {}".format(*self.ports)
+            line = typed(command.text).replace("{tty}", str(self.folder / "tty")).replace("{ports}", ports)
+            words = shlex.split(line)
+            if words[0] not in ("radarize", "radarsim", "torchrun"):
+                return f"nobody knows how to run it; {Path(__file__).name} has tables for that"
+            if words[1] == "emulate" or "--port" in words:
+                self.switch_on(words if words[1] == "emulate" else None)
+            if words[1] == "emulate":
+                return None
+            if all(re.fullmatch("[a-z]+", word) for word in words) and "list" not in words:
+                words.append("--help")  # only mentioned
+            for name in words:
+                self.prepare(name)
+        order = {"words": words, "folder": str(self.folder), "log": str(self.log)}
+        print(json.dumps(order), file=self.shell.stdin, flush=True)
+        code, used = self.shell.stdout.readline().split()
+        code, self.took[" ".join(words)] = int(code), float(used)
+        missing = [word for option, word in zip(words, words[1:], strict=False) if option in ("-o", "--out")]
+        missing = [name for name in missing if not [*self.folder.glob(f"{name}*")]]
+        if code == 0 and not missing:
+            return None
+        said = self.log.read_bytes()[before:].decode(errors="replace")[-1500:]
+        return f"{' '.join(words)}\nexit code {code}, not written: {missing}\n{said}"
+
+    def prepare(self, name: str) -> None:
+        """Have a short specification where a data set is asked for, and a file that the pages take as given."""
+        path = self.folder / name
+        if name.startswith("short/") and not path.exists():
+            specification(name.removeprefix("short/").removesuffix(".yaml"), path)
+        for given in ("adc_data.bin",) if name == "profile.cfg" else (name,):
+            if given in GIVEN and not (self.folder / given).exists():
+                GIVEN[given](self.folder / given)
+
+    def switch_on(self, words: list[str] | None) -> None:
+        """The virtual radar, with the words of a page if they come first."""
+        if self.radar:
+            return
+        default = typed("radarsim emulate walk.h5 --port-link tty")
+        ports = "--command-port {} --data-port {}".format(*self.ports)
+        words = words or shlex.split(default.replace("{tty}", str(self.folder / "tty")).replace("{ports}", ports))
+        command = [sys.executable, "-m", "radarsim.cli", *words[1:]]
+        self.radar = subprocess.Popen(
+            command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=self.environment
+        )
+        assert self.radar.stdout.readline().startswith("serial port")
+
+    def leave(self) -> None:
+        self.shell.communicate()
+        assert self.shell.returncode == 0
+        if self.radar:
+            self.radar.send_signal(signal.SIGINT)
+            self.radar.communicate(timeout=60)
+            assert self.radar.returncode == 0
+
+
+@pytest.fixture(scope="module")
+def caches(tmp_path_factory) -> Path:
+    """Of compiled kernels: empty, as in a fresh install."""
+    return tmp_path_factory.mktemp("caches")
+
+
+@pytest.fixture(scope="module")
+def after_readme(tmp_path_factory, caches) -> tuple[Path, list[str]]:
+    """Folder in which README's commands were typed, and which failed."""
+    folder = tmp_path_factory.mktemp("readme")
+    return folder, read(PAGES[0], folder, caches)
+
+
+def read(page: str, folder: Path, caches: Path) -> list[str]:
+    """Type all commands of a page; returns failures."""
+    reader = Reader(folder, caches)
+    try:
+        failures = [reader.type(command) for command in commands(page) if not reason_not_to(command)]
+    finally:
+        reader.leave()
+        print("processor time", *(f"{s:6.1f} s  {words}" for words, s in reader.took.items()), sep="\n")
+    return [failure for failure in failures if failure]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_every_command_of_a_page_works(page, after_readme, caches, tmp_path):
+    folder, failures = after_readme
+    if page != PAGES[0]:
+        copy = tmp_path / "folder"
+        shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("tty", "log.txt", "real.h5"))
+        failures = read(page, copy, caches)
+    assert not failures, "\n\n".join(failures)
+
+
+def test_no_page_is_forgotten_and_no_exception_outlives_its_command():
+    assert {path.relative_to(ROOT).as_posix() for path in (ROOT / "docs").glob("*.md")} | {"README.md"} == set(PAGES)
+    everything = [command.text for page in PAGES for command in commands(page)]
+    for pattern in NOT_TYPED:
+        assert any(re.fullmatch(pattern, text) for text in everything), f"no page has {pattern} any more"
+    for name in DATASETS:
+        assert any(text.startswith(f"radarsim dataset {name} ") for text in everything), f"no page makes {name}"
+
+
+def test_a_command_that_nobody_knows_fails(tmp_path):
+    reader = Reader(tmp_path, tmp_path)
+    try:
+        assert "nobody knows how" in reader.type(Command("ros2 run radar"))
+        assert "exit code 2" in reader.type(Command("radarize info missing.h5"))
+        assert "exit code 2" in reader.type(Command("radarize frobnicate"))
+    finally:
+        reader.leave()

@@ -36,6 +36,14 @@ INPUTS = {
     "ROS 1 bag": 2_000,
     "ROS 2 mcap": 2_000,
     "ROS 2 db3": 2_000,
+    "run: scans.h5": 6_000,
+    "run: run.json": 3_000,
+    "run: metrics.json": 2_000,
+    "run: map.yaml": 4_000,
+    "run: map.pgm": 4_000,
+    "run: trajectory.tum": 3_000,
+    "scans .npz": 6_000,
+    "weights": 6_000,
 }
 #: Inputs of one seed: hypothesis remembers what it has tried.
 _BATCH = 500

@@ -1,6 +1,7 @@
 """Plain files: what is read, what is written, and what is refused."""
 
 import json
+import tracemalloc
 
 import h5py
 import numpy as np
@@ -86,6 +87,17 @@ def test_bad_files_are_named(tmp_path, changes, sentence):
     scans, odometry = files(tmp_path, **changes)
     with pytest.raises(InputError, match=sentence):
         Log.read(scans, odometry)
+
+
+def test_a_log_that_unpacks_to_a_thousand_times_its_size_is_refused(tmp_path):
+    np.savez_compressed(tmp_path / "a.npz", ranges=np.zeros((5000, 5000)))
+    assert (tmp_path / "a.npz").stat().st_size < 200_000
+    tracemalloc.start()
+    with pytest.raises(InputError, match="declares 25000000 numbers, but has"):
+        Log.read(tmp_path / "a.npz")
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 4e6
 
 
 def test_settings_from_a_file(tmp_path):

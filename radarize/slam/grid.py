@@ -18,6 +18,8 @@ from radarize.errors import InputError
 from radarize.slam.config import GridConfig
 
 _MARGIN = 32  # cells added around whatever a grid has to hold when it grows
+#: Cells of a map: 2 GB.
+_MOST = 1 << 29
 
 
 class Evidence(NamedTuple):
@@ -84,13 +86,23 @@ class OccupancyGrid:
         if self.probability.size == 1:  # an empty grid starts where its first rays are
             self.origin = (first[::-1] - _MARGIN) * self.resolution + self.origin
             shape = last - first + 1 + 2 * _MARGIN
+            self._check(shape)
             self.probability = np.zeros(tuple(shape), np.float32)
             return
         before = np.where(first < 0, -first + _MARGIN, 0)
         after = np.where(last >= (rows, columns), last - (rows - 1, columns - 1) + _MARGIN, 0)
         if before.any() or after.any():
+            self._check(before + (rows, columns) + after)
             self.probability = np.pad(self.probability, np.stack([before, after], axis=1))
             self.origin = self.origin - before[::-1] * self.resolution
+
+    def _check(self, shape: np.ndarray) -> None:
+        rows, columns = map(float, shape)
+        if rows * columns > _MOST:
+            raise InputError(
+                f"a map of {columns * self.resolution:.0f} x {rows * self.resolution:.0f} m would be needed, expected "
+                f"at most {_MOST} cells of {self.resolution:g} m: poses or ranges are no metres"
+            )
 
     def crop(self, margin: int = 0) -> "OccupancyGrid":
         """The smallest grid with all known cells, and `margin` unknown ones around them."""

@@ -71,11 +71,11 @@ def write_map(folder: Path, points) -> None:
     )
 
 
-def write_run(folder: Path, seed: int = 0, truth: bool = True) -> Path:
+def write_run(folder: Path, seed: int = 0, truth: bool = True, walked: float = 20.0) -> Path:
     """Write a whole run folder: a good trajectory, a drifting odometry, and the truth if asked for."""
     rng = np.random.default_rng(seed)
     folder.mkdir(parents=True, exist_ok=True)
-    times, positions, yaw = walk()
+    times, positions, yaw = walk(duration=walked)
     step = np.gradient(positions, times, axis=0)
     c, s = np.cos(yaw), np.sin(yaw)
     velocity = np.column_stack([c * step[:, 0] + s * step[:, 1], -s * step[:, 0] + c * step[:, 1]])
@@ -95,7 +95,7 @@ def write_run(folder: Path, seed: int = 0, truth: bool = True) -> Path:
     ends = positions[:, None] + np.where(hit, ranges, 0)[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], -1)
     write_map(folder, to_estimate(ends[hit]))
 
-    frames = np.array([20, 110, 200])
+    frames = np.array([20, 110, 200]) * len(times) // 300
     map_ranges, speeds = np.arange(96) * 0.0446, np.linspace(-1.9, 1.8, 32)
     azimuths = np.radians(np.arange(-60.0, 61.0))
     with h5py.File(folder / "scans.h5", "w") as file:

@@ -1,6 +1,7 @@
-"""Recordings with hostile content in sound HDF5: what no checksum finds, declared sizes above all."""
+"""Recordings and runs with hostile content in sound HDF5: what no checksum finds, declared sizes above all."""
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import h5py
@@ -8,7 +9,8 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-_NAMES = ("radar/adc", "radar/time", "radar/valid", "truth/pose", "imu/time", "imu/gyroscope", "truth/plan")
+#: Data sets of a recording.
+RECORDING = ("radar/adc", "radar/time", "radar/valid", "truth/pose", "imu/time", "imu/gyroscope", "truth/plan")
 _HUGE = st.sampled_from((0, 1, 2, 3, 1000, 2**20, 2**31, 2**40, 2**62))
 _KINDS = ("i2", "f8", "f4", "?", "u1", "i8", "c8", "S3", "S0", "O", "V7", "compound", ">i2", "f2")
 _VALUE = st.one_of(
@@ -19,30 +21,28 @@ _VALUE = st.one_of(
     st.lists(st.floats(), max_size=4).map(np.array),
     st.just(h5py.Empty("f8")),
 )
-_EDIT = st.one_of(
-    st.tuples(st.just("drop"), st.sampled_from((*_NAMES, "radar", "truth")), st.none()),
-    st.tuples(
-        st.just("declare"),
-        st.sampled_from(_NAMES),
-        st.tuples(st.sampled_from(_KINDS), st.lists(_HUGE, max_size=6), st.booleans(), st.booleans()),
-    ),
-    st.tuples(st.just("resize"), st.sampled_from(_NAMES), _HUGE),
-    st.tuples(st.just("link"), st.sampled_from(_NAMES), st.sampled_from(("dangling", "external", "loop", "group"))),
-    st.tuples(st.just("write"), st.sampled_from(_NAMES), st.floats(-1e300, 1e300) | st.just(np.nan)),
-    st.tuples(
-        st.just("note"),
-        st.tuples(
-            st.sampled_from((*_NAMES, "radar", "/")), st.sampled_from(("config", "cfg", "clock", "unit", "about", "w"))
-        ),
-        _VALUE,
-    ),
-)
-#: Edits of a recording, for `altered`.
-EDITS: SearchStrategy[list[tuple]] = st.lists(_EDIT, min_size=1, max_size=4)
+
+
+def edits(names: Sequence[str]) -> SearchStrategy[list[tuple]]:
+    """Edits of a file with data sets of such names, for `altered`."""
+    name = st.sampled_from(tuple(names))
+    groups = st.sampled_from((*names, *sorted({path.split("/")[0] for path in names if "/" in path})))
+    declared = st.tuples(st.sampled_from(_KINDS), st.lists(_HUGE, max_size=6), st.booleans(), st.booleans())
+    links = st.sampled_from(("dangling", "external", "loop", "group", "virtual", "elsewhere"))
+    attributes = st.sampled_from(("config", "cfg", "clock", "unit", "about", "w"))
+    edit = st.one_of(
+        st.tuples(st.just("drop"), groups, st.none()),
+        st.tuples(st.just("declare"), name, declared),
+        st.tuples(st.just("resize"), name, _HUGE),
+        st.tuples(st.just("link"), name, links),
+        st.tuples(st.just("write"), name, st.floats(-1e300, 1e300) | st.just(np.nan)),
+        st.tuples(st.just("note"), st.tuples(st.one_of(groups, st.just("/")), attributes), _VALUE),
+    )
+    return st.lists(edit, min_size=1, max_size=4)
 
 
 def altered(seed: bytes, edits: list[tuple], path: Path) -> None:
-    """Write a recording with edits; those that HDF5 itself refuses are left out."""
+    """Write a file with edits; those that HDF5 itself refuses are left out."""
     path.write_bytes(seed)
     for edit in edits:
         try:
@@ -74,6 +74,12 @@ def _alter(file: h5py.File, kind: str, name, value) -> None:
     if kind == "link":
         if value == "group":
             file.create_group(name)
+        elif value == "virtual":
+            layout = h5py.VirtualLayout((2**40,), "f8")
+            layout[:8] = h5py.VirtualSource("/dev/zero", "adc", (8,))
+            file.create_virtual_dataset(name, layout)
+        elif value == "elsewhere":
+            file.create_dataset(name, (2**30,), "f8", external=[("/dev/zero", 0, 2**33)])
         else:
             file[name] = {
                 "dangling": h5py.SoftLink("/nowhere"),

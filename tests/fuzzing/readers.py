@@ -23,7 +23,14 @@ from scipy.io import savemat
 import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
 from radarize.contents import contents
 from radarize.errors import InputError
+from radarize.evaluation.blindness import BlindSpans
+from radarize.evaluation.evaluate import evaluate
+from radarize.features.grid import Grid
 from radarize.importers import Given, import_recording
+from radarize.log import Log
+from radarize.methods.radarize.motion import RotationNet
+from radarize.nets.weights import Header, build, save
+from radarize.nets.weights import load as load_weights
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import FrameAssembler, decode, encode
@@ -31,9 +38,12 @@ from radarize.radar.dca1000_commands import Command, Reply, Request, Status, pac
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import PRESETS, load_config
 from radarize.recording import Product, Recording, RecordingWriter, Stream
+from radarize.runfolder import RunFolder
+from radarize.runfolder.reader import SHAPES
 from radarize.tum import read_tum
+from tests.evaluation.fake_run import write_run
 from tests.fuzzing.damage import damaged, misspelled
-from tests.fuzzing.hdf5 import EDITS, altered
+from tests.fuzzing.hdf5 import RECORDING, altered, edits
 from tests.importers.ros import write_published
 from tests.importers.test_import_pcap import pcap, udp
 from tests.packets import packets
@@ -368,7 +378,7 @@ def recording() -> Reader:
             altered(seeds[0], what, path)
         return path
 
-    inputs = st.one_of(damaged(seeds), EDITS)
+    inputs = st.one_of(damaged(seeds), edits(RECORDING))
     return Reader(inputs, place, use, lambda what: len(what if isinstance(what, bytes) else seeds[0]))
 
 
@@ -387,6 +397,93 @@ def bags(kind: str) -> Reader:
     return Reader(damaged(seeds), _file(f"a.{kind}"), _importing())
 
 
+# --- runs and weights -------------------------------------------------------------------------------------------------
+@functools.cache
+def _run() -> dict[str, bytes]:
+    """The files of a run that knows the truth."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = write_run(Path(name) / "RUN", walked=2.0)
+        run = RunFolder(folder)
+        run.write_metrics(evaluate(run))
+        return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+def use_run(folder: Path) -> None:
+    """Read all of a run."""
+    Log.read(folder)
+    run = RunFolder(folder)
+    BlindSpans.of(run)
+    for part in ("facts", "methods", "metrics", "trajectory", "odometry", "reference", "map"):
+        getattr(run, part)
+    if run.map is not None:
+        run.map.centers(run.map.occupied)
+    for name in run.scans:
+        _ = run.scans[name]
+
+
+def run_file(name: str, inputs: SearchStrategy) -> Reader:
+    """A run in which one file is damaged."""
+
+    def place(data: bytes, folder: Path) -> Path:
+        for other, content in _run().items():
+            (folder / other).write_bytes(content)
+        (folder / name).write_bytes(data)
+        return folder
+
+    return Reader(inputs, place, use_run, lambda data: len(data) + sum(map(len, _run().values())))
+
+
+def run_scans() -> Reader:
+    """A run's HDF5: bytes damaged, or sound HDF5 with other content."""
+    seed = _run()["scans.h5"]
+    damages = run_file("scans.h5", st.one_of(damaged([seed]), edits(SHAPES)))
+
+    def place(what: bytes | list[tuple], folder: Path) -> Path:
+        damages.place(what if isinstance(what, bytes) else seed, folder)
+        if not isinstance(what, bytes):
+            altered(seed, what, folder / "scans.h5")
+        return folder
+
+    return Reader(damages.inputs, place, use_run, lambda what: len(seed) + 2 * len(what))
+
+
+def log() -> Reader:
+    """Scans of any sensor in an npz."""
+    fields = {"ranges": np.ones((6, 40)), "angle_min": -1.0, "angle_increment": 0.05, "range_max": 10.0}
+    with tempfile.TemporaryDirectory() as name:
+        path, seeds = Path(name) / "a.npz", []
+        for save, more in ((np.savez, {}), (np.savez_compressed, {"times": np.arange(6.0)})):
+            save(path, **fields, **more)
+            seeds.append(path.read_bytes())
+        np.savez_compressed(path, **fields | {"ranges": np.zeros((5000, 5000))})  # 200 MB in 195 kB
+        seeds.append(path.read_bytes())
+    return Reader(damaged(seeds), _file("a.npz"), Log.read)
+
+
+def weights() -> Reader:
+    """A network's file."""
+    seeds = []
+    with tempfile.TemporaryDirectory() as name:
+        path = Path(name) / "a.safetensors"
+        for width in (2, 4):
+            grid = Grid.of(PRESETS["radarize"], "range_azimuth")
+            header = Header(kind="rotation", frames=2, maps=("range_azimuth",), width=width, grid=grid)
+            seeds.append(save(build(RotationNet, header), header, path).read_bytes())
+    cuts = [(8 + int.from_bytes(seed[:8], "little"), seed) for seed in seeds]
+    # A header with other numbers and words before the same tensors, and its length right.
+    heads = st.one_of(
+        *(
+            misspelled([seed[8:cut].decode()]).map(
+                lambda head, rest=seed[cut:]: len(head).to_bytes(8, "little") + head + rest
+            )
+            for cut, seed in cuts
+        )
+    )
+    return Reader(
+        st.one_of(damaged(seeds), heads), _file("a.safetensors"), lambda path: load_weights(path, RotationNet)
+    )
+
+
 #: By name, in the order of the table; making one writes its valid files.
 READERS: dict[str, Callable[[], Reader]] = {
     "SDK .cfg": cfg,
@@ -402,4 +499,12 @@ READERS: dict[str, Callable[[], Reader]] = {
     "ROS 1 bag": lambda: bags("bag"),
     "ROS 2 mcap": lambda: bags("mcap"),
     "ROS 2 db3": lambda: bags("db3"),
+    "run: scans.h5": run_scans,
+    "run: run.json": lambda: run_file("run.json", misspelled([_run()["run.json"].decode()])),
+    "run: metrics.json": lambda: run_file("metrics.json", misspelled([_run()["metrics.json"].decode()])),
+    "run: map.yaml": lambda: run_file("map.yaml", misspelled([_run()["map.yaml"].decode()])),
+    "run: map.pgm": lambda: run_file("map.pgm", damaged([_run()["map.pgm"]])),
+    "run: trajectory.tum": lambda: run_file("trajectory.tum", misspelled([_run()["trajectory.tum"].decode()])),
+    "scans .npz": log,
+    "weights": weights,
 }

@@ -123,7 +123,7 @@ def test_memory_does_not_grow_with_what_is_written(tmp_path):
                 gc.collect()
                 taken.append(tracemalloc.get_traced_memory()[0])
         tracemalloc.stop()
-    assert taken[1] - taken[0] < 50e3  # scans of the 4,000 frames take 2 MB, of an hour 52
+    assert taken[1] - taken[0] < 0.6e6  # scans of these 4,000 frames alone take 1.9 MB; some are h5py's own notes
 
 
 def test_run_json_of_today_is_read(tmp_path):

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from radarize.published import heatmaps as published
-from radarize.published import labels
-from radarize.published.tasks import pooled_dice
-from radarize.training.tasks import first_cell
 
 from benchmarks.results import Data, publish
 from radarize.features.maps import MapMaker, maps_of
 from radarize.heatmaps import Heatmaps
+from radarize.methods.published import labels
+from radarize.methods.published import maps as published
+from radarize.methods.published.training import pooled_dice
+from radarize.methods.task import first_cell
 from radarize.nets import SegmentationNet
 from radarize.nets.losses import SURFACE, surfaces
 from radarize.odometry.doppler import DopplerVelocity

@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from given import DATASETS, GIVEN, specification
+from given import DATASETS, GIVEN, STUDIO, specification
 from pages import PAGES, ROOT, Command, commands
 
 from tests.virtual import free_ports
@@ -55,6 +55,8 @@ NOT_TYPED = {
     r"radarsim doctor": "compiles what the others compile, too; tests/test_setup.py runs it",
     r"python -m benchmarks\..*": "draws the page's own pictures, by the checkout's benchmarks",
 }
+if not STUDIO.is_dir():
+    NOT_TYPED[r"radarize import studio_folder .*"] = f"{STUDIO} is not there, a public capture"
 
 
 def typed(command: str) -> str:

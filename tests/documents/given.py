@@ -111,6 +111,16 @@ def _way(path: Path) -> None:
     path.write_text("x,y\n" + "".join(f"{x:.3f},{y:.3f}\n" for x, y in places))
 
 
+#: A public capture of mmWave Studio, where the public recordings are at hand.
+STUDIO = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "iwr6843-studio"
+
+
+def _studio(path: Path) -> None:
+    path.mkdir()
+    for file in STUDIO.iterdir():
+        shutil.copyfile(file, path / file.name)
+
+
 #: How each comes to be in a folder where `walk.h5` is there, in this order.
 GIVEN: dict[str, Callable[[Path], object]] = {
     "real.h5": lambda path: shutil.copy(path.with_name("walk.h5"), path),
@@ -122,6 +132,7 @@ GIVEN: dict[str, Callable[[Path], object]] = {
     "adc_data.bin": _capture,  # and profile.cfg
     "cart_sc_1_0.bag": lambda path: write_published(path, path.with_name("walk.h5")),
     "capture.pcap": lambda path: pcap(path, stream()),
+    "studio_folder": _studio,
     "cube.npy": _cube,
     "way.csv": _way,
     "map.yaml": _plan,

@@ -1,10 +1,8 @@
 """Recordings' maps, other readings and truth in memory, ready to be indexed: an hour of two range maps takes 1.7 GB."""
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +14,7 @@ from torch import Tensor
 from radarize.errors import InputError
 from radarize.features.grid import Grid
 from radarize.features.maps import Maker, MapMaker, maps_of
+from radarize.jobs import Report, attempt, perform
 from radarize.recording import Recording
 from radarize.tum import planar
 
@@ -123,22 +122,25 @@ class Table:
                 f"{paths[0].parent}: its maps take {size / 1e9:.1f} GB, expected at most {free / 1e9:.1f} GB"
             )
         joined = {name: np.empty((sum(lengths), *shape), np.float16) for name, shape in shapes.items()}
-        others: dict[str, list[np.ndarray]] = {reading.name: [] for reading in (*truth, *sensed)}
-        read = partial(_read, maps=tuple(maps), readings=(*truth, *sensed), kind=maker)
-        pool = ProcessPoolExecutor(workers, get_context("spawn")) if workers > 1 and len(paths) > 1 else None
-        try:
-            first = 0
-            for done, (made, rows) in enumerate((pool.map if pool else map)(read, paths)):
-                for name in maps:
-                    joined[name][first : first + lengths[done]] = made[name]
-                for name in others:
-                    others[name].append(rows[name])
-                first += lengths[done]
-                progress("reading", done + 1, len(paths))
-        finally:
-            if pool:
-                pool.shutdown(cancel_futures=True)
-        rows = {name: torch.from_numpy(np.concatenate(values)) for name, values in others.items()}
+        ends = np.cumsum(lengths)
+        places = {str(path): slice(end - length, end) for path, end, length in zip(paths, ends, lengths, strict=True)}
+        todo = {str(path): partial(_read, path, tuple(maps), (*truth, *sensed), maker) for path in paths}
+        if workers > 1 and len(paths) > 1:
+            heard = (news for news in perform(todo, workers) if news.ended)
+        else:
+            heard = (attempt(name, job, lambda done: None) for name, job in todo.items())
+        others: dict[str, dict[str, np.ndarray]] = {}
+        for news in heard:
+            if news.error is not None:
+                raise InputError(news.error)
+            made, others[news.name] = news.result
+            for name in maps:
+                joined[name][places[news.name]] = made[name]
+            progress("reading", len(others), len(paths))
+        rows = {
+            reading.name: torch.from_numpy(np.concatenate([others[path][reading.name] for path in places]))
+            for reading in (*truth, *sensed)
+        }
         return cls(
             {name: torch.from_numpy(values) for name, values in joined.items()},
             {reading.name: rows[reading.name] for reading in truth},
@@ -193,7 +195,9 @@ def _open(path: Path, maps: Sequence[str], maker: type[Maker]) -> tuple[int, flo
         return -(-len(recording) // stride), stride * recording.config.frame_period, grid
 
 
-def _read(path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker]) -> tuple[dict, dict]:
+def _read(
+    path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker], _: Report
+) -> tuple[dict, dict]:
     """Maps, and all else, of one recording."""
     with Recording(path) as recording:
         maker, count = kind(recording.config), len(recording)

@@ -39,6 +39,8 @@ def specification(name: str, path: Path) -> None:
     ]  # fmt: skip
     data["buildings"] = {building: data["buildings"][building] for building in kept}
     data["variants"] = dict(list(data.get("variants", {}).items())[:2])
+    if data["sensors"] == "all":
+        data["sensors"] = ["occupancy", "imu"]
     if "radar" in data:
         data["radar"] = str(folder / data["radar"])
     for split in data.get("splits", {}).values():

@@ -13,6 +13,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -26,8 +27,8 @@ WALK = "--duration 1.5"
 TYPED_INSTEAD = (
     # Shorter.
     (r"--duration \d+", WALK),
-    (r"^(radarsim simulate (?!.*--(?:duration|waypoints|trajectory|engine)).*)$", rf"\1 {WALK}"),
-    (r"^(radarsim simulate .*--engine sionna)$", r"\1 --duration 0.2"),
+    (r"^(radarsim simulate (?!.*--(?:duration|waypoints|trajectory)).*)$", rf"\1 {WALK}"),
+    (r"^(radarsim simulate .*--(?:engine sionna|provenance)).*$", r"\1 --duration 0.1"),
     (r"^radarsim dataset (\S+)", r"radarsim dataset short/\1.yaml"),
     (r"--epochs \d+", "--epochs 1"),
     (r"^((?:radarize|torchrun .* -m radarize\.cli) train (?!.*--epochs).*)$", r"\1 --epochs 1"),
@@ -58,7 +59,7 @@ NOT_TYPED = {
 }
 if not STUDIO.is_dir():
     NOT_TYPED[r"radarize import studio_folder .*"] = f"{STUDIO} is not there, a public capture"
-
+#: Options that name what a command writes.
 OUTPUT = ("-o", "--out")
 
 
@@ -159,19 +160,6 @@ class Reader:
             assert self.radar.returncode == 0
 
 
-@pytest.fixture(scope="module")
-def caches(tmp_path_factory) -> Path:
-    """Of compiled kernels: empty, as in a fresh install."""
-    return tmp_path_factory.mktemp("caches")
-
-
-@pytest.fixture(scope="module")
-def after_readme(tmp_path_factory, caches) -> tuple[Path, list[str]]:
-    """Folder in which README's commands were typed, and which failed."""
-    folder = tmp_path_factory.mktemp("readme")
-    return folder, read(PAGES[0], folder, caches)
-
-
 def read(page: str, folder: Path, caches: Path) -> list[str]:
     """Type all commands of a page; returns failures."""
     reader = Reader(folder, caches)
@@ -183,14 +171,26 @@ def read(page: str, folder: Path, caches: Path) -> list[str]:
     return [failure for failure in failures if failure]
 
 
+@pytest.fixture(scope="module")
+def failures(tmp_path_factory) -> dict[str, list[str]]:
+    """By page: README first, with empty folders of its own and of compiled kernels; the others two at a time."""
+    folder = tmp_path_factory.mktemp("documents")
+    caches, first = folder / "caches", folder / "README.md"
+    first.mkdir()
+    found = {PAGES[0]: read(PAGES[0], first, caches)}
+
+    def follow(page: str) -> list[str]:
+        copy = folder / Path(page).name
+        shutil.copytree(first, copy, ignore=shutil.ignore_patterns("tty", "log.txt", "real.h5"))
+        return read(page, copy, caches)
+
+    with ThreadPoolExecutor(2) as readers:
+        return found | dict(zip(PAGES[1:], readers.map(follow, PAGES[1:]), strict=True))
+
+
 @pytest.mark.parametrize("page", PAGES)
-def test_every_command_of_a_page_works(page, after_readme, caches, tmp_path):
-    folder, failures = after_readme
-    if page != PAGES[0]:
-        copy = tmp_path / "folder"
-        shutil.copytree(folder, copy, ignore=shutil.ignore_patterns("tty", "log.txt", "real.h5"))
-        failures = read(page, copy, caches)
-    assert not failures, "\n\n".join(failures)
+def test_every_command_of_a_page_works(page, failures):
+    assert not failures[page], "\n\n".join(failures[page])
 
 
 def test_no_page_is_forgotten_and_no_exception_outlives_its_command():

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-#: In the order in which one reads them.
-PAGES = ("README.md", "docs/simulating.md", "docs/radar.md", "docs/learning.md", "docs/comparing.md", "docs/physics.md")
+#: What is read first, and then, by two readers who each have what it left behind, in this order.
+FIRST = "README.md"
+THEN = (("docs/simulating.md", "docs/radar.md", "docs/physics.md"), ("docs/learning.md", "docs/comparing.md"))
+PAGES = (FIRST, *THEN[0], *THEN[1])
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 _OWN = re.compile(r"`((?:radarize|radarsim|torchrun|make|python) [^`]+)`")
 #: First line of the block that is no command: the tree of the house.

@@ -13,7 +13,10 @@ import subprocess
 import sys
 
 #: What takes long to import, and starts no threads, which a fork would lack.
-LIBRARIES = ("torch", "numba", "h5py", "scipy.spatial", "matplotlib.pyplot", "plotly.graph_objects", "pydantic")
+LIBRARIES = (
+    *("torch", "numba", "h5py", "scipy.interpolate", "scipy.signal", "scipy.optimize", "scipy.ndimage", "psutil"),
+    *("matplotlib.pyplot", "plotly.graph_objects", "pydantic", "shapely", "trimesh", "rich.progress", "gtsam"),
+)
 CONSOLE_SCRIPTS = {"radarize": "radarize.cli", "radarsim": "radarsim.cli"}
 
 

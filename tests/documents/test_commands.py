@@ -1,7 +1,7 @@
 """Every command of README and docs, in order, as a reader types them, where no kernel has been compiled yet.
 
 What is typed is what the pages say (`pages.py`), but for `TYPED_INSTEAD`: everything shorter, and hardware virtual.
-Each page begins with what README left behind. A command that is new on a page runs here by itself, or fails.
+The other pages follow README, with what it left behind. A command that is new on a page runs here by itself, or fails.
 """
 
 import json
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 from given import DATASETS, GIVEN, STUDIO, specification
-from pages import PAGES, ROOT, Command, commands
+from pages import FIRST, PAGES, ROOT, THEN, Command, commands
 
 from tests.virtual import free_ports
 
@@ -173,19 +173,21 @@ def read(page: str, folder: Path, caches: Path) -> list[str]:
 
 @pytest.fixture(scope="module")
 def failures(tmp_path_factory) -> dict[str, list[str]]:
-    """By page: README first, with empty folders of its own and of compiled kernels; the others two at a time."""
+    """By page, begun in an empty folder and with no compiled kernel."""
     folder = tmp_path_factory.mktemp("documents")
-    caches, first = folder / "caches", folder / "README.md"
+    caches, first = folder / "caches", folder / "first"
     first.mkdir()
-    found = {PAGES[0]: read(PAGES[0], first, caches)}
+    found = {FIRST: read(FIRST, first, caches)}
 
-    def follow(page: str) -> list[str]:
-        copy = folder / Path(page).name
+    def follow(pages: tuple[str, ...]) -> dict[str, list[str]]:
+        copy = folder / Path(pages[0]).stem
         shutil.copytree(first, copy, ignore=shutil.ignore_patterns("tty", "log.txt", "real.h5"))
-        return read(page, copy, caches)
+        return {page: read(page, copy, caches) for page in pages}
 
-    with ThreadPoolExecutor(2) as readers:
-        return found | dict(zip(PAGES[1:], readers.map(follow, PAGES[1:]), strict=True))
+    with ThreadPoolExecutor() as readers:
+        for more in readers.map(follow, THEN):
+            found |= more
+    return found
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -38,9 +38,9 @@ def judge(case: Case, weights: Path | None) -> dict[str, object]:
         for frames, adc in recording.batches(BATCH):
             spectrum = inputs.heatmaps.spectrum(adc, recording.valid(frames.start, frames.stop))
             times = recording.times[frames]
-            found = velocity.estimate(spectrum)
+            found = velocity.estimate(spectrum, times)
             said.append(found)
-            turns.append(rotation.turns(spectrum, times, found))
+            turns.append(rotation.turns(spectrum, times, found)[0])
             ranges.append(likeliest(scans.occupancy(spectrum)))
             steps.append(odometry.follow(spectrum, times))
         true_velocity, yaw = recording.read("truth/velocity")[:, :2], planar(recording.read("truth/pose"))[:, 2]

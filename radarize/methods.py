@@ -27,7 +27,7 @@ from radarize.odometry.doppler import DopplerVelocity
 from radarize.odometry.fused import FusedVelocity
 from radarize.odometry.integration import Odometry, Track
 from radarize.odometry.learned import LearnedRotation, LearnedVelocity
-from radarize.odometry.rotation import MapRotation, RotationSettings
+from radarize.odometry.rotation import MapRotation
 from radarize.odometry.scanmatching import ScanMatching
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
@@ -227,9 +227,7 @@ def fused(inputs: Inputs) -> Odometry:
     """Both: velocities by their covariances, and the map matched from where the network says that it has turned to."""
     maker, weights = inputs.maker, inputs.weights
     velocity = FusedVelocity(LearnedVelocity(maker, weights.of("translation")), DopplerVelocity(maker.heatmaps))
-    # A map that lags in a turn misleads many matches alike: beside the network each must claim more than its own noise.
-    settings = RotationSettings(yaw_noise=np.radians(0.8))
-    rotation = MapRotation(maker.heatmaps, settings, LearnedRotation(maker, weights.of("rotation")))
+    rotation = MapRotation(maker.heatmaps, prior=LearnedRotation(maker, weights.of("rotation")))
     return Odometry(inputs.config, velocity, rotation)
 
 

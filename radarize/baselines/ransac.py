@@ -60,12 +60,17 @@ class RansacVelocity:
         self._clouds = PointClouds(heatmaps.config, DENSE)
         self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 3))
 
-    def estimate(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Velocities:
-        """Velocities of a batch of frames from their `Heatmaps.spectrum`."""
+    def estimate(
+        self,
+        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
+        times: Float[np.ndarray, "frame"] | None = None,
+    ) -> Velocities:
+        """Velocities of a batch of frames from their `Heatmaps.spectrum`, whenever they were."""
         points, frame = self._clouds.of(self._heatmaps, spectrum)
         found = [self.solve(points[frame == k]) for k in range(len(spectrum))]
         velocity, covariance, inliers = zip(*found, strict=True)
-        return Velocities(np.stack(velocity), np.stack(covariance), np.array(inliers))
+        inliers = np.array(inliers)
+        return Velocities(np.stack(velocity), np.stack(covariance), inliers, inliers > 0)
 
     def solve(
         self, points: Float[np.ndarray, "point 6"]

@@ -33,7 +33,7 @@ class RadarHdScans:
     ) -> Float[torch.Tensor, "frame range direction"]:
         """Probability of a surface in cells of range and `radarhd.columns(DRAWN)`."""
         # One by one: a window has 41 maps.
-        return torch.cat([self._windows.net.estimate(window[None]) for window in self._windows.push(spectrum)[0]])
+        return torch.cat([self._windows.net.estimate(window[None]) for window in self._windows.push(spectrum)[0].maps])
 
     def scan(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]

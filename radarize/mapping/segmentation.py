@@ -40,7 +40,7 @@ class Segmentation:
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
     ) -> Float[np.ndarray, "frame range bearing"]:
         """Probability that a cell holds a bearing's first surface, if nothing is before it."""
-        return self._windows.net.estimate(self._windows.push(spectrum)[0]).numpy()
+        return self._windows.net.estimate(self._windows.push(spectrum)[0].maps).numpy()
 
     def scan(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]

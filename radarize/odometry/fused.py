@@ -2,7 +2,7 @@
 
 import numpy as np
 import torch
-from jaxtyping import Complex64
+from jaxtyping import Complex64, Float
 
 from radarize.odometry.doppler import DopplerVelocity, Velocities
 from radarize.odometry.learned import LearnedVelocity
@@ -22,13 +22,15 @@ class FusedVelocity:
     def __init__(self, learned: LearnedVelocity, doppler: DopplerVelocity, gate: float = 9.0):
         self.learned, self.doppler, self.gate = learned, doppler, gate
 
-    def estimate(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Velocities:
+    def estimate(
+        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"], times: Float[np.ndarray, "frame"]
+    ) -> Velocities:
         """Velocities of the next frames."""
-        one, other = self.learned.estimate(spectrum), self.doppler.estimate(spectrum)
+        one, other = self.learned.estimate(spectrum, times), self.doppler.estimate(spectrum, times)
         apart = (one.velocity - other.velocity)[:, :, None]
         total = one.covariance + other.covariance
         distance = (apart.mT @ np.linalg.solve(total, apart))[:, 0, 0]
         weight = one.covariance @ np.linalg.inv(total)
         velocity = one.velocity - (weight @ apart)[:, :, 0]
         covariance = (one.covariance - weight @ one.covariance) * np.maximum(distance / self.gate, 1.0)[:, None, None]
-        return Velocities(velocity, covariance, other.inliers)
+        return Velocities(velocity, covariance, other.inliers, one.seen | other.seen)

@@ -118,7 +118,8 @@ class Chain:
                 steps[i] = between(before, poses[i])
                 spreads[i, :2, :2] = dt**2 * velocity_noise[0].numpy()
             self._past = [*self._past[-CHAINS + 1 :], (time, poses[i].copy(), maps[i])]
-        return Track(times, poses, steps, spreads, velocity, velocity_noise.double().numpy())
+        seen = np.ones((2, len(times)), bool)  # the artefact knows of no doubt
+        return Track(times, poses, steps, spreads, velocity, velocity_noise.double().numpy(), *seen)
 
 
 def first_occupied(likely: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame bearing"]:
@@ -129,4 +130,5 @@ def first_occupied(likely: Float[np.ndarray, "frame range bearing"]) -> Float[np
 
 def _no_track() -> Track:
     none = np.zeros((0, 3))
-    return Track(np.zeros(0), none, none, np.zeros((0, 3, 3)), np.zeros((0, 2)), np.zeros((0, 2, 2)))
+    nothing = np.zeros((0, 2)), np.zeros((0, 2, 2)), np.zeros(0, bool), np.zeros(0, bool)
+    return Track(np.zeros(0), none, none, np.zeros((0, 3, 3)), *nothing)

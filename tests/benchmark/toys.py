@@ -25,7 +25,8 @@ class Scaled:
         velocity = self.steps[rows, :2] / self.config.frame_period
         square = np.tile(np.eye(3) * 1e-4, (len(times), 1, 1))
         middles = times + self.config.burst_center
-        return Track(middles, self.poses[rows], self.steps[rows], square, velocity, square[:, :2, :2])
+        seen = np.ones((2, len(times)), bool)
+        return Track(middles, self.poses[rows], self.steps[rows], square, velocity, square[:, :2, :2], *seen)
 
 
 class Metre:

@@ -122,9 +122,9 @@ def test_estimators_can_be_swapped(walked):
     adc, stamps, _ = walked
 
     class Forward:
-        def estimate(self, spectrum):
-            n = len(spectrum)
-            return Velocities(np.tile([1.0, 0.0], (n, 1)), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.ones(n, int))
+        def estimate(self, spectrum, times):
+            n, seen = len(times), np.ones(len(times), bool)
+            return Velocities(np.tile([1.0, 0.0], (n, 1)), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.ones(n, int), seen)
 
     result = Odometry(CONFIG, velocity=Forward(), rotation=MapRotation(Heatmaps(CONFIG))).push(adc[:20], stamps[:20])
     np.testing.assert_allclose(result.velocity[5:], np.tile([1.0, 0.0], (15, 1)), atol=0.02)
@@ -146,7 +146,7 @@ def test_filter_rejects_an_outlier_and_follows_a_step():
     truth = np.where(times < 1, 1.0, -0.5)
     velocity = np.stack([truth, np.zeros(60)], axis=1)
     velocity[15] = (-1.5, 2.0)
-    measured = Velocities(velocity, np.tile(1e-4 * np.eye(2), (60, 1, 1)), np.full(60, 50))
+    measured = Velocities(velocity, np.tile(1e-4 * np.eye(2), (60, 1, 1)), np.full(60, 50), np.ones(60, bool))
     found = VelocityFilter().filter(times, measured).velocity
     assert np.abs(found[15] - velocity[14]).max() < 0.3
     np.testing.assert_allclose(found[-1], velocity[-1], atol=0.02)
@@ -160,7 +160,7 @@ def test_a_turn_that_nothing_is_seen_of_is_claimed():
 
     class Sure:
         def estimate(self, spectrum, times, velocities):
-            return Rotations(np.zeros(len(times)), np.full(len(times), 1e-8), np.zeros(len(times)))
+            return Rotations(np.zeros(len(times)), np.full(len(times), 1e-8), np.ones(len(times), bool))
 
     adc = record(CONFIG, nowhere, np.array([[2.0, 0.0, 0.0]]), np.zeros(1), stamps, rng, 20.0, block=16)
     result = Odometry(CONFIG, rotation=MapRotation(Heatmaps(CONFIG), prior=Sure())).push(adc, stamps)

@@ -55,6 +55,9 @@ class RansacVelocity:
         InputError: see `PointClouds`.
     """
 
+    #: m, see `VelocityEstimator`; as published.
+    lever = 0.0
+
     def __init__(self, heatmaps: Heatmaps, settings: RansacSettings | None = None, seed: int = 0):
         self.settings, self._heatmaps = settings or RansacSettings(), heatmaps
         self._clouds = PointClouds(heatmaps.config, DENSE)

@@ -73,8 +73,23 @@ class DopplerConfig(BaseModel):
     )
     climb: float = Field(0.15, gt=0, description="m/s, expected vertical speed (handheld bobbing); its mean is zero")
     still: float = Field(
-        0.02, ge=0, description="m/s; below it, and with most echoes still as well, the sensor stands (zero velocity)"
+        0.02,
+        ge=0,
+        description="m/s; below it, with most echoes still as well and the fit's own error no less, the sensor stands",
     )
+    independent: float = Field(
+        0.25,
+        gt=0,
+        description="of the covariance of the fit, what is left if errors that echoes share are told apart; chosen with "
+        "the next two on data set odometry-choice, six walks of 20 s (by hand, cart and robot in A and B of seed 201)",
+    )
+    scale_noise: float = Field(
+        0.003, ge=0, description="of the speed, standard deviation of what all echoes share along it: their elevation"
+    )
+    course_noise: float = Field(
+        0.0065, ge=0, description="rad, of what they share across it: azimuths that are off to one side"
+    )
+    floor: float = Field(0.0005, ge=0, description="m/s, least standard deviation of a velocity")
 
 
 class DopplerVelocity:
@@ -82,6 +97,9 @@ class DopplerVelocity:
 
     Speeds beyond `config.max_velocity` alias. Residuals are taken modulo the unambiguous span, so a faster walk is
     still found from the echoes to the side, which close slowly enough.
+
+    Attributes:
+        lever: m, see `VelocityEstimator`.
     """
 
     def __init__(self, heatmaps: Heatmaps, settings: DopplerConfig | None = None, seed: int = 0):
@@ -93,6 +111,8 @@ class DopplerVelocity:
         self._steering = torch.as_tensor(heatmaps.steering(self.row, self._u), device=heatmaps.device)
         self._steering = self._steering.to(torch.complex64)
         self._array = _array(heatmaps, self._u)
+        # An echo's phase turns with its way to the transmitter and back to the receiver: it is the middle that moves.
+        self.lever = float(virtual_positions(self.config).reshape(-1, 3)[self.row, 1].mean()) / 2
         self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
         # One table of random numbers for all frames: the same frame gives the same answer in any batch.
         self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 2))
@@ -112,8 +132,16 @@ class DopplerVelocity:
             echoes = self._echoes(cells[frame], power[frame])
             solution = self._solve(echoes)
             velocity[frame], covariance[frame], inliers[frame] = solution
-        determined = np.linalg.eigvalsh(covariance)[:, -1] < _DETERMINED**2
-        return Velocities(velocity, covariance, inliers, determined & (inliers >= _ECHOES))
+        seen = (np.linalg.eigvalsh(covariance)[:, -1] < _DETERMINED**2) & (inliers >= _ECHOES)
+        covariance[seen] = self.settings.independent * covariance[seen] + self._shared(velocity[seen])
+        return Velocities(velocity, covariance, inliers, seen)
+
+    def _shared(self, velocity: Float[np.ndarray, "frame 2"]) -> Float[np.ndarray, "frame 2 2"]:
+        """Covariance of the errors that all echoes of a frame have in common: none of the fit's residuals tells."""
+        s = self.settings
+        across = np.stack([-velocity[:, 1], velocity[:, 0]], axis=1)
+        along, side = (v[:, :, None] * v[:, None] for v in (velocity, across))
+        return s.scale_noise**2 * along + s.course_noise**2 * side + s.floor**2 * np.eye(2)
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 6"]:
         """Peaks of one frame: range bin, closing speed (m/s), u_y, u_z and its variance, power over the median."""
@@ -137,7 +165,8 @@ class DopplerVelocity:
         noise = np.array([s.speed_noise, s.power_noise, s.azimuth_noise, s.elevation, climb])
         velocity, covariance, inliers = _fit(echoes[:, 1:], self._draws, noise, s.inlier, 2 * self.config.max_velocity)
         if inliers and np.hypot(*velocity) < s.still and np.median(np.abs(echoes[:, 1])) < 2 * s.still:
-            velocity = np.zeros(2)
+            if velocity @ np.linalg.solve(covariance, velocity) < _SIGMAS**2:
+                velocity = np.zeros(2)
         return velocity, covariance, inliers
 
 
@@ -170,6 +199,8 @@ def _array(heatmaps: Heatmaps, u: np.ndarray) -> _Array:
 UNKNOWN_SPEED = 10.0
 #: Fewer echoes than these determine no velocity; nor do those that leave a standard deviation, m/s, as large as that.
 _ECHOES, _DETERMINED = 4, 0.3
+#: Standard deviations from which a velocity is not zero: a walk that sets in is slow, but its speed is well known.
+_SIGMAS = 3.0
 #: A weaker peak beside a stronger one of the same range and Doppler may be its sidelobe (-25 dB, and mismatch).
 SIDELOBE = 0.1
 

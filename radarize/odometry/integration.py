@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -25,10 +25,18 @@ TURN_SPREAD = 0.2
 #: second. What that adds to a step is within a fifth of what true velocities by hand do, over 0.2 to 2 s (data set
 #: odometry-choice: four handheld walks of 20 s in buildings A to D of seed 201).
 _BRIDGED, _SMOOTH = 0.32, 1.0
+#: s, over which turns are averaged to a rate.
+_STEADY = 0.1
 
 
 class VelocityEstimator(Protocol):
-    """Sensor velocity per frame from `Heatmaps.spectrum` of frames in order, and their burst-centre times."""
+    """Sensor velocity per frame from `Heatmaps.spectrum` of frames in order, and their burst-centre times.
+
+    Attributes:
+        lever: m, how far to the left of the sensor's origin the point lies whose velocity this is.
+    """
+
+    lever: float
 
     def estimate(self, spectrum: torch.Tensor, times: np.ndarray) -> Velocities: ...
 
@@ -134,6 +142,7 @@ class Odometry:
         self.velocity = velocity or DopplerVelocity(self.heatmaps)
         self.rotation = rotation or MapRotation(self.heatmaps)
         self._filter = VelocityFilter(settings)
+        self._rate = 0.0  # of turning, rad/s, without the matches' jitter
         self._pose = np.zeros(3)
         self._last: tuple[float, np.ndarray, np.ndarray] | None = None  # time, velocity, covariance
 
@@ -163,12 +172,20 @@ class Odometry:
     ) -> Track:
         """As `push`, from spectra of `Heatmaps.spectrum`; `stage` is entered with each estimator's name, to time it."""
         centers = np.asarray(times, float) + self.config.burst_center
-        intervals(centers, None if self._last is None else self._last[0])
+        steps = intervals(centers, None if self._last is None else self._last[0])
         with stage("translation"):
             velocities = self._filter.filter(centers, self.velocity.estimate(spectrum, centers))
         with stage("rotation"):
             rotations = self.rotation.estimate(spectrum, centers, velocities)
-        return self._integrate(centers, velocities, rotations)
+        return self._integrate(centers, self._at_origin(steps, velocities, rotations), rotations)
+
+    def _at_origin(self, steps: np.ndarray, measured: Velocities, rotations: Rotations) -> Velocities:
+        """Velocities of the sensor's origin, which does not swing about it as the estimator's point does."""
+        velocity = measured.velocity.copy()
+        for i, (dt, yaw) in enumerate(zip(steps, rotations.yaw, strict=True)):
+            self._rate += -np.expm1(-dt / _STEADY) * (yaw / dt - self._rate)
+            velocity[i, 0] += self.velocity.lever * self._rate
+        return replace(measured, velocity=velocity)
 
     def _integrate(self, times: np.ndarray, velocities: Velocities, rotations: Rotations) -> Track:
         frames = len(times)

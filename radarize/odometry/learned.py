@@ -25,6 +25,9 @@ class LearnedVelocity:
         weights: file; the shipped ones if None.
     """
 
+    #: m, see `VelocityEstimator`: it was taught the velocity of the origin.
+    lever = 0.0
+
     def __init__(self, maker: MapMaker, weights: Path | None = None):
         self._windows = Windows(maker, "translation", weights)
 

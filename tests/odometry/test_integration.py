@@ -122,6 +122,8 @@ def test_estimators_can_be_swapped(walked):
     adc, stamps, _ = walked
 
     class Forward:
+        lever = 0.0
+
         def estimate(self, spectrum, times):
             n, seen = len(times), np.ones(len(times), bool)
             return Velocities(np.tile([1.0, 0.0], (n, 1)), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.ones(n, int), seen)

@@ -21,7 +21,8 @@ class Shown:
     """Windows of one spacing that end at consecutive frames.
 
     Attributes:
-        maps: (frame, window, map, row, azimuth); a frame that is not there looks as the next one of its window does.
+        maps: (frame, window, map, row, azimuth); a frame that is not there looks as the one after the gap, or as
+            the stream's first.
         whole: (frame,) every frame of the window is there.
         back: (frame,) frames from the window's first to its last; of no meaning unless it is whole.
     """
@@ -87,13 +88,9 @@ def spaced(
     """Windows of so many frames, `apart` seconds from one to the next, that end at each of the `new` last ones.
 
     Returns:
-        Rows, of a frame that is not there that of the next one in its window; and which are there, give or take half of
-        the radar's frame period.
+        Rows, of a frame that is not there that of the one after the gap; and which are there, give or take half of the
+        radar's frame period.
     """
-    newest = np.arange(len(stamps) - new, len(stamps))
-    wanted = stamps[newest, None] - apart * np.arange(frames - 1, -1, -1)
-    rows = np.abs(stamps - wanted[..., None]).argmin(axis=-1)
-    there = np.abs(stamps[rows] - wanted) < period / 2
-    for place in range(frames - 2, -1, -1):
-        rows[:, place] = np.where(there[:, place], rows[:, place], rows[:, place + 1])
-    return rows, there
+    wanted = stamps[len(stamps) - new :, None] - apart * np.arange(frames - 1, -1, -1)
+    rows = np.searchsorted(stamps, wanted - period / 2)
+    return rows, stamps[rows] < wanted + period / 2

@@ -66,7 +66,7 @@ class DopplerConfig(BaseModel):
     elevation: float = Field(
         0.4,
         gt=0,
-        description="standard deviation of u_z over all echoes; readings are drawn to the horizon accordingly",
+        description="standard deviation of u_z over all echoes, by which readings are drawn to the horizon",
     )
     beam: float = Field(
         0.25, gt=0, description="the most that u_z varies within one echo, which the beam limits; taken if not known"
@@ -75,7 +75,7 @@ class DopplerConfig(BaseModel):
     still: float = Field(
         0.02,
         ge=0,
-        description="m/s; below it, with most echoes still as well and the fit's own error no less, the sensor stands",
+        description="m/s; below it and within the fit's own error, if most echoes are still, the sensor stands",
     )
     independent: float = Field(
         0.25,
@@ -84,7 +84,7 @@ class DopplerConfig(BaseModel):
         "the next two on data set odometry-choice, six walks of 20 s (by hand, cart and robot in A and B of seed 201)",
     )
     scale_noise: float = Field(
-        0.003, ge=0, description="of the speed, standard deviation of what all echoes share along it: their elevation"
+        0.003, ge=0, description="of the speed, standard deviation of what echoes share along it: their elevation"
     )
     course_noise: float = Field(
         0.0065, ge=0, description="rad, of what they share across it: azimuths that are off to one side"

@@ -80,8 +80,8 @@ class DopplerConfig(BaseModel):
     independent: float = Field(
         0.25,
         gt=0,
-        description="of the covariance of the fit, what is left if errors that echoes share are told apart; chosen with "
-        "the next two on data set odometry-choice, six walks of 20 s (by hand, cart and robot in A and B of seed 201)",
+        description="of the covariance of the fit, what is left where errors that echoes share are told apart; chosen "
+        "with the next two on data set odometry-choice, six walks of 20 s (by hand, cart, robot; A and B of seed 201)",
     )
     scale_noise: float = Field(
         0.003, ge=0, description="of the speed, standard deviation of what echoes share along it: their elevation"

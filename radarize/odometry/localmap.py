@@ -48,8 +48,9 @@ class LocalMap:
 
     def correlate(
         self, view: View, position: Float[np.ndarray, "2"], yaws: Float[np.ndarray, "yaw"]
-    ) -> Float[np.ndarray, "yaw"]:
-        """Correlation (-1...1) of a frame with the map, seen from a position (m) at each yaw; 0 where none overlaps."""
+    ) -> tuple[Float[np.ndarray, "yaw"], Float[np.ndarray, "yaw"]]:
+        """Correlation (-1...1) of a frame with the map, seen from a position (m) at each yaw, and how much of the
+        frame's area (0...1) the map knows there."""
         return _correlate(view, self._grid, position, yaws)
 
     def blend(self, view: View, position: Float[np.ndarray, "2"], yaw: float, share: float) -> None:
@@ -82,10 +83,10 @@ def _shifted(grid: np.ndarray, shift: np.ndarray) -> np.ndarray:
 
 @njit(cache=True, fastmath=True)
 def _correlate(view, grid, position, yaws):
-    """Normalised correlation of a polar map with the grid; cells weigh by area."""
+    """Normalised correlation of a polar map with the grid, and their overlap; cells weigh by area."""
     (feature, u_z, ranges, sines), (mean, count, cell) = view, grid
     side = mean.shape[0]
-    result = np.zeros(len(yaws))
+    correlation, overlap = np.zeros(len(yaws)), np.zeros(len(yaws))
     origin_x, origin_y = position[0] / cell + side / 2, position[1] / cell + side / 2
     ahead, left = np.empty(feature.shape, np.float32), np.empty(feature.shape, np.float32)
     for i in range(len(ranges)):
@@ -116,8 +117,9 @@ def _correlate(view, grid, position, yaws):
                 sum_fm += w * f * m
         if n > 0:
             f_var, m_var = sum_ff - sum_f * sum_f / n, sum_mm - sum_m * sum_m / n
-            result[k] = (sum_fm - sum_f * sum_m / n) / np.sqrt(max(f_var * m_var, 1e-12))
-    return result
+            correlation[k] = (sum_fm - sum_f * sum_m / n) / np.sqrt(max(f_var * m_var, 1e-12))
+            overlap[k] = n / (ranges.sum() * len(sines))
+    return correlation, overlap
 
 
 @njit(cache=True, fastmath=True)

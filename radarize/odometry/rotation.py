@@ -32,8 +32,8 @@ from radarize.odometry.ties import wandered
 _TEXTURE = (12, 12)
 #: Of the predicted yaw's standard deviations, how many are searched to either side.
 _SIGMAS = 3.0
-#: Cells of a frame that speak independently of the others: a match of correlation c is that much likelier than chance,
-#: (1 - c^2)^(-cells / 2).
+#: Cells of a frame that speak independently of the others. Of those that the map knows, a correlation c is so much
+#: likelier for a match than by chance: (1 - c^2)^(-cells / 2).
 _INDEPENDENT = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
 _ASTRAY = np.radians(45.0)
@@ -211,13 +211,14 @@ class MapRotation:
         s = self.settings
         fan = np.clip(_SIGMAS * np.sqrt(self._spread[0, 0]), s.fan, s.widest)
 
-        def correlate(offsets: np.ndarray) -> np.ndarray:
+        def correlate(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return self._map.correlate(view, self._position, self._heading[0] + offsets)
 
         coarse = 3 * s.step * np.arange(-np.ceil(fan / (3 * s.step)), np.ceil(fan / (3 * s.step)) + 1)
-        odds = -_INDEPENDENT / 2 * np.log1p(-(np.clip(correlate(coarse), 0, 0.999) ** 2))
+        correlation, overlap = correlate(coarse)
+        odds = -_INDEPENDENT * overlap / 2 * np.log1p(-(np.clip(correlation, 0, 0.999) ** 2))
         fine = coarse[np.argmax(odds - (coarse * _SIGMAS / fan) ** 2 / 2)] + s.step * np.arange(-4, 5)
-        correlation = correlate(fine)
+        correlation, _ = correlate(fine)
         best = int(np.argmax(correlation))
         if not 0 < best < len(fine) - 1:
             return 0.0, 0.0

@@ -113,13 +113,21 @@ def test_a_map_that_is_left_behind_is_empty():
     view = View(feature, np.zeros_like(feature), ranges, sines)
     grid, yaws = LocalMap(4.0, CELL), np.zeros(1)
     grid.blend(view, np.zeros(2), 0.0, 0.05)
-    assert grid.correlate(view, np.zeros(2), yaws)[0] > 0.5
+    assert grid.correlate(view, np.zeros(2), yaws)[0][0] > 0.5
     near = grid.follow(np.array([1.5, 0.0]))
     assert np.abs(near).max() < CELL
-    assert grid.correlate(view, near - [1.5, 0.0], yaws)[0] > 0.5
+    assert grid.correlate(view, near - [1.5, 0.0], yaws)[0][0] > 0.5
     for far in ([18.0, 0.0], [-6.0, 400.0], [0.0, -11.9]):
         place = grid.follow(np.array(far))
         assert np.abs(place).max() < CELL
-        assert grid.correlate(view, place, yaws)[0] == 0
+        assert grid.correlate(view, place, yaws)[0][0] == 0
         grid.blend(view, place, 0.0, 0.05)
-        assert grid.correlate(view, place, yaws)[0] > 0.5
+        assert grid.correlate(view, place, yaws)[0][0] > 0.5
+
+
+def test_a_corner_of_the_map_that_fits_by_chance_is_no_match():
+    """Half a turn too far only a few cells are left to correlate: they prove little."""
+    times = np.concatenate([np.arange(30), np.arange(30) + 60]) / 30
+    yaw = np.radians(np.concatenate([75 * times[:30], 75 * times[29] + 40 + 20 * (times[30:] - times[30])]))
+    found = follow(times, np.stack([np.zeros(60), np.zeros(60), yaw], axis=1))
+    assert np.degrees(found.yaw[30]) == pytest.approx(40, abs=3)

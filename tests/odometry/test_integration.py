@@ -5,8 +5,8 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
-from radarize.odometry.doppler import Velocities
-from radarize.odometry.integration import Odometry, VelocityFilter
+from radarize.odometry.doppler import DopplerVelocity, Velocities
+from radarize.odometry.integration import Odometry, VelocityConfig, VelocityFilter
 from radarize.odometry.rotation import MapRotation, Rotations
 from radarize.pose import compose, exponential
 from radarize.radar.presets import PRESETS
@@ -168,3 +168,58 @@ def test_a_turn_that_nothing_is_seen_of_is_claimed():
     result = Odometry(CONFIG, rotation=MapRotation(Heatmaps(CONFIG), prior=Sure())).push(adc, stamps)
     # People turn by 20 deg in a second, and more; and it is noise, so some frames match by chance.
     assert np.sqrt(result.covariance[1:, 2, 2].sum()) > np.radians(15)
+
+
+class Told:
+    """Estimators whose answers are known: a velocity straight ahead, a rate of turning."""
+
+    def __init__(self, speed=1.0, rate=0.0, lever=0.0, variance=1e-6):
+        self.speed, self.rate, self.lever, self.variance, self.last = speed, rate, lever, variance, 0.0
+
+    def velocity(self) -> "Told":
+        self.estimate = lambda spectrum, times: Velocities(
+            np.tile([self.speed, 0.0], (len(times), 1)),
+            np.tile(self.variance * np.eye(2), (len(times), 1, 1)),
+            np.full(len(times), 50),
+            np.ones(len(times), bool),
+        )
+        return self
+
+    def rotation(self) -> "Told":
+        self.estimate = lambda spectrum, times, velocities: Rotations(
+            self.rate * np.diff(times, prepend=times[0]), np.full(len(times), 1e-6), np.ones(len(times), bool)
+        )
+        return self
+
+
+def test_the_antennas_swing_about_the_origin():
+    """Their middle is 1 cm to the left: turning to the left at 1.5 rad/s, it goes backward by 1.5 cm/s."""
+    times = np.arange(60) * CONFIG.frame_period
+    odometry = Odometry(CONFIG, Told(1.0 - 0.015, lever=0.01).velocity(), Told(rate=1.5).rotation())
+    found = odometry.follow(None, times)
+    assert found.velocity[30:, 0] == pytest.approx(1.0, abs=1e-3)
+    antennas = DopplerVelocity(Heatmaps(CONFIG)).lever
+    # Eight of them half a wavelength apart, of which each is the sum of a transmitter's place and a receiver's.
+    assert antennas == pytest.approx(3.5 * CONFIG.wavelength / 2 / 2, rel=0.05)
+
+
+@pytest.mark.parametrize("gap", [0.2, 0.5, 1.0, 2.0])
+def test_a_gap_is_claimed_by_its_length(gap):
+    """As much as walks by hand change their speed meanwhile; within it, no step claims more than its velocities'."""
+    times = np.concatenate([np.arange(10) * CONFIG.frame_period, 9 * CONFIG.frame_period + gap * np.array([1.0])])
+    found = Odometry(CONFIG, Told().velocity(), Told().rotation()).follow(None, times)
+    spread = np.sqrt(found.covariance[:, 0, 0])
+    by_hand = {0.2: 0.0015, 0.5: 0.018, 1.0: 0.072, 2.0: 0.263}
+    assert spread[10] == pytest.approx(by_hand[gap], rel=0.25)
+    assert (spread[1:10] < 1e-4).all()
+
+
+@pytest.mark.parametrize("rate", [5, 15, 30])
+def test_velocity_is_forgotten_by_the_second_not_by_the_frame(rate):
+    count = rate + 1
+    blind = np.arange(count) > 0
+    covariance = np.where(blind, 1e9, 1e-6)[:, None, None] * np.eye(2)
+    measured = Velocities(np.zeros((count, 2)), covariance, np.where(blind, 0, 50), ~blind)
+    filtered = VelocityFilter().filter(np.arange(count) / rate, measured)
+    assert filtered.covariance[-1, 0, 0] == pytest.approx(VelocityConfig().wander ** 2, rel=1e-3)
+    assert (filtered.seen == ~blind).all()

@@ -14,9 +14,9 @@ import psutil
 from jaxtyping import Bool
 
 from benchmarks.results import publish, surroundings
-from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import MAX_PAYLOAD
+from radarize.radar.presets import load_config
 from radarize.recording import Losses, Recording, RecordingWriter
 from radarsim.emulator.disturbance import Disturbance
 

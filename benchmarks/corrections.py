@@ -6,19 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import torch
-
-from benchmarks.results import publish
-from radarize.heatmaps import Heatmaps
-from radarize.nets import SegmentationNet
-from radarize.odometry.doppler import DopplerVelocity
 from radarize.published import heatmaps as published
 from radarize.published import labels
 from radarize.published.tasks import pooled_dice
+from radarize.training.tasks import first_cell
+
+from benchmarks.results import publish
+from radarize.features.maps import MapMaker, maps_of
+from radarize.heatmaps import Heatmaps
+from radarize.nets import SegmentationNet
+from radarize.nets.losses import SURFACE, surfaces
+from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
-from radarize.training.losses import SURFACE, surfaces
-from radarize.training.maps import MapMaker, maps_of
-from radarize.training.tasks import first_cell
 from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.sensors.scan import AZIMUTHS, level_rays

@@ -16,7 +16,7 @@ from benchmarks.results import publish, surroundings
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
-from radarize.methods import BEST, CLASSICAL, best_methods
+from radarize.methods.registry import BEST, CLASSICAL, best_methods
 from radarize.pipeline import Pipeline
 from radarsim.simulate import simulate
 

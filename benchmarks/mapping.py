@@ -5,7 +5,7 @@ import argparse
 from pathlib import Path
 
 from benchmarks.evaluation import add_options, compare
-from radarize.methods import SCANS
+from radarize.methods.registry import SCANS
 
 
 def main() -> None:

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from benchmarks.evaluation import add_options, compare
-from radarize.methods import ODOMETRY
+from radarize.methods.registry import ODOMETRY
 
 #: Mean ATE in m and rad that our odometry is to reach: half of the paper's.
 TARGET = {"odometry": (0.40, 0.18), "odometry-platforms": (0.56, 0.28)}

@@ -9,7 +9,7 @@ from benchmarks.results import peak_memory_mb, publish
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair, measure
 from radarize.benchmark.runtime import NOTES, PAPER, PAPER_STAGES, stages
-from radarize.methods import BEST, CLASSICAL
+from radarize.methods.registry import BEST, CLASSICAL
 from radarize.pipeline import BATCH
 from radarize.recording import Recording
 from radarsim.simulate import simulate

@@ -10,10 +10,10 @@ import numpy as np
 
 from benchmarks.results import memory_mb, publish
 from radarize.console import progress
+from radarize.log import Log
 from radarize.pose import between, compose, wrap
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
-from radarize.slam.log import Log
 from radarize.slam.posegraph import PoseGraph
 from radarize.tum import planar, read_tum
 

@@ -17,13 +17,13 @@ from benchmarks.results import FOLDER, publish
 from radarize.console import progress
 from radarize.errors import InputError
 from radarize.evaluation.likeness import frechet_distance, patch_statistics
-from radarize.importers import import_recording
-from radarize.methods import best_methods
+from radarize.features.maps import MapMaker, maps_of
+from radarize.importers import Given, import_recording
+from radarize.methods.registry import best_methods
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.run import run
 from radarize.training.dataset import recordings
-from radarize.training.maps import MapMaker, maps_of
 from radarsim.calibrate import calibrate
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.planner import plan_motion
@@ -48,9 +48,9 @@ def captures(source: Path, folder: Path) -> dict[str, Path]:
     chirps = {"tx": (0, 2), "start_frequency": 77e9, "slope": 60.012e12, "sample_rate": 2.5e6, "idle_time": 30e-6,
               "ramp_end_time": 62e-6, "adc_start_time": 6e-6}  # fmt: skip
     return {
-        "pcap": import_recording(pcap, folder / "pcap.h5", overrides={"samples": 256, "loops": 16, "rx": 1}),
+        "pcap": import_recording(pcap, folder / "pcap.h5", Given(overrides={"samples": 256, "loops": 16, "rx": 1})),
         "studio": import_recording(source / "iwr6843-studio", folder / "studio.h5"),
-        "people": import_recording(people, folder / "people.h5", shape="loop,virtual,sample", overrides=chirps),
+        "people": import_recording(people, folder / "people.h5", Given(shape="loop,virtual,sample", overrides=chirps)),
     }
 
 

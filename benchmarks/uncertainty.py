@@ -5,16 +5,16 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
+from radarize.mapping.segmentation import LEAST, NEAR, Segmentation, likeliest
+from radarize.odometry.learned import LearnedRotation, LearnedVelocity
 
 from benchmarks.evaluation import Case, add_options, cases, groups, through
 from benchmarks.results import publish
 from radarize.evaluation.motion import turn_errors, velocity_errors
 from radarize.evaluation.scans import true_ranges
 from radarize.mapping.scans import BEARINGS
-from radarize.mapping.segmentation import LEAST, NEAR, Segmentation, likeliest
-from radarize.methods import BEST, Inputs, Weights
+from radarize.methods.registry import BEST, Inputs, Weights
 from radarize.odometry.doppler import Velocities
-from radarize.odometry.learned import LearnedRotation, LearnedVelocity
 from radarize.pipeline import BATCH
 from radarize.pose import wrap
 from radarize.recording import Recording

@@ -13,9 +13,9 @@ from PIL import Image
 
 from radarize.evaluation.drawings import draw_doppler, draw_fan, draw_scan
 from radarize.evaluation.evaluate import trajectory_errors
-from radarize.evaluation.runfiles import read_map, read_scans
 from radarize.heatmaps import Heatmaps
 from radarize.recording import Recording
+from radarize.runfolder import RunFolder
 from radarsim.scene.preview import preview
 from radarsim.scene.scene import Scene
 
@@ -47,12 +47,13 @@ def heat_maps(recording: Path, seconds: float) -> plt.Figure:
 
 def trajectory_and_map(run: Path) -> plt.Figure:
     """Floor plan, map and trajectories from above."""
-    errors, scans = trajectory_errors(run), read_scans(run / "scans.h5")
+    folder = RunFolder(run)
+    errors, scans = trajectory_errors(folder), folder.scans
     slam = errors["slam"]
     figure, axis = plt.subplots(figsize=(11, 7.4), layout="constrained")
     plan = scans["truth/floor_plan"]
     axis.plot(plan[:, [0, 2]].T, plan[:, [1, 3]].T, color="0.55", lw=0.8)
-    grid = read_map(run / "map.yaml")
+    grid = folder.map
     cells = grid.centers(grid.occupied)
     cells = np.column_stack([cells, np.zeros(len(cells))]) @ slam.turn.T + slam.shift
     axis.plot(cells[:, 0], cells[:, 1], "s", color="#7b52c7", ms=1.6, label="map (occupied cells)")

@@ -5,13 +5,13 @@ from typing import Annotated, Literal
 
 import typer
 
-from radarize.console import keeping, new_app, progress, run, until_interrupted, working
+from radarize.console import new_app, progress, run, until_interrupted, working
 from radarize.errors import InputError
 
 app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
 
 RecordingFile = Annotated[Path, typer.Argument(metavar="REC.h5", help="A recording.")]
-RunFolder = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
+RunPath = Annotated[Path, typer.Argument(metavar="RUN", help="Folder that `radarize run` wrote.")]
 Beside = Annotated[list[Path] | None, typer.Option(help="Another run of the same recording; may be repeated.")]
 RadarFile = Annotated[str | None, typer.Option("--config", help="A .cfg or a preset's name.")]
 PortName = Annotated[str | None, typer.Option("--port", help="The radar's serial command port.")]
@@ -22,6 +22,7 @@ CommandPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of th
 DataPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of its samples.")]
 Duration = Annotated[float | None, typer.Option(min=0.0, help="End after so many seconds.")]
 FrameCount = Annotated[int | None, typer.Option(min=1, help="End after so many frames.")]
+Reading = Literal["corrected", "published"]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 
@@ -76,35 +77,20 @@ def import_(
 ):
     """Make a recording from a capture of a real radar."""
     fields = {
-        "samples": samples,
-        "loops": loops,
-        "rx": _antennas(rx, "--rx"),
-        "tx": _antennas(tx, "--tx"),
-        "iq_order": iq_order,
-        "board": board,
-        "start_frequency": start_frequency,
-        "slope": slope,
-        "sample_rate": sample_rate,
-        "idle_time": idle_time,
-        "adc_start_time": adc_start_time,
-        "ramp_end_time": ramp_end_time,
-        "frame_period": frame_period,
-        "start_time": start_time,
-    }
+        "samples": samples, "loops": loops, "rx": _antennas(rx, "--rx"), "tx": _antennas(tx, "--tx"),
+        "iq_order": iq_order, "board": board, "start_frequency": start_frequency, "slope": slope,
+        "sample_rate": sample_rate, "idle_time": idle_time, "adc_start_time": adc_start_time,
+        "ramp_end_time": ramp_end_time, "frame_period": frame_period,
+    }  # fmt: skip
     overrides = {name: value for name, value in fields.items() if value is not None}
-    from radarize.importers import import_recording
+    from radarize.importers import Given, import_recording
+    from radarize.radar.presets import load_config
+    from radarize.recording import keeping
 
-    radar, cfg_text = None, ""
-    if config is not None:
-        from radarize.radar.cfg import load_config
-
-        radar, cfg_text = load_config(config)
+    radar, text = load_config(config) if config is not None else (None, "")
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency)
     with keeping(output), progress("import") as report:
-        written = import_recording(
-            source, output, config=radar, cfg_text=cfg_text, poses=poses, shape=shape, variable=variable,
-            latency=latency, overrides=overrides, progress=report,
-        )  # fmt: skip
-    _tell(written)
+        _tell(import_recording(source, output, given, progress=report))
 
 
 def _tell(written: Path) -> None:
@@ -164,8 +150,7 @@ def live(
     from radarize.capture.live import Live, prepare
     from radarize.capture.page import Page
     from radarize.capture.replay import Replay
-    from radarize.methods import best_methods
-    from radarize.pipeline import Pipeline
+    from radarize.methods.registry import Inputs, best_methods
     from radarize.recording import RecordingWriter
 
     if replay and (config or port):
@@ -176,8 +161,8 @@ def live(
     writer = None
     with until_interrupted() as stopping, ExitStack() as stack:
         with working("warming up"):
-            pipeline = prepare(radar, lambda: Pipeline(radar, **chosen))
-        live = Live(pipeline, stack.enter_context(Page(address)))
+            inputs = prepare(Inputs(radar), chosen)
+        live = Live(inputs, chosen, stack.enter_context(Page(address)))
         report = stack.enter_context(progress("live"))
         stack.enter_context(stream)
         print(f"page: {live.page.url}", flush=True)
@@ -189,7 +174,7 @@ def live(
         warnings = stream.troubles() + live.losses.warnings()
         if writer:
             writer.annotate(warnings="; ".join(warnings))
-    for words in warnings:
+    for words in (*warnings, *filter(None, [live.blindness.warning])):
         typer.echo(f"warning: {words}", err=True)
     print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
 
@@ -198,7 +183,7 @@ def _sensor(config: str | None, port: str | None, baud: int, *network):
     """The sensor that the options of `capture` and `live` describe."""
     from radarize.capture.board import Network
     from radarize.capture.sensor import Sensor
-    from radarize.radar.cfg import load_config
+    from radarize.radar.presets import load_config
 
     for name, value in (("--config", config), ("--port", port)):
         if value is None:
@@ -231,22 +216,44 @@ def run_(
     scans: Annotated[
         str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
     ] = None,
-    settings: Annotated[str | None, typer.Option(help="Reading of the paper: corrected, or published.")] = None,
+    settings: Annotated[
+        Reading, typer.Option(help="Reading of the paper: published is --odometry published --scans published.")
+    ] = "corrected",
     weights: Annotated[
         Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
     ] = None,
+    config: Annotated[Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")] = None,
 ):
     """Estimate trajectory and map of a recording."""
+    from radarize.methods.configuration import Configuration
     from radarize.run import run
+    from radarize.runfolder import RunFolder
 
-    choices = {"odometry": odometry, "scans": scans, "settings": settings, "weights": weights}
-    given = {name: value for name, value in choices.items() if value is not None}
+    if settings == "published":
+        for option, value in (("--odometry", odometry), ("--scans", scans)):
+            if value not in (None, "published"):
+                raise InputError(f"{option} is {value!r}, expected none with --settings published, which has its own")
+        odometry = scans = "published"
+    configuration = Configuration() if config is None else Configuration.load(config)
     try:
         with progress("run") as report:
-            written = run(recording, output, **given, progress=report)
+            written = run(
+                recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,
+                progress=report,
+            )  # fmt: skip
     except KeyboardInterrupt:
-        raise InputError(f"stopped; {output} is not a whole run, the recording is untouched") from None
+        raise InputError(f"stopped; {output} is as it was before, and so is the recording") from None
+    for words in RunFolder(written).facts["warnings"]:
+        typer.echo(f"warning: {words}", err=True)
     print(written)
+
+
+@app.command("config")
+def config_():
+    """Print all settings of the pipeline as YAML, with what they mean: `radarize config > mine.yaml`."""
+    from radarize.methods.configuration import Configuration
+
+    print(Configuration().text(), end="")
 
 
 @app.command()
@@ -270,7 +277,7 @@ def train(
     workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where a training was stopped.")] = False,
     onnx: Annotated[bool, typer.Option("--onnx", help="Write the network as ONNX as well.")] = False,
-    settings: Annotated[str, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
+    settings: Annotated[Reading, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
 ):
     """Train a network on recordings; figures in brackets are the three tasks' defaults.
 
@@ -278,19 +285,21 @@ def train(
     """
     from dataclasses import replace
 
-    from radarize.training.train import find_task, train
+    from radarize.methods.registry import find_task
+    from radarize.training.train import train
 
     choices = {
         "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
         "patience": patience, "precision": precision, "seed": seed,
     }  # fmt: skip
     given = {name: value for name, value in choices.items() if value is not None}
-    hyper = replace(find_task(task, settings).defaults, **given)
+    task = f"published-{task}" if settings == "published" and not task.startswith("published-") else task
+    hyper = replace(find_task(task).defaults, **given)
     try:
         with progress("train") as report:
             written = train(
                 task, data, output, split=split, settings=hyper, device=device, workers=workers, resume=resume,
-                onnx=onnx, setting=settings, progress=report, say=lambda line: typer.echo(line, err=True),
+                onnx=onnx, progress=report, say=lambda line: typer.echo(line, err=True),
             )  # fmt: skip
     except KeyboardInterrupt:
         raise InputError("stopped; with --resume the same command goes on after the last whole epoch") from None
@@ -312,8 +321,8 @@ def slam(
 
     SCANS holds ranges (scan, beam), angle_min, angle_increment, range_max and, unless one a second, times.
     """
+    from radarize.log import run
     from radarize.slam.config import SlamConfig
-    from radarize.slam.log import run
 
     name = preset or ("radar" if scans.is_dir() else "lidar")
     settings = SlamConfig.load(config, name) if config else SlamConfig.preset(name)
@@ -323,7 +332,7 @@ def slam(
 
 @app.command()
 def evaluate(
-    run: RunFolder,
+    run: RunPath,
     beside: Beside = None,
     reference: Annotated[Path | None, typer.Option(help="True poses (TUM); by default the run's own.")] = None,
     as_json: AsJson = False,

@@ -1,4 +1,4 @@
-"""What both command lines share: errors as one sentence, progress bars, and what an interrupt leaves behind."""
+"""What both command lines share: errors as one sentence, progress bars, and how a command is stopped."""
 
 import errno
 import signal
@@ -6,7 +6,6 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -131,34 +130,3 @@ def until_interrupted() -> Iterator[threading.Event]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-@contextmanager
-def keeping(output: Path) -> Iterator[None]:
-    """Turn an interrupt into a sentence that says what of `output`, a recording, was kept.
-
-    Raises:
-        InputError: the user interrupted.
-    """
-    before = _written(output)
-    try:
-        yield
-    except KeyboardInterrupt:
-        raise InputError(f"stopped; {_kept(output, before)}") from None
-
-
-def _written(path: Path) -> int | None:
-    return path.stat().st_mtime_ns if path.is_file() else None
-
-
-def _kept(output: Path, before: int | None) -> str:
-    from radarize.recording import Recording
-
-    for path in (output, output.with_name(output.name + ".part")):
-        if path.is_file() and not (path == output and _written(path) == before):
-            try:
-                with Recording(path) as recording:
-                    return f"{len(recording)} whole frames are kept in {path}"
-            except InputError:
-                pass  # not even its first frame was written
-    return "nothing was written"

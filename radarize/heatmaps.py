@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float32, Int16
+from pydantic import BaseModel, ConfigDict, Field
 from scipy.signal import windows
 
 from radarize.errors import InputError
@@ -21,6 +22,16 @@ from radarize.radar.config import RadarConfig
 
 #: Default azimuth grid: -60...60 deg, ascending (left is positive); the antenna's gain is 15 dB down at its ends.
 AZIMUTHS = np.radians(np.arange(-60.0, 61.0))
+
+
+class HeatmapConfig(BaseModel):
+    """Settings of the heat maps."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    loading: float = Field(
+        0.01, gt=0, description="diagonal loading of Capon's covariance, as a share of its mean eigenvalue"
+    )
 
 
 class Heatmaps:
@@ -34,8 +45,7 @@ class Heatmaps:
     Args:
         config: radar configuration.
         azimuths: (azimuth,) columns of all maps, rad, ascending.
-        loading: diagonal loading of Capon's covariance, as a fraction of its mean eigenvalue.
-        device: torch device for all arithmetic; maps are returned on it.
+        settings: of the beamformers.
 
     Attributes:
         ranges: (range,) m, `config.range_bias` subtracted.
@@ -43,14 +53,8 @@ class Heatmaps:
         azimuths: (azimuth,) rad.
     """
 
-    def __init__(
-        self,
-        config: RadarConfig,
-        azimuths: np.ndarray = AZIMUTHS,
-        loading: float = 0.01,
-        device: str | torch.device = "cpu",
-    ):
-        self.config, self.loading, self.device = config, loading, torch.device(device)
+    def __init__(self, config: RadarConfig, azimuths: np.ndarray = AZIMUTHS, settings: HeatmapConfig | None = None):
+        self.config, self.settings = config, settings or HeatmapConfig()
         self.azimuths = np.asarray(azimuths, float)
         self.ranges = config.ranges - config.range_bias
         bins = np.arange(config.loops) - config.loops // 2
@@ -71,7 +75,7 @@ class Heatmaps:
         self._pair_steering = None if self.pairs is None else self._beams(self.pairs[:, 0])
 
     def _tensor(self, values: np.ndarray, kind: torch.dtype) -> torch.Tensor:
-        return torch.as_tensor(np.asarray(values), device=self.device).to(kind)
+        return torch.as_tensor(np.asarray(values)).to(kind)
 
     def steering(self, antennas: np.ndarray, u_y: np.ndarray) -> np.ndarray:
         """Far-field phasors (antenna, direction) of flat virtual antennas for direction cosines u_y to the left."""
@@ -109,7 +113,7 @@ class Heatmaps:
                 f"frames have shape {tuple(adc.shape[1:])}, expected {self.config.frame_shape} "
                 "(loop, tx, rx, sample, iq) from the configuration"
             )
-        samples = torch.view_as_complex(torch.as_tensor(adc, device=self.device).float())
+        samples = torch.view_as_complex(torch.as_tensor(adc).float())
         weights = self._loop_weights(len(samples), valid)  # (frame, loop, tx)
         profiles = torch.fft.fft(samples * self._range_window, dim=-1)
         profiles = profiles * (weights[..., None] * self._calibration)[..., None]
@@ -122,7 +126,7 @@ class Heatmaps:
         loops, tx = self.config.frame_shape[:2]
         weights = self._loop_window[None, :, None].expand(frames, loops, tx)
         if valid is not None:
-            weights = weights * torch.as_tensor(valid, device=self.device)
+            weights = weights * torch.as_tensor(valid)
         return weights / weights.sum(dim=1, keepdim=True).clamp_min(1e-6)
 
     @property
@@ -150,7 +154,7 @@ class Heatmaps:
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"], antennas: np.ndarray
     ) -> Complex64[torch.Tensor, "frame range antenna antenna"]:
         """Spatial covariance per range bin, summed over Doppler: an echo of amplitude A has the diagonal A^2."""
-        x = spectrum[..., torch.as_tensor(antennas, device=self.device)]
+        x = spectrum[..., torch.as_tensor(antennas)]
         return x.transpose(-1, -2) @ x.conj() / self._loop_energy
 
     def range_azimuth(
@@ -185,7 +189,7 @@ class Heatmaps:
         """`elevation_aware` of a spectrum at hand."""
         if self.pairs is None:
             raise self._no_pairs()
-        pairs = spectrum[..., torch.as_tensor(self.pairs, device=self.device)].mean(dim=-1)
+        pairs = spectrum[..., torch.as_tensor(self.pairs)].mean(dim=-1)
         covariance = self.covariance(pairs, np.arange(len(self.pairs)))
         return self._bartlett(covariance, self._pair_steering)
 
@@ -208,7 +212,7 @@ class Heatmaps:
         """
         if self.pairs is None:
             raise self._no_pairs()
-        pairs = torch.as_tensor(self.pairs, device=self.device)
+        pairs = torch.as_tensor(self.pairs)
         lower, upper = spectrum[..., pairs[:, 0]], spectrum[..., pairs[:, 1]]
 
         def beam(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
@@ -229,8 +233,8 @@ class Heatmaps:
         antennas = covariance.shape[-1]
         level = covariance.diagonal(dim1=-2, dim2=-1).real.mean(dim=-1)
         # The floor keeps all-zero cells (lost frames) regular.
-        load = self.loading * level + 1e-12 * level.amax(dim=-1, keepdim=True) + 1e-30
-        loaded = covariance + load[..., None, None] * torch.eye(antennas, device=self.device)
+        load = self.settings.loading * level + 1e-12 * level.amax(dim=-1, keepdim=True) + 1e-30
+        loaded = covariance + load[..., None, None] * torch.eye(antennas)
         scale = (level + load)[..., None]
         inverse = torch.linalg.inv(loaded / scale[..., None])
         power = ((inverse @ self._steering) * self._steering.conj()).sum(dim=-2).real
@@ -245,7 +249,7 @@ class Heatmaps:
         self, spectrum: torch.Tensor, antennas: np.ndarray, steering: torch.Tensor
     ) -> Float32[torch.Tensor, "frame range doppler direction"]:
         """Windowed-sum power of chosen antennas (flat indices) for any `steering` phasors (antenna, direction)."""
-        x = spectrum[..., torch.as_tensor(antennas, device=self.device)]
+        x = spectrum[..., torch.as_tensor(antennas)]
         beams = steering.conj() * self._tensor(self._taper(len(antennas)), torch.float32)[:, None]
         y = x @ beams
         return y.real.square() + y.imag.square()
@@ -271,10 +275,10 @@ class Heatmaps:
         if elevation_aware:
             if self.pairs is None:
                 raise self._no_pairs()
-            x = spectrum[..., torch.as_tensor(self.pairs, device=self.device)].mean(dim=-1)
+            x = spectrum[..., torch.as_tensor(self.pairs)].mean(dim=-1)
             steering = self._pair_steering
         else:
-            x, steering = spectrum[..., torch.as_tensor(self.row, device=self.device)], self._steering
+            x, steering = spectrum[..., torch.as_tensor(self.row)], self._steering
         x = x.transpose(1, 2)  # (frame, doppler, range, antenna)
         covariance = x.transpose(-1, -2) @ x.conj() / self._range_energy
         sharp = method == "capon" and not elevation_aware

@@ -1,112 +1,98 @@
-"""From raw I/Q to trajectory and map: the whole of Radarize, frame batch by frame batch."""
+"""From raw I/Q to trajectory and map: the whole of Radarize, batch by batch.
 
-import time as clock
-from collections import defaultdict
-from collections.abc import Iterator
-from contextlib import contextmanager
+    samples -> Batch (spectra, maps, points, made when asked for) -> odometry -> SLAM -> trajectory
+                                                                  -> scans    ->      -> map
+
+Methods of odometry and of scans come from `radarize.methods`; what a batch gave is a `Result`, which goes to a sink: a
+run's folder, the live page, or memory.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
+from jaxtyping import Float, Float32, Int
 
+from radarize.batch import Batch
 from radarize.mapping.scans import BEARINGS
-from radarize.methods import CLASSICAL, Inputs, Weights
-from radarize.published.chain import Chain
-from radarize.radar.config import RadarConfig
-from radarize.recording import Recording
+from radarize.odometry.integration import Track
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
+from radarize.stopwatch import Stopwatch, stage
 
-#: Frames a batch: enough to vectorise over, few enough to stay in cache.
-BATCH = 16
+
+class Follower(Protocol):
+    """Odometry of a stream of frames."""
+
+    def follow(self, batch: Batch) -> Track:
+        """Poses of the next frames, or of those of them that it uses."""
+        ...
+
+
+class Scanner(Protocol):
+    """Scans of a stream of frames."""
+
+    def scan(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
+        """Ranges of the next frames on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen."""
+        ...
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a batch gave.
+
+    Attributes:
+        frames: numbers of its frames, counted as the radar delivered them.
+        track: of these frames: poses, covariances, velocities.
+        ranges: scans on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen.
+    """
+
+    frames: Int[np.ndarray, "frame"]
+    track: Track
+    ranges: Float32[np.ndarray, "frame bearing"]
 
 
 class Pipeline:
-    """Radar SLAM as a stream: push raw frames, then read trajectory and map. Memory grows with the path, not the data.
-
-    Lost chirps weigh nothing. Frames that are lost as a whole, or nearly, or silent, leave a gap, over which odometry
-    takes motion to change evenly; `frames` says which ones are left.
+    """Radar SLAM as a stream: push batches, then read trajectory and map off `slam`. Memory grows with the ground that
+    is covered, not with the data.
 
     Args:
-        config: radar configuration.
-        scans: how scans are made, a key of `radarize.methods.SCANS`.
-        odometry: where motion comes from, a key of `radarize.methods.ODOMETRY`.
-        weights: of the networks; the shipped ones if None.
-        recording: with other sensors' streams, for methods that use them.
-        chain: what else makes odometry and scans of samples, then in place of all these.
-        beside: a pipeline of the same radar, weights and recording that is pushed the same batches, the same objects:
-            whatever both need is made once.
+        odometry, scanner: methods; pipelines that are pushed the same batches may share them.
+        slam: settings of the back end.
 
-    Raises:
-        InputError: an unknown method, or networks that do not fit the radar.
+    Attributes:
+        slam: the back end.
+        seconds: of each stage by name, so far.
     """
 
-    def __init__(
-        self,
-        config: RadarConfig,
-        scans: str = CLASSICAL["scans"],
-        odometry: str = CLASSICAL["odometry"],
-        weights: Weights | None = None,
-        recording: Recording | None = None,
-        chain: Chain | None = None,
-        beside: "Pipeline | None" = None,
-    ):
-        self.config, self.scans, self.chain = config, scans, chain
-        self._inputs = (
-            beside._inputs.beside(scans) if beside else Inputs(config, weights, scans, recording, self._stage)
-        )
-        self.heatmaps = self._inputs.heatmaps
-        self.odometry, self.scanner = self._inputs.odometry(odometry), self._inputs.scanner()
-        self.slam = Slam(SlamConfig.preset("radar"))
-        self.pushed = self.lost = 0
-        self.frames: list[np.ndarray] = []  # numbers of those used, counted as pushed
-        self.times: list[np.ndarray] = []
-        self.poses: list[np.ndarray] = []
-        self.velocities: list[np.ndarray] = []
-        self.velocity_covariances: list[np.ndarray] = []
-        self.step_covariances: list[np.ndarray] = []
-        self.ranges: list[np.ndarray] = []
-        self.stage_seconds: dict[str, float] = defaultdict(float)
+    def __init__(self, odometry: Follower, scanner: Scanner, slam: SlamConfig | None = None):
+        self.odometry, self.scanner = odometry, scanner
+        self.slam = Slam(slam or SlamConfig.preset("radar"))
+        self._stopwatch = Stopwatch()
 
-    def push(self, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None = None) -> None:
-        """Process the next frames.
+    @property
+    def seconds(self) -> dict[str, float]:
+        return self._stopwatch.seconds
 
-        Args:
-            adc: int16 (frame, loop, tx, rx, sample, iq).
-            times: (frame,) stamps, s.
-            valid: (frame, loop, tx), False where a chirp was lost.
-        """
-        numbers = self.pushed + np.arange(len(times))
-        self.pushed += len(times)
-        if self.chain:
-            used = numbers % self.chain.stride == 0
-            track, ranges = self.chain.push(adc, times, self._stage)
-        else:
-            used, spectrum = self._inputs.frames(adc, valid)
-            self.lost += int(np.count_nonzero(~used))
-            if spectrum is None:
-                return
-            track = self.odometry.follow(spectrum, times[used], self._stage)
-            ranges = self.scanner.scan(spectrum)
-        self.frames.append(numbers[used])
-        with self._stage("slam"):
-            for instant, pose, spread, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):
-                self.slam.add_odometry(instant, pose, spread)
-                self.slam.add_scan(instant, BEARINGS, scan)
-        self.times.append(track.time)
-        self.poses.append(track.pose)
-        self.velocities.append(track.velocity)
-        self.velocity_covariances.append(track.velocity_covariance)
-        self.step_covariances.append(track.covariance)
-        self.ranges.append(ranges.astype(np.float32))
+    def push(self, batch: Batch) -> Result:
+        """Follow the sensor over the next frames, and map what it saw."""
+        with self._stopwatch.running():
+            track = batch.made(self.odometry.follow)
+            used = np.isin(batch.centers, track.time)
+            ranges = batch.made(self.scanner.scan)[used]
+            with stage("slam"):
+                for time, pose, covariance, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):
+                    self.slam.add_odometry(time, pose, covariance)
+                    self.slam.add_scan(time, BEARINGS, scan)
+            return Result(batch.numbers[used], track, ranges.astype(np.float32))
+
+    def follow(self, batches: Iterable[Batch]) -> Iterator[Result]:
+        """Push all of a stream's batches that hold frames, then finish."""
+        yield from (self.push(batch) for batch in batches if len(batch))
+        self.finish()
 
     def finish(self) -> None:
         """Close the last loops and optimise."""
-        with self._stage("slam"):
+        with self._stopwatch.running(), stage("slam"):
             self.slam.finish()
-
-    @contextmanager
-    def _stage(self, name: str) -> Iterator[None]:
-        """Time a step; what steps within it take is theirs."""
-        start, others = clock.perf_counter(), sum(self.stage_seconds.values())
-        yield
-        within = sum(self.stage_seconds.values()) - others
-        self.stage_seconds[name] += clock.perf_counter() - start - within

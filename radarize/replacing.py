@@ -2,7 +2,8 @@
 
 import contextlib
 import os
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -28,3 +29,64 @@ def replacing(path: str | Path) -> Iterator[Path]:
         if isinstance(error, OSError):
             raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
         raise
+
+
+class Replacement:
+    """Files that take the places of those in a folder together, or not at all.
+
+    Args:
+        folder: where they go; made if need be.
+        names: of all files that there may be. The first goes first and comes last: where it is, so are the others, and
+            of one making.
+
+    Attributes:
+        part: folder to write them to.
+
+    Raises:
+        InputError: nothing can be written there.
+    """
+
+    def __init__(self, folder: Path, names: Sequence[str]):
+        self.folder, self.names, self.part = folder, names, folder / ".part"
+        self._new = not folder.exists()
+        try:
+            if self.part.exists():
+                shutil.rmtree(self.part)  # of one who died here
+            self.part.mkdir(parents=True)
+        except OSError as error:
+            raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
+
+    def place(self) -> None:
+        """Let the files take their places; those of the folder that are not among them go.
+
+        Raises:
+            InputError: they cannot.
+        """
+        try:
+            for name in self.names:
+                (self.folder / name).unlink(missing_ok=True)
+            for name in reversed(self.names):
+                if (self.part / name).exists():
+                    os.replace(self.part / name, self.folder / name)
+            self.part.rmdir()
+        except OSError as error:
+            raise InputError(f"{self.folder}: cannot be written ({error.strerror or error})") from error
+
+    def discard(self) -> None:
+        """Leave the folder as it was; nothing to do after `place`."""
+        if self.part.exists():
+            shutil.rmtree(self.part, ignore_errors=True)
+            if self._new:
+                with contextlib.suppress(OSError):
+                    self.folder.rmdir()
+
+
+def write_whole(path: Path, text: str) -> Path:
+    """Write a text file under a temporary name and rename it when it is whole.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+    return path

@@ -1,12 +1,16 @@
 """TUM trajectory files: ``time x y z qx qy qz qw`` a line, ``#`` comments."""
 
 from pathlib import Path
+from typing import TextIO
 
 import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
 from radarize.replacing import replacing
+
+#: Poses that are written at a time.
+_ROWS = 1024
 
 
 def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]]:
@@ -54,9 +58,16 @@ def write_tum(path: str | Path, times: Float[np.ndarray, "pose"], poses: Float[n
     Raises:
         InputError: the file cannot be written.
     """
-    with replacing(path) as part:
-        np.savetxt(part, np.column_stack([times, poses]), fmt="%.9f")
+    with replacing(path) as part, part.open("w") as file:
+        write_poses(file, times, poses)
     return Path(path)
+
+
+def write_poses(file: TextIO, times: Float[np.ndarray, "pose"], poses: Float[np.ndarray, "pose 7"]) -> None:
+    """Add lines to an open TUM file, see `write_tum`."""
+    for start in range(0, len(times), _ROWS):
+        rows = slice(start, start + _ROWS)
+        np.savetxt(file, np.column_stack([times[rows], poses[rows]]), fmt="%.9f")
 
 
 def planar(poses: Float[np.ndarray, "pose 7"]) -> Float[np.ndarray, "pose 3"]:

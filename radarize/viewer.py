@@ -19,13 +19,14 @@ from jaxtyping import Float, Shaped, UInt8
 
 from radarize.errors import InputError
 from radarize.evaluation.drawings import LEAKAGE
+from radarize.evaluation.evaluate import trajectories
 from radarize.evaluation.page import COLORS
-from radarize.evaluation.runfiles import read_map, read_scans
-from radarize.evaluation.trajectory import alignment, load, matched, planar
+from radarize.evaluation.trajectory import alignment, matched, planar, trajectory
+from radarize.features.maps import MapMaker, maps_of
 from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
 from radarize.replacing import replacing
-from radarize.training.maps import MapMaker, maps_of
+from radarize.runfolder import RunFolder
 
 _BATCH = 16
 _MAPS = ("range_azimuth", "doppler_azimuth")
@@ -61,22 +62,21 @@ def view(
         if run is not None:
             raise InputError(f"{source} is a run, and --run {run} another, expected a recording with --run")
         source, run = None, source
-    if run is not None and not (run / "trajectory.tum").is_file():
-        raise InputError(f"{run}: has no trajectory.tum, expected a folder that radarize run wrote")
+    folder = None if run is None else RunFolder(run)
     if save is None:
-        _show(source, run, None, progress)
+        _show(source, folder, None, progress)
         return None
     with replacing(save) as part:
-        _show(source, run, part, progress)
+        _show(source, folder, part, progress)
     return Path(save)
 
 
-def _show(source: Path | None, run: Path | None, save: Path | None, progress) -> None:
+def _show(source: Path | None, run: RunFolder | None, save: Path | None, progress) -> None:
     import rerun as rr
 
     recording = None if source is None else Recording(source)
     try:
-        stream = rr.RecordingStream("radarize", recording_id=str((source or run).resolve()))
+        stream = rr.RecordingStream("radarize", recording_id=str((source or run.path).resolve()))
         if save is None:
             stream.spawn(default_blueprint=_layout())
         else:
@@ -273,16 +273,11 @@ def picture(
     return colormaps["magma"](shade, bytes=True)[..., :3]
 
 
-def show_run(screen: Screen, run: Path) -> None:
+def show_run(screen: Screen, run: RunFolder) -> None:
     """What a run holds: trajectories, laid upon the truth where it is known, map and scans."""
     rr = screen.rr
-    scans = read_scans(run / "scans.h5") if (run / "scans.h5").is_file() else {}
-    paths = {
-        name: load(run / file)
-        for name, file in (("slam", "trajectory.tum"), ("odometry", "odometry.tum"))
-        if (run / file).is_file()
-    }
-    reference = load(run / "reference.tum") if (run / "reference.tum").is_file() else None
+    scans, paths = run.scans, trajectories(run)
+    reference = None if run.reference is None else trajectory(*run.reference)
     screen.start = screen.start or float(paths["slam"].timestamps[0])
     screen.fixed("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     for name, path in paths.items():
@@ -298,8 +293,8 @@ def show_run(screen: Screen, run: Path) -> None:
         screen.scans("world/slam/radar/scan", scans["time"], scans["azimuths"], scans["ranges"], COLORS["slam"])
     if "velocity" in scans:
         screen.speeds(scans["time"], scans["velocity"], "run")
-    if (run / "map.yaml").is_file():
-        _send_map(screen, read_map(run / "map.yaml"))
+    if run.map is not None:
+        _send_map(screen, run.map)
 
 
 def _send_map(screen: Screen, found) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from radarize.console import keeping, new_app, progress, run, working
+from radarize.console import new_app, progress, run, working
 from radarize.errors import InputError
 
 app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as raw int16 I/Q.")
@@ -53,7 +53,7 @@ def simulate(
     ] = "",
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth."""
-    from radarize.recording import Recording
+    from radarize.recording import Recording, keeping
     from radarsim.motion import Mounting
     from radarsim.simulate import simulate
     from radarsim.statistics import Statistics
@@ -146,7 +146,7 @@ def twin(
 ):
     """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
     from radarize.evaluation.twin_report import report_twin
-    from radarize.recording import Recording
+    from radarize.recording import Recording, keeping
     from radarsim.motion import Mounting
     from radarsim.twin import make_twin
 

@@ -8,9 +8,9 @@ from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
 from radarize.errors import InputError
-from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
+from radarize.radar.presets import load_config
 from radarize.recording import RecordingWriter
 from radarsim.motion import Motion, Mounting, motion_from_tum
 from radarsim.physics.crowd import Crowd

@@ -53,9 +53,10 @@ def test_help_is_instant(name):
 @pytest.mark.parametrize(
     "command",
     ["radarize import", "radarize info", "radarize run", "radarize slam", "radarize train", "radarize evaluate",
-     "radarize report", "radarize benchmark", "radarize export", "radarize view", "radarsim simulate",
-     "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene", "radarsim scene info",
-     "radarsim scene preview", "radarsim scene import", "radarsim export", "radarsim emulate", "radarsim doctor"],
+     "radarize config", "radarize report", "radarize benchmark", "radarize export", "radarize view",
+     "radarsim simulate", "radarsim dataset", "radarsim calibrate", "radarsim twin", "radarsim scene",
+     "radarsim scene info", "radarsim scene preview", "radarsim scene import", "radarsim export", "radarsim emulate",
+     "radarsim doctor"],
 )  # fmt: skip
 def test_every_command_explains_itself(capsys, command):
     code, out, _ = call(capsys, command, "--help")
@@ -152,8 +153,8 @@ def test_an_interrupt_says_what_was_kept(capsys, monkeypatch, tmp_path):
 def test_import_hands_over_what_was_typed(capsys, monkeypatch, tmp_path):
     seen = {}
 
-    def record(source, output, **options):
-        seen.update(options, source=source)
+    def record(source, output, given, progress):
+        seen.update(vars(given), source=source)
         return small_recording(output)
 
     monkeypatch.setattr("radarize.importers.import_recording", record)
@@ -163,10 +164,11 @@ def test_import_hands_over_what_was_typed(capsys, monkeypatch, tmp_path):
     assert seen["overrides"] == {
         "samples": 256, "loops": 16, "rx": 1, "tx": (0, 2, 1), "iq_order": "qqii", "slope": 80e12, "frame_period": 0.1,
     }  # fmt: skip
-    assert seen["config"] is None and seen["poses"] is None
-    axes = ["--shape", "loop,virtual,sample", "--variable", "adc", "--latency", "0.03"]
+    assert seen["config"] is None and seen["poses"] is None and seen["start_time"] is None
+    axes = ["--shape", "loop,virtual,sample", "--variable", "adc", "--latency", "0.03", "--start-time", "5"]
     call(capsys, "radarize import", "a.npz", "-o", tmp_path / "a.h5", "--config", "radarize", *axes)
-    assert (seen["shape"], seen["variable"], seen["latency"]) == ("loop,virtual,sample", "adc", 0.03)
+    assert (seen["shape"], seen["variable"]) == ("loop,virtual,sample", "adc")
+    assert (seen["latency"], seen["start_time"]) == (0.03, 5.0)
     assert seen["config"] == PRESETS["radarize"] and "profileCfg" in seen["cfg_text"]
 
 

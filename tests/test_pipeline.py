@@ -6,15 +6,21 @@ import h5py
 import numpy as np
 import pytest
 
+from radarize.batch import Intake
+from radarize.cli import app
+from radarize.console import run as command
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate
-from radarize.pipeline import Pipeline
+from radarize.methods.configuration import Configuration
+from radarize.methods.registry import CLASSICAL, Inputs, Workshop
+from radarize.pipeline import Pipeline, Result
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter, Stream
 from radarize.run import run
 from radarize.tum import read_tum
 from radarsim.simulate import simulate
+from tests.batches import stream
 
 
 @pytest.fixture(scope="module")
@@ -67,16 +73,25 @@ def test_scans_mostly_end_at_surfaces(finished):
     assert np.mean(np.abs(found[both] - truth[both]) < 0.25) > 0.6
 
 
+def follow(adc, times, valid=None, size=16, config=PRESETS["radarize"]) -> tuple[list[Result], Pipeline, Intake]:
+    """Results of the methods without networks, which are the fastest."""
+    inputs = Inputs(config)
+    pipeline, intake = Workshop(inputs).pipeline(**CLASSICAL), Intake(inputs.signal)
+    return list(pipeline.follow(stream(intake, adc, times, valid, size))), pipeline, intake
+
+
+def poses(results: list[Result]) -> np.ndarray:
+    return np.concatenate([result.track.pose for result in results])
+
+
 def test_batches_do_not_matter(walk):
-    """Frames one by one or in sixteens: the same trajectory, so a live stream gives what a file gives."""
-    ends = []
-    for size in (1, 16):
-        with Recording(walk) as source:
-            pipeline = Pipeline(source.config)
-            for start in range(0, 48, size):
-                pipeline.push(source.adc(start, start + size), source.times[start : start + size])
-        ends.append(np.concatenate(pipeline.poses))
-    assert ends[0] == pytest.approx(ends[1], abs=1e-6)
+    """Frames one by one or in sixteens: the same trajectory and map, so a live stream gives what a file gives."""
+    with Recording(walk) as source:
+        adc, times = source.adc(0, 48), source.times[:48]
+    (one, slow, _), (other, fast, _) = (follow(adc, times, size=size) for size in (1, 16))
+    assert len(one) == 48 and len(other) == 3
+    assert poses(one) == pytest.approx(poses(other), abs=1e-6)
+    assert slow.slam.trajectory()[1] == pytest.approx(fast.slam.trajectory()[1], abs=1e-4)
 
 
 def test_lost_chirps_do_no_harm(walk, tmp_path):
@@ -87,30 +102,25 @@ def test_lost_chirps_do_no_harm(walk, tmp_path):
         valid = rng.random(adc.shape[:3]) > 0.2
         adc[~valid] = 0
         writer.append(adc, source.times[:120], valid)
-    whole, lossy = Pipeline(PRESETS["radarize"]), Pipeline(PRESETS["radarize"])
     with Recording(walk) as source, Recording(tmp_path / "lossy.h5") as damaged:
-        whole.push(source.adc(0, 120), source.times[:120])
-        lossy.push(damaged.adc(0, 120), damaged.times, damaged.valid(0, 120))
-    assert np.isfinite(lossy.poses[0]).all()
-    assert np.linalg.norm(whole.poses[0][-1, :2] - lossy.poses[0][-1, :2]) < 0.15
+        whole = poses(follow(source.adc(0, 120), source.times[:120], size=120)[0])
+        lossy = poses(follow(damaged.adc(0, 120), damaged.times, damaged.valid(0, 120), size=120)[0])
+    assert np.isfinite(lossy).all()
+    assert np.linalg.norm(whole[-1, :2] - lossy[-1, :2]) < 0.15
 
 
 def spoil(walk, valid):
-    """A pipeline over the walk's first frames with the chirps lost that are not valid."""
+    """The walk's first frames with the chirps lost that are not valid."""
     frames = len(valid)
     with Recording(walk) as source:
-        pipeline, adc = Pipeline(source.config), source.adc(0, frames)
+        adc = source.adc(0, frames)
         adc[~valid] = 0
-        for at in range(0, frames, 16):
-            part = slice(at, at + 16)
-            pipeline.push(adc[part], source.times[:frames][part], valid[part])
-    pipeline.finish()
-    return pipeline
+        return follow(adc, source.times[:frames], valid)
 
 
 @pytest.fixture(scope="module")
 def unspoilt(walk):
-    return spoil(walk, np.ones((120, 32, 3), bool))
+    return poses(spoil(walk, np.ones((120, 32, 3), bool))[0])
 
 
 @pytest.mark.parametrize(
@@ -127,13 +137,12 @@ def unspoilt(walk):
 def test_lost_bursts_and_frames_leave_a_gap(walk, unspoilt, lost, frames, tolerance):
     valid = np.ones((120, 32, 3), bool)
     valid[lost] = False
-    pipeline = spoil(walk, valid)
-    numbers, poses = np.concatenate(pipeline.frames), np.concatenate(pipeline.poses)
-    assert len(poses) == len(numbers) == frames and pipeline.lost == 120 - frames
-    whole = np.concatenate(unspoilt.poses)
-    away = np.linalg.norm((poses - poses[0] - whole[numbers] + whole[numbers[0]])[:, :2], axis=1)
+    results, _, intake = spoil(walk, valid)
+    numbers, found = np.concatenate([result.frames for result in results]), poses(results)
+    assert len(found) == len(numbers) == frames and (intake.taken, intake.lost) == (120, 120 - frames)
+    away = np.linalg.norm((found - found[0] - unspoilt[numbers] + unspoilt[numbers[0]])[:, :2], axis=1)
     assert away.max() < tolerance
-    covariance = np.concatenate(pipeline.step_covariances)
+    covariance = np.concatenate([result.track.covariance for result in results])
     assert np.isfinite(covariance).all() and (np.linalg.eigvalsh(covariance[1:]) > 0).all()
     # A step across a gap is less certain, by the time that it took.
     gaps = np.diff(numbers, prepend=numbers[0] - 1)
@@ -143,8 +152,8 @@ def test_lost_bursts_and_frames_leave_a_gap(walk, unspoilt, lost, frames, tolera
 
 def test_everything_lost(walk, tmp_path):
     """No crash, nothing seen, nothing moved; and a run of such a recording says so."""
-    pipeline = spoil(walk, np.zeros((40, 32, 3), bool))
-    assert pipeline.times == [] and pipeline.lost == 40 and not pipeline.slam.nodes
+    results, pipeline, intake = spoil(walk, np.zeros((40, 32, 3), bool))
+    assert results == [] and intake.lost == 40 and not pipeline.slam.nodes
     with Recording(walk) as source, RecordingWriter(tmp_path / "lost.h5", source.config) as writer:
         shape = (20, *source.config.frame_shape)
         writer.append(np.zeros(shape, np.int16), source.times[:20], np.zeros(shape[:3], bool))
@@ -174,10 +183,8 @@ def test_silence_is_survived(tmp_path):
     """All samples zero (a radar that was never started): no crash, no motion, and a sentence."""
     config = PRESETS["radarize"]
     silence, times = np.zeros((20, *config.frame_shape), np.int16), np.arange(20) / 30
-    pipeline = Pipeline(config)
-    pipeline.push(silence, times)
-    pipeline.finish()
-    assert pipeline.times == [] and pipeline.lost == 20
+    results, _, intake = follow(silence, times)
+    assert results == [] and intake.lost == 20
     with RecordingWriter(tmp_path / "silent.h5", config) as writer:
         writer.append(silence, times)
     with pytest.raises(InputError, match="all its 20 frames are lost or silent"):
@@ -189,7 +196,6 @@ def test_silence_is_survived(tmp_path):
     [
         ({"odometry": "magic"}, "odometry is 'magic', expected one of fused"),
         ({"scans": "magic"}, "scans is 'magic', expected one of"),
-        ({"settings": "magic"}, "settings is 'magic', expected one of corrected"),
     ],
 )
 def test_unknown_methods(walk, tmp_path, arguments, words):
@@ -206,6 +212,26 @@ def test_an_array_without_elevation(tmp_path):
     with pytest.raises(InputError, match="first-echo"):
         run(tmp_path / "flat.h5", tmp_path / "run", scans="elevation-aware")
     run(tmp_path / "flat.h5", tmp_path / "run", scans="first-echo")
+
+
+def test_a_configuration_changes_the_run(walk, finished, tmp_path):
+    """What is set is used, and told; what is not set is as always."""
+    (tmp_path / "mine.yaml").write_text("slam:\n  grid:\n    map_resolution: 0.1\nscans:\n  min_range: 2.0\n")
+    mine = Configuration.load(tmp_path / "mine.yaml")
+    out = tmp_path / "run"
+    methods = ["--odometry", "doppler", "--scans", "first-echo"]
+    with pytest.raises(SystemExit) as ended:
+        command(app, "radarize", ["run", str(walk), "-o", str(out), *methods, "--config", str(tmp_path / "mine.yaml")])
+    assert ended.value.code == 0
+    told = json.loads((out / "run.json").read_text())["configuration"]
+    assert told == json.loads(mine.model_dump_json())
+    assert told["slam"]["grid"]["map_resolution"] == 0.1 and told["scans"]["min_range"] == 2.0
+    usual = json.loads((finished / "run.json").read_text())["configuration"]
+    assert usual == json.loads(Configuration().model_dump_json()) and usual["slam"]["grid"]["map_resolution"] != 0.1
+    assert "resolution: 0.1\n" in (out / "map.yaml").read_text()
+    with h5py.File(out / "scans.h5") as file:
+        ranges = file["ranges"][:]
+    assert ranges.min() > 1.95 and np.isfinite(ranges).any()
 
 
 def test_empty_recording(tmp_path):

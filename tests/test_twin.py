@@ -16,8 +16,7 @@ from benchmarks.twin import altered, shaken
 from radarize.errors import InputError
 from radarize.evaluation.twin import compare
 from radarize.evaluation.twin_report import report_twin
-from radarize.radar.cfg import load_config
-from radarize.radar.presets import PRESETS
+from radarize.radar.presets import PRESETS, load_config
 from radarize.recording import Recording, RecordingWriter
 from radarsim.motion import Mounting
 from radarsim.scene.materials import MATERIALS

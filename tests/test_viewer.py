@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
-from radarize.evaluation.runfiles import read_map, read_scans
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
+from radarize.runfolder import OccupancyMap, Scans
 from radarize.tum import read_tum
 from radarize.viewer import view
 from tests.evaluation.fake_run import write_run
@@ -159,11 +159,11 @@ def test_a_run_lies_upon_the_truth(tmp_path):
     turn = np.array(shown["/world/slam", "Transform3D:mat3x3"]).reshape(3, 3).T  # column by column
     shift = np.ravel(shown["/world/slam", "Transform3D:translation"])
     assert places @ turn.T + shift == pytest.approx(truth[:, :3], abs=0.15)
-    scans = read_scans(run / "scans.h5")
+    scans = Scans(run / "scans.h5")
     hit = np.isfinite(scans["ranges"]).sum(axis=1)
     clouds = shown["/world/slam/radar/scan", "Points3D:positions"]
     assert [len(cloud or ()) for cloud in clouds] == hit.tolist()
-    found = read_map(run / "map.yaml")
+    found = OccupancyMap.read(run / "map.yaml")
     assert bytes(np.array(shown["/world/slam/map", "GridMap:data"][0], np.uint8)) == found.pixels.tobytes()
     assert shown["/world/slam/map", "GridMap:translation"][0][:2] == pytest.approx(found.origin[:2], abs=1e-5)
     assert "/world/odometry/path" in shown.found and "/velocity/forward/run" in shown.found

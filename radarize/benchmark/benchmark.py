@@ -11,7 +11,7 @@ from radarize.benchmark.steps import Step, perform
 from radarize.benchmark.table import Table
 from radarize.errors import InputError
 from radarize.evaluation.page import Page
-from radarize.methods import BEST, ODOMETRY, SCANS, best_methods
+from radarize.methods.registry import BEST, ODOMETRY, SCANS, best_methods
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from radarize.errors import InputError
-from radarize.evaluation.runfiles import read_json
+from radarize.jsonfile import read_json
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 

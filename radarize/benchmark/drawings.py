@@ -1,7 +1,6 @@
 """What a benchmark's page shows below its tables: trajectories, maps beside the floor plan, distributions of errors."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
@@ -9,10 +8,10 @@ import plotly.graph_objects as go
 from radarize.benchmark.benchmark import Study
 from radarize.benchmark.runs import Pair, Run
 from radarize.evaluation.drawings import canvas
-from radarize.evaluation.evaluate import TRAJECTORIES
+from radarize.evaluation.evaluate import trajectories
 from radarize.evaluation.page import COLORS, INK, Page
-from radarize.evaluation.runfiles import read_map, read_scans
-from radarize.evaluation.trajectory import alignment, load, matched, moved, planar
+from radarize.evaluation.trajectory import alignment, matched, moved, planar, trajectory
+from radarize.runfolder import RunFolder
 
 #: Recordings whose maps are shown, and poses of a trajectory that are drawn.
 _MAPS, _POSES = 4, 240
@@ -53,11 +52,11 @@ def _trajectories(study: Study, page: Page, which: str, names: dict[Pair, str]) 
     figure, owners = go.Figure(), []
     for case in cases:
         drawn = [(pair, run) for pair, found in runs.items() if (run := found.get(case))]
-        reference = load(study.output / drawn[0][1].place / "reference.tum")
+        reference = trajectory(*RunFolder(study.output / drawn[0][1].place).reference)
         _line(figure, planar(reference).positions_xyz, "truth", COLORS["good"], case is cases[0], dash="dot")
         owners.append(case)
         for pair, run in drawn:
-            estimate, truth = map(planar, matched(load(study.output / run.place / TRAJECTORIES[which]), reference))
+            estimate, truth = map(planar, matched(trajectories(RunFolder(study.output / run.place))[which], reference))
             path = moved(estimate, *alignment(estimate, truth, in_plane=True)).positions_xyz
             _line(figure, path, names[pair], _color(study, pair), case is cases[0])
             owners.append(case)
@@ -153,9 +152,8 @@ def _row(study: Study, drawn: Sequence[tuple[Pair, Run]], names: dict[Pair, str]
     columns = min(len(drawn) + 1, 4)
     rows = -(-(len(drawn) + 1) // columns)
     figure, axes = canvas(columns, rows, height=3.0)
-    first = study.output / drawn[0][1].place
-    plan = read_scans(first / "scans.h5").get("truth/floor_plan")
-    reference = load(first / "reference.tum")
+    first = RunFolder(study.output / drawn[0][1].place)
+    plan, reference = first.scans.get("truth/floor_plan"), trajectory(*first.reference)
     path = planar(reference).positions_xyz
     low, high = path[:, :2].min(axis=0) - 5, path[:, :2].max(axis=0) + 5
     for axis in axes.flat:
@@ -167,7 +165,7 @@ def _row(study: Study, drawn: Sequence[tuple[Pair, Run]], names: dict[Pair, str]
             axis.plot(*_segments(plan), color=INK, lw=0.8 if title == "floor plan" else 0.4, alpha=0.9)
     axes.flat[0].plot(path[:, 0], path[:, 1], color=COLORS["good"], lw=1)
     for axis, (pair, run) in zip(axes.flat[1:], drawn, strict=False):
-        x, y = _cells(study.output / run.place, reference)
+        x, y = _cells(RunFolder(study.output / run.place), reference)
         axis.plot(x, y, ",", color=COLORS["slam"] if pair == study.chosen.partner else COLORS["odometry"])
     return figure
 
@@ -176,10 +174,10 @@ def _segments(plan: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return tuple(np.column_stack([plan[:, i], plan[:, i + 2], np.full(len(plan), np.nan)]).ravel() for i in (0, 1))
 
 
-def _cells(run: Path, reference) -> tuple[np.ndarray, np.ndarray]:
+def _cells(run: RunFolder, reference) -> tuple[np.ndarray, np.ndarray]:
     """Occupied cells in the truth's frame."""
-    estimate, truth = map(planar, matched(load(run / TRAJECTORIES["slam"]), reference))
+    estimate, truth = map(planar, matched(trajectory(*run.trajectory), reference))
     turn, shift = alignment(estimate, truth, in_plane=True)
-    grid = read_map(run / "map.yaml")
+    grid = run.map
     cells = grid.centers(grid.occupied)
     return tuple((np.column_stack([cells, np.zeros(len(cells))]) @ turn.T + shift)[:, :2].T)

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from radarize.benchmark.steps import Report
 from radarize.errors import InputError
-from radarize.methods import Weights
+from radarize.methods.registry import Weights, find_task
 from radarize.training.dataset import recordings
-from radarize.training.train import find_task, train
+from radarize.training.train import train
 
 
 @dataclass(frozen=True)

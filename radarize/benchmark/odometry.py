@@ -12,9 +12,9 @@ from radarize.benchmark.runs import Pair, Run
 from radarize.benchmark.table import Table, mean
 from radarize.benchmark.trajectories import trajectory_tables
 from radarize.evaluation.motion import turn_errors, velocity_errors
-from radarize.evaluation.runfiles import read_scans
 from radarize.pose import wrap
-from radarize.tum import planar, read_tum
+from radarize.runfolder import RunFolder
+from radarize.tum import planar
 
 #: s: span that the paper's network tells a turn over.
 WINDOW = 4 / 15
@@ -77,8 +77,8 @@ class Followed:
         Raises:
             InputError: a damaged file.
         """
-        scans = read_scans(run / "scans.h5")
-        times, poses = read_tum(run / "odometry.tum")
+        folder = RunFolder(run)
+        scans, (times, poses) = folder.scans, folder.odometry
         yaw = planar(poses)[:, 2]
         # Truth has a pose for every frame, a run one for every frame that was not lost.
         rows = (

@@ -7,7 +7,7 @@ from radarize.benchmark.results import Results
 from radarize.benchmark.table import cell
 from radarize.errors import InputError
 from radarize.evaluation.page import Page
-from radarize.evaluation.runfiles import read_json
+from radarize.jsonfile import read_json
 
 
 def write_page(study: Study, results: Results, path: Path) -> Path:

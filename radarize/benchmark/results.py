@@ -12,7 +12,7 @@ from pathlib import Path
 from radarize import __version__
 from radarize.benchmark.table import Table
 from radarize.evaluation.metrics import without_nan
-from radarize.evaluation.runfiles import write_whole
+from radarize.replacing import write_whole
 
 
 def machine() -> dict[str, str]:

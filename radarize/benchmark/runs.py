@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 
 import radarize
+from radarize import log
+from radarize.batch import BATCH, Intake
 from radarize.benchmark.dataset import Case
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.steps import Report
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate, trajectory_errors
-from radarize.evaluation.runfiles import read_scans
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import missed, sources
-from radarize.methods import ODOMETRY, SCANS
-from radarize.pipeline import BATCH, Pipeline
+from radarize.methods.registry import ODOMETRY, SCANS, Inputs, Workshop
 from radarize.recording import Recording
 from radarize.run import run_each
-from radarize.slam import log
+from radarize.runfolder import RunFolder
 from radarize.slam.config import LoopConfig, SlamConfig
 
 #: Folder in a run's with the back end's result where no loops were closed.
@@ -67,7 +67,7 @@ class _Step:
             "frames": self.case.frames,
             "bytes": self.case.path.stat().st_size,
             "networks": self.networks.digests(self.pair.networks),
-            "code": code(ODOMETRY[self.pair.odometry].make, SCANS[self.pair.scans].make),
+            "code": code(ODOMETRY[self.pair.odometry].maker, SCANS[self.pair.scans].maker),
         }
 
 
@@ -168,7 +168,7 @@ def figures(run: Path, recording: Path) -> dict[str, object]:
     found["quantiles"] = {
         name: np.quantile(each.position_errors, levels).round(4).tolist() for name, each in errors.items()
     }
-    scans = read_scans(run / "scans.h5")
+    scans = RunFolder(run).scans
     if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
         true = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
         found["missed"] = missed(scans["ranges"], true)
@@ -211,20 +211,23 @@ def measure(
         ``stages``: ms per frame by name, ``whole``: ms per frame, reading included; ``frames``.
     """
 
-    def pipeline() -> Pipeline:
-        return Pipeline(source.config, pair.scans, pair.odometry, networks.weights, source)
+    inputs = Inputs(source.config, weights=networks.weights, recording=source)
 
-    pipeline().push(source.adc(0, BATCH), source.times[:BATCH])  # compiles
-    timed = pipeline()
+    def pipeline() -> tuple[Pipeline, Intake]:
+        return Workshop(inputs).pipeline(pair.odometry, pair.scans), Intake(inputs.signal)
+
+    warm, intake = pipeline()
+    warm.push(intake.take(source.adc(0, BATCH), source.times[:BATCH]))  # compiles
+    timed, intake = pipeline()
     start = time.perf_counter()
     for first in range(0, frames, BATCH):
         stop = min(first + BATCH, frames)
-        timed.push(source.adc(first, stop), source.times[first:stop], source.valid(first, stop))
+        timed.push(intake.take(source.adc(first, stop), source.times[first:stop], source.valid(first, stop)))
         report(stop / frames)
     timed.finish()
     whole = 1e3 * (time.perf_counter() - start) / frames
     return {
-        "stages": {name: 1e3 * seconds / frames for name, seconds in timed.stage_seconds.items()},
+        "stages": {name: 1e3 * seconds / frames for name, seconds in timed.seconds.items()},
         "whole": whole,
         "frames": frames,
     }

@@ -1,10 +1,10 @@
 """Milliseconds per frame of every stage from raw I/Q to map: the paper's table 6."""
 
+from radarize.batch import BATCH
 from radarize.benchmark.benchmark import Chosen, Study
 from radarize.benchmark.runs import TIMED, Pair
 from radarize.benchmark.table import Table
-from radarize.methods import CLASSICAL
-from radarize.pipeline import BATCH
+from radarize.methods.registry import CLASSICAL
 
 #: Stages as the paper lists them, of ours.
 STAGES = {

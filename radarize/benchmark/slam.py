@@ -5,7 +5,7 @@ from radarize.benchmark.protocol import PROTOCOLS
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Table
 from radarize.benchmark.trajectories import PAPER_COLUMNS, trajectory_tables
-from radarize.methods import BEST
+from radarize.methods.registry import BEST
 
 #: The paper's combinations: ATE in m and rad, RE between frames in m. RadarHD alone is scan matching on its scans.
 PAPER = {

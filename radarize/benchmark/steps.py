@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Protocol
 
 from radarize.errors import InputError
-from radarize.evaluation.runfiles import read_json, write_whole
+from radarize.jsonfile import read_json
+from radarize.replacing import write_whole
 
 #: File with what a step found.
 FOUND = "found.json"

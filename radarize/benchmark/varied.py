@@ -9,7 +9,7 @@ from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Table, at, mean
 from radarize.evaluation.page import Page
 from radarize.evaluation.stress import FIGURES, SOURCES, curves
-from radarize.methods import CLASSICAL, ODOMETRY, SCANS
+from radarize.methods.registry import CLASSICAL, ODOMETRY, SCANS
 
 #: Where figures of `radarize.evaluation.stress` stand in those of a run.
 PLACES = {

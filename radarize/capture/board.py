@@ -86,6 +86,7 @@ class Board:
         self.network = network
         self._socket = network.bind(network.command_port)
         self._reported = Status(0)
+        self._foreign = ""
 
     def __enter__(self) -> "Board":
         return self
@@ -138,9 +139,8 @@ class Board:
             except OSError as error:
                 raise InputError(f"--dca {self.network.dca}: {error.strerror or error}") from error
             deadline = time.monotonic() + _PATIENCE
-            while (left := deadline - time.monotonic()) > 0:
-                reply = self._hear(left)
-                if reply is None or reply.command != command:
+            while reply := self._hear(deadline):
+                if reply.command != command:
                     continue
                 if reply.status and not answer:
                     raise InputError(
@@ -148,16 +148,17 @@ class Board:
                         "expected 0 (success); switch it off and on again"
                     )
                 return reply.status
+        elsewhere = f"; {self._foreign} sent something instead, which is not --dca" if self._foreign else ""
         raise InputError(
             f"--dca {self.network.dca}: no DCA1000 answers {command.name} at UDP port {self.network.command_port} "
             f"({_ATTEMPTS} times asked); is it powered, its Ethernet cable in, and no firewall before "
-            f"{self.network.host}?"
+            f"{self.network.host}?{elsewhere}"
         )
 
     def status(self, patience: float = 0.0) -> Status:
         """What the board has reported on its own since `start`."""
         deadline = time.monotonic() + patience
-        while self._hear(max(deadline - time.monotonic(), 0.0)) is not None:
+        while self._hear(deadline):
             pass
         return self._reported
 
@@ -166,14 +167,24 @@ class Board:
         reported = self.status()
         return [f"the DCA1000 {words}" for bit, words in _TROUBLE.items() if reported & bit]
 
-    def _hear(self, patience: float) -> Reply | None:
-        """The next reply; reports of its own are noted."""
-        self._socket.settimeout(patience)
-        try:
-            data, (sender, _) = self._socket.recvfrom(2048)
-            reply = Reply.decode(data)
-        except (OSError, InputError):
-            return None
-        if sender == self.network.dca and reply.command == Command.STATUS:
-            self._reported |= Status(reply.status)
-        return reply
+    def _hear(self, deadline: float) -> Reply | None:
+        """The board's next reply until an instant (monotonic, s); reports of its own are noted.
+
+        It replies from any port of its address (real ones from 1024), and nobody else is heard.
+        """
+        while True:
+            self._socket.settimeout(max(deadline - time.monotonic(), 0.0))
+            try:
+                data, (sender, _) = self._socket.recvfrom(2048)
+            except OSError:
+                return None
+            if sender != self.network.dca:
+                self._foreign = sender
+                continue
+            try:
+                reply = Reply.decode(data)
+            except InputError:
+                continue
+            if reply.command == Command.STATUS:
+                self._reported |= Status(reply.status)
+            return reply

@@ -7,11 +7,12 @@ from threading import Event
 import numpy as np
 import torch
 
+from radarize.batch import BATCH, Intake
 from radarize.capture.page import Page
 from radarize.capture.stream import Stream, follow
 from radarize.capture.view import View
-from radarize.pipeline import BATCH, Pipeline
-from radarize.radar.config import RadarConfig
+from radarize.methods.registry import Inputs, Workshop
+from radarize.odometry.blindness import Blindness
 from radarize.recording import Losses, RecordingWriter
 
 #: s between pictures of a frame, and of the map; redrawing the map takes at most this share of the time.
@@ -22,18 +23,22 @@ class Live:
     """A pipeline that follows a stream.
 
     Args:
-        pipeline: to push frames to; see `prepare`.
+        inputs: what its methods are made from; see `prepare`.
+        methods: odometry and scans by name.
         page: to show it on.
 
     Attributes:
+        pipeline: the pipeline.
         losses: of the frames that came.
+        blindness: of the odometry.
         busy: s spent on the frames so far, showing them included.
     """
 
-    def __init__(self, pipeline: Pipeline, page: Page):
-        self.pipeline, self.page = pipeline, page
-        self.view = View(pipeline)
-        self.losses = Losses()
+    def __init__(self, inputs: Inputs, methods: dict[str, str], page: Page):
+        self.pipeline, self.page = Workshop(inputs).pipeline(**methods), page
+        self.intake = Intake(inputs.signal)
+        self.view = View(self.pipeline, inputs.signal)
+        self.losses, self.blindness = Losses(), Blindness()
         self.busy = 0.0
         self._frame_due = self._map_due = 0.0
 
@@ -59,17 +64,20 @@ class Live:
             InputError: see `follow`.
         """
         self.page.send("facts", self.view.facts())
-        for batch in follow(stream, stopping, most=BATCH, frames=frames):
+        for came in follow(stream, stopping, most=BATCH, frames=frames):
             start = time.monotonic()
-            adc, stamps, valid = batch["adc"], batch["time"], batch["valid"]
-            self.pipeline.push(adc, stamps, valid)
+            adc, stamps, valid = came["adc"], came["time"], came["valid"]
+            if batch := self.intake.take(adc, stamps, valid):
+                result = self.pipeline.push(batch)
+                self.blindness.add(result.frames, result.track)
+                self.view.add(result)
             self.losses.add(valid)
             if writer:
                 writer.append(adc, stamps, valid)
             self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
             self.busy += time.monotonic() - start
             if progress:
-                progress(int(batch["number"][-1]) + 1, frames or 0)
+                progress(int(came["number"][-1]) + 1, frames or 0)
         self.pipeline.finish()
         self.page.send("map", self.view.map())
         self.page.send("end", {"troubles": stream.troubles()})
@@ -91,22 +99,23 @@ class Live:
         }
         self.page.send("frame", self.view.frame(adc, valid, stamp) | figures)
         drawn = time.monotonic()
-        self.pipeline.stage_seconds["page"] += drawn - now
+        self.pipeline.seconds["page"] += drawn - now
         if now >= self._map_due and self.pipeline.slam.nodes:
             self.page.send("map", self.view.map())
             took = time.monotonic() - drawn
-            self.pipeline.stage_seconds["page"] += took
+            self.pipeline.seconds["page"] += took
             self._map_due = now + max(_MAP_INTERVAL, took / _MAP_SHARE)
 
 
-def prepare(config: RadarConfig, make: Callable[[], Pipeline]) -> Pipeline:
-    """A pipeline that is fast from its first frame on: another one has run on noise before, so that whatever is
-    compiled or loaded at first use is there."""
+def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
+    """Make a pipeline fast from its first frame on: another one runs on noise before, so that whatever is compiled or
+    loaded at first use is there."""
     torch.set_num_threads(1)  # a frame is too little to share out: threads that wait for each other cost more
-    pipeline, rng = make(), np.random.default_rng(0)
+    pipeline, intake, radar = Workshop(inputs).pipeline(**methods), Intake(inputs.signal), inputs.radar
+    view, rng = View(pipeline, inputs.signal), np.random.default_rng(0)
     for frames in (1, BATCH):
-        adc = rng.integers(-200, 200, (frames, *config.frame_shape), dtype=np.int16)
-        start = pipeline.pushed * config.frame_period
-        pipeline.push(adc, start + np.arange(frames), np.ones(adc.shape[:3], bool))
-    View(pipeline).frame(adc[-1:], np.ones((1, *adc.shape[1:3]), bool), 0.0)
-    return make()
+        adc = rng.integers(-200, 200, (frames, *radar.frame_shape), dtype=np.int16)
+        stamps = intake.taken * radar.frame_period + np.arange(frames)
+        view.add(pipeline.push(intake.take(adc, stamps)))
+    view.frame(adc[-1:], np.ones((1, *adc.shape[1:3]), bool), 0.0)
+    return inputs

@@ -15,11 +15,11 @@ _LONGEST_GAP = 60.0
 _BLOCK = 64
 
 
-def enlarge(receiver: socket.socket, wanted: int = SOCKET_BUFFER) -> int:
+def enlarge(receiver: socket.socket) -> int:
     """Raise a socket's buffer as far as permitted; returns the bytes it holds."""
     for option in (getattr(socket, "SO_RCVBUFFORCE", 33), socket.SO_RCVBUF):  # beyond the limit for root alone
         try:
-            receiver.setsockopt(socket.SOL_SOCKET, option, wanted)
+            receiver.setsockopt(socket.SOL_SOCKET, option, SOCKET_BUFFER)
             break
         except OSError:
             continue

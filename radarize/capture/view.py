@@ -9,9 +9,10 @@ import matplotlib
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from radarize.batch import Signal
 from radarize.evaluation.drawings import DEPTH, LEAKAGE, decibels
 from radarize.heatmaps import Heatmaps
-from radarize.pipeline import Pipeline
+from radarize.pipeline import Pipeline, Result
 from radarize.pose import between, compose
 
 #: Pixels across the fan, and s over which figures are averaged.
@@ -67,17 +68,24 @@ class View:
 
     Args:
         pipeline: to look at.
+        signal: makes heat maps of the frames.
     """
 
-    def __init__(self, pipeline: Pipeline):
-        self._pipeline = pipeline
-        self._heatmaps = pipeline.heatmaps
+    def __init__(self, pipeline: Pipeline, signal: Signal):
+        self._pipeline, self._heatmaps = pipeline, signal.heatmaps
+        self._newest: Result | None = None
+        self._frames = 0
         self._fan = Fan(self._heatmaps)
         self._history: deque[tuple[float, int, dict[str, float]]] = deque()  # clock, frames, seconds by stage
 
+    def add(self, result: Result) -> None:
+        """Take what a batch gave: the sink of a live pipeline."""
+        if len(result.frames):
+            self._newest, self._frames = result, int(result.frames[-1]) + 1
+
     def facts(self) -> dict[str, object]:
         """What does not change: axes of the heat maps, the budget."""
-        config, maps = self._pipeline.config, self._heatmaps
+        config, maps = self._heatmaps.config, self._heatmaps
         return {
             "budget_ms": 1e3 * config.frame_period,
             "fan": {"width": self._fan.width, "reach": self._fan.reach},
@@ -116,16 +124,16 @@ class View:
     def _pose(self) -> list[float] | None:
         """Where the sensor is on the map: odometry since the last node, from that node on."""
         slam = self._pipeline.slam
-        if not self._pipeline.poses:
+        if self._newest is None:
             return None
-        now = self._pipeline.poses[-1][-1]
+        now = self._newest.track.pose[-1]
         if slam.nodes:
             now = compose(slam.graph.poses[-1], between(slam.odometry.pose(slam.nodes[-1].time), now))
         return [round(float(value), 4) for value in now]
 
     def _load(self) -> dict[str, object]:
         """Frames a second and ms a frame by stage, over the last seconds."""
-        now = time.monotonic(), self._pipeline.pushed, dict(self._pipeline.stage_seconds)
+        now = time.monotonic(), self._frames, dict(self._pipeline.seconds)
         self._history.append(now)
         while len(self._history) > 2 and self._history[1][0] <= now[0] - _SPAN:
             self._history.popleft()

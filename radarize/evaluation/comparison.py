@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from radarize.evaluation.evaluate import evaluate
-from radarize.evaluation.runfiles import read_json
+from radarize.evaluation.evaluate import assess
+from radarize.runfolder import RunFolder
 
 #: Columns: heading, unit, factor, and where the number stands in the metrics.
 COLUMNS = (
@@ -19,19 +19,18 @@ COLUMNS = (
 
 
 def compare(runs: Sequence[Path], reference: Path | None = None) -> list[tuple[str, ...]]:
-    """A row for each run: its methods, then `COLUMNS`, as text; - where a run does not know.
+    """A row for each run: its methods, then `COLUMNS`, as text; - where a run does not know. Nothing is written.
 
     Raises:
         InputError: not a run, no truth, or nothing that matches.
     """
-    return [(methods(run), *_figures(evaluate(run, reference))) for run in runs]
+    return [(methods(run), *_figures(assess(run, reference))) for run in map(RunFolder, runs)]
 
 
-def methods(run: Path) -> str:
+def methods(run: RunFolder) -> str:
     """What a run was made with, in short."""
-    facts = read_json(Path(run) / "run.json") if (Path(run) / "run.json").is_file() else {}
-    used = facts.get("methods", {})
-    return " + ".join(str(used[name]) for name in ("odometry", "scans") if name in used) or Path(run).name
+    used = run.methods
+    return " + ".join(used[name] for name in ("odometry", "scans") if name in used) or run.path.name
 
 
 def _figures(metrics: dict) -> list[str]:

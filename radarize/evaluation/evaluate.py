@@ -1,24 +1,25 @@
 """A whole run against the truth: trajectories, map, scans, velocities; written as metrics.json."""
 
-import json
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from evo.core.trajectory import PoseTrajectory3D
 
 from radarize.errors import InputError
 from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.motion import velocity_errors
-from radarize.evaluation.runfiles import read_map, read_scans, write_whole
 from radarize.evaluation.scans import scan_errors, true_ranges
 from radarize.evaluation.trajectory import Association, load, matched, trajectory, yaws
+from radarize.runfolder import RunFolder
 
 #: Trajectories of a run by what the metrics call them, the best last.
-TRAJECTORIES = {"odometry": "odometry.tum", "slam": "trajectory.tum"}
+TRAJECTORIES = ("odometry", "slam")
 
 
 def trajectory_errors(
-    run: Path, reference: Path | None = None, association: Association = "interpolate"
+    run: Path | RunFolder, reference: Path | None = None, association: Association = "interpolate"
 ) -> dict[str, TrajectoryErrors]:
     """Errors of the run's trajectories, by ``odometry`` and ``slam``.
 
@@ -30,20 +31,24 @@ def trajectory_errors(
     Raises:
         InputError: not a run, no reference, or nothing that matches.
     """
-    if not (run / TRAJECTORIES["slam"]).is_file():
-        raise InputError(f"{run}: has no trajectory.tum, expected a folder that radarize run wrote")
-    path = reference or run / "reference.tum"
+    run = run if isinstance(run, RunFolder) else RunFolder(run)
+    path = reference or run.path / "reference.tum"
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected true poses (TUM); --reference names another file")
     truth = load(path)
     return {
-        name: evaluate_trajectory(load(run / file), truth, association=association, names=(str(run / file), str(path)))
-        for name, file in TRAJECTORIES.items()
-        if (run / file).is_file()
+        name: evaluate_trajectory(each, truth, association=association, names=(f"{run.path}: {name}", str(path)))
+        for name, each in trajectories(run).items()
     }
 
 
-def true_scans(scans: dict[str, np.ndarray], truth: TrajectoryErrors) -> tuple[np.ndarray, ...] | None:
+def trajectories(run: RunFolder) -> dict[str, PoseTrajectory3D]:
+    """Of odometry, if there is any, and of SLAM."""
+    found = {"odometry": run.odometry, "slam": run.trajectory}
+    return {name: trajectory(*poses) for name, poses in found.items() if poses is not None}
+
+
+def true_scans(scans: Mapping[str, np.ndarray], truth: TrajectoryErrors) -> tuple[np.ndarray, ...] | None:
     """Positions, yaw, azimuths and ranges of what the radar could return, in the reference's frame; None if unknown."""
     if "truth/scan" not in scans or "truth/scan_azimuths" not in scans:
         return None
@@ -56,11 +61,19 @@ def true_scans(scans: dict[str, np.ndarray], truth: TrajectoryErrors) -> tuple[n
     return poses.positions_xyz[:, :2], yaws(poses), azimuths[inside], scans["truth/scan"][rows][:, inside]
 
 
-def evaluate(run: Path, reference: Path | None = None) -> dict[str, object]:
-    """Compare a run with the truth and write ``metrics.json`` into it.
+def evaluate(run: Path | RunFolder, reference: Path | None = None) -> dict[str, object]:
+    """`assess` a run, and write ``metrics.json`` into it."""
+    run = run if isinstance(run, RunFolder) else RunFolder(run)
+    metrics = assess(run, reference)
+    run.write_metrics(metrics)
+    return metrics
+
+
+def assess(run: Path | RunFolder, reference: Path | None = None) -> dict[str, object]:
+    """Compare a run with the truth; nothing is written.
 
     Args:
-        run: folder of a run.
+        run: a run, or its folder.
         reference: TUM file of the truth; by default the run's ``reference.tum``.
 
     Returns:
@@ -70,29 +83,25 @@ def evaluate(run: Path, reference: Path | None = None) -> dict[str, object]:
     Raises:
         InputError: not a run, no truth, or nothing that matches.
     """
-    run = Path(run)
+    run = run if isinstance(run, RunFolder) else RunFolder(run)
     errors = trajectory_errors(run, reference)
     metrics: dict[str, object] = {name: item.summary() for name, item in errors.items()}
     metrics["reference"] = Path(reference).name if reference else "reference.tum"
-    if (run / "scans.h5").is_file():
-        scans = read_scans(run / "scans.h5")
-        if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
-            there = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
-            metrics["scans"] = scan_errors(scans["ranges"], there)
-        if {"velocity", "truth/velocity"} <= scans.keys():
-            metrics["velocity"] = velocity_errors(
-                scans["velocity"][:, :2], scans["truth/velocity"][:, :2], scans.get("velocity_covariance")
-            )
-        if "truth/floor_plan" in scans and (run / "map.yaml").is_file():
-            best = errors["slam"]
-            true, grid = true_scans(scans, best), read_map(run / "map.yaml")
-            seen = None if true is None else scan_endpoints(*true)
-            metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
-            if true is not None:
-                metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
-    metrics = without_nan(metrics)
-    write_whole(run / "metrics.json", json.dumps(metrics, indent=2) + "\n")
-    return metrics
+    scans, grid, best = run.scans, run.map, errors["slam"]
+    if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
+        there = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
+        metrics["scans"] = scan_errors(scans["ranges"], there)
+    if {"velocity", "truth/velocity"} <= scans.keys():
+        metrics["velocity"] = velocity_errors(
+            scans["velocity"][:, :2], scans["truth/velocity"][:, :2], scans.get("velocity_covariance")
+        )
+    if "truth/floor_plan" in scans and grid is not None:
+        true = true_scans(scans, best)
+        seen = None if true is None else scan_endpoints(*true)
+        metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
+        if true is not None:
+            metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
+    return without_nan(metrics)
 
 
 def show(metrics: dict) -> None:

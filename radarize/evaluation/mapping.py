@@ -5,7 +5,7 @@ import shapely
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from radarize.evaluation.runfiles import OccupancyMap
+from radarize.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid
 

@@ -6,7 +6,7 @@ import io
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from radarize.evaluation.runfiles import write_whole
+from radarize.replacing import write_whole
 
 #: Readable on light and dark ground alike: axes and text of plots, and one colour per meaning.
 INK, GRID = "#7d8590", "rgba(125,133,144,0.22)"

@@ -10,12 +10,19 @@ from plotly.subplots import make_subplots
 from radarize.errors import InputError
 from radarize.evaluation import comparison
 from radarize.evaluation.drawings import canvas, draw_doppler, draw_fan, draw_scan
-from radarize.evaluation.evaluate import MAP_WORDS, SCAN_WORDS, VELOCITY_WORDS, evaluate, trajectory_errors
+from radarize.evaluation.evaluate import (
+    MAP_WORDS,
+    SCAN_WORDS,
+    VELOCITY_WORDS,
+    evaluate,
+    trajectories,
+    trajectory_errors,
+)
 from radarize.evaluation.metrics import TrajectoryErrors
 from radarize.evaluation.page import COLORS, INK, Page
 from radarize.evaluation.recording_report import report_recording
-from radarize.evaluation.runfiles import read_json, read_map, read_scans
-from radarize.evaluation.trajectory import load, moved
+from radarize.evaluation.trajectory import moved
+from radarize.runfolder import RunFolder, Scans
 
 __all__ = ["report_recording", "report_run"]
 
@@ -38,40 +45,37 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     Raises:
         InputError: not a run, or a damaged one.
     """
-    run = Path(run)
-    facts = read_json(run / "run.json")
-    scans = read_scans(run / "scans.h5") if (run / "scans.h5").is_file() else {}
-    if not (run / "trajectory.tum").is_file():
-        raise InputError(f"{run}: has no trajectory.tum, expected a folder that radarize run wrote")
-    errors = trajectory_errors(run) if (run / "reference.tum").is_file() else {}
-    metrics = evaluate(run) if errors else {}
+    folder = RunFolder(run)
+    scans, others = folder.scans, [RunFolder(other) for other in beside]
+    errors = trajectory_errors(folder) if folder.has("reference.tum") else {}
+    metrics = evaluate(folder) if errors else {}
 
-    page = Page(f"Run {run.resolve().name}", _about(facts, errors))
+    page = Page(f"Run {folder.path.resolve().name}", _about(folder, errors))
     if errors:
         _figures(page, metrics, errors)
     if errors and beside:
         page.section("Beside other methods", "The same recording; odometry and SLAM against the truth.")
         heads = ("method", *(name for name, *_ in comparison.COLUMNS))
         page.table(heads, comparison.compare([run, *beside]), numbers=tuple(range(1, len(heads))))
-    _plan(page, run, scans, errors, beside)
+    _plan(page, folder, errors, others)
     if errors:
         _over_time(page, errors)
     if "velocity" in scans:
         _velocities(page, scans, metrics.get("velocity"))
     if "heatmaps/frames" in scans:
         _heatmaps(page, scans, metrics.get("scans"))
-    _settings(page, facts)
-    return page.write(Path(output) if output else run / "report.html")
+    _settings(page, folder.facts)
+    return page.write(Path(output) if output else folder.path / "report.html")
 
 
-def _about(facts: dict, errors: dict[str, TrajectoryErrors]) -> str:
+def _about(run: RunFolder, errors: dict[str, TrajectoryErrors]) -> str:
+    facts = run.facts
     parts = [f"Radar-only SLAM on {facts['recording']}" if "recording" in facts else "Radar-only SLAM"]
     if errors:
         best = errors["slam"]
         parts.append(f"{best.distance:.1f} m in {best.duration:.0f} s")
-    methods = facts.get("methods")
-    if isinstance(methods, dict):
-        parts.append(", ".join(f"{name} {value}" for name, value in methods.items()))
+    if run.methods:
+        parts.append(", ".join(f"{name} {value}" for name, value in run.methods.items()))
     return " · ".join(parts)
 
 
@@ -120,7 +124,7 @@ def _words(page: Page, title: str, content: dict, words: dict) -> None:
     page.table((title, ""), rows, numbers=(1,))
 
 
-def _plan(page: Page, run: Path, scans: dict, errors: dict[str, TrajectoryErrors], beside: Sequence[Path] = ()) -> None:
+def _plan(page: Page, run: RunFolder, errors: dict[str, TrajectoryErrors], beside: Sequence[RunFolder]) -> None:
     """Trajectories, map and floor plan from above, in the truth's frame if there is one."""
     page.section(
         "Trajectory and map",
@@ -129,13 +133,12 @@ def _plan(page: Page, run: Path, scans: dict, errors: dict[str, TrajectoryErrors
     )
     figure = go.Figure()
     turn, shift = (errors["slam"].turn, errors["slam"].shift) if errors else (np.eye(3), np.zeros(3))
-    if errors and "truth/floor_plan" in scans:
-        plan = scans["truth/floor_plan"]
+    if errors and "truth/floor_plan" in run.scans:
+        plan = run.scans["truth/floor_plan"]
         x, y = (np.column_stack([plan[:, i], plan[:, i + 2], np.full(len(plan), np.nan)]).ravel() for i in (0, 1))
         style = {"color": COLORS["truth"], "width": 1.2}
         figure.add_scatter(x=_short(x), y=_short(y), name="floor plan", mode="lines", line=style)
-    if (run / "map.yaml").is_file():
-        grid = read_map(run / "map.yaml")
+    if (grid := run.map) is not None:
         cells = grid.centers(grid.occupied)
         cells = np.column_stack([cells, np.zeros(len(cells))]) @ turn.T + shift
         marker = {"color": COLORS["map"], "size": 3, "symbol": "square"}
@@ -148,9 +151,8 @@ def _plan(page: Page, run: Path, scans: dict, errors: dict[str, TrajectoryErrors
             _line(figure, path, f"odometry {comparison.methods(other)}", INK, dash="dash")
         _line(figure, errors["slam"].reference.positions_xyz, "truth", "#22a06b", dash="dot")
     else:
-        for name, file in {"odometry": "odometry.tum", "slam": "trajectory.tum"}.items():
-            if (run / file).is_file():
-                _line(figure, moved(load(run / file), turn, shift).positions_xyz, _NAMES[name], COLORS[name])
+        for name, path in trajectories(run).items():
+            _line(figure, moved(path, turn, shift).positions_xyz, _NAMES[name], COLORS[name])
     figure.update_xaxes(title="x, m", constrain="domain")
     figure.update_yaxes(title="y, m", scaleanchor="x")
     page.plot(figure, height=640)
@@ -181,7 +183,7 @@ def _over_time(page: Page, errors: dict[str, TrajectoryErrors]) -> None:
     page.plot(figure, height=440)
 
 
-def _velocities(page: Page, scans: dict, metrics: dict | None) -> None:
+def _velocities(page: Page, scans: Scans, metrics: dict | None) -> None:
     known = "truth/velocity" in scans
     page.section(
         "Velocity",
@@ -226,7 +228,7 @@ def _velocities(page: Page, scans: dict, metrics: dict | None) -> None:
         _words(page, "Error", metrics, VELOCITY_WORDS)
 
 
-def _heatmaps(page: Page, scans: dict, metrics: dict | None) -> None:
+def _heatmaps(page: Page, scans: Scans, metrics: dict | None) -> None:
     page.section(
         "Heat maps and scans",
         "Left: range and azimuth from above, with the scan that was made of it (rings) on the true surfaces (dots). "

@@ -1,7 +1,7 @@
 """How alike a recording and its twin are, frame by frame: the same radar on the same walk, in the real place and in a
 model of it (`radarsim twin`).
 
-Maps are those that networks see (`radarize.training.maps`), in dB over their own median, so that the receiver's gain,
+Maps are those that networks see (`radarize.features.maps`), in dB over their own median, so that the receiver's gain,
 which is a figure of its own, and the noise of empty cells drop out. Velocities and scans are made without networks, of
 single frames (Doppler least squares; Capon's maps, first echo), so that any radar has them.
 """
@@ -16,12 +16,12 @@ from jaxtyping import Float, Int
 
 from radarize.errors import InputError
 from radarize.evaluation.likeness import correlation, foreground, frechet_distance, patch_statistics, similarity
+from radarize.features.maps import MapMaker
 from radarize.mapping.scans import ScanConfig, make_scans
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.config import RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
 from radarize.recording import Recording
-from radarize.training.maps import MapMaker
 
 #: What is compared of every frame, with unit and meaning. Those of maps end in the map's name.
 FIGURES = {

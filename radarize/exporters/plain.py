@@ -4,12 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from radarize.errors import InputError
 from radarize.recording import Recording
-from radarize.replacing import replacing
-from radarize.tum import read_tum, write_tum
+from radarize.runfolder import RunFolder
+from radarize.tum import write_tum
 
 
 def export_tum(source: Path, output: Path, *, run: None, progress: Callable[[int, int], None]) -> Path:
@@ -19,7 +18,7 @@ def export_tum(source: Path, output: Path, *, run: None, progress: Callable[[int
         InputError: there is none, or the file cannot be written.
     """
     if source.is_dir():
-        return write_tum(output, *read_tum(source / "trajectory.tum"))
+        return write_tum(output, *RunFolder(source).trajectory)
     with Recording(source) as recording:
         if not (recording.has("truth/time") and recording.has("truth/pose")):
             raise InputError(f"{source}: has no true poses (/truth/time and /truth/pose) to write as TUM")
@@ -35,17 +34,10 @@ def export_map(source: Path, output: Path, *, run: None, progress: Callable[[int
     Raises:
         InputError: `source` is no run with a map, or a file cannot be written.
     """
-    from radarize.evaluation.runfiles import read_map
-
     if not source.is_dir():
         raise InputError(f"{source}: has no map, expected the folder of a run (radarize run {source} -o RUN)")
-    description = source / "map.yaml"
-    read_map(description)
-    fields = yaml.safe_load(description.read_text())
+    found = RunFolder(source).map
+    if found is None:
+        raise InputError(f"{source}: has no map.yaml, expected a folder that radarize run wrote")
     stem = output.with_suffix("") if output.suffix in (".pgm", ".yaml") else output
-    image = stem.with_name(stem.name + ".pgm")
-    with replacing(image) as part:
-        part.write_bytes((description.parent / fields["image"]).read_bytes())
-    with replacing(stem.with_name(stem.name + ".yaml")) as part:
-        part.write_text(yaml.safe_dump({**fields, "image": image.name}, sort_keys=False))
-    return stem.with_name(stem.name + ".yaml")
+    return found.save(stem.with_name(stem.name + ".yaml"))

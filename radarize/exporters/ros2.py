@@ -19,11 +19,11 @@ from jaxtyping import Float
 from radarize.errors import InputError
 from radarize.exporters.bagwriter import BagWriter, header, message, vector
 from radarize.heatmaps import Heatmaps
+from radarize.log import Log
 from radarize.points import COLUMNS
 from radarize.pose import adjoint, between, inverse
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
-from radarize.slam.log import Log
 from radarize.tum import planar_poses
 
 #: When, on which topic, and what.

@@ -16,12 +16,14 @@ from radarize.importers import cube as cube_format
 from radarize.importers import pcap as pcap_format
 from radarize.importers import studio as studio_format
 from radarize.importers.capture import Batch, Capture
-from radarize.importers.parameters import configure
+from radarize.importers.parameters import Given
 from radarize.importers.poses import pose_products
-from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import range_balance
+from radarize.radar.presets import load_config
 from radarize.recording import RecordingWriter
+
+__all__ = ["Given", "import_recording"]
 
 #: From this many dB on, the samples themselves say which of I and Q comes first.
 _CERTAIN_DB = 10.0
@@ -37,17 +39,7 @@ _POSES = ("truth/time", "truth/pose", "truth/velocity")
 
 
 def import_recording(
-    source: Path,
-    output: Path,
-    *,
-    config: RadarConfig | None = None,
-    cfg_text: str = "",
-    poses: Path | None = None,
-    shape: str | None = None,
-    variable: str | None = None,
-    latency: float | None = None,
-    overrides: dict[str, object] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    source: Path, output: Path, given: Given | None = None, progress: Callable[[int, int], None] | None = None
 ) -> Path:
     """Write a recording (.h5) from a capture.
 
@@ -60,14 +52,7 @@ def import_recording(
             lie beside it), a ``.pcap`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, or an array of
             samples (``.npy``, ``.npz``, ``.mat``).
         output: recording to write.
-        config: radar configuration; by default what lies beside the source.
-        cfg_text: text that `config` was read from, kept in the recording.
-        poses: TUM file of the sensor's true poses on the recording's clock.
-        shape: axes of an array: names in order, such as ``frame,loop,tx,rx,sample``, or five or six lengths.
-        variable: which array of an ``.npz`` or ``.mat``.
-        latency: from a frame's start to its receipt in a ROS bag, s; by default, see `radarize.importers.bag`.
-        overrides: fields of `RadarConfig` that replace or stand in for the configuration's; ``rx`` and ``tx`` may be
-            counts; ``start_time`` is the first frame's stamp, s.
+        given: what the user says of it.
         progress: called with frames done and (estimated) frames in all.
 
     Returns:
@@ -77,20 +62,19 @@ def import_recording(
         InputError: unknown format, nothing usable in the source, or a configuration that does not fit it.
     """
     source, output = Path(source), Path(output)
-    overrides = dict(overrides or {})
-    given_start = overrides.pop("start_time", None)
-    start_time = float(given_start or 0.0)
+    given = given or Given()
+    start_time = float(given.start_time or 0.0)
     if source.resolve() == output.resolve():
         raise InputError(f"{output}: is the source itself, expected another output file")
-    products = pose_products(Path(poses)) if poses else {}
+    products = pose_products(given.poses) if given.poses else {}
 
-    capture = _open(source, output, config, cfg_text, overrides, shape, variable, latency)
+    capture = _open(source, output, given)
     batches = iter(capture.batches)
     first = next(batches)
-    if given_start is not None and first.times is not None:
-        raise InputError(f"{source}: has stamps of its own, but start_time is {given_start}, expected none")
-    radar, swapped = _settle_iq_order(capture, first, "iq_order" in overrides)
-    streams = {name: stream for name, stream in capture.streams.items() if not poses or not name.startswith(_POSES)}
+    if given.start_time is not None and first.times is not None:
+        raise InputError(f"{source}: has stamps of its own, but start_time is {given.start_time}, expected none")
+    radar, swapped = _settle_iq_order(capture, first, "iq_order" in given.overrides)
+    streams = {name: each for name, each in capture.streams.items() if not products or not name.startswith(_POSES)}
     writer = RecordingWriter(
         output,
         radar,
@@ -113,7 +97,7 @@ def import_recording(
                 progress(done, max(done, capture.expected_frames))
         if products:
             end = last + radar.frame_period
-            capture.warnings += _apart(products["truth/time"].data, start_time, end, Path(poses))
+            capture.warnings += _apart(products["truth/time"].data, start_time, end, given.poses)
         capture.warnings += writer.losses.warnings()
         writer.annotate(warnings="; ".join(capture.warnings), assumed=", ".join(capture.assumed))
     return output
@@ -129,45 +113,33 @@ def _apart(times: np.ndarray, start: float, end: float, poses: Path) -> list[str
     ]
 
 
-def _open(
-    source: Path,
-    output: Path,
-    config: RadarConfig | None,
-    cfg_text: str,
-    overrides: dict[str, object],
-    shape: str | None,
-    variable: str | None,
-    latency: float | None,
-) -> Capture:
+def _open(source: Path, output: Path, given: Given) -> Capture:
     """Choose the format and the configuration."""
     if not source.exists():
         raise InputError(f"{source}: no such file or folder, expected {_EXPECTED}")
     kind = _kind(source)
-    if (shape or variable) and kind != "cube":
+    if (given.shape or given.variable) and kind != "cube":
         raise InputError(f"{source}: is no array, but shape or variable is given, expected {', '.join(_ARRAYS)}")
-    if latency is not None and kind != "bag":
-        raise InputError(f"{source}: is no ROS bag, but latency is {latency:g} s, expected none")
+    if given.latency is not None and kind != "bag":
+        raise InputError(f"{source}: is no ROS bag, but latency is {given.latency:g} s, expected none")
     if kind == "studio":
         studio = studio_format.find(source)
-        if config is None:
-            config, cfg_text = studio.config, studio.text
-        config, _ = configure(config, overrides, str(studio.settings))
-        return bin_format.open_bin(studio.files, config, cfg_text, warnings=studio.warnings)
+        given = given.or_else(studio.config, studio.text)
+        config, _ = given.configure(str(studio.settings))
+        return bin_format.open_bin(studio.files, config, given.cfg_text, warnings=studio.warnings)
     beside = bin_format.whole_name(source).with_suffix(".cfg")
-    if config is None and beside.is_file():
-        config, cfg_text = load_config(beside)
+    if given.config is None and beside.is_file():
+        given = given.or_else(*load_config(beside))
     if kind == "bag":
         from radarize.importers.bag import open_bag
 
-        return open_bag(source, config, cfg_text, overrides, latency=latency)
+        return open_bag(source, given)
     if kind == "cube":
-        return cube_format.open_cube(
-            source, config, cfg_text, overrides, shape=shape, variable=variable, folder=output.parent
-        )
-    config, assumed = configure(config, overrides, str(source))
+        return cube_format.open_cube(source, given, folder=output.parent)
+    config, assumed = given.configure(str(source))
     if kind == "pcap":
-        return pcap_format.open_pcap(source, config, cfg_text, assumed)
-    return bin_format.open_bin(bin_format.parts(source), config, cfg_text, assumed)
+        return pcap_format.open_pcap(source, config, given.cfg_text, assumed)
+    return bin_format.open_bin(bin_format.parts(source), config, given.cfg_text, assumed)
 
 
 def _kind(source: Path) -> str:

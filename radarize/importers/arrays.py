@@ -8,9 +8,9 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from numpy.lib import format as npy
 
 from radarize.errors import InputError, reason
+from radarize.npyfile import npy_header
 
 #: Bytes of a compressed member unpacked at a time.
 _PIECE = 1 << 18
@@ -81,7 +81,7 @@ class MemberArray(MappedArray):
     def __init__(self, name: str, archive: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path):
         self._file = tempfile.NamedTemporaryFile(dir=folder)
         with archive.open(member) as packed:
-            header = _npy_header(packed, name)
+            header = npy_header(packed, name)
             while piece := packed.read(_PIECE):
                 self._file.write(piece)
         self._file.flush()
@@ -133,25 +133,12 @@ def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
         if path.suffix.lower() == ".mat":
             return _open_mat(path, variable)
         with path.open("rb") as file:
-            header = _npy_header(file, str(path))
+            header = npy_header(file, str(path))
             return MappedArray(str(path), path, header, file.tell())
     except InputError:
         raise
     except Exception as error:  # zipfile, zlib, HDF5 and scipy raise whatever they meet in a damaged file
         raise InputError(f"{path}: cannot be read ({reason(error)})") from error
-
-
-def _npy_header(file, name: str) -> tuple[tuple[int, ...], bool, np.dtype]:
-    """Shape, whether the first axis runs fastest, and type."""
-    try:
-        version = npy.read_magic(file)
-        reader = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, fortran, stored = reader(file)
-    except Exception as error:  # Python's own tokenizer and parser are at work there
-        raise InputError(f"{name}: is no array in NumPy's format ({reason(error)})") from error
-    if min(shape, default=0) < 0:
-        raise InputError(f"{name}: has shape {shape}, expected no negative length")
-    return shape, fortran, stored
 
 
 def _open_npz(path: Path, variable: str | None, folder: Path) -> ArrayFile:
@@ -161,7 +148,7 @@ def _open_npz(path: Path, variable: str | None, folder: Path) -> ArrayFile:
         for name, info in members.items():
             if info.filename.endswith(".npy"):
                 with archive.open(info) as packed:
-                    headers[name] = _npy_header(packed, f"{path}: {name}"), packed.tell()
+                    headers[name] = npy_header(packed, f"{path}: {name}"), packed.tell()
         shapes = {name: header[0] for name, (header, _) in headers.items() if header[2].kind in "iufcV"}
         chosen = _choose(path, variable, shapes)
         member, (header, length) = members[chosen], headers[chosen]

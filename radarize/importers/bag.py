@@ -14,7 +14,7 @@ from radarize.importers.bin import all_zero
 from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.importers.companions import ChipPoints, Companion, Depth, InertialSensor, TrackedPose
 from radarize.importers.frames import Frames, Stamps
-from radarize.importers.parameters import configure
+from radarize.importers.parameters import Given
 from radarize.importers.rosbag import Bag, is_frame
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import check_layout, decode
@@ -38,9 +38,7 @@ _CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 _AHEAD = 0.5
 
 
-def open_bag(
-    path: Path, config: RadarConfig | None, cfg_text: str, overrides: dict[str, object], *, latency: float | None = None
-) -> Capture:
+def open_bag(path: Path, given: Given) -> Capture:
     """Open a bag.
 
     The radar's configuration is what was given, else the data set's own (preset ``radarize``) if the frames have its
@@ -48,8 +46,7 @@ def open_bag(
 
     Args:
         path: a ROS 1 ``.bag``, a ROS 2 bag's folder, or its ``.mcap`` or ``.db3``.
-        config, cfg_text, overrides: what is known of the radar.
-        latency: from a frame's start to its receipt, s; by default what the headers say, else the burst's length.
+        given: what is known of the radar and of its latency.
 
     Raises:
         InputError: no readable bag, one without raw frames, or frames that do not fit the configuration.
@@ -57,7 +54,7 @@ def open_bag(
     with Bag(path) as bag:
         radar, others, warnings = _topics(bag)
         received, first = _first(bag, radar)
-        config, assumed = _configure(path, first, config, overrides)
+        config, assumed = _configure(path, first, given)
         config = _calibrated(config, first, str(path), warnings)
         companions = {}
         for topic, kind in others.items():
@@ -69,8 +66,8 @@ def open_bag(
         count = bag.topics[radar][1]
     taken = list(companions.values())
     check_layout(config)
-    stamps = Stamps(config, first, received, latency)
-    capture = Capture(config, cfg_text, (), count, (*assumed, *stamps.assumed), warnings)
+    stamps = Stamps(config, first, received, given.latency)
+    capture = Capture(config, given.cfg_text, (), count, (*assumed, *stamps.assumed), warnings)
     capture.attributes["stamps"] = str(stamps)
     capture.streams = {name: stream for companion in taken for name, stream in companion.streams.items()}
     capture.products = {name: product for companion in taken for name, product in companion.products.items()}
@@ -112,9 +109,7 @@ def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
     return radar, others, warnings
 
 
-def _configure(
-    path: Path, frame: object, config: RadarConfig | None, overrides: dict[str, object]
-) -> tuple[RadarConfig, tuple[str, ...]]:
+def _configure(path: Path, frame: object, given: Given) -> tuple[RadarConfig, tuple[str, ...]]:
     try:
         shape = tuple(int(length) for length in np.atleast_1d(frame.shape))
         rx, tx = _antennas(frame.rx), _antennas(frame.tx)
@@ -129,11 +124,9 @@ def _configure(
         )
     said = {"samples": shape[-1], "loops": loops, "rx": rx, "tx": tx}
     preset = PRESETS["radarize"]
-    if config is not None:
-        return configure(config, overrides, str(path))
-    if (preset.samples, preset.loops, preset.rx, preset.tx) == (shape[-1], loops, rx, tx):
-        return configure(preset, overrides, str(path))[0], ("configuration: preset radarize", "iq_order")
-    return configure(None, said | overrides, str(path))
+    if given.config is None and said == {name: getattr(preset, name) for name in said}:
+        return given.or_else(preset, "").configure(str(path))[0], ("configuration: preset radarize", "iq_order")
+    return given.configure(str(path), said)
 
 
 def _antennas(field: object) -> tuple[int, ...]:

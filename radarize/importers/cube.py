@@ -11,7 +11,7 @@ from jaxtyping import Complex, Int16
 from radarize.errors import InputError
 from radarize.importers.arrays import ArrayFile, open_array
 from radarize.importers.capture import Batch, Capture, batch_frames
-from radarize.importers.parameters import configure
+from radarize.importers.parameters import Given
 from radarize.radar.config import RadarConfig
 
 #: Axes of a recording's samples; ``iq`` is missing where entries are complex.
@@ -114,40 +114,26 @@ class Axes:
         return block[:, :, list(config.slot)] if fired else block
 
 
-def open_cube(
-    path: Path,
-    config: RadarConfig | None,
-    cfg_text: str,
-    overrides: dict[str, object],
-    *,
-    shape: str | None,
-    variable: str | None,
-    folder: Path,
-) -> Capture:
+def open_cube(path: Path, given: Given, folder: Path) -> Capture:
     """Open an array of samples; ADC counts, or any unit, which is then scaled to counts.
 
     Args:
         path: the file.
-        config, cfg_text, overrides: what is known of the radar; lengths of axes need not be.
-        shape: names or lengths of the axes; by default those of a recording.
-        variable: which array of several.
+        given: what is known of the radar, lengths of axes need not be; and which array, with which axes (by default
+            those of a recording).
         folder: where a compressed array may be unpacked.
 
     Raises:
         InputError: not such a file, or its shape does not fit the configuration.
     """
-    array = open_array(path, variable, folder)
-    axes = Axes.parse(shape, array) if shape else Axes.guess(array)
-    counts = {key: len(value) if isinstance(value, tuple) else value for key, value in overrides.items()}
-    given = {"loop": counts.get("loops"), "tx": counts.get("tx"), "rx": counts.get("rx")}
-    if config is not None:
-        known = {"loop": config.loops, "tx": len(config.tx), "rx": len(config.rx)}
-        given = {name: given[name] or known[name] for name in given}
-    lengths = axes.lengths(array, given)
-    if config is None:
-        found = {"samples": lengths["sample"], "loops": lengths["loop"], "rx": lengths["rx"], "tx": lengths["tx"]}
-        overrides = found | overrides
-    config, assumed = configure(config, overrides, str(path))
+    array = open_array(path, given.variable, folder)
+    axes = Axes.parse(given.shape, array) if given.shape else Axes.guess(array)
+    said = given.config.model_dump() | {"tx": given.config.tx} if given.config else {}
+    said |= {name: value for name, value in given.overrides.items() if value}
+    counts = {name: len(value) if isinstance(value, tuple) else value for name, value in said.items()}
+    lengths = axes.lengths(array, {"loop": counts.get("loops"), "tx": counts.get("tx"), "rx": counts.get("rx")})
+    found = {"samples": lengths["sample"], "loops": lengths["loop"], "rx": lengths["rx"], "tx": lengths["tx"]}
+    config, assumed = given.configure(str(path), found)
     expected = dict(zip(STANDARD[1:5], config.frame_shape, strict=False))
     if wrong := [name for name in expected if expected[name] != lengths[name]]:
         raise InputError(
@@ -156,7 +142,7 @@ def open_cube(
         )
     if not lengths["frame"]:
         raise InputError(f"{array.name}: has shape {array.shape}, expected at least one frame")
-    capture = Capture(config, cfg_text, (), lengths["frame"], assumed)
+    capture = Capture(config, given.cfg_text, (), lengths["frame"], assumed)
     capture.batches = _batches(array, axes, capture)
     return capture
 

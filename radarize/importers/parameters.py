@@ -1,4 +1,8 @@
-"""Settings given by hand, for captures whose configuration is lost or wrong."""
+"""Settings given by hand, for captures that say too little of themselves."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
@@ -22,41 +26,70 @@ _AFTER_ADC = 1e-6
 _FRAME_PERIOD = 0.1
 
 
-def configure(
-    config: RadarConfig | None, overrides: dict[str, object], name: str
-) -> tuple[RadarConfig, tuple[str, ...]]:
-    """The configuration with settings given by hand, and the names of those that had to be assumed.
+@dataclass(frozen=True)
+class Given:
+    """What the user says of a capture, where it does not say so itself, or wrongly.
 
-    Args:
-        config: what the capture came with, if anything.
-        overrides: fields of `RadarConfig`; ``rx`` and ``tx`` may be counts; None counts as not given.
-        name: what errors call it.
-
-    Raises:
-        InputError: a value is impossible, or too few are known.
+    Attributes:
+        config: radar configuration; by default what lies beside the source.
+        cfg_text: text that `config` was read from, kept in the recording.
+        overrides: fields of `RadarConfig` that replace or stand in for the configuration's; ``rx`` and ``tx`` may be
+            counts; None counts as not given.
+        start_time: the first frame's stamp, s.
+        poses: TUM file of the sensor's true poses on the recording's clock.
+        shape: axes of an array: names in order, such as ``frame,loop,tx,rx,sample``, or five or six lengths.
+        variable: which array of an ``.npz`` or ``.mat``.
+        latency: from a frame's start to its receipt in a ROS bag, s; by default what the headers say, else the burst's
+            length.
     """
-    given = {key: value for key, value in overrides.items() if value is not None}
-    for key, most in (("rx", 4), ("tx", 3)):
-        if isinstance(count := given.get(key), int) and not 1 <= count <= most:
-            raise InputError(f"{name}: {key} is {count}, expected 1 to {most} antennas")
-    if isinstance(rx := given.get("rx"), int):
-        given["rx"] = tuple(range(rx))
-    if (tx := given.pop("tx", None)) is not None:
-        given.setdefault("tx_order", tuple(range(tx)) if isinstance(tx, int) else tuple(tx))
-    if config is not None:
-        return (RadarConfig.build(name, **{**config.model_dump(), **given}) if given else config), ()
 
-    if missing := [key for key in REQUIRED if key not in given]:
-        raise InputError(
-            f"{name}: has no radar configuration, expected a .cfg or .mmwave.json file, or at least values for "
-            f"{', '.join(REQUIRED)} (missing: {', '.join(missing)})"
-        )
-    fields = {**ASSUMED, **given}
-    try:
-        adc_end = fields["adc_start_time"] + fields["samples"] / fields["sample_rate"]
-        fields.setdefault("ramp_end_time", adc_end + _AFTER_ADC)
-        burst = fields["loops"] * len(fields["tx_order"]) * (fields["idle_time"] + fields["ramp_end_time"])
-        fields.setdefault("frame_period", max(_FRAME_PERIOD, 1.5 * burst))
-    except (TypeError, ZeroDivisionError, OverflowError):
-        pass  # the configuration's own checks name the field
-    return RadarConfig.build(name, **fields), tuple(key for key in fields if key not in given)
+    config: RadarConfig | None = None
+    cfg_text: str = ""
+    overrides: Mapping[str, object] = field(default_factory=dict)
+    start_time: float | None = None
+    poses: Path | None = None
+    shape: str | None = None
+    variable: str | None = None
+    latency: float | None = None
+
+    def or_else(self, config: RadarConfig, cfg_text: str) -> "Given":
+        """The same with a configuration, and its text, unless there is one."""
+        return self if self.config else replace(self, config=config, cfg_text=cfg_text)
+
+    def configure(self, name: str, found: Mapping[str, object] | None = None) -> tuple[RadarConfig, tuple[str, ...]]:
+        """The configuration with the overrides, and the names of settings that had to be assumed.
+
+        Args:
+            name: what errors call it.
+            found: what the source itself says where there is no configuration.
+
+        Raises:
+            InputError: a value is impossible, or too few are known.
+        """
+        given = {key: value for key, value in self.overrides.items() if value is not None}
+        if self.config is None:
+            given = {**(found or {}), **given}
+        for key, most in (("rx", 4), ("tx", 3)):
+            if isinstance(count := given.get(key), int) and not 1 <= count <= most:
+                raise InputError(f"{name}: {key} is {count}, expected 1 to {most} antennas")
+        if isinstance(rx := given.get("rx"), int):
+            given["rx"] = tuple(range(rx))
+        if (tx := given.pop("tx", None)) is not None:
+            given.setdefault("tx_order", tuple(range(tx)) if isinstance(tx, int) else tuple(tx))
+        if self.config is not None:
+            return (RadarConfig.build(name, **{**self.config.model_dump(), **given}) if given else self.config), ()
+
+        if missing := [key for key in REQUIRED if key not in given]:
+            raise InputError(
+                f"{name}: has no radar configuration, expected a .cfg or .mmwave.json file, or at least values for "
+                f"{', '.join(REQUIRED)} (missing: {', '.join(missing)})"
+            )
+        fields = {**ASSUMED, **given}
+        try:
+            adc_end = fields["adc_start_time"] + fields["samples"] / fields["sample_rate"]
+            fields.setdefault("ramp_end_time", adc_end + _AFTER_ADC)
+            burst = fields["loops"] * len(fields["tx_order"]) * (fields["idle_time"] + fields["ramp_end_time"])
+            fields.setdefault("frame_period", max(_FRAME_PERIOD, 1.5 * burst))
+        except (TypeError, ZeroDivisionError, OverflowError):
+            pass  # the configuration's own checks name the field
+        return RadarConfig.build(name, **fields), tuple(key for key in fields if key not in given)

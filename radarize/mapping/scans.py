@@ -5,49 +5,59 @@ there, each a function of `Maps` that returns fractional range bins. A network j
 """
 
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
-import torch
-from jaxtyping import Bool, Complex64, Float
+from jaxtyping import Bool, Float
 from pydantic import BaseModel, ConfigDict, Field
 
+from radarize.batch import Batch
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.mapping import echoes
 from radarize.points import Cfar, level_around
+from radarize.stopwatch import stage
 
 #: Bearings of a scan: 88 columns of 1 deg, -44...+43 deg, left positive, rad (the paper's field of view).
 BEARINGS = np.radians(np.arange(-44.0, 44.0))
 
 
 class ScanConfig(BaseModel):
-    """Parameters of detection.
-
-    Attributes:
-        min_range: nearer cells hold transmitter leakage, m.
-        above_noise_db: an echo stands so far above the noise.
-        below_ring_db: an echo lies at most so far below the strongest of all bearings at its range; what is weaker is
-            taken for that echo's sidelobe.
-        below_bearing_db: an echo lies at most so far below the strongest of all ranges on its bearing; what is weaker
-            and nearer is clutter above or below the plane, or the skirt of a neighbour. In simulated offices 6 dB
-            halves the echoes that come too early and costs one in ten of the others.
-        noise_quantile: the noise is this quantile of a frame's cells: most of a room's cells are behind its walls.
-        cfar: what an echo stands above in range and in bearing, for the method of that name.
-        elevation_power: how strongly echoes from above and below are weighed down: a cell's power is multiplied with
-            (elevation-aware / reference power)^this, at most 1.
-    """
+    """Detection of echoes in range-azimuth maps."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    min_range: float = Field(0.3, ge=0)
-    above_noise_db: float = Field(15.0, gt=0)
-    below_ring_db: float = Field(15.0, gt=0)
-    below_bearing_db: float = Field(6.0, gt=0)
-    noise_quantile: float = Field(0.25, gt=0, lt=1)
-    cfar: Cfar = Cfar(window=8, guard=4, threshold=10.0)
-    elevation_power: float = Field(2.0, gt=0)
+    min_range: float = Field(0.3, ge=0, description="m, nearer cells hold transmitter leakage")
+    above_noise_db: float = Field(15.0, gt=0, description="dB, an echo stands so far above the noise")
+    below_ring_db: float = Field(
+        15.0,
+        gt=0,
+        description="dB, an echo lies at most so far below the strongest of all bearings at its range; what is weaker "
+        "is taken for that echo's sidelobe",
+    )
+    below_bearing_db: float = Field(
+        6.0,
+        gt=0,
+        description="dB, the same below the strongest of all ranges on its bearing; what is weaker and nearer is "
+        "clutter above or below the plane, or the skirt of a neighbour: in simulated offices 6 dB halves the echoes "
+        "that come too early and costs one in ten of the others",
+    )
+    noise_quantile: float = Field(
+        0.25,
+        gt=0,
+        lt=1,
+        description="the noise is this quantile of a frame's cells: most of a room's cells are behind its walls",
+    )
+    cfar: Cfar = Field(
+        Cfar(window=8, guard=4, threshold=10.0),
+        description="what an echo stands above in range and in bearing, for scans by cfar",
+    )
+    elevation_power: float = Field(
+        2.0,
+        gt=0,
+        description="how strongly echoes from above and below are weighed down, for scans by elevation-aware: a cell's "
+        "power is multiplied with (elevation-aware / reference power)^this, at most 1",
+    )
 
 
 @dataclass(frozen=True)
@@ -179,40 +189,31 @@ class HeatmapScans:
         heatmaps: make the maps.
         method: a key of `METHODS`.
         config: parameters of detection.
-        stage: entered with ``"maps"`` where maps are made, to time it.
 
     Raises:
         InputError: the array has no elevation-aware maps, and the method needs them.
     """
 
-    def __init__(
-        self,
-        heatmaps: Heatmaps,
-        method: str,
-        config: ScanConfig | None = None,
-        stage: Callable[[str], AbstractContextManager] = nullcontext,
-    ):
+    def __init__(self, heatmaps: Heatmaps, method: str, config: ScanConfig | None = None):
         if method == "elevation-aware" and heatmaps.pairs is None:
             raise InputError(
                 "scans is 'elevation-aware', which needs antennas of two heights; this radar has none, use first-echo"
             )
         self.heatmaps, self.method, self.config = heatmaps, method, config or ScanConfig()
-        self._stage = stage
 
-    def scan(
-        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
-    ) -> Float[np.ndarray, "frame bearing"]:
+    def scan(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `BEARINGS`, m, inf where nothing is seen."""
-        maps, level, reference = self.heatmaps, None, None
-        with self._stage("maps"):
+        maps, spectrum, level, reference = self.heatmaps, batch.spectrum, None, None
+        with stage("maps"):
             # Scans want Capon's sharp beams; the horizon is told from two maps of one beamformer, Bartlett's.
             sharp = maps.range_azimuth_of(spectrum, "capon").numpy()
             if self.method == "elevation-aware":
                 level = maps.elevation_aware_of(spectrum).numpy()
                 reference = maps.range_azimuth_of(spectrum).numpy()
-        return make_scans(
-            sharp, maps.ranges, maps.azimuths, level, reference=reference, method=self.method, config=self.config
-        )
+        with stage("scans"):
+            return make_scans(
+                sharp, maps.ranges, maps.azimuths, level, reference=reference, method=self.method, config=self.config
+            )
 
 
 def _resample(power: np.ndarray, azimuths: np.ndarray) -> np.ndarray:

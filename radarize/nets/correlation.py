@@ -12,7 +12,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn.functional import normalize, pad
 
-from radarize.nets.maps import Maps
+from radarize.features.maps import Maps
 
 
 class Correlation(nn.Module):

@@ -37,14 +37,11 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
         raise InputError("ONNX needs packages that are not installed; type: pip install 'radarize[onnx]'") from error
     # It lists what it would do with torchvision.
     logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
-    # Not "mean", which is what torch calls the average over an image.
-    outputs = ["probability"] if header.kind in ("segmentation", "radarhd") else ["estimate", "covariance"]
-    inputs, item = example(header), torch.export.Dim("item")
-    names = list(getattr(net, "inputs", ("maps", "travel")))
+    inputs, item = example(net, header), torch.export.Dim("item")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         program = torch.onnx.export(
-            Estimate(net).eval().cpu(), inputs, input_names=names[: len(inputs)], output_names=outputs,
+            Estimate(net).eval().cpu(), inputs, input_names=list(net.inputs), output_names=list(net.outputs),
             dynamic_shapes=(tuple({0: item} for _ in inputs),), dynamo=True, verbose=False,
         )  # fmt: skip
     program.model.metadata_props["radarize"] = header.model_dump_json()

@@ -4,10 +4,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from radarize.features.maps import Maps
+
 #: dB that become 1: about the standard deviation of a map's cells.
 SCALE = 10.0
-
-Maps = Float[Tensor, "item frame map row azimuth"]
 
 
 def level(maps: Maps) -> Maps:

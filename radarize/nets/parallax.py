@@ -5,7 +5,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn.functional import grid_sample
 
-from radarize.training.maps import AZIMUTHS
+from radarize.features.maps import AZIMUTHS
 
 
 class Moved(nn.Module):

@@ -1,9 +1,8 @@
 """Trained networks as files: safetensors in float16, with a header that says what they were trained on and for."""
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import torch
 from jaxtyping import Float
@@ -14,54 +13,11 @@ from torch import Tensor, nn
 
 from radarize import __version__
 from radarize.errors import InputError
+from radarize.features.grid import TOLERANCE, Grid
+from radarize.features.maps import Maker, MapMaker
+from radarize.features.windows import Windows
 from radarize.radar.config import RadarConfig
 from radarize.replacing import replacing
-from radarize.settings import SETTINGS
-
-#: Steps of range or speed that differ by less read as the same grid.
-_TOLERANCE = 0.01
-#: Networks that need to know how far their maps' rows are apart.
-_SCALED = ("translation", "rotation")
-
-
-class Grid(BaseModel):
-    """Cells of a map: a network that knows one grid reads wrong speeds and ranges off another.
-
-    Attributes:
-        rows: range bins, or Doppler bins.
-        step: m, or m/s, from row to row.
-        azimuths: columns.
-        field: rad, from the first column to the last.
-        frame_period: s.
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    rows: int
-    step: float
-    azimuths: int
-    field: float
-    frame_period: float
-
-    @classmethod
-    def of(cls, config: RadarConfig, name: str, setting: str = "corrected") -> "Grid":
-        """The grid of a radar's map."""
-        maker = SETTINGS[setting].maker
-        axes = maker.axes(config, name)
-        return cls(
-            rows=axes.rows,
-            step=axes.step,
-            azimuths=len(axes.azimuths),
-            field=float(axes.azimuths[-1] - axes.azimuths[0]),
-            frame_period=config.frame_period * maker.stride(config),
-        )
-
-    def difference(self, other: "Grid", ignore: tuple[str, ...] = ()) -> str | None:
-        """What differs of another grid, in words; None if nothing does."""
-        for name, own in self:
-            if name not in ignore and abs(own - getattr(other, name)) > _TOLERANCE * abs(own):
-                return f"{name.replace('_', ' ')} {getattr(other, name):.6g} instead of {own:.6g}"
-        return None
 
 
 class Header(BaseModel):
@@ -69,7 +25,7 @@ class Header(BaseModel):
 
     Attributes:
         kind: of the network.
-        setting: key of `radarize.settings.SETTINGS`.
+        setting: reading of the paper that its maps follow: ``corrected``, or ``published``.
         frames, maps, width: what the network is built with; maps are names of all that it reads of a frame.
         grid: of its maps; None if it sees none.
         spacings: frames from one of the window to the next, as trained.
@@ -102,30 +58,50 @@ class Header(BaseModel):
             ValueError: the radar's frames do not come as often, or not at a whole multiple.
         """
         ratio = self.grid.frame_period / config.frame_period
-        if round(ratio) < 1 or abs(ratio - round(ratio)) > _TOLERANCE * ratio:
+        if round(ratio) < 1 or abs(ratio - round(ratio)) > TOLERANCE * ratio:
             raise ValueError(
                 f"frame period {config.frame_period:.6g} instead of {self.grid.frame_period:.6g} or a part"
             )
         return round(ratio)
 
+    def windows(self, config: RadarConfig) -> Windows:
+        """Of a radar's frames, as the network was trained on them."""
+        return Windows(self.maps, self.frames, self.stride(config), config.frame_period, max(self.spacings))
 
-def make(
-    kind: str, frames: int, maps: Sequence[str], width: int, grid: Grid | None, setting: str = "corrected"
-) -> nn.Module:
-    """An untrained network for maps of a grid.
+
+#: Bytes of a file's header: ours have some thousands.
+_HEADER = 1 << 20
+
+
+class Network(Protocol):
+    """What a class of networks says of itself; made from frames of a window, names of its inputs and width, and `step`
+    if it is `scaled`.
+
+    Attributes:
+        kind: name of its task; setting: see `Header`.
+        maker: of the maps that it sees.
+        scaled: it needs to know how far its maps' rows are apart.
+        inputs, outputs: names of what `estimate` takes and gives.
+    """
+
+    kind: str
+    setting: str = "corrected"
+    maker: type[Maker] = MapMaker
+    scaled: bool = False
+    inputs: tuple[str, ...] = ("maps",)
+    outputs: tuple[str, ...] = ("estimate", "covariance")
+
+
+def build(network: type[Network], header: Header) -> nn.Module:
+    """An untrained network as a header describes it.
 
     Raises:
-        ValueError: it needs to know the grid.
+        ValueError: it needs to know the grid, and there is none.
     """
-    if kind in _SCALED and grid is None:
-        raise ValueError(f"{kind} without a grid")
-    scale = {"step": grid.step} if kind in _SCALED else {}
-    return SETTINGS[setting].nets[kind](frames, maps, width, **scale)
-
-
-def build(header: Header) -> nn.Module:
-    """The network of a header, untrained."""
-    return make(header.kind, header.frames, header.maps, header.width, header.grid, header.setting)
+    if network.scaled and header.grid is None:
+        raise ValueError(f"{header.kind} without a grid")
+    scale = {"step": header.grid.step} if network.scaled else {}
+    return network(header.frames, header.maps, header.width, **scale)
 
 
 def save(net: nn.Module, header: Header, path: Path) -> Path:
@@ -143,67 +119,77 @@ def save(net: nn.Module, header: Header, path: Path) -> Path:
     return path
 
 
-def load(path: Path, config: RadarConfig | None = None) -> tuple[nn.Module, Header]:
+def load(path: Path, network: type[Network], config: RadarConfig | None = None) -> tuple[nn.Module, Header]:
     """A network in float32, ready for use.
 
     Args:
         path: file that `save` wrote.
+        network: what it has to be.
         config: of the radar whose maps it is to read.
 
     Raises:
-        InputError: no such file, no weights of this project, or trained for maps of another grid.
+        InputError: no such file, no weights of this project, another network's, or trained for maps of another grid.
     """
     tensors, about = read(path)
+    header = _header(about, path)
+    if (header.kind, header.setting) != (network.kind, network.setting):
+        raise InputError(
+            f"{path}: is a network for {header.kind!r} ({header.setting}), expected one for {network.kind!r} "
+            f"({network.setting})"
+        )
     try:
-        header = _header(about, path)
-        net = build(header)
+        with torch.device("meta"):  # sizes that the header makes up take no memory
+            build(network, header).load_state_dict(tensors)
+        net = build(network, header)
         net.load_state_dict(tensors)
-    except (ValueError, RuntimeError) as error:
+    except (ValueError, RuntimeError, OverflowError) as error:
         raise _misfit(path, error) from error
     if config is not None:
-        _check(header, config, path)
+        _check(header, config, path, network.maker)
     return net.eval(), header
 
 
 def check(path: Path, config: RadarConfig) -> None:
-    """Whether a network reads a radar's maps, by its header alone.
+    """Whether a network reads the maps of a radar that networks commonly see, by its header alone.
 
     Raises:
         InputError: see `load`.
     """
-    _check(_header(read(path, tensors=False)[1], path), config, path)
+    _check(header_of(path), config, path, MapMaker)
+
+
+def header_of(path: Path) -> Header:
+    """What a file says of itself.
+
+    Raises:
+        InputError: no such file, or no weights of this project.
+    """
+    return _header(read(path, tensors=False)[1], path)
 
 
 def _header(about: dict[str, Any], path: Path) -> Header:
     try:
-        header = Header.model_validate(about)
+        return Header.model_validate(about)
     except ValidationError as error:
         raise _misfit(path, error) from error
-    for value, known in ((header.setting, SETTINGS), (header.kind, SETTINGS["corrected"].nets)):
-        if value not in known:
-            raise InputError(f"{path}: is a network for {value!r}, expected one of: {', '.join(known)}")
-    return header
 
 
 def _misfit(path: Path, error: Exception) -> InputError:
     return InputError(f"{path}: its weights do not fit its header ({str(error).splitlines()[0].rstrip(':')})")
 
 
-def _check(header: Header, config: RadarConfig, path: Path) -> None:
+def _check(header: Header, config: RadarConfig, path: Path, maker: type[Maker]) -> None:
     if header.grid is None:
         return
-    difference = header.grid.difference(Grid.of(config, header.maps[0], header.setting), ignore=("frame_period",))
+    if header.maps[0] not in maker.maps:
+        raise InputError(f"{path}: reads maps {header.maps[0]!r}, expected some of: {', '.join(maker.maps)}")
+    difference = header.grid.difference(Grid.of(config, header.maps[0], maker), ignore=("frame_period",))
     try:
         header.stride(config)
     except ValueError as error:
         difference = difference or str(error)
     if difference:
         raise InputError(f"{path}: does not fit this radar, whose maps have {difference}; it needs weights of its own")
-
-
-def shipped(kind: str) -> Path:
-    """Weights that come with the package: for the ``radarize`` preset, trained on simulated buildings."""
-    return Path(__file__).parents[1] / "weights" / f"{kind}.safetensors"
 
 
 def write(tensors: dict[str, Tensor], about: dict[str, Any], path: Path) -> None:
@@ -227,20 +213,22 @@ def read(path: Path, tensors: bool = True) -> tuple[dict[str, Float[Tensor, "...
     if not Path(path).is_file():
         raise InputError(f"{path}: no such file, expected weights (.safetensors)")
     try:
+        with Path(path).open("rb") as file:
+            if (size := int.from_bytes(file.read(8), "little")) > _HEADER:
+                raise ValueError(f"its header has {size} bytes, expected at most {_HEADER}")
         with safe_open(path, "pt") as file:
             about = json.loads((file.metadata() or {})["radarize"])
             return {name: file.get_tensor(name) for name in (file.keys() if tensors else ())}, about
-    except (OSError, SafetensorError, KeyError, ValueError) as error:
+    except (OSError, SafetensorError, KeyError, ValueError, RecursionError) as error:
         reason = "has no header of radarize" if isinstance(error, KeyError) else str(error)
         raise InputError(f"{path}: is no file of weights of this project ({reason})") from error
 
 
-def example(header: Header) -> tuple[Tensor, ...]:
-    """What a network reads, twice: maps of noise, and for turns of setting `corrected` a travel; or other readings."""
+def example(net: nn.Module, header: Header) -> tuple[Tensor, ...]:
+    """What a network reads, twice: maps of noise and, if it wants to be told, a travel; or its other readings."""
     noise = torch.Generator().manual_seed(0)
     if header.grid is None:
-        return tuple(torch.randn((2, *shape), generator=noise) for shape in build(header).shapes)
+        return tuple(torch.randn((2, *shape), generator=noise) for shape in net.shapes)
     shape = (2, header.frames, len(header.maps), header.grid.rows, header.grid.azimuths)
     maps = 10 * torch.randn(shape, generator=noise)
-    told = header.kind == "rotation" and header.setting == "corrected"
-    return (maps, 0.1 * torch.randn((2, 2), generator=noise)) if told else (maps,)
+    return (maps, 0.1 * torch.randn((2, 2), generator=noise)) if "travel" in net.inputs else (maps,)

@@ -24,6 +24,7 @@ from jaxtyping import Bool, Complex64, Float, Int
 from numba import njit
 from pydantic import BaseModel, ConfigDict, Field
 
+from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
 from radarize.radar.array import virtual_positions
 
@@ -108,7 +109,7 @@ class DopplerVelocity:
         self.row, self.pairs = heatmaps.row, heatmaps.pairs
         self._heatmaps = heatmaps
         self._u = np.linspace(-0.94, 0.94, self.settings.beams)
-        self._steering = torch.as_tensor(heatmaps.steering(self.row, self._u), device=heatmaps.device)
+        self._steering = torch.as_tensor(heatmaps.steering(self.row, self._u))
         self._steering = self._steering.to(torch.complex64)
         self._array = _array(heatmaps, self._u)
         # An echo's phase turns with its way to the transmitter and back to the receiver: it is the middle that moves.
@@ -117,14 +118,11 @@ class DopplerVelocity:
         # One table of random numbers for all frames: the same frame gives the same answer in any batch.
         self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 2))
 
-    def estimate(
-        self,
-        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
-        times: Float[np.ndarray, "frame"] | None = None,
-    ) -> Velocities:
-        """Velocities of a batch of frames from their `Heatmaps.spectrum`, whenever they were."""
-        power = self._heatmaps.beamformed(spectrum, self.row, self._steering).cpu().numpy()
-        cells = spectrum.cpu().numpy()
+    def estimate(self, batch: Batch) -> Velocities:
+        """Velocities of the next frames."""
+        spectrum = batch.spectrum
+        power = self._heatmaps.beamformed(spectrum, self.row, self._steering).numpy()
+        cells = spectrum.numpy()
         frames = len(cells)
         velocity, covariance = np.zeros((frames, 2)), np.zeros((frames, 2, 2))
         inliers = np.zeros(frames, int)
@@ -145,8 +143,8 @@ class DopplerVelocity:
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 6"]:
         """Peaks of one frame: range bin, closing speed (m/s), u_y, u_z and its variance, power over the median."""
-        power = self._heatmaps.beamformed(spectrum[None], self.row, self._steering)[0].cpu().numpy()
-        return self._echoes(spectrum.cpu().numpy(), power)
+        power = self._heatmaps.beamformed(spectrum[None], self.row, self._steering)[0].numpy()
+        return self._echoes(spectrum.numpy(), power)
 
     def _echoes(self, cells: np.ndarray, power: np.ndarray) -> np.ndarray:
         level = float(np.median(power[self._first :: 2, :, ::4]))

@@ -1,21 +1,19 @@
 """Planar odometry: velocities at burst centres and yaw increments between them, integrated to a trajectory."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-import torch
-from jaxtyping import Bool, Float, Int16
+from jaxtyping import Bool, Float
 from pydantic import BaseModel, ConfigDict, Field
 
+from radarize.batch import Batch
 from radarize.errors import InputError
-from radarize.heatmaps import Heatmaps
-from radarize.odometry.doppler import DopplerVelocity, Velocities
-from radarize.odometry.rotation import MapRotation, Rotations
+from radarize.odometry.doppler import Velocities
+from radarize.odometry.rotation import Rotations
 from radarize.pose import compose, exponential
 from radarize.radar.config import RadarConfig
+from radarize.stopwatch import stage
 
 #: Standard deviation of a step's heading as a share of its turn, on top of the estimator's own. A local map that lags
 #: in a turn lags in all its frames: errors of up to 6 deg a corner add up instead of averaging out, and independent
@@ -30,7 +28,7 @@ _STEADY = 0.1
 
 
 class VelocityEstimator(Protocol):
-    """Sensor velocity per frame from `Heatmaps.spectrum` of frames in order, and their burst-centre times.
+    """Sensor velocities at burst centres.
 
     Attributes:
         lever: m, how far to the left of the sensor's origin the point lies whose velocity this is.
@@ -38,13 +36,13 @@ class VelocityEstimator(Protocol):
 
     lever: float
 
-    def estimate(self, spectrum: torch.Tensor, times: np.ndarray) -> Velocities: ...
+    def estimate(self, batch: Batch) -> Velocities: ...
 
 
 class RotationEstimator(Protocol):
-    """Yaw increment per frame from spectra in order, their burst-centre times and filtered velocities."""
+    """Yaw increments from frame to frame, given the filtered velocities."""
 
-    def estimate(self, spectrum: torch.Tensor, times: np.ndarray, velocities: Velocities) -> Rotations: ...
+    def estimate(self, batch: Batch, velocities: Velocities) -> Rotations: ...
 
 
 @dataclass(frozen=True)
@@ -122,62 +120,39 @@ class VelocityFilter:
 
 
 class Odometry:
-    """Radar odometry in a stream: push batches of frames of any size, get their poses. Memory does not grow.
+    """Radar odometry in a stream. Memory does not grow.
 
     Args:
-        config: radar configuration.
-        velocity, rotation: estimators; Doppler least squares and local-map matching if None.
+        radar: configuration.
+        velocity, rotation: estimators.
         settings: of the filter of velocities.
     """
 
     def __init__(
         self,
-        config: RadarConfig,
-        velocity: VelocityEstimator | None = None,
-        rotation: RotationEstimator | None = None,
+        radar: RadarConfig,
+        velocity: VelocityEstimator,
+        rotation: RotationEstimator,
         settings: VelocityConfig | None = None,
     ):
-        self.config = config
-        self.heatmaps = Heatmaps(config)
-        self.velocity = velocity or DopplerVelocity(self.heatmaps)
-        self.rotation = rotation or MapRotation(self.heatmaps)
+        self.config, self.velocity, self.rotation = radar, velocity, rotation
         self._filter = VelocityFilter(settings)
         self._rate = 0.0  # of turning, rad/s, without the matches' jitter
         self._pose = np.zeros(3)
         self._last: tuple[float, np.ndarray, np.ndarray] | None = None  # time, velocity, covariance
 
-    def push(
-        self,
-        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
-        times: Float[np.ndarray, "frame"],
-        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
-    ) -> Track:
+    def follow(self, batch: Batch) -> Track:
         """Poses of the next frames.
 
-        Args:
-            adc: raw samples.
-            times: the frames' stamps (starts of their first chirps), s.
-            valid: False where a chirp was lost.
-
         Raises:
-            InputError: samples of the wrong shape, or stamps that do not increase.
+            InputError: stamps that do not increase.
         """
-        return self.follow(self.heatmaps.spectrum(adc, valid), times)
-
-    def follow(
-        self,
-        spectrum: torch.Tensor,
-        times: Float[np.ndarray, "frame"],
-        stage: Callable[[str], AbstractContextManager] = nullcontext,
-    ) -> Track:
-        """As `push`, from spectra of `Heatmaps.spectrum`; `stage` is entered with each estimator's name, to time it."""
-        centers = np.asarray(times, float) + self.config.burst_center
-        steps = intervals(centers, None if self._last is None else self._last[0])
+        steps = intervals(batch.centers, None if self._last is None else self._last[0])
         with stage("translation"):
-            velocities = self._filter.filter(centers, self.velocity.estimate(spectrum, centers))
+            velocities = self._filter.filter(batch.centers, self.velocity.estimate(batch))
         with stage("rotation"):
-            rotations = self.rotation.estimate(spectrum, centers, velocities)
-        return self._integrate(centers, self._at_origin(steps, velocities, rotations), rotations)
+            rotations = self.rotation.estimate(batch, velocities)
+        return self._integrate(batch.centers, self._at_origin(steps, velocities, rotations), rotations)
 
     def _at_origin(self, steps: np.ndarray, measured: Velocities, rotations: Rotations) -> Velocities:
         """Velocities of the sensor's origin, which does not swing about it as the estimator's point does."""

@@ -23,6 +23,7 @@ from jaxtyping import Bool, Complex64, Float, Float32
 from pydantic import BaseModel, ConfigDict, Field
 from torch.nn.functional import avg_pool1d
 
+from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
@@ -106,7 +107,7 @@ class MapRotation:
     ):
         s = self.settings = settings or RotationConfig()
         self._sines = np.linspace(-s.field, s.field, s.columns)
-        self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(self._sines), heatmaps.loading, heatmaps.device)
+        self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(self._sines), heatmaps.settings)
         self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
         self._ranges = heatmaps.ranges[self._first :]
         self._map = LocalMap(self._ranges[-1], s.cell)
@@ -130,36 +131,22 @@ class MapRotation:
         level = level - level.median(dim=1, keepdim=True).values
         level = level.clamp(0, s.contrast)
         surroundings = _box_mean(_box_mean(level, _TEXTURE[1]).mT, _TEXTURE[0]).mT
-        return (level - surroundings).contiguous().cpu().numpy(), self._elevation(spectrum).cpu().numpy()
+        return (level - surroundings).contiguous().numpy(), self._elevation(spectrum).numpy()
 
     def _elevation(self, spectrum: torch.Tensor) -> torch.Tensor:
         if self._heatmaps.pairs is None:
             return torch.zeros(len(spectrum), len(self._ranges), self.settings.columns)
         u_z, coherence = self._heatmaps.elevation_of(spectrum[:, self._first :])
-        limit = torch.as_tensor(0.9 * np.cos(self._heatmaps.azimuths), dtype=u_z.dtype, device=u_z.device)
+        limit = torch.as_tensor(0.9 * np.cos(self._heatmaps.azimuths), dtype=u_z.dtype)
         return torch.clamp(u_z, -limit, limit) * coherence
 
-    def estimate(
-        self,
-        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
-        times: Float[np.ndarray, "frame"],
-        velocities: Velocities,
-    ) -> Rotations:
-        """Yaw increments of the next frames.
-
-        Args:
-            spectrum: `Heatmaps.spectrum` of the frames.
-            times: burst centres, s.
-            velocities: velocities there.
-        """
-        told = None if self._prior is None else self._prior.estimate(spectrum, times, velocities)
-        yaw, variance, seen = np.zeros(len(times)), np.zeros(len(times)), np.ones(len(times), bool)
-        for i, (feature, u_z) in enumerate(zip(*self.features(spectrum), strict=True)):
-            view, time, velocity = (
-                View(feature, u_z, self._ranges, self._sines),
-                float(times[i]),
-                velocities.velocity[i],
-            )
+    def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
+        """Yaw increments of the next frames, given their velocities."""
+        told = None if self._prior is None else self._prior.estimate(batch, velocities)
+        yaw, variance, seen = np.zeros(len(batch)), np.zeros(len(batch)), np.ones(len(batch), bool)
+        for i, (feature, u_z) in enumerate(zip(*self.features(batch.spectrum), strict=True)):
+            view = View(feature, u_z, self._ranges, self._sines)
+            time, velocity = float(batch.centers[i]), velocities.velocity[i]
             if self._time is not None:
                 turn = None if told is None else (told.yaw[i], told.variance[i])
                 yaw[i], variance[i], seen[i] = self._turn(view, time - self._time, velocity, turn)

@@ -56,6 +56,15 @@ BOARDS: dict[str, Board] = {
 }
 
 
+def board_of(device: str, start_frequency: float) -> str:
+    """The evaluation board of a device name and band (Hz); plain iwr6843 is taken for the ISK, the commonest of its
+    three boards."""
+    if start_frequency > 70e9:
+        return "iwr1843boost"
+    name = device.lower()
+    return "iwr6843aop" if "aop" in name else "iwr6843ods" if "ods" in name else "iwr6843isk"
+
+
 def tx_positions(config: RadarConfig) -> Float[np.ndarray, "tx 3"]:
     """Positions of the enabled transmitters in the sensor frame, m, physical order."""
     return _positions(config, BOARDS[config.board].tx, config.tx)

@@ -12,9 +12,8 @@ from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
 from radarize.errors import InputError
-from radarize.radar.array import BOARDS
+from radarize.radar.array import BOARDS, board_of
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
-from radarize.radar.presets import PRESETS
 
 #: Fields of the commands read here, in order.
 FIELDS: dict[str, tuple[str, ...]] = {
@@ -37,31 +36,6 @@ FIELDS: dict[str, tuple[str, ...]] = {
 }
 REQUIRED = ("dfeDataOutputMode", "channelCfg", "adcCfg", "adcbufCfg", "profileCfg", "chirpCfg", "frameCfg")
 REFUSED = {"advFrameCfg": "advanced frames", "subFrameCfg": "advanced frames", "contModeCfg": "continuous mode"}
-
-
-def load_config(source: str | Path | RadarConfig) -> tuple[RadarConfig, str]:
-    """A configuration by preset name, from a ``.cfg`` or ``.mmwave.json`` file, or as it is given.
-
-    Returns the configuration and the text it was read from (``write_cfg`` of it where there is none).
-
-    Raises:
-        InputError: no such preset or file, or its content cannot be used.
-    """
-    config = source if isinstance(source, RadarConfig) else PRESETS.get(str(source))
-    if config is not None:
-        return config, write_cfg(config)
-    path = Path(source)
-    if not path.is_file():
-        raise InputError(
-            f"{source}: no such radar configuration, expected a .cfg or .mmwave.json file or one of the presets "
-            f"{', '.join(PRESETS)}"
-        )
-    if path.suffix.lower() == ".json":
-        from radarize.radar.studio import load_studio
-
-        return load_studio(path)
-    text = read_text(path)
-    return parse_cfg(text, name=str(path)), text
 
 
 def read_text(path: Path) -> str:
@@ -263,11 +237,8 @@ def _board(text: str, start_frequency: float, name: str) -> str:
         if found[1] not in BOARDS:
             raise InputError(f"{name}: Board is {found[1]}, expected one of {', '.join(BOARDS)}")
         return found[1]
-    if start_frequency > 70e9:
-        return "iwr1843boost"
     platform = re.search(r"^%\s*Platform:\s*(\S+)", text, re.MULTILINE)
-    suffix = platform[1].lower() if platform else ""
-    return "iwr6843aop" if "aop" in suffix else "iwr6843ods" if "ods" in suffix else "iwr6843isk"
+    return board_of(platform[1] if platform else "", start_frequency)
 
 
 def _backoff(profile: Command, tx_order: tuple[int, ...]) -> float:

@@ -124,13 +124,6 @@ class Packet:
         return cls(sequence, low | high << 32, bytes(data[HEADER.size :]))
 
 
-def packets(stream: bytes, sequence: int = 1, offset: int = 0) -> Iterator[Packet]:
-    """Cut captured bytes into packets as the DCA1000 does, regardless of frames."""
-    for start in range(0, len(stream), MAX_PAYLOAD):
-        yield Packet(sequence, offset + start, bytes(stream[start : start + MAX_PAYLOAD]))
-        sequence += 1
-
-
 @dataclass
 class PacketCounts:
     """What became of a capture's packets.

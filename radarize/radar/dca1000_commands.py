@@ -107,19 +107,18 @@ class Reply:
         return cls(command, status)
 
 
-def packet_settings(delay: float = 25e-6, payload: int = MAX_PAYLOAD) -> bytes:
-    """Body of PACKETS.
+def packet_settings(delay: float = 25e-6) -> bytes:
+    """Body of PACKETS, for packets of `MAX_PAYLOAD` bytes of samples.
 
     Args:
         delay: between packets, s: 5, 10, 25 and 50 us let 706, 545, 325 and 193 Mbit/s through.
-        payload: bytes of samples in a packet.
 
     Raises:
         InputError: the delay is outside `DELAYS`.
     """
     if not DELAYS[0] <= delay <= DELAYS[1]:
         raise InputError(f"packet delay is {delay * 1e6:g} us, expected 5-500 us")
-    return _PACKETS.pack(payload + _PACKET_HEAD, round(delay / _TICK), 0)
+    return _PACKETS.pack(MAX_PAYLOAD + _PACKET_HEAD, round(delay / _TICK), 0)
 
 
 def read_packet_settings(body: bytes) -> tuple[float, int]:

@@ -1,45 +1,49 @@
-"""Radar configurations by name."""
+"""Radar configurations by name: of a preset, or of a file."""
 
+from pathlib import Path
+
+from radarize.errors import InputError
+from radarize.radar.cfg import parse_cfg, read_text, write_cfg
 from radarize.radar.config import RadarConfig
+from radarize.radar.studio import load_studio
 
 PRESETS: dict[str, RadarConfig] = {
     # The paper's `1843_v1`: 4 GHz, 30 frames/s, 1.89 m/s, 4.28 m.
     "radarize": RadarConfig(
-        start_frequency=77e9,
-        slope=80e12,
-        idle_time=122e-6,
-        adc_start_time=7e-6,
-        ramp_end_time=50e-6,
-        samples=96,
-        sample_rate=2.285e6,
-        loops=32,
-        frame_period=33.333e-3,
-        tx_order=(0, 2, 1),
+        start_frequency=77e9, slope=80e12, idle_time=122e-6, adc_start_time=7e-6, ramp_end_time=50e-6, samples=96,
+        sample_rate=2.285e6, loops=32, frame_period=33.333e-3, tx_order=(0, 2, 1),
     ),
     # Five times the range at the same frame rate and velocity span, for halls: 8 cm bins, 20 m.
     "long-range": RadarConfig(
-        start_frequency=77e9,
-        slope=35e12,
-        idle_time=108e-6,
-        adc_start_time=7e-6,
-        ramp_end_time=64e-6,
-        samples=256,
-        sample_rate=4.8e6,
-        loops=32,
-        frame_period=33.333e-3,
-        tx_order=(0, 2, 1),
+        start_frequency=77e9, slope=35e12, idle_time=108e-6, adc_start_time=7e-6, ramp_end_time=64e-6, samples=256,
+        sample_rate=4.8e6, loops=32, frame_period=33.333e-3, tx_order=(0, 2, 1),
     ),
     # Azimuth only, twice the unambiguous speed: TX1 and TX3.
     "two-tx": RadarConfig(
-        start_frequency=77e9,
-        slope=80e12,
-        idle_time=36e-6,
-        adc_start_time=7e-6,
-        ramp_end_time=50e-6,
-        samples=96,
-        sample_rate=2.285e6,
-        loops=64,
-        frame_period=33.333e-3,
-        tx_order=(0, 2),
+        start_frequency=77e9, slope=80e12, idle_time=36e-6, adc_start_time=7e-6, ramp_end_time=50e-6, samples=96,
+        sample_rate=2.285e6, loops=64, frame_period=33.333e-3, tx_order=(0, 2),
     ),
-}
+}  # fmt: skip
+
+
+def load_config(source: str | Path | RadarConfig) -> tuple[RadarConfig, str]:
+    """A configuration by preset name, from a ``.cfg`` or ``.mmwave.json`` file, or as it is given.
+
+    Returns the configuration and the text it was read from (``write_cfg`` of it where there is none).
+
+    Raises:
+        InputError: no such preset or file, or its content cannot be used.
+    """
+    config = source if isinstance(source, RadarConfig) else PRESETS.get(str(source))
+    if config is not None:
+        return config, write_cfg(config)
+    path = Path(source)
+    if not path.is_file():
+        raise InputError(
+            f"{source}: no such radar configuration, expected a .cfg or .mmwave.json file or one of the presets "
+            f"{', '.join(PRESETS)}"
+        )
+    if path.suffix.lower() == ".json":
+        return load_studio(path)
+    text = read_text(path)
+    return parse_cfg(text, name=str(path)), text

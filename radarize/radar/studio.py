@@ -8,7 +8,7 @@ from decimal import Decimal
 from pathlib import Path
 
 from radarize.errors import InputError
-from radarize.radar.array import BOARDS
+from radarize.radar.array import BOARDS, board_of
 from radarize.radar.cfg import distinct_order, read_text
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
 
@@ -71,7 +71,7 @@ def parse_studio(text: str, name: str = "mmwave.json", device: str = "") -> Rada
     order, profile = _firing(rf, frame)
     tx_order, repeats = distinct_order(order, f"{name}: rlFrameCfg_t")
     start_frequency = profile.decimal("startFreqConst_GHz", 9)
-    board = _board(device, start_frequency)
+    board = board_of(device, start_frequency)
     return RadarConfig.build(
         name,
         board=board,
@@ -117,14 +117,6 @@ def _firing(rf: "_Node", frame: "_Node") -> tuple[tuple[int, ...], "_Node"]:
     if len(used) != 1 or not matching:
         raise frame.error("chirpEndIdx", end, f"chirps of one defined profile, found profiles {sorted(used)}")
     return tuple(order), matching[-1]
-
-
-def _board(device: str, start_frequency: float) -> str:
-    """The evaluation board of a device name; plain iwr6843 is taken for the ISK, the commonest of its three boards."""
-    if start_frequency > 70e9:
-        return "iwr1843boost"
-    name = device.lower()
-    return "iwr6843aop" if "aop" in name else "iwr6843ods" if "ods" in name else "iwr6843isk"
 
 
 def _object(text: str, name: str) -> dict:

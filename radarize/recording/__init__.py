@@ -15,9 +15,10 @@ without a clock were written once.
 """
 
 from radarize.recording.additions import add
+from radarize.recording.interrupted import keeping
 from radarize.recording.losses import Losses
 from radarize.recording.reader import Recording
 from radarize.recording.streams import Product, Stream
 from radarize.recording.writer import RecordingWriter
 
-__all__ = ["Losses", "Product", "Recording", "RecordingWriter", "Stream", "add"]
+__all__ = ["Losses", "Product", "Recording", "RecordingWriter", "Stream", "add", "keeping"]

@@ -28,8 +28,15 @@ def reading(message: str) -> Iterator[None]:
         raise InputError(f"{message} ({reason(error)})") from error
 
 
-def dataset(group: h5py.Group, name: str, path: Path) -> h5py.Dataset:
-    """A data set of numbers that is no larger than what lies in the file can be.
+def dataset(
+    group: h5py.Group, name: str, path: Path, packed: float = _DEFLATE, ahead: int = _BYTES_AHEAD
+) -> h5py.Dataset:
+    """A data set of numbers that lies in the file, and is no larger than what lies there can be.
+
+    Args:
+        group, name: where it is; path: of the file.
+        packed: bytes that one on disk may stand for.
+        ahead: bytes that may be declared before they are on disk.
 
     Raises:
         InputError: it is not.
@@ -41,11 +48,13 @@ def dataset(group: h5py.Group, name: str, path: Path) -> h5py.Dataset:
         raise InputError(f"{where} is no data set, expected one")
     if data.dtype.kind not in "biufc":
         raise InputError(f"{where} holds {str(data.dtype)[:40]}, expected numbers")
+    if data.external or data.is_virtual:
+        raise InputError(f"{where} lies in other files, expected all of it in this one")
     chunks = data.chunks or data.shape
     declared = data.dtype.itemsize * max(math.prod(data.shape), math.prod(chunks))
     count = math.prod(-(-rows // length) for rows, length in zip(data.shape, chunks, strict=True) if length)
     stored = data.id.get_storage_size()
-    if declared > _DEFLATE * stored + _BYTES_AHEAD or count > stored // _PACKED_CHUNK + _CHUNKS_AHEAD:
+    if declared > packed * stored + ahead or count > stored // _PACKED_CHUNK + _CHUNKS_AHEAD:
         raise InputError(
             f"{where} declares {declared} bytes in {count} chunks (shape {data.shape}), but {stored} are in the file"
         )

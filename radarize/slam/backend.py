@@ -20,10 +20,15 @@ from radarize.slam.matcher import match, thin
 from radarize.slam.node import Node, Scan
 from radarize.slam.odometry import Drift, Odometry, Stillness
 from radarize.slam.posegraph import PoseGraph
+from radarize.slam.rows import Rows
 from radarize.slam.submap import Submap
 
 #: Nodes whose last loop searches may wait at a time.
 _AHEAD = 16
+#: Who has moved by less than this share of what makes a node stands.
+_STILL = 1 / 3
+#: Scans that `Slam.trajectory` takes at a time.
+_BLOCK = 4096
 
 
 class Slam:
@@ -40,9 +45,9 @@ class Slam:
 
     Odometry and scans come in any interleaving: a scan waits until odometry has reached its time. Entries that are not
     later than the one before them are left out and counted in `skipped`; scans before the first odometry entry take
-    its pose, scans after the last one the last; a jump in time is a step like any other. Empty scans and such of nan
-    alone follow odometry; no scans at all give an empty trajectory and map. Without any odometry motion is taken to go
-    on as matched before.
+    its pose, scans after the last one the last; a jump in time is a step like any other. Empty scans and
+    such of nan alone follow odometry; no scans at all give an empty trajectory and map. Without any odometry motion is
+    taken to go on as matched before. While the sensor stands no nodes are made, and a frame takes 40 bytes.
 
     Args:
         config: all parameters; the default is the preset ``lidar``.
@@ -56,7 +61,7 @@ class Slam:
         self.submaps: list[Submap] = []
         self.skipped = {"odometry": 0, "scans": 0}
         self._waiting: deque[tuple[float, np.ndarray, np.ndarray]] = deque()
-        self._scan_times: list[float] = []
+        self._scan_times = Rows()
         self._open: list[Scan] = []
         self._local: list[np.ndarray] = []  # of every node in the local frame
         self._drift = Drift(self.config.odometry.scale)
@@ -100,7 +105,7 @@ class Slam:
             raise InputError(f"scan: time is {time}, expected a finite number of seconds")
         if azimuths.ndim != 1 or azimuths.shape != ranges.shape:
             raise InputError(f"scan at {time}: {ranges.shape} ranges on {azimuths.shape} azimuths, expected one each")
-        if self._scan_times and time <= self._scan_times[-1]:
+        if len(self._scan_times) and time <= self._scan_times.values[-1]:
             self.skipped["scans"] += 1
             return
         self._scan_times.append(float(time))
@@ -121,22 +126,25 @@ class Slam:
         self.graph.optimise()
 
     def trajectory(self) -> tuple[Float[np.ndarray, "scan"], Float[np.ndarray, "scan 3"]]:
-        """Times (s) and poses (x, y, yaw) of every scan in a node, in the frame in which odometry began.
+        """Times (s) and poses (x, y, yaw) of every scan up to the last node's, in the frame in which odometry began.
 
         Between two nodes odometry gives the shape, and the nodes its ends.
         """
         if not self.nodes:
             return np.zeros(0), np.zeros((0, 3))
         knots, poses = np.array([node.time for node in self.nodes]), self.graph.poses
-        times = np.array(self._scan_times[: len(self._scan_times) - len(self._waiting) - len(self._open)])
-        odometry = np.stack([self.odometry.pose(t) for t in times])
-        anchors = np.stack([self.odometry.pose(t) for t in knots])
-        after = np.clip(np.searchsorted(knots, times), 1, max(len(knots) - 1, 1))
-        before, after = after - 1, np.minimum(after, len(knots) - 1)
-        forward = compose(poses[before], between(anchors[before], odometry))
-        backward = compose(poses[after], between(anchors[after], odometry))
-        span = np.maximum(knots[after] - knots[before], 1e-9)
-        return times, interpolate(forward, backward, np.clip((times - knots[before]) / span, 0, 1))
+        times = self._scan_times.values[: len(self._scan_times) - len(self._waiting) - len(self._open)].copy()
+        anchors, found = self.odometry.pose(knots), np.empty((len(times), 3))
+        for start in range(0, len(times), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            odometry, instants = self.odometry.pose(times[block]), times[block]
+            after = np.clip(np.searchsorted(knots, instants), 1, max(len(knots) - 1, 1))
+            before, after = after - 1, np.minimum(after, len(knots) - 1)
+            forward = compose(poses[before], between(anchors[before], odometry))
+            backward = compose(poses[after], between(anchors[after], odometry))
+            share = (instants - knots[before]) / np.maximum(knots[after] - knots[before], 1e-9)
+            found[block] = interpolate(forward, backward, np.clip(share, 0, 1))
+        return times, found
 
     def covariances(self) -> Float[np.ndarray, "scan 3 3"]:
         """Covariance of every pose of `trajectory` for (x, y, yaw) in its own frame, given the first node: that of the
@@ -145,7 +153,9 @@ class Slam:
         if not len(times):
             return np.zeros((0, 3, 3))
         knots = np.array([node.time for node in self.nodes])
-        return self.graph.covariances()[np.abs(knots[:, None] - times).argmin(axis=0)]
+        after = np.clip(np.searchsorted(knots, times), min(1, len(knots) - 1), len(knots) - 1)
+        before = np.maximum(after - 1, 0)
+        return self.graph.covariances()[np.where(times - knots[before] <= knots[after] - times, before, after)]
 
     def map(self) -> OccupancyGrid:
         """Occupancy grid of all nodes, drawn anew at their optimised poses."""
@@ -159,15 +169,29 @@ class Slam:
         while self._waiting and (final or self.odometry.covers(self._waiting[0][0])):
             time, azimuths, ranges = self._waiting.popleft()
             scan = Scan(time, self.odometry.pose(time), azimuths, ranges)
-            if self._open and self._moved(self._open[0], scan):
+            if self._open and self._stands(scan):
+                self.odometry.release(self.nodes[-1].time, self._open[-1].time)
+                self._open = []  # the last node has seen it all
+            elif self._open and self._moved(self._open[0], scan):
                 self._add_node()
             self._open.append(scan)
 
     def _moved(self, first: Scan, scan: Scan) -> bool:
-        x, y, yaw = between(first.odometry, scan.odometry)
+        return self._far(first.odometry, scan, 1.0) or scan.time - first.time >= self.config.node.duration
+
+    def _stands(self, scan: Scan) -> bool:
+        """Whether nothing has moved since the last node, which lies back by more than a node's time."""
+        if not self.nodes or scan.time - self._open[0].time < self.config.node.duration:
+            return False
+        place = self.odometry.pose(self.nodes[-1].time)
+        return not any(self._far(place, each, _STILL) for each in (*self._open, scan))
+
+    def _far(self, place: np.ndarray, scan: Scan, share: float) -> bool:
+        """Whether a scan is from elsewhere, by a share of what makes a node; without odometry nobody knows."""
+        x, y, yaw = between(place, scan.odometry)
         c = self.config.node
-        still = isinstance(self.odometry, Stillness)
-        return still or np.hypot(x, y) >= c.distance or abs(yaw) >= c.angle or scan.time - first.time >= c.duration
+        unknown = isinstance(self.odometry, Stillness)
+        return unknown or np.hypot(x, y) >= share * c.distance or abs(yaw) >= share * c.angle
 
     def _add_node(self) -> None:
         node = Node.gather(self._open, self.config)
@@ -188,6 +212,7 @@ class Slam:
             if isinstance(self.odometry, Stillness):
                 self.odometry.last = moved
         self.nodes.append(node)
+        self.odometry.release(node.time, node.time)
         self._insert(len(self.nodes) - 1, node)
         if self.config.loop.enabled:
             self._close(len(self.nodes) - 1)

@@ -1,4 +1,7 @@
-"""Every parameter of the SLAM back end, with its unit, its default, and presets."""
+"""Every parameter of the SLAM back end, with its unit, its default, and presets.
+
+Defaults are the preset ``lidar``; values without a source are ours.
+"""
 
 from pathlib import Path
 from typing import Literal
@@ -14,25 +17,21 @@ class _Section(BaseModel):
 
 
 class OdometryConfig(_Section):
-    """Uncertainty of odometry that comes without covariances, as standard deviations of one step.
+    """Uncertainty of odometry that comes without covariances, as standard deviations of one step."""
 
-    Attributes:
-        translation, rotation: floor of a step, m and rad.
-        translation_per_metre, rotation_per_metre: m/m and rad/m.
-        rotation_per_radian: rad/rad.
-        scale: error of length that all steps share, m/m; added to covariances that come with the odometry, which know
-            of each step alone.
-        missing_translation, missing_rotation: of a step without any odometry (constant velocity is assumed), m and rad.
-    """
-
-    translation: float = Field(0.02, gt=0)
-    rotation: float = Field(0.01, gt=0)
-    translation_per_metre: float = Field(0.05, ge=0)
-    rotation_per_metre: float = Field(0.02, ge=0)
-    rotation_per_radian: float = Field(0.03, ge=0)
-    scale: float = Field(0.01, ge=0)
-    missing_translation: float = Field(0.3, gt=0)
-    missing_rotation: float = Field(0.2, gt=0)
+    translation: float = Field(0.02, gt=0, description="floor of a step, m")
+    rotation: float = Field(0.01, gt=0, description="floor of a step, rad")
+    translation_per_metre: float = Field(0.05, ge=0, description="m/m")
+    rotation_per_metre: float = Field(0.02, ge=0, description="rad/m")
+    rotation_per_radian: float = Field(0.03, ge=0, description="rad/rad")
+    scale: float = Field(
+        0.01, ge=0, description="error of length that all steps share, m/m; added to covariances that come with the "
+        "odometry, which know of each step alone"
+    )  # fmt: skip
+    missing_translation: float = Field(
+        0.3, gt=0, description="of a step without any odometry (constant velocity is assumed), m"
+    )
+    missing_rotation: float = Field(0.2, gt=0, description="of a step without any odometry, rad")
 
 
 class NodeConfig(_Section):
@@ -40,119 +39,92 @@ class NodeConfig(_Section):
 
     Scans join the open node until the sensor has moved by `distance` or `angle`, or `duration` has passed since its
     first one. This is the motion filter, and what makes enough points of scans that are too sparse alone.
-
-    Attributes:
-        distance, angle, duration: m, rad, s.
-        scans: at most so many scans, evenly picked, are used of a node.
-        min_points: nodes with fewer points are neither matched nor searched for loops.
     """
 
-    distance: float = Field(0.2, ge=0)
-    angle: float = Field(0.1, ge=0)
-    duration: float = Field(5.0, ge=0)
-    scans: int = Field(1, gt=0)
-    min_points: int = Field(20, gt=0)
+    distance: float = Field(0.2, ge=0, description="a new node starts after so many m")
+    angle: float = Field(0.1, ge=0, description="or so many rad")
+    duration: float = Field(5.0, ge=0, description="or so many s")
+    scans: int = Field(1, gt=0, description="at most so many scans, evenly picked, are used of a node")
+    min_points: int = Field(20, gt=0, description="nodes with fewer are neither matched nor searched for loops")
 
 
 class GridConfig(_Section):
-    """Probability grids of submaps and of the final map.
+    """Probability grids of submaps and of the final map."""
 
-    Attributes:
-        resolution: cell size of submaps, m.
-        map_resolution: cell size of the final map, m.
-        hit, miss: probability that a cell is occupied given one echo from it, or one ray through it.
-        lowest, highest: probabilities are kept between these, so that a map can change its mind.
-        min_range, max_range: returns outside count as nothing seen, m.
-        free_range: rays that saw nothing clear the cells up to here, m; 0 means they say nothing.
-        nodes: nodes per submap; the next submap starts when half of them are in.
-    """
-
-    resolution: float = Field(0.05, gt=0)
-    map_resolution: float = Field(0.05, gt=0)
-    hit: float = Field(0.7, gt=0.5, lt=1)
-    miss: float = Field(0.45, gt=0, lt=0.5)
-    lowest: float = Field(0.12, gt=0, lt=0.5)
-    highest: float = Field(0.97, gt=0.5, lt=1)
-    min_range: float = Field(0.1, ge=0)
-    max_range: float = Field(30.0, gt=0)
-    free_range: float = Field(5.0, ge=0)
-    nodes: int = Field(10, ge=2)
+    resolution: float = Field(0.05, gt=0, description="cell size of submaps, m")
+    map_resolution: float = Field(0.05, gt=0, description="cell size of the final map, m")
+    hit: float = Field(0.7, gt=0.5, lt=1, description="probability that a cell is occupied given one echo from it")
+    miss: float = Field(0.45, gt=0, lt=0.5, description="the same given one ray through it")
+    lowest: float = Field(0.12, gt=0, lt=0.5, description="least probability, so that a map can change its mind")
+    highest: float = Field(0.97, gt=0.5, lt=1, description="largest probability, for the same reason")
+    min_range: float = Field(0.1, ge=0, description="nearer returns count as nothing seen, m")
+    max_range: float = Field(30.0, gt=0, description="farther ones too, m")
+    free_range: float = Field(5.0, ge=0, description="rays that saw nothing clear cells up to here, m; 0: none")
+    nodes: int = Field(10, ge=2, description="nodes of a submap; the next one starts when half of them are in")
 
 
 class MatcherConfig(_Section):
-    """Scan-to-submap matching.
+    """Scan-to-submap matching."""
 
-    Attributes:
-        enabled: without it nodes follow odometry and submaps serve the loop search only.
-        presearch_distance, presearch_angle: half-widths of the correlative search before refinement, m and rad;
-            0 switches it off.
-        presearch_sigma: as `sigma`, for the weight of odometry in that search: far from a match the points, most of
-            them on the same few walls, are wrong together.
-        sigma: standard deviation of the residual 1 - p of one point, points taken as independent. It sets the weight of
-            a match against odometry, and the covariance it enters the graph with.
-        translation_floor, rotation_floor: no match is believed better than this, m and rad.
-        iterations: at most so many Gauss-Newton steps.
-        spacing: points are thinned to one per square of this size, m.
-    """
-
-    enabled: bool = True
-    presearch_distance: float = Field(0.3, ge=0)
-    presearch_angle: float = Field(0.17, ge=0)
-    presearch_sigma: float = Field(2.0, gt=0)
-    sigma: float = Field(0.7, gt=0)
-    translation_floor: float = Field(0.01, gt=0)
-    rotation_floor: float = Field(0.003, gt=0)
-    iterations: int = Field(20, gt=0)
-    spacing: float = Field(0.05, gt=0)
+    enabled: bool = Field(True, description="else nodes follow odometry, and submaps serve the loop search only")
+    presearch_distance: float = Field(
+        0.3, ge=0, description="half-width of the correlative search before refinement, m; 0 switches it off"
+    )
+    presearch_angle: float = Field(0.17, ge=0, description="half-width of that search, rad")
+    presearch_sigma: float = Field(
+        2.0, gt=0, description="as sigma, for the weight of odometry in that search: far from a match the points, most "
+        "of them on the same few walls, are wrong together"
+    )  # fmt: skip
+    sigma: float = Field(
+        0.7, gt=0, description="standard deviation of the residual 1 - p of one point, points taken as independent: "
+        "sets the weight of a match against odometry, and its covariance in the graph"
+    )  # fmt: skip
+    translation_floor: float = Field(0.01, gt=0, description="no match is believed better than this, m")
+    rotation_floor: float = Field(0.003, gt=0, description="nor than this, rad")
+    iterations: int = Field(20, gt=0, description="at most so many Gauss-Newton steps")
+    spacing: float = Field(0.05, gt=0, description="points are thinned to one per square of this size, m")
 
 
 class LoopConfig(_Section):
-    """Loop closure.
+    """Loop closure."""
 
-    Attributes:
-        enabled: search for loops at all.
-        radius: submaps whose centre is estimated to lie this near to a node are searched, m.
-        distance, angle: half-widths of the search window, m and rad.
-        candidates: at most so many submaps are searched per node, nearest first.
-        every: only every so-many-th node is searched for.
-        nodes: points of so many nodes, the latest ones, are searched for together: one view may be too poor. At the end
-            such windows overlap by half.
-        front: so far in front of its points, m, a node must find the submap free: else a wall fits to any other one,
-            a corridor's left to its right. 0: not asked, where every view is rich enough.
-        min_score: mean probability at the points that a closure needs, and of being free in front of them.
-        final_score: as `min_score`, for the search at the end: the graph then says how far to look, and judges at once.
-        levels: halvings of the resolution in the branch-and-bound search.
-        sigma: as `MatcherConfig.sigma`, for closures; it also says how well another pose must fit to be as likely
-            (`radarize.slam.correlation.scatter`).
-        translation_floor, rotation_floor: no closure is believed better than this, m and rad.
-        lag: searches run in the background; what they find is taken in so many nodes later.
-        support: closures that contradict the present estimate are believed when so many of them agree.
-        update_every: nodes between two updates of the graph where no loop has just closed.
-        inlier_probability: closures whose error is less likely than one minus this are rejected.
-    """
-
-    enabled: bool = True
-    radius: float = Field(10.0, gt=0)
-    distance: float = Field(3.0, gt=0)
-    angle: float = Field(0.5, gt=0)
-    candidates: int = Field(4, gt=0)
-    every: int = Field(4, gt=0)
-    nodes: int = Field(1, gt=0)
-    front: float = Field(0.0, ge=0)
-    min_score: float = Field(0.6, gt=0, lt=1)
-    final_score: float = Field(0.5, gt=0, lt=1)
-    levels: int = Field(5, ge=0, le=8)
-    sigma: float = Field(0.7, gt=0)
-    translation_floor: float = Field(0.02, gt=0)
-    rotation_floor: float = Field(0.006, gt=0)
-    lag: int = Field(4, ge=0)
-    support: int = Field(3, gt=0)
-    update_every: int = Field(10, gt=0)
-    inlier_probability: float = Field(0.99, gt=0, lt=1)
+    enabled: bool = Field(True, description="search for loops at all")
+    radius: float = Field(10.0, gt=0, description="submaps with their centre this near to a node are searched, m")
+    distance: float = Field(3.0, gt=0, description="half-width of the search window, m")
+    angle: float = Field(0.5, gt=0, description="half-width of the search window, rad")
+    candidates: int = Field(4, gt=0, description="at most so many submaps are searched per node, nearest first")
+    every: int = Field(4, gt=0, description="only every so-many-th node is searched for")
+    nodes: int = Field(
+        1, gt=0, description="points of so many nodes, the latest ones, are searched for together: one view may be too "
+        "poor; at the end such windows overlap by half"
+    )  # fmt: skip
+    front: float = Field(
+        0.0, ge=0, description="so far in front of its points, m, a node must find the submap free, else a wall fits "
+        "to any other one, a corridor's left to its right; 0: not asked, where every view is rich enough"
+    )  # fmt: skip
+    min_score: float = Field(
+        0.6, gt=0, lt=1, description="mean probability that a closure needs at its points, and of being free in front"
+    )
+    final_score: float = Field(
+        0.5, gt=0, lt=1, description="as min_score, for the search at the end: the graph then says how far to look, "
+        "and judges at once"
+    )  # fmt: skip
+    levels: int = Field(5, ge=0, le=8, description="halvings of the resolution in the branch-and-bound search")
+    sigma: float = Field(
+        0.7, gt=0, description="as the matcher's, for closures: also how well another pose must fit to be as likely"
+    )
+    translation_floor: float = Field(0.02, gt=0, description="no closure is believed better than this, m")
+    rotation_floor: float = Field(0.006, gt=0, description="nor than this, rad")
+    lag: int = Field(4, ge=0, description="what a search in the background finds is taken in so many nodes later")
+    support: int = Field(3, gt=0, description="closures that contradict the estimate are believed if so many agree")
+    update_every: int = Field(10, gt=0, description="nodes between updates of the graph where no loop has just closed")
+    inlier_probability: float = Field(
+        0.99, gt=0, lt=1, description="closures whose error is less likely than one minus this are rejected"
+    )
 
 
 class SlamConfig(_Section):
-    """All parameters of `radarize.slam.backend.Slam`. The defaults are the preset ``lidar``."""
+    """All parameters of `radarize.slam.backend.Slam`."""
 
     odometry: OdometryConfig = OdometryConfig()
     node: NodeConfig = NodeConfig()
@@ -200,10 +172,7 @@ PRESETS: dict[str, SlamConfig] = {
     "lidar": SlamConfig(),
     "radar": SlamConfig(
         odometry=OdometryConfig(
-            translation=0.005,
-            rotation=0.005,
-            translation_per_metre=0.03,
-            rotation_per_metre=0.03,
+            translation=0.005, rotation=0.005, translation_per_metre=0.03, rotation_per_metre=0.03,
             rotation_per_radian=0.05,
         ),
         node=NodeConfig(distance=0.3, angle=0.2, duration=3.0, scans=10, min_points=25),
@@ -213,19 +182,8 @@ PRESETS: dict[str, SlamConfig] = {
             presearch_distance=0.0, presearch_angle=0.0, sigma=2.0, translation_floor=0.03, rotation_floor=0.015
         ),
         loop=LoopConfig(
-            radius=8.0,
-            distance=3.0,
-            angle=0.5,
-            candidates=5,
-            every=4,
-            nodes=8,
-            front=0.25,
-            min_score=0.4,
-            final_score=0.4,
-            levels=4,
-            sigma=2.0,
-            translation_floor=0.05,
-            rotation_floor=0.02,
+            radius=8.0, distance=3.0, angle=0.5, candidates=5, every=4, nodes=8, front=0.25, min_score=0.4,
+            final_score=0.4, levels=4, sigma=2.0, translation_floor=0.05, rotation_floor=0.02,
         ),
     ),
     # Published with Radarize: 0.08 m cells, 30 scans per submap (Cartographer finishes one after twice as many), ranges
@@ -239,15 +197,8 @@ PRESETS: dict[str, SlamConfig] = {
         ),
         matcher=MatcherConfig(presearch_distance=0.0, presearch_angle=0.0, iterations=100),
         loop=LoopConfig(
-            radius=15.0,
-            distance=7.0,
-            angle=0.5236,
-            every=3,
-            min_score=0.55,
-            final_score=0.55,
-            levels=6,
-            update_every=90,
-            support=1,
+            radius=15.0, distance=7.0, angle=0.5236, every=3, min_score=0.55, final_score=0.55, levels=6,
+            update_every=90, support=1,
         ),
     ),
-}
+}  # fmt: skip

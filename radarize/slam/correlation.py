@@ -9,6 +9,7 @@ free: a wall seen from its other side, which is what a corridor's two walls are 
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -21,25 +22,51 @@ _TURN = 0.05  # rad between them, at most
 _BLIND = 0.1  # least share of a window's information that counts
 
 
+class Levels(NamedTuple):
+    """Bounds of a grid at falling resolution, probabilities in 1/255, all levels in one buffer.
+
+    Attributes:
+        buffer: levels one after the other, row by row: first of being occupied, then, if asked for, of being free.
+        starts, rows, columns: of each level; from level 1 on, cell (-1, -1) is stored at (0, 0).
+    """
+
+    buffer: np.ndarray
+    starts: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+
+
+class Window(NamedTuple):
+    """Poses that are tried: shifts of up to `half` cells each way, and angles (rad).
+
+    Attributes:
+        angles: in the grid's frame.
+        prices: subtracted from the score at each angle.
+        half: cells.
+        price: subtracted from the score per square cell away from the middle.
+    """
+
+    angles: np.ndarray
+    prices: np.ndarray
+    half: int
+    price: float
+
+
 @dataclass(frozen=True)
 class Pyramid:
-    """Bounds of a grid at falling resolution, probabilities in 1/255, all levels in one buffer.
+    """A grid, ready to be searched.
 
     Attributes:
         resolution, origin: of level 0, as in `OccupancyGrid`.
         half: half-width of the largest window that can be searched, cells; twice this much empty space is added around
             the grid, so that the search need not look where the grid ends.
-        buffer: levels one after the other, row by row: first of being occupied, then, if asked for, of being free.
-        starts, rows, columns: of each level; from level 1 on, cell (-1, -1) is stored at (0, 0).
+        levels: its bounds.
     """
 
     resolution: float
     origin: Float[np.ndarray, "2"]
     half: int
-    buffer: np.ndarray
-    starts: np.ndarray
-    rows: np.ndarray
-    columns: np.ndarray
+    levels: Levels
 
     @classmethod
     def of(cls, grid: OccupancyGrid, levels: int, distance: float, free: bool = False) -> "Pyramid":
@@ -58,13 +85,8 @@ class Pyramid:
             base = layer[: sizes[0]].reshape(rows[0], columns[0])
             base[2 * half : rows[0] - 2 * half, 2 * half : columns[0] - 2 * half] = values
             _fill(layer, starts, rows, columns)
-        buffer = buffer.ravel()
-        return cls(grid.resolution, grid.origin - 2 * half * grid.resolution, half, buffer, starts, rows, columns)
-
-    @property
-    def levels(self) -> int:
-        """Number of halvings."""
-        return len(self.starts) - 1
+        origin = grid.origin - 2 * half * grid.resolution
+        return cls(grid.resolution, origin, half, Levels(buffer.ravel(), starts, rows, columns))
 
 
 def search(
@@ -103,19 +125,12 @@ def search(
     half = min(int(np.ceil(distance / pyramid.resolution)), pyramid.half)
     everything = points if fronts is None else np.concatenate([points, fronts])
     found, score, a, dx, dy = _search(
-        pyramid.buffer,
-        pyramid.starts,
-        pyramid.rows,
-        pyramid.columns,
-        np.ascontiguousarray(everything, float),
+        pyramid.levels,
+        np.ascontiguousarray(everything, float) * (1 / pyramid.resolution),
         len(points),
         (np.asarray(guess, float)[:2] - pyramid.origin) / pyramid.resolution,
-        guess[2] + angles,
-        angles**2 * penalty[1],
-        1 / pyramid.resolution,
-        half,
+        Window(guess[2] + angles, angles**2 * penalty[1], half, penalty[0] * pyramid.resolution**2),
         min_score,
-        penalty[0] * pyramid.resolution**2,
     )
     if not found:
         return None
@@ -155,8 +170,9 @@ def scatter(
     shifts = np.arange(-half, half + 1, stride)
     turns = np.linspace(-angle, angle, 2 * int(np.ceil(angle / _TURN)) + 1)
     residuals = (1 - np.maximum(2 * np.arange(256) / 255 - 1, 0)) ** 2
+    rows, columns = pyramid.levels.rows[0], pyramid.levels.columns[0]
     cost = _costs(
-        pyramid.buffer[: pyramid.rows[0] * pyramid.columns[0]].reshape(pyramid.rows[0], pyramid.columns[0]),
+        pyramid.levels.buffer[: rows * columns].reshape(rows, columns),
         np.ascontiguousarray(points, float) / pyramid.resolution,
         (pose[:2] - pyramid.origin) / pyramid.resolution,
         pose[2] + turns,
@@ -262,10 +278,11 @@ def _nearest(low, size):
 
 
 @numba.njit(cache=True, nogil=True)
-def _search(
-    buffer, starts, rows, columns, points, echoes, guess, angles, angle_penalty, scale, half, min_score, penalty
-):
+def _search(levels, points, echoes, guess, window, min_score):
+    # Points and guess in cells, the first `echoes` points to lie on what is occupied, the others on what is free.
     # Shifts (dx, dy) count from the window's corner, so a block's shift at its level is one number for all points.
+    buffer, starts, rows, columns = levels
+    angles, half = window.angles, window.half
     top = len(starts) - 1
     size = 1 << top
     across = (2 * half + size) // size
@@ -280,9 +297,8 @@ def _search(
     for a in range(len(angles)):
         cos, sin = np.cos(angles[a]), np.sin(angles[a])
         for k in range(len(points)):
-            x, y = points[k, 0] * scale, points[k, 1] * scale
-            column = int(np.floor(cos * x - sin * y + guess[0])) - half
-            row = int(np.floor(sin * x + cos * y + guess[1])) - half
+            column = int(np.floor(cos * points[k, 0] - sin * points[k, 1] + guess[0])) - half
+            row = int(np.floor(sin * points[k, 0] + cos * points[k, 1] + guess[1])) - half
             if column >= 0 and row >= 0 and column + 2 * half < columns[0] and row + 2 * half < rows[0]:
                 corner[a, inside[a], 0], corner[a, inside[a], 1] = row, column
                 corner[a, inside[a], 2] = 0 if k < echoes else len(buffer) // 2
@@ -293,7 +309,7 @@ def _search(
             for j in range(across):
                 dx, dy = i * size, j * size
                 away = _nearest(dx - half, size) ** 2 + _nearest(dy - half, size) ** 2
-                cost = angle_penalty[a] + penalty * away
+                cost = window.prices[a] + window.price * away
                 shift = i + j * columns[top]
                 score = _bound(buffer, cells[a, top, : inside[a]], split[a], shift, min_score + cost, echoes, fronts)
                 bounds[n] = score - cost
@@ -329,7 +345,7 @@ def _search(
                 if cx <= 2 * half and cy <= 2 * half:
                     away = _nearest(cx - half, size) ** 2 + _nearest(cy - half, size) ** 2
                     shift = (cx >> level) + (cy >> level) * columns[level]
-                    cost = angle_penalty[a] + penalty * away
+                    cost = window.prices[a] + window.price * away
                     score = _bound(buffer, cells[a, level, : inside[a]], split[a], shift, best + cost, echoes, fronts)
                     child_bound[c] = score - cost
             for c in np.argsort(child_bound):  # the best child is looked at first

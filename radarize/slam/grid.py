@@ -8,6 +8,7 @@ either one hit or one miss, the hit first (Hess et al., Real-Time Loop Closure i
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -17,6 +18,15 @@ from radarize.errors import InputError
 from radarize.slam.config import GridConfig
 
 _MARGIN = 32  # cells added around whatever a grid has to hold when it grows
+
+
+class Evidence(NamedTuple):
+    """What a hit and a miss multiply a cell's odds by, and the probabilities that it is kept between."""
+
+    hit: float
+    miss: float
+    lowest: float
+    highest: float
 
 
 @dataclass
@@ -64,10 +74,7 @@ class OccupancyGrid:
             (origins - self.origin) / self.resolution,
             (ends - self.origin) / self.resolution,
             np.ascontiguousarray(hits, dtype=np.bool_),
-            config.hit / (1 - config.hit),
-            config.miss / (1 - config.miss),
-            config.lowest,
-            config.highest,
+            Evidence(config.hit / (1 - config.hit), config.miss / (1 - config.miss), config.lowest, config.highest),
             spread,
         )
 
@@ -106,11 +113,11 @@ class OccupancyGrid:
         """What `probability` counts in."""
         return 1 / 255 if self.probability.dtype == np.uint8 else 1.0
 
-    def image(self, occupied: float = 0.65, free: float = 0.35) -> UInt8[np.ndarray, "row column"]:
+    def image(self) -> UInt8[np.ndarray, "row column"]:
         """The map_server picture, y up: 0 occupied, 254 free, 205 unknown."""
         picture = np.full(self.probability.shape, 205, np.uint8)
-        picture[self.probability >= occupied] = 0
-        picture[(self.probability > 0) & (self.probability <= free)] = 254
+        picture[self.probability >= 0.65] = 0
+        picture[(self.probability > 0) & (self.probability <= 0.35)] = 254
         return picture[::-1]
 
     def save(self, path: str | Path) -> None:
@@ -163,7 +170,7 @@ def cross(x0: float, y0: float, x1: float, y1: float, out: np.ndarray) -> int:
 
 
 @numba.njit(cache=True, nogil=True)
-def _insert(probability, origins, ends, hits, hit_odds, miss_odds, lowest, highest, spread):
+def _insert(probability, origins, ends, hits, evidence, spread):
     left, top = int(min(origins[:, 0].min(), ends[:, 0].min())) - 1, int(min(origins[:, 1].min(), ends[:, 1].min())) - 1
     right = int(max(origins[:, 0].max(), ends[:, 0].max())) + 1
     bottom = int(max(origins[:, 1].max(), ends[:, 1].max())) + 1
@@ -190,5 +197,5 @@ def _insert(probability, origins, ends, hits, hit_odds, miss_odds, lowest, highe
             share = news[row, column]
             if share != 0:
                 p = probability[row + top, column + left]
-                odds = (p / (1 - p) if p > 0 else 1.0) * (miss_odds if share < 0 else hit_odds**share)
-                probability[row + top, column + left] = min(max(odds / (1 + odds), lowest), highest)
+                odds = (p / (1 - p) if p > 0 else 1.0) * (evidence.miss if share < 0 else evidence.hit**share)
+                probability[row + top, column + left] = min(max(odds / (1 + odds), evidence.lowest), evidence.highest)

@@ -11,12 +11,23 @@ of its sides.
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numba
 import numpy as np
 from jaxtyping import Float
 
 from radarize.slam.grid import OccupancyGrid
+
+
+class Surface(NamedTuple):
+    """A grid as the kernels take it: probabilities in steps of `unit`, the outer corner and the cells' size in m."""
+
+    probability: np.ndarray
+    unit: float
+    x: float
+    y: float
+    resolution: float
 
 
 @dataclass(frozen=True)
@@ -55,20 +66,17 @@ def match(
         iterations: at most so many steps.
     """
     weight = np.zeros((3, 3)) if covariance is None else np.linalg.inv(covariance)
-    pose, score, information = _refine(
-        grid.probability,
-        grid.unit,
-        grid.origin[0],
-        grid.origin[1],
-        grid.resolution,
-        np.ascontiguousarray(points, float),
-        np.asarray(guess, float),
-        np.asarray(guess if prior is None else prior, float),
-        weight,
-        1 / sigma**2,
-        iterations,
+    return Match(
+        *_refine(
+            Surface(grid.probability, grid.unit, grid.origin[0], grid.origin[1], grid.resolution),
+            np.ascontiguousarray(points, float),
+            np.asarray(guess, float),
+            np.asarray(guess if prior is None else prior, float),
+            weight,
+            1 / sigma**2,
+            iterations,
+        )
     )
-    return Match(pose, score, information)
 
 
 def thin(points: Float[np.ndarray, "n 2"], spacing: float) -> Float[np.ndarray, "m 2"]:
@@ -103,7 +111,7 @@ def interpolate(probability: np.ndarray, x: float, y: float, unit: float = 1.0) 
 
 
 @numba.njit(cache=True, nogil=True)
-def _cost(probability, unit, ox, oy, resolution, points, pose, prior, prior_weight, weight, hessian, gradient):
+def _cost(surface, points, pose, prior, prior_weight, weight, hessian, gradient):
     # Fills the Gauss-Newton system at the pose; returns the cost and the mean occupancy.
     hessian[:] = 0
     gradient[:] = 0
@@ -112,11 +120,12 @@ def _cost(probability, unit, ox, oy, resolution, points, pose, prior, prior_weig
     for k in range(len(points)):
         rx = cos * points[k, 0] - sin * points[k, 1]
         ry = sin * points[k, 0] + cos * points[k, 1]
-        m, gx, gy = interpolate(probability, (rx + pose[0] - ox) / resolution, (ry + pose[1] - oy) / resolution, unit)
+        x, y = (rx + pose[0] - surface.x) / surface.resolution, (ry + pose[1] - surface.y) / surface.resolution
+        m, gx, gy = interpolate(surface.probability, x, y, surface.unit)
         total += m
         residual = 1 - m
         cost += weight * residual * residual
-        jx, jy = -gx / resolution, -gy / resolution
+        jx, jy = -gx / surface.resolution, -gy / surface.resolution
         jt = -ry * jx + rx * jy
         gradient[0] += weight * jx * residual
         gradient[1] += weight * jy * residual
@@ -138,13 +147,13 @@ def _cost(probability, unit, ox, oy, resolution, points, pose, prior, prior_weig
 
 
 @numba.njit(cache=True, nogil=True)
-def _refine(probability, unit, ox, oy, resolution, points, guess, prior, prior_weight, weight, iterations):
+def _refine(surface, points, guess, prior, prior_weight, weight, iterations):
     # Levenberg's damping: steps that raise the cost are taken back and shortened.
     pose = guess.copy()
     hessian, gradient = np.empty((3, 3)), np.empty(3)
     trial_hessian, trial_gradient = np.empty((3, 3)), np.empty(3)
     cost, score, prior_gradient, prior_hessian = _cost(
-        probability, unit, ox, oy, resolution, points, pose, prior, prior_weight, weight, hessian, gradient
+        surface, points, pose, prior, prior_weight, weight, hessian, gradient
     )
     damping = 1e-3
     for _ in range(iterations):
@@ -154,9 +163,8 @@ def _refine(probability, unit, ox, oy, resolution, points, guess, prior, prior_w
         step = -np.linalg.solve(full, gradient + prior_gradient)
         trial = pose + step
         new_cost, new_score, new_prior_gradient, new_prior_hessian = _cost(
-            probability, unit, ox, oy, resolution, points, trial,
-            prior, prior_weight, weight, trial_hessian, trial_gradient,
-        )  # fmt: skip
+            surface, points, trial, prior, prior_weight, weight, trial_hessian, trial_gradient
+        )
         if new_cost < cost:
             small = np.abs(step[0]) + np.abs(step[1]) < 1e-4 and np.abs(step[2]) < 1e-5
             pose, cost, score = trial, new_cost, new_score

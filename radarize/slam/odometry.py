@@ -1,6 +1,7 @@
 """Odometry as a function of time: where it says the sensor was, and how sure it is of a motion."""
 
-from bisect import bisect_left
+from collections import deque
+from itertools import islice
 
 import numpy as np
 from jaxtyping import Float
@@ -8,6 +9,7 @@ from jaxtyping import Float
 from radarize.errors import InputError
 from radarize.pose import adjoint, between, interpolate, inverse
 from radarize.slam.config import OdometryConfig
+from radarize.slam.rows import Rows
 
 
 class Odometry:
@@ -19,12 +21,17 @@ class Odometry:
 
     def __init__(self, config: OdometryConfig):
         self.config = config
-        self.times: list[float] = []
-        self.poses: list[np.ndarray] = []
-        self.covariances: list[np.ndarray | None] = []
+        self._times, self._poses = Rows(), Rows(3)
+        self._covariances: deque[np.ndarray | None] = deque()  # of the last entries, those that motions still need
+        self._known: tuple[float, float, np.ndarray] | None = None  # start, end and covariance of a motion
 
     def __len__(self) -> int:
-        return len(self.times)
+        return len(self._times)
+
+    @property
+    def times(self) -> Float[np.ndarray, "entry"]:
+        """Of the entries, s."""
+        return self._times.values
 
     def add(self, time: float, pose: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"] | None) -> bool:
         """Append a pose and the covariance of the motion since the one before; False if it comes too late.
@@ -45,49 +52,71 @@ class Odometry:
                     f"odometry at {time}: covariance is {covariance.tolist()}, "
                     "expected it symmetric and without negative eigenvalues"
                 )
-        if self.times and time <= self.times[-1]:
+        if len(self) and time <= self.times[-1]:
             return False
-        self.times.append(float(time))
-        self.poses.append(pose)
-        self.covariances.append(covariance)
+        self._times.append(float(time))
+        self._poses.append(pose)
+        self._covariances.append(covariance)
         return True
 
     def covers(self, time: float) -> bool:
         """Whether the pose at a time is known without looking into the future."""
-        return bool(self.times) and self.times[-1] >= time
+        return bool(len(self)) and bool(self.times[-1] >= time)
 
-    def pose(self, time: float) -> Float[np.ndarray, "3"]:
+    def pose(self, time: float | Float[np.ndarray, "instant"]) -> Float[np.ndarray, "*instant 3"]:
         """Pose at a time, interpolated; before the first entry and after the last the sensor stands still."""
-        after = bisect_left(self.times, time)
-        if after == 0:
-            return self.poses[0]
-        if after == len(self.times):
-            return self.poses[-1]
-        t0, t1 = self.times[after - 1], self.times[after]
-        return interpolate(self.poses[after - 1], self.poses[after], (time - t0) / (t1 - t0))
+        times, poses, last = self.times, self._poses.values, len(self) - 1
+        after = np.searchsorted(times, time)
+        right = np.clip(after, min(1, last), last)
+        left = np.maximum(right - 1, 0)
+        inside = (after > 0) & (after <= last)
+        share = (time - times[left]) / np.where(inside, times[right] - times[left], 1.0)
+        between_entries = interpolate(poses[left], poses[right], share)
+        return np.where(inside[..., None], between_entries, poses[np.minimum(after, last)])
 
     def motion(self, start: float, end: float) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
         """Motion from start to end (s) in the frame at the start, and its covariance in the frame at the end.
 
-        Steps are independent: C = Ad C_before Ad^T + C_step, with the adjoint of the step's inverse.
+        Covariances from before a `release` are gone: `start` is its, or later.
         """
-        first, last = self.pose(start), self.pose(end)
-        whole = between(first, last)
-        low, high = bisect_left(self.times, start), bisect_left(self.times, end)
-        inner = range(max(low, 1), min(high, len(self.times) - 1) + 1)
-        steps = [(k, self.covariances[k]) for k in inner]
-        if not steps or any(c is None for _, c in steps):
+        whole = between(self.pose(start), self.pose(end))
+        total = self._sum(start, end)
+        if total is None:
             return whole, self.model(whole)
-        total = np.zeros((3, 3))
-        for k, covariance in steps:
-            t0, t1 = self.times[k - 1], self.times[k]
-            fraction = (min(end, t1) - max(start, t0)) / (t1 - t0)
-            step = between(self.pose(max(start, t0)), self.pose(min(end, t1)))
-            carry = adjoint(inverse(step))
-            total = carry @ total @ carry.T + fraction * covariance
         # A floor keeps the graph solvable where the source claims to be perfect (a sensor at rest).
         shared = 1e-4 + self.config.scale * np.hypot(whole[0], whole[1])
         return whole, total + np.diag([shared, shared, 1e-4]) ** 2
+
+    def release(self, start: float, until: float) -> None:
+        """Forget covariances up to `until`, but for their sum since `start` (s); motions are asked for from there, or
+        from `until`, on."""
+        total = self._sum(start, until) if until > start else None
+        self._known = None if total is None else (start, until, total)
+        first = int(np.searchsorted(self.times, until))
+        while len(self) - len(self._covariances) < first:
+            self._covariances.popleft()
+
+    def _sum(self, start: float, end: float) -> Float[np.ndarray, "3 3"] | None:
+        """Covariance of a motion; None if one of its steps came without.
+
+        Steps are independent: C = Ad C_before Ad^T + C_step, with the adjoint of the step's inverse.
+        """
+        times, total = self.times, np.zeros((3, 3))
+        if known := self._known and self._known[0] == start and self._known[1] <= end:
+            start, total = self._known[1:]
+        low, high = np.searchsorted(times, (start, end))
+        gone, first, last = len(self) - len(self._covariances), max(low, 1), min(high, len(self) - 1)
+        if first < gone:
+            return None
+        steps = list(islice(self._covariances, max(first - gone, 0), max(last + 1 - gone, 0)))
+        if not (steps or known) or any(covariance is None for covariance in steps):
+            return None
+        for k, covariance in enumerate(steps, first):
+            t0, t1 = times[k - 1], times[k]
+            begin, finish = max(start, t0), min(end, t1)
+            carry = adjoint(inverse(between(self.pose(begin), self.pose(finish))))
+            total = carry @ total @ carry.T + (finish - begin) / (t1 - t0) * covariance
+        return total
 
     def model(self, step: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
         """Covariance of a step from the configured standard deviations."""
@@ -128,9 +157,9 @@ class Stillness(Odometry):
         super().__init__(config)
         self.last = np.zeros(3)
 
-    def pose(self, time: float) -> Float[np.ndarray, "3"]:
+    def pose(self, time: float | Float[np.ndarray, "instant"]) -> Float[np.ndarray, "*instant 3"]:
         """Scans of one node are taken from one place."""
-        return np.zeros(3)
+        return np.zeros((*np.shape(time), 3))
 
     def motion(self, start: float, end: float) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3 3"]]:
         """The last motion again, with the wide covariance of no odometry."""

@@ -10,6 +10,8 @@ import gtsam
 import numpy as np
 from jaxtyping import Float
 
+from radarize.slam.rows import Rows
+
 
 class PoseGraph:
     """Poses of nodes and relative poses between them.
@@ -29,7 +31,7 @@ class PoseGraph:
         self.inlier_probability = inlier_probability
         self.closures: list[tuple[int, int]] = []
         self.accepted = np.zeros(0, bool)
-        self._poses, self._count = np.zeros((64, 3)), 0
+        self._poses = Rows(3)
         self._certain: list[gtsam.BetweenFactorPose2] = []
         self._matches: list[gtsam.BetweenFactorPose2] = []
         self._matches_kept = np.zeros(0, bool)
@@ -42,15 +44,12 @@ class PoseGraph:
     @property
     def poses(self) -> Float[np.ndarray, "node 3"]:
         """Current estimate."""
-        return self._poses[: self._count]
+        return self._poses.values
 
     def add_node(self, pose: Float[np.ndarray, "3"]) -> int:
         """Add a node with a first estimate; returns its number."""
-        if self._count == len(self._poses):
-            self._poses = np.concatenate([self._poses, np.zeros_like(self._poses)])
-        self._poses[self._count] = pose
-        self._count += 1
-        return self._count - 1
+        self._poses.append(pose)
+        return len(self._poses) - 1
 
     def add_motion(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
         """A relative pose that is known not to be an outlier: odometry."""
@@ -76,7 +75,7 @@ class PoseGraph:
 
     def update(self) -> None:
         """Move poses towards where everything believed agrees, by one step, solving anew only what changed."""
-        if self._count < 2:
+        if len(self.poses) < 2:
             return
         try:
             self._step()
@@ -89,29 +88,29 @@ class PoseGraph:
             self._isam, self._known = gtsam.ISAM2(_incremental(self._factorization)), 0
             self._news = self._graph(self._believed())
         values = gtsam.Values()
-        for k in range(self._known, self._count):
-            values.insert(k, gtsam.Pose2(*self._poses[k]))
+        for k in range(self._known, len(self.poses)):
+            values.insert(k, gtsam.Pose2(*self.poses[k]))
         self._isam.update(self._news, values)
-        self._news, self._known = gtsam.NonlinearFactorGraph(), self._count
-        self._poses[: self._count] = gtsam.utilities.extractPose2(self._isam.calculateBestEstimate())
+        self._news, self._known = gtsam.NonlinearFactorGraph(), len(self.poses)
+        self.poses[:] = gtsam.utilities.extractPose2(self._isam.calculateBestEstimate())
 
     def optimise(self) -> None:
         """Decide over all closures afresh, and move poses to the optimum."""
-        if self._count < 2:
+        if len(self.poses) < 2:
             return
         if self._uncertain or self._matches:
             self._judge()
         graph = self._graph(self._believed())
         values = gtsam.LevenbergMarquardtOptimizer(graph, self._values(), _levenberg()).optimize()
-        self._poses[: self._count] = gtsam.utilities.extractPose2(values)
+        self.poses[:] = gtsam.utilities.extractPose2(values)
         self._isam = None
 
     def covariances(self) -> Float[np.ndarray, "node 3 3"]:
         """Marginal covariance of every node for (x, y, yaw) in its own frame, given that node 0 is exact."""
-        if not self._count:
+        if not len(self.poses):
             return np.zeros((0, 3, 3))
         marginals = gtsam.Marginals(self._graph(self._believed()), self._values())
-        return np.stack([marginals.marginalCovariance(k) for k in range(self._count)])
+        return np.stack([marginals.marginalCovariance(k) for k in range(len(self.poses))])
 
     def _believed(self) -> list:
         new = np.ones(len(self._matches) - len(self._matches_kept), bool)
@@ -133,7 +132,7 @@ class PoseGraph:
     def _graph(self, others: list) -> gtsam.NonlinearFactorGraph:
         graph = gtsam.NonlinearFactorGraph()
         anchor = gtsam.noiseModel.Isotropic.Sigma(3, 1e-6)
-        graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*self._poses[0]), anchor))
+        graph.add(gtsam.PriorFactorPose2(0, gtsam.Pose2(*self.poses[0]), anchor))
         for factor in (*self._certain, *others):
             graph.add(factor)
         return graph

@@ -10,9 +10,9 @@ import torch
 from torch.utils.data import Dataset
 
 from radarize.errors import InputError
+from radarize.features.maps import MAPS, MapMaker, maps_of
 from radarize.pose import wrap
 from radarize.recording import Recording
-from radarize.training.maps import MAPS, MapMaker, maps_of
 from radarize.tum import planar
 
 #: Truth by the name of a field, as the path in the recording and the columns of it.
@@ -33,7 +33,7 @@ class Frames(Dataset):
         folder: what `radarsim dataset` wrote, or any folder of recordings (then without splits).
         split: a name of the specification's splits, such as ``random-0``; None for all recordings.
         part: ``train``, ``validation`` or ``test``.
-        fields: of an item, each with the window as its first axis: maps (`radarize.training.maps.MAPS`, float32, dB),
+        fields: of an item, each with the window as its first axis: maps (`radarize.features.maps.MAPS`, float32, dB),
             ``adc`` (int16 samples), ``time`` (s), truth (`TRUTH`), and ``turn``: the change of yaw from each frame of
             the window to the next, rad, positive to the left, one fewer than frames.
         window: frames of an item.

@@ -8,19 +8,17 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.baselines.tasks import BASELINE_TASKS
 from radarize.errors import InputError
-from radarize.nets.weights import Header, save
-from radarize.published.tasks import PUBLISHED_TASKS
+from radarize.features.table import Table
+from radarize.methods.registry import find_task
+from radarize.methods.task import Settings, Task
+from radarize.nets.export import export_onnx
+from radarize.nets.weights import save
 from radarize.replacing import replacing
 from radarize.training.dataset import recordings
-from radarize.training.table import Table
-from radarize.training.tasks import TASKS, Settings, Task
 from radarize.training.team import team
 from radarize.training.trainer import Trainer
 
-#: Trainings by setting (see `radarize.settings`) and name.
-TRAININGS = {"corrected": TASKS | BASELINE_TASKS, "published": PUBLISHED_TASKS}
 #: Without a split, every so manieth recording validates.
 _TENTH = 10
 
@@ -36,14 +34,13 @@ def train(
     workers: int = 1,
     resume: bool = False,
     onnx: bool = False,
-    setting: str = "corrected",
     progress: Callable[..., None] = lambda *where: None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Path:
     """Train a network on recordings, alone or as one of the processes that `torchrun` started.
 
     Args:
-        kind: a key of `TASKS`.
+        kind: a key of `radarize.methods.registry.TASKS`.
         data: folder of recordings, of samples or of maps.
         output: weights to write (.safetensors). The log is beside it (.csv), and so is the checkpoint of the last
             epoch (.checkpoint) until training has ended.
@@ -53,7 +50,6 @@ def train(
         workers: processes that read.
         resume: go on from the checkpoint, if there is one.
         onnx: write the network as ONNX as well.
-        setting: reading of the paper, a key of `TRAININGS`.
         progress: called with (stage, done, in all).
         say: takes a line for every epoch.
 
@@ -64,7 +60,7 @@ def train(
         InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
             is no number.
     """
-    task, output, data = find_task(kind, setting), Path(output), Path(data)
+    task, output, data = find_task(kind), Path(output), Path(data)
     settings = settings or task.defaults
     _check(kind, settings, output)
     checkpoint = output.with_suffix(".checkpoint")
@@ -74,25 +70,11 @@ def train(
         lead = crew.rank == 0
         report, note = (progress, say) if lead else (_nothing, _nothing)
         parts = _read(task, data, split, settings.seed, workers, report)
-        _fit(kind, Trainer(task, settings, *parts, crew), output, data, split, resume, onnx, report, note)
+        _fit(Trainer(task, settings, *parts, crew), output, data, split, resume, onnx, report, note)
     return output
 
 
-def find_task(kind: str, setting: str = "corrected") -> Task:
-    """A training by name.
-
-    Raises:
-        InputError: there is none.
-    """
-    if setting not in TRAININGS:
-        raise InputError(f"settings is {setting!r}, expected one of: {', '.join(TRAININGS)}")
-    if kind not in TRAININGS[setting]:
-        raise InputError(f"task is {kind!r}, expected one of: {', '.join(TRAININGS[setting])}")
-    return TRAININGS[setting][kind]
-
-
 def _fit(
-    kind: str,
     trainer: Trainer,
     output: Path,
     data: Path,
@@ -103,7 +85,8 @@ def _fit(
     say: Callable[[str], None],
 ) -> None:
     checkpoint, log = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
-    about = {"kind": kind, "setting": trainer.task.setting, "data": data.resolve().name, "split": split}
+    network = trainer.task.network
+    about = {"kind": network.kind, "setting": network.setting, "data": data.resolve().name, "split": split}
     lead, settings = trainer.team.rank == 0, trainer.settings
     if resume and checkpoint.exists():
         trainer.restore(checkpoint, about)
@@ -117,15 +100,12 @@ def _fit(
             say(_words(found))
     if lead:
         metrics = trainer.finish()
-        header = Header(
-            frames=settings.frames, maps=trainer.task.reads, width=settings.width, grid=trainer.training.grid,
-            spacings=tuple(trainer.spacings), seed=settings.seed, epochs=len(trainer.history), metrics=metrics,
-            **about,
+        header = trainer.task.header(
+            settings, trainer.training.grid, data=about["data"], split=split, spacings=tuple(trainer.spacings),
+            epochs=len(trainer.history), metrics=metrics,
         )  # fmt: skip
         save(trainer.net, header, output)
         if onnx:
-            from radarize.nets.export import export_onnx
-
             export_onnx(trainer.net, header, output.with_suffix(".onnx"))
         checkpoint.unlink(missing_ok=True)
         say("calibrated: " + _words(metrics))
@@ -152,8 +132,7 @@ def _read(
         parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
     else:
         parts = [recordings(data, split, part) for part in ("train", "validation")]
-    table = Table.read(parts[0] + parts[1], task.maps, task.truth, workers, progress, task.setting, task.sensed)
-    return table.divide(len(parts[0]))
+    return task.table(parts[0] + parts[1], workers, progress).divide(len(parts[0]))
 
 
 def _check(kind: str, settings: Settings, output: Path) -> None:

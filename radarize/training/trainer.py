@@ -16,9 +16,9 @@ from torch import Generator, Tensor
 from torch.optim.lr_scheduler import ReduceLROnPlateau
 
 from radarize.errors import InputError
+from radarize.features.table import Table
+from radarize.methods.task import Inputs, Settings, Task
 from radarize.nets import weights
-from radarize.training.table import Table
-from radarize.training.tasks import Inputs, Settings, Task
 from radarize.training.team import Team
 
 #: Share of a cosine schedule in which the rate rises.

@@ -38,9 +38,9 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from radarize.errors import InputError
-from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
+from radarize.radar.presets import load_config
 from radarize.yamlfile import read_yaml
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task

@@ -127,7 +127,7 @@ class Task:
         """
         if threads:
             _use_threads(threads)
-        from radarize.training.maps import keep_maps
+        from radarize.features.keeping import keep_maps
         from radarsim.accompany import accompany
         from radarsim.scene.scene import Scene
         from radarsim.simulate import simulate

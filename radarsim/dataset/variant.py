@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
+from radarize.radar.presets import load_config
 from radarsim.motion import Mounting
 from radarsim.physics.frontend_config import FrontEndConfig
 

@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Int16
 
 from radarize.errors import InputError
-from radarize.radar.cfg import load_config
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
+from radarize.radar.presets import load_config
 from radarize.recording import Recording
 
 #: What does not change the samples that the radar sends: corrections for whoever reads them.

@@ -18,7 +18,7 @@ from radarize.benchmark.run import benchmark
 from radarize.benchmark.runs import Pair, Run, code
 from radarize.console import run as command_line
 from radarize.errors import InputError
-from radarize.methods import ODOMETRY, SCANS
+from radarize.methods.registry import ODOMETRY, SCANS
 from radarize.recording import Recording
 from tests.benchmark import toys as toy_file
 from tests.benchmark.rooms import ROOMS, write_rooms
@@ -104,7 +104,7 @@ def test_a_changed_method_is_run_again(tmp_path, monkeypatch):
     from own_method import make
 
     before = code(make, partial(make, None))
-    assert before != code(ODOMETRY["doppler"].make)  # of the package
+    assert before != code(ODOMETRY["doppler"].maker)  # of the package
     code.cache_clear()
     assert before == code(make, partial(make, None))
     own.write_text("def make(inputs):\n    return 2\n")

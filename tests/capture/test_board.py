@@ -86,6 +86,31 @@ def test_no_board_and_a_board_that_refuses(monkeypatch):
             client.start()
 
 
+def test_replies_of_others_are_not_heard(monkeypatch):
+    monkeypatch.setattr("radarize.capture.board._PATIENCE", 0.2)
+    where = network()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger, Board(where) as client:
+        forger.bind(("127.0.0.3", where.command_port))  # the board's own port, but not its address
+        for reply in (Reply(Command.ALIVE), Reply(Command.VERSION, 0x0402), Reply(Command.STATUS, Status.NO_LVDS)):
+            forger.sendto(reply.encode(), (where.host, where.command_port))
+        assert client.status(0.1) == Status(0)
+        forger.sendto(Reply(Command.ALIVE).encode(), (where.host, where.command_port))
+        with pytest.raises(InputError, match="no DCA1000 answers ALIVE.*127.0.0.3 sent something instead"):
+            client.request(Command.ALIVE)
+
+
+def test_a_forged_failure_and_noise_stop_nothing():
+    with Scripted() as board, Board(board.network) as client:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger:
+            forger.bind(("127.0.0.3", 0))
+            for data in (Reply(Command.START, 1).encode(), b"noise"):
+                forger.sendto(data, (board.network.host, board.network.command_port))
+        client.start()
+        board.say(b"noise")
+        board.say(Reply(Command.STATUS, Status.NO_LVDS).encode())
+        assert client.status(0.2) == Status.NO_LVDS  # what comes after a datagram that cannot be read is heard
+
+
 def test_what_the_board_reports_on_its_own():
     with Scripted() as board, Board(board.network) as client:
         assert client.troubles() == []

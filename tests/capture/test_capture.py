@@ -16,11 +16,12 @@ from radarize.capture.record import record
 from radarize.capture.sensor import Sensor
 from radarize.errors import InputError
 from radarize.radar.cfg import parse_cfg, write_cfg
-from radarize.radar.dca1000 import MAX_PAYLOAD, FrameAssembler, decode, encode, packets
+from radarize.radar.dca1000 import MAX_PAYLOAD, FrameAssembler, decode, encode
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarsim.emulator.disturbance import Disturbance
 from tests import virtual
+from tests.packets import packets
 from tests.virtual import SMALL, emulated, network, sensor
 
 FRAMES = 100

@@ -9,12 +9,14 @@ import pytest
 from browser import CHROMIUM, Browser
 from typer.testing import CliRunner
 
+from radarize.batch import Intake
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
 from radarize.cli import app
 from radarize.errors import InputError
-from radarize.pipeline import Pipeline
+from radarize.methods.registry import CLASSICAL, Inputs, Workshop
+from radarize.pipeline import Result
 from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
@@ -50,29 +52,41 @@ def walk(tmp_path_factory):
     return path
 
 
-def make(path):
-    with Recording(path) as recording:
-        return Pipeline(recording.config)
+class Kept(Live):
+    """A live pipeline whose results are kept."""
+
+    def __init__(self, *arguments):
+        super().__init__(*arguments)
+        self.results: list[Result] = []
+        shown = self.view.add
+        self.view.add = lambda result: (self.results.append(result), shown(result))
+
+
+def poses(results: list[Result]) -> np.ndarray:
+    return np.concatenate([result.track.pose for result in results])
 
 
 def test_a_replay_gives_what_the_file_gives(walk, tmp_path):
     with Page("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
-        live = Live(make(walk), page)
+        live = Kept(Inputs(PRESETS["radarize"]), CLASSICAL, page)
         with RecordingWriter(tmp_path / "again.h5", stream.config) as writer:
             live.run(stream, threading.Event(), writer=writer)
-    offline = make(walk)
+    inputs = Inputs(PRESETS["radarize"])
+    offline, intake = Workshop(inputs).pipeline(**CLASSICAL), Intake(inputs.signal)
     with Recording(walk) as one, Recording(tmp_path / "again.h5") as other:
-        offline.push(one.adc(0, FRAMES), one.times, one.valid(0, FRAMES))
+        result = offline.push(intake.take(one.adc(0, FRAMES), one.times, one.valid(0, FRAMES)))
         assert np.array_equal(one.adc(0, FRAMES), other.adc(0, FRAMES))
         assert np.array_equal(one.valid(0, FRAMES), other.valid(0, FRAMES)) and np.array_equal(one.times, other.times)
-    assert np.concatenate(live.pipeline.poses) == pytest.approx(np.concatenate(offline.poses), abs=1e-6)
-    assert live.losses.lost_frames == 1 and live.pipeline.pushed == FRAMES and stream.counts.dropped == 0
+    assert poses(live.results) == pytest.approx(result.track.pose, abs=1e-6)
+    assert np.array_equal(np.concatenate([each.frames for each in live.results]), result.frames)
+    assert len(result.frames) == FRAMES - 1 and live.intake.lost == intake.lost == 1
+    assert live.losses.lost_frames == 1 and live.intake.taken == FRAMES and stream.counts.dropped == 0
 
 
 def test_too_slow_means_dropped_frames_not_delay(walk):
     """Ten times real time, and room for four frames: what is processed is whole, and the rest is counted."""
     with Page("127.0.0.1:0") as page, Replay(walk, speed=1e4, slots=4) as stream:
-        live = Live(make(walk), page)
+        live = Live(Inputs(PRESETS["radarize"]), CLASSICAL, page)
         while stream.counts.frames < FRAMES:
             pass
         live.run(stream, threading.Event())
@@ -83,7 +97,7 @@ def test_too_slow_means_dropped_frames_not_delay(walk):
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed (apt-get install chromium)")
 def test_a_browser_shows_it_while_it_runs(walk, tmp_path):
-    pipeline = prepare(PRESETS["radarize"], lambda: make(walk))
+    inputs = prepare(Inputs(PRESETS["radarize"]), CLASSICAL)
     with Page("127.0.0.1:0") as page, Browser(page.url, tmp_path / "profile") as browser:
         browser.wait("document.getElementById('state').textContent == 'waiting for frames'")
         browser.wait("events.readyState == 1")
@@ -91,7 +105,7 @@ def test_a_browser_shows_it_while_it_runs(walk, tmp_path):
 
         def run() -> None:
             with Replay(walk, speed=0.5, slots=FRAMES) as stream:
-                Live(pipeline, page).run(stream, shown)
+                Live(inputs, CLASSICAL, page).run(stream, shown)
 
         thread = threading.Thread(target=run)
         thread.start()

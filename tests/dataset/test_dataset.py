@@ -13,8 +13,8 @@ import yaml
 from fakes import FakeSpecification, fake
 
 from radarize.errors import InputError
+from radarize.features.maps import MAPS
 from radarize.recording import Recording
-from radarize.training.maps import MAPS
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
 from radarsim.planner import plan_motion

@@ -9,9 +9,8 @@ import yaml
 
 from radarize.errors import InputError
 from radarize.radar.array import azimuth_row, virtual_positions
-from radarize.radar.cfg import load_config
 from radarize.radar.config import SPEED_OF_LIGHT
-from radarize.radar.presets import PRESETS
+from radarize.radar.presets import PRESETS, load_config
 from radarsim.dataset.specification import Specification
 from radarsim.scene.description import shipped
 

@@ -5,9 +5,9 @@ import re
 import pytest
 
 from radarize.errors import InputError
-from radarize.radar.cfg import load_config, write_cfg
+from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
-from radarize.radar.presets import PRESETS
+from radarize.radar.presets import PRESETS, load_config
 from radarsim.emulator.commandline import CommandLine
 
 LINES = [line for line in write_cfg(PRESETS["radarize"]).splitlines() if line != "sensorStart"]

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from radarize.radar.cfg import write_cfg
-from radarize.radar.dca1000 import Packet, decode, encode, packets
+from radarize.radar.dca1000 import Packet, decode, encode
 from radarize.radar.dca1000_commands import Command, Reply, Status
 from radarize.recording import Recording
 from radarsim.emulator.commandline import PROMPT
 from radarsim.emulator.disturbance import Disturbance
 from radarsim.emulator.source import Playback, Walk
 from tests.emulator.client import SMALL, attached
+from tests.packets import packets
 from tests.virtual import CONFIG, record
 
 

@@ -10,7 +10,8 @@ from fake_run import PLAN, write_run
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate
 from radarize.evaluation.mapping import distance_to_plan, segment_points
-from radarize.evaluation.runfiles import read_map, read_pgm
+from radarize.runfolder import OccupancyMap
+from radarize.runfolder.occupancy import read_pgm
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +45,7 @@ def test_metrics_of_a_known_run(run):
 
 def test_a_mirrored_map_does_not_fit(run, tmp_path):
     flipped = write_run(tmp_path / "flipped")
-    grid = read_map(flipped / "map.yaml")
+    grid = OccupancyMap.read(flipped / "map.yaml")
     height, width = grid.pixels.shape
     (flipped / "map.pgm").write_bytes(b"P5\n%d %d\n255\n" % (width, height) + grid.pixels[::-1].tobytes())
     assert evaluate(flipped)["map"]["f1"] < 0.5
@@ -65,7 +66,7 @@ def test_cells_lie_where_map_server_puts_them(tmp_path):
     pixels[0, 3] = 0  # upper right
     (tmp_path / "map.pgm").write_bytes(b"P5 4 3 255\n" + pixels.tobytes())
     (tmp_path / "map.yaml").write_text("image: map.pgm\nresolution: 0.5\norigin: [10, 20, 0]\nnegate: 0\n")
-    grid = read_map(tmp_path / "map.yaml")
+    grid = OccupancyMap.read(tmp_path / "map.yaml")
     np.testing.assert_allclose(sorted(grid.centers(grid.occupied).tolist()), [[10.25, 20.25], [11.75, 21.25]])
     assert grid.free.sum() == 10
 

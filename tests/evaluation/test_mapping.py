@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarize.evaluation.mapping import free_space_iou
-from radarize.evaluation.runfiles import read_map
+from radarize.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid
 
@@ -17,7 +17,7 @@ def disc(folder, radius):
     for _ in range(6):
         grid.insert(np.zeros_like(ends), ends, np.ones(len(ends), bool), GridConfig())
     grid.save(folder / "map")
-    return read_map(folder / "map.yaml")
+    return OccupancyMap.read(folder / "map.yaml")
 
 
 @pytest.mark.parametrize("radius, expected", [(2.0, 1.0), (1.5, 0.5625), (2.5, 0.64)])

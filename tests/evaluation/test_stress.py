@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from fake_run import write_run
 
-from radarize.evaluation.runfiles import read_scans
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import SOURCES, curves, missed, sources
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, RecordingWriter, Stream
+from radarize.runfolder.reader import Scans
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
 LABELS = ("direct", "floor_ceiling", "ghost_1", "ghost_2", "ghost_3", "through_slab", "moving", "leakage")
@@ -41,7 +41,7 @@ def test_what_wrong_returns_come_from(tmp_path):
     run = write_run(tmp_path / "run")
     with h5py.File(run / "scans.h5", "r+") as file:
         file["ranges"][::3] = file["ranges"][::3] + 0.3
-    scans = read_scans(run / "scans.h5")
+    scans = Scans(run / "scans.h5")
     # Every second frame of the recording is in the run, whose instants are in the middle of the bursts.
     times = np.repeat(scans["time"], 2) - 0.01
     times[1::2] += 1 / 30
@@ -63,7 +63,7 @@ def test_what_wrong_returns_come_from(tmp_path):
 
 
 def test_a_recording_that_knows_no_causes(tmp_path):
-    scans = read_scans(write_run(tmp_path / "run") / "scans.h5")
+    scans = Scans(write_run(tmp_path / "run") / "scans.h5")
     times = scans["time"] - 0.01
     path = record(tmp_path / "a.h5", times, np.zeros((len(times), 96, len(BEARINGS)), np.uint8), labels=())
     assert sources(scans, scans["ranges"], path) == {}

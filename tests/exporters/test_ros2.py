@@ -10,16 +10,16 @@ from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
-from radarize.evaluation.runfiles import read_map
 from radarize.exporters import export
 from radarize.heatmaps import Heatmaps
 from radarize.importers.companions import depth_picture
+from radarize.log import run as slam
 from radarize.mapping.scans import BEARINGS
 from radarize.pose import compose, exponential
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
+from radarize.runfolder import OccupancyMap
 from radarize.slam.config import SlamConfig
-from radarize.slam.log import run as slam
 from radarize.tum import planar, planar_poses, write_tum
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 4})
@@ -152,7 +152,7 @@ def test_odometry_and_its_transform(bag):
 def test_covariance_adds_up_as_in_a_simulation():
     """Many walks whose steps err as their covariance says: positions spread as the bag claims."""
     from radarize.exporters.ros2 import _odometry
-    from radarize.slam.log import Log
+    from radarize.log import Log
 
     rng, error = np.random.default_rng(1), np.diag([0.01, 0.02, 0.01]) ** 2
     log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), np.tile(error, (COUNT, 1, 1)))
@@ -239,7 +239,7 @@ def test_a_failure_leaves_nothing(recording, tmp_path):
 def test_maps_and_trajectories(recording, run, tmp_path):
     written = export(run, "map", tmp_path / "floor.pgm")
     assert written.name == "floor.yaml" and yaml.safe_load(written.read_text())["image"] == "floor.pgm"
-    assert np.array_equal(read_map(written).pixels, read_map(run / "map.yaml").pixels)
+    assert np.array_equal(OccupancyMap.read(written).pixels, OccupancyMap.read(run / "map.yaml").pixels)
     export(run, "tum", tmp_path / "slam.tum")
     assert np.loadtxt(tmp_path / "slam.tum") == pytest.approx(np.loadtxt(run / "trajectory.tum"), abs=1e-8)
     export(recording, "tum", tmp_path / "truth.tum")

@@ -23,19 +23,20 @@ from scipy.io import savemat
 import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
 from radarize.contents import contents
 from radarize.errors import InputError
-from radarize.importers import import_recording
-from radarize.radar.cfg import load_config, write_cfg
+from radarize.importers import Given, import_recording
+from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import FrameAssembler, decode, encode, packets
+from radarize.radar.dca1000 import FrameAssembler, decode, encode
 from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings, read_packet_settings
 from radarize.radar.limits import check_limits
-from radarize.radar.presets import PRESETS
+from radarize.radar.presets import PRESETS, load_config
 from radarize.recording import Product, Recording, RecordingWriter, Stream
 from radarize.tum import read_tum
 from tests.fuzzing.damage import damaged, misspelled
 from tests.fuzzing.hdf5 import EDITS, altered
 from tests.importers.ros import write_published
 from tests.importers.test_import_pcap import pcap, udp
+from tests.packets import packets
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 #: A reader may take so much processor time (s), and memory (bytes): buffers of a fixed size, and so many times the
@@ -124,7 +125,7 @@ def _importing(**more) -> Callable[[Path], None]:
     """Imports a file, and reads what came of it."""
 
     def read(path: Path) -> None:
-        use(import_recording(path, path.with_name("out.h5"), **({"config": CONFIG} | more)))
+        use(import_recording(path, path.with_name("out.h5"), Given(**({"config": CONFIG} | more))))
 
     return read
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from radarize.errors import InputError
-from radarize.importers import import_recording
+from radarize.importers import Given, import_recording
 from radarize.recording import Recording
 from tests.importers.test_import_bin import CONFIG, room
 
@@ -22,7 +22,7 @@ CUBE = FRAMES[..., 0] + 1j * FRAMES[..., 1].astype(np.float32)
 
 
 def imported(path: Path, **more) -> np.ndarray:
-    with Recording(import_recording(path, path.with_name("out.h5"), **({"config": CONFIG} | more))) as recording:
+    with Recording(import_recording(path, path.with_name("out.h5"), Given(**({"config": CONFIG} | more)))) as recording:
         return recording.adc(0, len(recording))
 
 
@@ -96,7 +96,7 @@ def test_without_a_configuration(tmp_path):
         assert np.array_equal(recording.adc(0, 3), FRAMES)
         assert recording.attributes["found"].startswith("iq_order iiqq (")
         assert "slope" in recording.attributes["assumed"]
-    import_recording(tmp_path / "a.npy", tmp_path / "a.h5", overrides={"iq_order": "qqii"})
+    import_recording(tmp_path / "a.npy", tmp_path / "a.h5", Given(overrides={"iq_order": "qqii"}))
     with Recording(out) as recording:
         assert np.array_equal(recording.adc(0, 3), FRAMES[..., ::-1])
         assert "found" not in recording.attributes
@@ -108,7 +108,7 @@ def test_the_people_of_a_public_capture(recordings, tmp_path):
              "ramp_end_time": 62e-6, "adc_start_time": 6e-6}  # fmt: skip
     source = recordings / "xwr-moving-people" / "doppler_example_1.npy"
     with Recording(
-        import_recording(source, tmp_path / "a.h5", shape="loop,virtual,sample", overrides=given)
+        import_recording(source, tmp_path / "a.h5", Given(shape="loop,virtual,sample", overrides=given))
     ) as recording:
         config, adc = recording.config, recording.adc(0, 1)[0].astype(float)
     assert config.frame_shape == (128, 2, 4, 128, 2)
@@ -129,19 +129,19 @@ def test_the_people_of_a_public_capture(recordings, tmp_path):
 def test_values_that_are_no_counts(tmp_path):
     path = tmp_path / "a.npy"
     np.save(path, CUBE / 32768)
-    with Recording(import_recording(path, tmp_path / "a.h5", config=CONFIG)) as recording:
+    with Recording(import_recording(path, tmp_path / "a.h5", Given(config=CONFIG))) as recording:
         scale = recording.attributes["counts_per_unit"]
         assert recording.adc(0, 3) == pytest.approx(FRAMES * scale / 32768, abs=0.51)
         assert abs(recording.adc(0, 3)).max() == 8192
     loud = CUBE * 1000
     np.save(path, np.rint(loud))
-    with Recording(import_recording(path, tmp_path / "a.h5", config=CONFIG)) as recording:
+    with Recording(import_recording(path, tmp_path / "a.h5", Given(config=CONFIG))) as recording:
         assert "values lie outside of 16 bits" in recording.attributes["warnings"]
     holed = CUBE.copy()
     holed[1, 2, 1, 0, 7] = np.nan
     holed[2, 0, 0] = 0
     np.save(path, holed)
-    with Recording(import_recording(path, tmp_path / "a.h5", config=CONFIG)) as recording:
+    with Recording(import_recording(path, tmp_path / "a.h5", Given(config=CONFIG))) as recording:
         lost = np.argwhere(~recording.valid(0, 3))
         assert lost.tolist() == [[1, 2, 1], [2, 0, 0]]
 
@@ -157,7 +157,7 @@ def test_memory_does_not_grow_with_the_array(tmp_path, monkeypatch):
             (np.savez_compressed if packed else np.savez)(tmp_path / "a.npz", many)
             del many
             tracemalloc.start()
-            import_recording(tmp_path / "a.npz", tmp_path / "a.h5", config=CONFIG, shape=shape)
+            import_recording(tmp_path / "a.npz", tmp_path / "a.h5", Given(config=CONFIG, shape=shape))
             peaks.append(tracemalloc.get_traced_memory()[1])
             tracemalloc.stop()
         assert peaks[1] < 1.2 * peaks[0]

@@ -8,7 +8,7 @@ import pytest
 from rosbags.rosbag2 import StoragePlugin
 
 from radarize.errors import InputError
-from radarize.importers import import_recording
+from radarize.importers import Given, import_recording
 from radarize.importers.bag import open_bag
 from radarize.importers.companions import depth_picture
 from radarize.points import PointClouds
@@ -165,7 +165,7 @@ def test_calibration_and_sizes_come_from_the_frames(tmp_path):
     config = SMALL.model_copy(update={"range_bias": 0.07})
     write(tmp_path / "a.bag", config, 0.05 * np.arange(3), calibration=factors)
     given = {"tx": (0, 2, 1), "slope": 60e12, "iq_order": "qqii", "frame_period": 0.05}
-    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", overrides=given)) as recording:
+    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(overrides=given))) as recording:
         assert recording.config.frame_shape == SMALL.frame_shape
         assert recording.config.range_bias == pytest.approx(0.07)
         assert np.asarray(recording.config.channel_calibration) == pytest.approx(factors, abs=1e-6)
@@ -188,7 +188,7 @@ def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
         ("b.bag", None, 0.001, ""),
         ("b.bag", 0.03, 0, ""),
     ):
-        out = import_recording(tmp_path / name, tmp_path / "a.h5", config=SMALL, latency=latency)
+        out = import_recording(tmp_path / name, tmp_path / "a.h5", Given(config=SMALL, latency=latency))
         with Recording(out) as recording:
             assert recording.times - EPOCH == pytest.approx(times + late, abs=1e-6), (name, latency)
             assert recording.attributes["assumed"] == assumed
@@ -198,7 +198,7 @@ def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
 def test_missing_frames_leave_a_gap_and_repeated_ones_are_dropped(tmp_path):
     times = np.array([0, 1, 2, 5, 5, 6]) * 0.05
     write(tmp_path / "a.bag", SMALL, times)
-    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", config=SMALL)) as recording:
+    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
         assert recording.times - EPOCH == pytest.approx(np.unique(times), abs=1e-6)
         assert "2 frames are missing" in recording.attributes["warnings"]
         assert "1 frames came again" in recording.attributes["warnings"]
@@ -211,7 +211,7 @@ def test_poses_are_unknown_where_tracking_was_lost(tmp_path):
             for tick in 0.05 * k + 0.01 * np.arange(5):
                 if not 1 < tick < 2:
                     bag.odometry(tick, np.array([tick, 0, 0, 0, 0, 0, 1.0]), tick)
-    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", config=SMALL)) as recording:
+    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
         pose, times = recording.read("truth/pose"), recording.read("truth/time") - EPOCH
     lost = (times > 1.0) & (times < 2.0)
     assert np.isnan(pose[lost]).all() and np.isfinite(pose[~lost & (times < 2.9)]).all()
@@ -227,7 +227,7 @@ def test_a_silent_radar_does_not_keep_the_others_waiting(tmp_path):
             if k % 5 == 0 and not 0.5 <= tick < 11.5:
                 bag.frame(tick, frames[k // 5 % 20], SMALL)
             bag.odometry(tick, np.array([tick, 0, 0, 0, 0, 0, 1.0]), tick)
-    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", config=SMALL)) as recording:
+    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
         pose, times = recording.read("truth/pose"), recording.read("truth/time") - EPOCH
         assert len(recording) == 20 and "220 frames are missing" in recording.attributes["warnings"]
     assert pose[:-1, 0] == pytest.approx(times[:-1], abs=1e-4)
@@ -238,7 +238,7 @@ def test_damaged_depth_pictures_are_counted(tmp_path):
         for k, frame in enumerate(noise(SMALL, 4)):
             bag.frame(0.05 * k, frame, SMALL)
             bag.depth(0.05 * k, np.full((2, 3), k + 1, np.uint16) if k != 2 else np.full((5, 5), 9, np.uint16))
-    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", config=SMALL)) as recording:
+    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
         assert recording.read("truth/depth")[:, 0, 0].tolist() == [1, 2, 0, 4]
         assert "compressedDepth: 1 messages could not be used" in recording.attributes["warnings"]
         assert not recording.has("truth/depth_intrinsics")
@@ -299,13 +299,13 @@ def test_refusals(tmp_path):
     for name, data in cases.items():
         (tmp_path / name).write_bytes(data)
         with pytest.raises(InputError, match=f"{name}: is no readable ROS bag"):
-            import_recording(tmp_path / name, tmp_path / "out.h5", config=SMALL)
+            import_recording(tmp_path / name, tmp_path / "out.h5", Given(config=SMALL))
     with pytest.raises(InputError, match="2 frames have not the 73728 words"):
-        import_recording(tmp_path / "a.bag", tmp_path / "out.h5", config=CONFIG)
+        import_recording(tmp_path / "a.bag", tmp_path / "out.h5", Given(config=CONFIG))
     with pytest.raises(InputError, match="stamps of its own, but start_time is 5"):
-        import_recording(tmp_path / "a.bag", tmp_path / "out.h5", config=SMALL, overrides={"start_time": 5.0})
+        import_recording(tmp_path / "a.bag", tmp_path / "out.h5", Given(config=SMALL, start_time=5.0))
     with pytest.raises(InputError, match="is no array, but shape"):
-        import_recording(tmp_path / "a.bag", tmp_path / "out.h5", config=SMALL, shape="frame,sample")
+        import_recording(tmp_path / "a.bag", tmp_path / "out.h5", Given(config=SMALL, shape="frame,sample"))
     assert not (tmp_path / "out.h5").exists()
 
 
@@ -316,7 +316,7 @@ def test_a_bag_that_breaks_off_inside_says_so(tmp_path):
     data[at - 4 : at] = b"\xff\xff\xff\x7f"
     (tmp_path / "b.bag").write_bytes(data)
     with pytest.raises(InputError, match="b.bag: is no readable ROS bag"):
-        import_recording(tmp_path / "b.bag", tmp_path / "out.h5", config=SMALL)
+        import_recording(tmp_path / "b.bag", tmp_path / "out.h5", Given(config=SMALL))
 
 
 def test_depth_encodings():
@@ -344,5 +344,5 @@ def test_frames_named_once_are_enough(tmp_path):
     write(tmp_path / "a.bag", SMALL, [0.0, 0.05])
     data = (tmp_path / "a.bag").read_bytes().replace(RADAR.encode(), b"/other7/radar_data")
     (tmp_path / "a.bag").write_bytes(data)
-    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", config=SMALL)) as recording:
+    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
         assert recording.attributes["topics"] == "/other7/radar_data"

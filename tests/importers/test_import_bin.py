@@ -7,7 +7,7 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.exporters import export
-from radarize.importers import capture, import_recording
+from radarize.importers import Given, capture, import_recording
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
@@ -69,7 +69,7 @@ def test_batches_do_not_show(tmp_path, monkeypatch):
     source = write_bin(tmp_path / "a.bin", frames, CONFIG, cut=100)
     monkeypatch.setattr(capture, "BATCH_BYTES", 2 * CONFIG.frame_bytes)
     seen = []
-    import_recording(source, tmp_path / "a.h5", config=CONFIG, progress=lambda done, total: seen.append((done, total)))
+    import_recording(source, tmp_path / "a.h5", Given(CONFIG), progress=lambda done, total: seen.append((done, total)))
     assert seen == [(2, 6), (4, 6), (6, 6)]
     with Recording(tmp_path / "a.h5") as recording:
         assert np.array_equal(recording.adc(0, 6), frames[:6])
@@ -79,7 +79,7 @@ def test_batches_do_not_show(tmp_path, monkeypatch):
 def test_a_truncated_file_keeps_its_whole_frames_and_says_so(tmp_path, cut):
     frames = room(CONFIG, 4)
     source = write_bin(tmp_path / "a.bin", frames, CONFIG, cut=cut)
-    import_recording(source, tmp_path / "a.h5", config=CONFIG)
+    import_recording(source, tmp_path / "a.h5", Given(config=CONFIG))
     with Recording(tmp_path / "a.h5") as recording:
         assert np.array_equal(recording.adc(0, 9), frames[:3])
         assert f"3 whole frames and {CONFIG.frame_bytes - cut} bytes" in recording.attributes["warnings"]
@@ -88,10 +88,10 @@ def test_a_truncated_file_keeps_its_whole_frames_and_says_so(tmp_path, cut):
 def test_less_than_a_frame_is_refused(tmp_path):
     source = write_bin(tmp_path / "a.bin", room(CONFIG, 1), CONFIG, cut=4)
     with pytest.raises(InputError, match=f"has {CONFIG.frame_bytes - 4} bytes, less than one frame; .*32 samples"):
-        import_recording(source, tmp_path / "a.h5", config=CONFIG)
+        import_recording(source, tmp_path / "a.h5", Given(config=CONFIG))
     (tmp_path / "empty.bin").touch()
     with pytest.raises(InputError, match="has 0 bytes"):
-        import_recording(tmp_path / "empty.bin", tmp_path / "a.h5", config=CONFIG)
+        import_recording(tmp_path / "empty.bin", tmp_path / "a.h5", Given(config=CONFIG))
     assert not (tmp_path / "a.h5").exists()
 
 
@@ -100,24 +100,24 @@ def test_a_wrong_sample_count_is_refused_with_both_sizes(tmp_path, samples):
     source = write_bin(tmp_path / "a.bin", room(CONFIG, 9), CONFIG)
     wrong = CONFIG.model_copy(update={"samples": samples})
     if source.stat().st_size % wrong.frame_bytes == 0:  # nothing is left over: imported with a warning
-        import_recording(source, tmp_path / "a.h5", config=wrong)
+        import_recording(source, tmp_path / "a.h5", Given(config=wrong))
         with Recording(tmp_path / "a.h5") as recording:
             assert "repeat every 384" in recording.attributes["warnings"]
         return
     with pytest.raises(InputError, match=rf"repeat every 384 and not every {12 * samples} \(TX x RX x samples\)"):
-        import_recording(source, tmp_path / "a.h5", config=wrong)
+        import_recording(source, tmp_path / "a.h5", Given(config=wrong))
 
 
 def test_odd_sample_counts_are_refused(tmp_path):
     source = write_bin(tmp_path / "a.bin", room(CONFIG, 2), CONFIG)
     with pytest.raises(InputError, match="samples is 31, expected an even number"):
-        import_recording(source, tmp_path / "a.h5", config=CONFIG, overrides={"samples": 31})
+        import_recording(source, tmp_path / "a.h5", Given(config=CONFIG, overrides={"samples": 31}))
 
 
 def test_zero_filled_chirps_are_marked(tmp_path):
     frames = room(CONFIG, 2)
     frames[1, 2, 1] = 0  # TX2 of the third loop
-    import_recording(write_bin(tmp_path / "a.bin", frames, CONFIG), tmp_path / "a.h5", config=CONFIG)
+    import_recording(write_bin(tmp_path / "a.bin", frames, CONFIG), tmp_path / "a.h5", Given(config=CONFIG))
     with Recording(tmp_path / "a.h5") as recording:
         valid = recording.valid(0, 2)
         assert not valid[1, 2, 1] and valid.sum() == valid.size - 1
@@ -125,7 +125,7 @@ def test_zero_filled_chirps_are_marked(tmp_path):
 
 def test_a_wrong_iq_order_is_noticed(tmp_path):
     source = write_bin(tmp_path / "a.bin", room(CONFIG, 2), CONFIG)
-    import_recording(source, tmp_path / "a.h5", config=CONFIG.model_copy(update={"iq_order": "iiqq"}))
+    import_recording(source, tmp_path / "a.h5", Given(config=CONFIG.model_copy(update={"iq_order": "iiqq"})))
     with Recording(tmp_path / "a.h5") as recording:
         assert "the samples look like qqii" in recording.attributes["warnings"]
 
@@ -136,9 +136,9 @@ def test_without_a_configuration(tmp_path, iq_order):
     frames = room(config, 2)
     source = write_bin(tmp_path / "a.bin", frames, config)
     with pytest.raises(InputError, match=r"no radar configuration.*missing: loops, rx"):
-        import_recording(source, tmp_path / "a.h5", overrides={"samples": 32})
-    given = {"samples": 32, "loops": 4, "rx": 4, "tx": 2, "slope": 70e12, "start_time": 5.0, "board": None}
-    import_recording(source, tmp_path / "a.h5", overrides=given)
+        import_recording(source, tmp_path / "a.h5", Given(overrides={"samples": 32}))
+    given = {"samples": 32, "loops": 4, "rx": 4, "tx": 2, "slope": 70e12, "board": None}
+    import_recording(source, tmp_path / "a.h5", Given(overrides=given, start_time=5.0))
     with Recording(tmp_path / "a.h5") as recording:
         assert np.array_equal(recording.adc(0, 2), frames)
         assert recording.config.iq_order == iq_order
@@ -167,7 +167,7 @@ def test_impossible_overrides_are_named(tmp_path, given, message):
     for config in (CONFIG, None):
         with pytest.raises(InputError) as error:
             import_recording(
-                source, tmp_path / "a.h5", config=config, overrides={"samples": 32, "loops": 4, "rx": 4} | given
+                source, tmp_path / "a.h5", Given(config=config, overrides={"samples": 32, "loops": 4, "rx": 4} | given)
             )
         assert message in str(error.value)
 
@@ -188,14 +188,14 @@ def test_sources_that_are_none(tmp_path, name):
     (tmp_path / "a.wav").write_bytes(b"RIFF" + bytes(100))
     (tmp_path / "a.h5").write_bytes(b"\x89HDF" + bytes(100))
     with pytest.raises(InputError, match=name):
-        import_recording(tmp_path / name, tmp_path / "a.h5", config=CONFIG)
+        import_recording(tmp_path / name, tmp_path / "a.h5", Given(config=CONFIG))
 
 
 # --- poses -----------------------------------------------------------------------------------------------------------
 def test_poses_come_along(tmp_path):
     source = write_bin(tmp_path / "a.bin", room(CONFIG, 2), CONFIG)
     (tmp_path / "p.tum").write_text("# time x y z qx qy qz qw\n0 1 2 3 0 0 0 1\n\n0.05 1.1 2 3 0 0 0.6 0.8\n")
-    import_recording(source, tmp_path / "a.h5", config=CONFIG, poses=tmp_path / "p.tum")
+    import_recording(source, tmp_path / "a.h5", Given(config=CONFIG, poses=tmp_path / "p.tum"))
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.read("truth/time") == pytest.approx([0, 0.05])
         assert recording.read("truth/pose") == pytest.approx(
@@ -209,8 +209,7 @@ def test_poses_of_another_clock_are_noticed(tmp_path):
     source = write_bin(tmp_path / "a.bin", room(CONFIG, 2), CONFIG)
     (tmp_path / "p.tum").write_text("1700000000 1 2 3 0 0 0 1\n1700000009 1 2 3 0 0 0 1\n")
     for start, warned in ((0.0, True), (1700000001.0, False)):
-        overrides = {"start_time": start}
-        import_recording(source, tmp_path / "a.h5", config=CONFIG, poses=tmp_path / "p.tum", overrides=overrides)
+        import_recording(source, tmp_path / "a.h5", Given(config=CONFIG, poses=tmp_path / "p.tum", start_time=start))
         with Recording(tmp_path / "a.h5") as recording:
             assert ("give start_time" in recording.attributes["warnings"]) == warned
 
@@ -233,7 +232,7 @@ def test_bad_poses_are_refused_before_anything_is_written(tmp_path, text, messag
     source = write_bin(tmp_path / "a.bin", room(CONFIG, 2), CONFIG)
     (tmp_path / "p.tum").write_text(text, encoding="latin-1")
     with pytest.raises(InputError, match=message):
-        import_recording(source, tmp_path / "a.h5", config=CONFIG, poses=tmp_path / "p.tum")
+        import_recording(source, tmp_path / "a.h5", Given(config=CONFIG, poses=tmp_path / "p.tum"))
     assert not list(tmp_path.glob("*.h5*"))
 
 
@@ -262,7 +261,7 @@ def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
     for count in (512, 2048):
         source = write_bin(tmp_path / "a.bin", np.tile(room(CONFIG, 4), (count // 4, 1, 1, 1, 1, 1)), CONFIG)
         tracemalloc.start()
-        import_recording(source, tmp_path / "a.h5", config=CONFIG)
+        import_recording(source, tmp_path / "a.h5", Given(config=CONFIG))
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.1 * peaks[0]

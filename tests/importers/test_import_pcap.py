@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
-from radarize.importers import import_recording
+from radarize.importers import Given, import_recording
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import Packet, encode, packets
+from radarize.radar.dca1000 import Packet, encode
 from radarize.recording import Recording
+from tests.packets import packets
 
 PUBLIC = {"samples": 256, "loops": 16, "rx": 1}
 CONFIG = RadarConfig(
@@ -45,13 +46,13 @@ def stream(frames: np.ndarray = FRAMES) -> list[bytes]:
 
 
 def imported(source: Path, config: RadarConfig | None = CONFIG, **more) -> Recording:
-    return Recording(import_recording(source, source.with_suffix(".h5"), config=config, **more))
+    return Recording(import_recording(source, source.with_suffix(".h5"), Given(config=config, **more)))
 
 
 # --- the public capture ----------------------------------------------------------------------------------------------
 def test_known_echoes_of_the_public_capture(recordings, tmp_path):
     source = recordings / "iwr1843-pcap" / "test_one_frame.pcap"
-    with Recording(import_recording(source, tmp_path / "a.h5", overrides=PUBLIC)) as recording:
+    with Recording(import_recording(source, tmp_path / "a.h5", Given(overrides=PUBLIC))) as recording:
         assert len(recording) == 1
         assert recording.config.iq_order == "qqii"
         assert recording.valid(0, 1).all()
@@ -69,24 +70,24 @@ def test_known_echoes_of_the_public_capture(recordings, tmp_path):
 
 def test_the_samples_win_over_the_default_iq_order_but_not_over_the_users(recordings, tmp_path):
     source = recordings / "iwr1843-pcap" / "test_one_frame.pcap"
-    forced = import_recording(source, tmp_path / "a.h5", overrides=PUBLIC | {"iq_order": "iiqq"})
+    forced = import_recording(source, tmp_path / "a.h5", Given(overrides=PUBLIC | {"iq_order": "iiqq"}))
     with Recording(forced) as recording:
         assert recording.config.iq_order == "iiqq"
 
 
 def test_a_capture_of_commands_alone_has_no_frame(recordings, tmp_path):
     with pytest.raises(InputError, match="holds 0 bytes of samples in 0 data packets.*port 4098"):
-        import_recording(recordings / "iwr1843-pcap" / "test_cmd.pcap", tmp_path / "a.h5", overrides=PUBLIC)
+        import_recording(recordings / "iwr1843-pcap" / "test_cmd.pcap", tmp_path / "a.h5", Given(overrides=PUBLIC))
     assert not (tmp_path / "a.h5").exists()
 
 
 def test_the_public_capture_has_less_than_a_frame_of_a_foreign_cfg(recordings, tmp_path):
     folder = recordings / "iwr1843-pcap"
-    from radarize.radar.cfg import load_config
+    from radarize.radar.presets import load_config
 
     config, _ = load_config(folder / "xwr18xx_profile_2023_01_01T00_00_00_000.cfg")
     with pytest.raises(InputError, match=f"holds 16384 bytes .* expected at least one frame of {config.frame_bytes}"):
-        import_recording(folder / "test_one_frame.pcap", tmp_path / "a.h5", config=config)
+        import_recording(folder / "test_one_frame.pcap", tmp_path / "a.h5", Given(config=config))
 
 
 # --- the format ------------------------------------------------------------------------------------------------------

@@ -7,7 +7,7 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.exporters import export
-from radarize.importers import import_recording
+from radarize.importers import Given, import_recording
 from radarize.recording import Recording
 
 
@@ -40,7 +40,8 @@ def test_known_echoes_of_the_public_capture(recordings, tmp_path, source):
 @pytest.mark.parametrize("samples", [450, 500, 510])
 def test_a_wrong_sample_count_is_refused(recordings, tmp_path, samples):
     with pytest.raises(InputError, match=f"repeat every 6144 and not every {12 * samples}"):
-        import_recording(recordings / "iwr6843-studio", tmp_path / "a.h5", overrides={"samples": samples, "loops": 30})
+        given = Given(overrides={"samples": samples, "loops": 30})
+        import_recording(recordings / "iwr6843-studio", tmp_path / "a.h5", given)
 
 
 def test_export_gives_the_captured_file_back(recordings, tmp_path):

@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 import torch
 
+from radarize.features.maps import AZIMUTHS
 from radarize.mapping.scans import BEARINGS
-from radarize.nets import NETS, RotationNet, SegmentationNet, TranslationNet
+from radarize.methods.radarize.motion import RotationNet, TranslationNet
+from radarize.methods.radarize.segmentation import SegmentationNet
 from radarize.nets.correlation import Correlation
 from radarize.nets.gaussian import Gaussian
 from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
 from radarize.nets.unet import UNet
-from radarize.training.maps import AZIMUTHS
+
+NETS = {net.kind: net for net in (TranslationNet, RotationNet, SegmentationNet)}
 
 
 def parameters(net: torch.nn.Module) -> int:

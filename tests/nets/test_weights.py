@@ -1,6 +1,7 @@
 """Files of weights: what comes back, what is refused, and ONNX."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -9,12 +10,15 @@ from safetensors import safe_open
 from safetensors.torch import save_file
 
 from radarize.errors import InputError
-from radarize.nets import NETS
+from radarize.features.grid import Grid
+from radarize.methods.radarize.motion import RotationNet, TranslationNet
+from radarize.methods.radarize.segmentation import SegmentationNet
 from radarize.nets.export import export_onnx
-from radarize.nets.weights import Grid, Header, build, example, load, save
+from radarize.nets.weights import Header, build, example, load, save
 from radarize.radar.presets import PRESETS
 
 CONFIG = PRESETS["radarize"]
+NETS = {net.kind: net for net in (TranslationNet, RotationNet, SegmentationNet)}
 MAPS = {"translation": ("doppler_azimuth", "doppler_elevation_aware"), "rotation": ("range_azimuth",)}
 
 
@@ -26,8 +30,8 @@ def network(kind: str, width: int = 4):
         metrics={"loss": 0.5},
     )  # fmt: skip
     torch.manual_seed(0)
-    net = build(header)
-    net(*example(header))  # moves the batch normalisation's statistics
+    net = build(NETS[kind], header)
+    net(*example(net, header))  # moves the batch normalisation's statistics
     return net.eval(), header
 
 
@@ -35,9 +39,9 @@ def network(kind: str, width: int = 4):
 def test_round_trip(kind, tmp_path):
     net, header = network(kind)
     path = save(net, header, tmp_path / "net.safetensors")
-    again, read = load(path, CONFIG)
+    again, read = load(path, NETS[kind], CONFIG)
     assert read == header and not again.training
-    for a, b in zip(net.estimate(*example(header)), again.estimate(*example(header)), strict=True):
+    for a, b in zip(net.estimate(*example(net, header)), again.estimate(*example(again, header)), strict=True):
         assert torch.allclose(a, b, rtol=0.05, atol=0.02)
     with safe_open(path, "pt") as file:
         assert json.loads(file.metadata()["radarize"])["kind"] == kind
@@ -51,21 +55,26 @@ def test_what_does_not_fit_is_refused(tmp_path):
     net, header = network("translation")
     path = save(net, header, tmp_path / "net.safetensors")
     with pytest.raises(InputError, match="does not fit this radar, whose maps have rows 16 instead of 32"):
-        load(path, CONFIG.model_copy(update={"loops": 16}))
+        load(path, TranslationNet, CONFIG.model_copy(update={"loops": 16}))
     with pytest.raises(InputError, match="missing.safetensors: no such file"):
-        load(tmp_path / "missing.safetensors")
+        load(tmp_path / "missing.safetensors", TranslationNet)
     (tmp_path / "text.safetensors").write_text("no weights at all")
     with pytest.raises(InputError, match="text.safetensors: is no file of weights"):
-        load(tmp_path / "text.safetensors")
+        load(tmp_path / "text.safetensors", TranslationNet)
     save_file({"a": torch.zeros(2)}, tmp_path / "other.safetensors")
     with pytest.raises(InputError, match="has no header of radarize"):
-        load(tmp_path / "other.safetensors")
+        load(tmp_path / "other.safetensors", TranslationNet)
     save(net, header.model_copy(update={"width": 8}), path)
     with pytest.raises(InputError, match="its weights do not fit its header"):
-        load(path)
-    save(net, header.model_copy(update={"kind": "flight"}), path)
-    with pytest.raises(InputError, match="is a network for 'flight', expected one of: translation"):
-        load(path)
+        load(path, TranslationNet)
+    for change, what in (
+        ({"kind": "flight"}, "'flight' (corrected)"),
+        ({"setting": "published"}, "'translation' (pub"),
+    ):
+        save(net, header.model_copy(update=change), path)
+        with pytest.raises(InputError, match=re.escape(f"is a network for {what}")) as refused:
+            load(path, TranslationNet)
+        assert "expected one for 'translation' (corrected)" in str(refused.value)
     with torch.no_grad():
         net.resnet.head.bias[0] = 1e6
     with pytest.raises(InputError, match="resnet.head.bias has values that float16 does not hold"):
@@ -80,7 +89,7 @@ def test_onnx_says_the_same(kind, tmp_path):
     path = export_onnx(net, header, tmp_path / "net.onnx")
     session = runtime.InferenceSession(path)
     assert Header.model_validate_json(session.get_modelmeta().custom_metadata_map["radarize"]) == header
-    two = example(header)
+    two = example(net, header)
     for inputs in (two, [torch.cat([each, each[:1]]) for each in two]):
         expected = net.estimate(*inputs)
         expected = expected if isinstance(expected, tuple) else (expected,)

@@ -6,6 +6,7 @@ import pytest
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import DopplerVelocity, _fit
 from radarize.radar.presets import PRESETS
+from tests.batches import batch
 from tests.echoes import record
 from tests.rooms import antenna_gain, furnished_room
 
@@ -36,7 +37,7 @@ def test_velocity_of_either_sign(room):
     maps = Heatmaps(CONFIG)
     adc = np.concatenate([burst(room, v, yaw=y) for v in VELOCITIES for y in (0.3, 2.1)])
     truth = np.repeat(VELOCITIES, 2, axis=0)
-    found = DopplerVelocity(maps).estimate(maps.spectrum(adc))
+    found = DopplerVelocity(maps).estimate(batch(CONFIG, adc, np.arange(len(adc))))
     error = np.abs(found.velocity - truth)
     assert (np.median(error, axis=0) < 0.015).all()
     assert error.max() < 0.06
@@ -50,13 +51,13 @@ def test_velocity_of_either_sign(room):
 def test_turning_and_climbing_do_not_count(room):
     maps = Heatmaps(CONFIG)
     adc = burst(room, (0.8, 0.1), climb=0.15, turn=np.radians(90))
-    found = DopplerVelocity(maps).estimate(maps.spectrum(adc))
+    found = DopplerVelocity(maps).estimate(batch(CONFIG, adc, np.arange(len(adc))))
     np.testing.assert_allclose(found.velocity[0], (0.8, 0.1), atol=0.03)
 
 
 def test_standing_still_is_exactly_zero(room):
     maps = Heatmaps(CONFIG)
-    found = DopplerVelocity(maps).estimate(maps.spectrum(burst(room, (0.0, 0.0))))
+    found = DopplerVelocity(maps).estimate(batch(CONFIG, burst(room, (0.0, 0.0)), np.zeros(1)))
     assert (found.velocity[0] == 0).all()
     assert found.covariance[0].max() < 0.01
 
@@ -78,7 +79,7 @@ def test_people_are_outliers(room):
     # Whoever runs at the radar while it drives closes faster: the same echoes from a faster radar.
     other = burst((person, 100.0 * np.exp(2j * np.pi * rng.random(30))), (0.9 + 0.7, 0.0), noise=0.0)
     maps = Heatmaps(CONFIG)
-    found = DopplerVelocity(maps).estimate(maps.spectrum(still + other))
+    found = DopplerVelocity(maps).estimate(batch(CONFIG, still + other, np.zeros(1)))
     np.testing.assert_allclose(found.velocity[0], (0.9, 0.0), atol=0.03)
 
 
@@ -86,7 +87,7 @@ def test_without_echoes_the_covariance_is_large():
     maps = Heatmaps(CONFIG)
     noise = np.random.default_rng(2).normal(0, 20, (2, *CONFIG.frame_shape)).astype(np.int16)
     noise[1] = 0
-    found = DopplerVelocity(maps).estimate(maps.spectrum(noise))
+    found = DopplerVelocity(maps).estimate(batch(CONFIG, noise, np.arange(2)))
     assert np.isfinite(found.velocity).all()
     assert (np.linalg.eigvalsh(found.covariance)[:, 0] > 0.2).all()
     assert not found.seen.any()
@@ -94,7 +95,7 @@ def test_without_echoes_the_covariance_is_large():
 
 def test_faster_than_the_unambiguous_speed(room):
     maps = Heatmaps(CONFIG)
-    found = DopplerVelocity(maps).estimate(maps.spectrum(burst(room, (2.0, 0.0))))
+    found = DopplerVelocity(maps).estimate(batch(CONFIG, burst(room, (2.0, 0.0)), np.zeros(1)))
     # Straight ahead the world aliases to receding; to the sides it does not.
     np.testing.assert_allclose(found.velocity[0], (2.0, 0.0), atol=0.15)
 
@@ -151,7 +152,7 @@ def test_elevation_of_one_echo_and_of_two_at_once():
 def test_other_configurations(room, preset):
     config = PRESETS[preset]
     maps = Heatmaps(config)
-    found = DopplerVelocity(maps).estimate(maps.spectrum(burst(room, (0.8, 0.2), config=config)))
+    found = DopplerVelocity(maps).estimate(batch(config, burst(room, (0.8, 0.2), config=config), np.zeros(1)))
     np.testing.assert_allclose(found.velocity[0], (0.8, 0.2), atol=0.08)
 
 

@@ -3,17 +3,25 @@
 import numpy as np
 import pytest
 
+from radarize.batch import Signal
 from radarize.errors import InputError
-from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import DopplerVelocity, Velocities
 from radarize.odometry.integration import Odometry, VelocityConfig, VelocityFilter
 from radarize.odometry.rotation import MapRotation, Rotations
 from radarize.pose import compose, exponential
 from radarize.radar.presets import PRESETS
+from tests.batches import batch, of_spectrum
 from tests.echoes import record
 from tests.rooms import antenna_gain, furnished_room, walk
 
 CONFIG = PRESETS["radarize"]
+SIGNAL = Signal(CONFIG)
+
+
+def classical(velocity=None, rotation=None) -> Odometry:
+    """Least squares and a local map, unless told otherwise."""
+    heatmaps = SIGNAL.heatmaps
+    return Odometry(CONFIG, velocity or DopplerVelocity(heatmaps), rotation or MapRotation(heatmaps))
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +41,8 @@ def walked():
 @pytest.fixture(scope="module")
 def track(walked):
     adc, stamps, _ = walked
-    odometry = Odometry(CONFIG)
-    return [odometry.push(adc[i : i + 50], stamps[i : i + 50]) for i in range(0, len(adc), 50)]
+    odometry = classical()
+    return [odometry.follow(batch(SIGNAL, adc[i : i + 50], stamps[i : i + 50])) for i in range(0, len(adc), 50)]
 
 
 def test_walk(walked, track):
@@ -65,8 +73,8 @@ def test_covariance_of_steps(walked, track):
 
 def test_batch_size_does_not_matter(walked, track):
     adc, stamps, _ = walked
-    odometry = Odometry(CONFIG)
-    parts = [odometry.push(adc[i : i + 7], stamps[i : i + 7]) for i in range(0, 42, 7)]
+    odometry = classical()
+    parts = [odometry.follow(batch(SIGNAL, adc[i : i + 7], stamps[i : i + 7])) for i in range(0, 42, 7)]
     np.testing.assert_allclose(np.concatenate([p.pose for p in parts]), track[0].pose[:42], atol=1e-4)
 
 
@@ -79,7 +87,7 @@ def test_standing_still_does_not_turn():
         return np.broadcast_to([3.0, 2.0, 0.0], (*t.shape, 3)), np.zeros(t.shape)
 
     adc = record(CONFIG, still, points, amplitudes, stamps, rng, 20.0, block=16, gain=antenna_gain)
-    result = Odometry(CONFIG).push(adc, stamps)
+    result = classical().follow(batch(SIGNAL, adc, stamps))
     assert np.abs(result.pose[:, :2]).max() < 1e-3
     assert np.abs(np.degrees(result.pose[:, 2])).max() < 0.5  # of a map match; it does not add up
 
@@ -94,7 +102,7 @@ def test_turning_on_the_spot_either_way():
             return np.broadcast_to([3.0, 2.0, 0.0], (*t.shape, 3)), rate * t
 
         adc = record(CONFIG, turning, points, amplitudes, stamps, rng, 20.0, block=16, gain=antenna_gain)
-        result = Odometry(CONFIG).push(adc, stamps)
+        result = classical().follow(batch(SIGNAL, adc, stamps))
         expected = rate * (stamps[-1] - stamps[0])
         assert result.pose[-1, 2] == pytest.approx(expected, rel=0.06)
 
@@ -104,7 +112,7 @@ def test_lost_frames_are_bridged(walked):
     adc, valid = adc[:80].copy(), np.ones((80, *CONFIG.frame_shape[:2]), bool)
     adc[40:43], valid[40:43] = 0, False
     adc[60, 10:20], valid[60, 10:20] = 0, False
-    result = Odometry(CONFIG).push(adc, stamps[:80], valid)
+    result = classical().follow(batch(SIGNAL, adc, stamps[:80], valid))
     assert np.isfinite(result.pose).all() and np.isfinite(result.covariance).all()
     assert np.linalg.norm(result.pose[-1, :2] - truth[79, :2]) < 0.06
     assert result.covariance[42, 2, 2] > 2 * result.covariance[39, 2, 2]
@@ -112,10 +120,10 @@ def test_lost_frames_are_bridged(walked):
 
 def test_times_must_ascend(walked):
     adc, stamps, _ = walked
-    odometry = Odometry(CONFIG)
-    odometry.push(adc[:2], stamps[:2])
+    odometry = classical()
+    odometry.follow(batch(SIGNAL, adc[:2], stamps[:2]))
     with pytest.raises(InputError, match="ascending"):
-        odometry.push(adc[:2], stamps[:2])
+        odometry.follow(batch(SIGNAL, adc[:2], stamps[:2]))
 
 
 def test_estimators_can_be_swapped(walked):
@@ -124,11 +132,11 @@ def test_estimators_can_be_swapped(walked):
     class Forward:
         lever = 0.0
 
-        def estimate(self, spectrum, times):
-            n, seen = len(times), np.ones(len(times), bool)
+        def estimate(self, batch):
+            n, seen = len(batch), np.ones(len(batch), bool)
             return Velocities(np.tile([1.0, 0.0], (n, 1)), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.ones(n, int), seen)
 
-    result = Odometry(CONFIG, velocity=Forward(), rotation=MapRotation(Heatmaps(CONFIG))).push(adc[:20], stamps[:20])
+    result = classical(velocity=Forward()).follow(batch(SIGNAL, adc[:20], stamps[:20]))
     np.testing.assert_allclose(result.velocity[5:], np.tile([1.0, 0.0], (15, 1)), atol=0.02)
 
 
@@ -161,11 +169,11 @@ def test_a_turn_that_nothing_is_seen_of_is_claimed():
         return np.zeros((*t.shape, 3)), np.zeros(t.shape)
 
     class Sure:
-        def estimate(self, spectrum, times, velocities):
-            return Rotations(np.zeros(len(times)), np.full(len(times), 1e-8), np.ones(len(times), bool))
+        def estimate(self, batch, velocities):
+            return Rotations(np.zeros(len(batch)), np.full(len(batch), 1e-8), np.ones(len(batch), bool))
 
     adc = record(CONFIG, nowhere, np.array([[2.0, 0.0, 0.0]]), np.zeros(1), stamps, rng, 20.0, block=16)
-    result = Odometry(CONFIG, rotation=MapRotation(Heatmaps(CONFIG), prior=Sure())).push(adc, stamps)
+    result = classical(rotation=MapRotation(SIGNAL.heatmaps, prior=Sure())).follow(batch(SIGNAL, adc, stamps))
     # People turn by 20 deg in a second, and more; and it is noise, so some frames match by chance.
     assert np.sqrt(result.covariance[1:, 2, 2].sum()) > np.radians(15)
 
@@ -177,17 +185,19 @@ class Told:
         self.speed, self.rate, self.lever, self.variance, self.last = speed, rate, lever, variance, 0.0
 
     def velocity(self) -> "Told":
-        self.estimate = lambda spectrum, times: Velocities(
-            np.tile([self.speed, 0.0], (len(times), 1)),
-            np.tile(self.variance * np.eye(2), (len(times), 1, 1)),
-            np.full(len(times), 50),
-            np.ones(len(times), bool),
+        self.estimate = lambda batch: Velocities(
+            np.tile([self.speed, 0.0], (len(batch), 1)),
+            np.tile(self.variance * np.eye(2), (len(batch), 1, 1)),
+            np.full(len(batch), 50),
+            np.ones(len(batch), bool),
         )
         return self
 
     def rotation(self) -> "Told":
-        self.estimate = lambda spectrum, times, velocities: Rotations(
-            self.rate * np.diff(times, prepend=times[0]), np.full(len(times), 1e-6), np.ones(len(times), bool)
+        self.estimate = lambda batch, velocities: Rotations(
+            self.rate * np.diff(batch.stamps, prepend=batch.stamps[0]),
+            np.full(len(batch), 1e-6),
+            np.ones(len(batch), bool),
         )
         return self
 
@@ -196,9 +206,9 @@ def test_the_antennas_swing_about_the_origin():
     """Their middle is 1 cm to the left: turning to the left at 1.5 rad/s, it goes backward by 1.5 cm/s."""
     times = np.arange(60) * CONFIG.frame_period
     odometry = Odometry(CONFIG, Told(1.0 - 0.015, lever=0.01).velocity(), Told(rate=1.5).rotation())
-    found = odometry.follow(None, times)
+    found = odometry.follow(of_spectrum(SIGNAL, times, times))
     assert found.velocity[30:, 0] == pytest.approx(1.0, abs=1e-3)
-    antennas = DopplerVelocity(Heatmaps(CONFIG)).lever
+    antennas = DopplerVelocity(SIGNAL.heatmaps).lever
     # Eight of them half a wavelength apart, of which each is the sum of a transmitter's place and a receiver's.
     assert antennas == pytest.approx(3.5 * CONFIG.wavelength / 2 / 2, rel=0.05)
 
@@ -207,7 +217,7 @@ def test_the_antennas_swing_about_the_origin():
 def test_a_gap_is_claimed_by_its_length(gap):
     """As much as walks by hand change their speed meanwhile; within it, no step claims more than its velocities'."""
     times = np.concatenate([np.arange(10) * CONFIG.frame_period, 9 * CONFIG.frame_period + gap * np.array([1.0])])
-    found = Odometry(CONFIG, Told().velocity(), Told().rotation()).follow(None, times)
+    found = Odometry(CONFIG, Told().velocity(), Told().rotation()).follow(of_spectrum(SIGNAL, times, times))
     spread = np.sqrt(found.covariance[:, 0, 0])
     by_hand = {0.2: 0.0015, 0.5: 0.018, 1.0: 0.072, 2.0: 0.263}
     assert spread[10] == pytest.approx(by_hand[gap], rel=0.25)

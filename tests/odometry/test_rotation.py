@@ -4,14 +4,16 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from radarize.heatmaps import Heatmaps
+from radarize.batch import Signal
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.rotation import MapRotation, Rotations
 from radarize.pose import wrap
 from radarize.radar.presets import PRESETS
+from tests.batches import of_spectrum
 
 CONFIG = PRESETS["radarize"]
+SIGNAL = Signal(CONFIG)
 CELL = 0.05
 WORLD = gaussian_filter(np.random.default_rng(0).normal(size=(400, 400)), 2.5, mode="wrap")
 WORLD = np.clip(WORLD / WORLD.std() - 1, 0, None)
@@ -30,14 +32,14 @@ def see(rotation: MapRotation, poses: np.ndarray, rng: np.random.Generator) -> t
 
 def follow(times: np.ndarray, poses: np.ndarray, prior=None) -> Rotations:
     """What `MapRotation` makes of frames at true poses whose velocities are known."""
-    rotation = MapRotation(Heatmaps(CONFIG), prior=prior)
+    rotation = MapRotation(SIGNAL.heatmaps, prior=prior)
     rotation.features = lambda poses: see(rotation, poses, np.random.default_rng(1))
     velocity = np.gradient(poses[:, :2], times, axis=0)
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     velocity = np.stack([cos * velocity[:, 0] + sin * velocity[:, 1], cos * velocity[:, 1] - sin * velocity[:, 0]], 1)
     count = len(times)
     known = Velocities(velocity, np.tile(1e-4 * np.eye(2), (count, 1, 1)), np.full(count, 50), np.ones(count, bool))
-    return rotation.estimate(poses, times, known)
+    return rotation.estimate(of_spectrum(SIGNAL, poses, times - CONFIG.burst_center), known)
 
 
 @pytest.mark.parametrize("rate", [5, 10, 15, 30])
@@ -78,8 +80,8 @@ class Unsure:
         self.turns, self.lost = turns.copy(), lost
         self.turns[lost] = 0.0
 
-    def estimate(self, spectrum, times, velocities) -> Rotations:
-        at = np.arange(len(times)) == self.lost
+    def estimate(self, batch, velocities) -> Rotations:
+        at = np.arange(len(batch)) == self.lost
         return Rotations(self.turns, np.where(at, np.radians(30) ** 2, 1e-5), ~at)
 
 
@@ -94,13 +96,13 @@ def test_the_search_goes_as_far_as_the_prior_is_unsure():
 
 @pytest.mark.parametrize("rate", [5, 15, 30])
 def test_what_a_blind_second_claims_does_not_depend_on_the_frame_rate(rate):
-    rotation = MapRotation(Heatmaps(CONFIG))
+    rotation = MapRotation(SIGNAL.heatmaps)
     shape = len(rotation._ranges), len(rotation._sines)
-    rotation.features = lambda count: (np.zeros((count, *shape), np.float32),) * 2
+    rotation.features = lambda frames: (np.zeros((len(frames), *shape), np.float32),) * 2
     count = rate + 1
     nothing = Velocities(np.zeros((count, 2)), np.tile(np.eye(2), (count, 1, 1)), np.zeros(count, int), np.zeros(count))
     rotation._spread[1, 1] = np.radians(5) ** 2
-    found = rotation.estimate(count, np.arange(count) / rate, nothing)
+    found = rotation.estimate(of_spectrum(SIGNAL, np.arange(count), np.arange(count) / rate), nothing)
     s = rotation.settings
     assert not found.seen[1:].any()
     assert found.variance.sum() == pytest.approx(np.radians(5) ** 2 + s.wander**2 / 3 + s.unseen**2, rel=1e-6)

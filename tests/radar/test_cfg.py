@@ -4,9 +4,9 @@ from hypothesis import strategies as st
 
 from radarize.errors import InputError
 from radarize.radar.array import BOARDS
-from radarize.radar.cfg import load_config, parse_cfg, write_cfg
+from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
-from radarize.radar.presets import PRESETS
+from radarize.radar.presets import PRESETS, load_config
 
 PAPER = """
 % the paper's 1843_v1

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import FrameAssembler, Packet, decode, encode, packets, range_balance
+from radarize.radar.dca1000 import FrameAssembler, Packet, decode, encode, range_balance
+from tests.packets import packets
 
 ORDERS = [order for n in (1, 2, 3) for order in itertools.permutations((0, 1, 2), n)]
 

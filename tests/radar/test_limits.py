@@ -1,9 +1,8 @@
 import pytest
 
 from radarize.errors import InputError
-from radarize.radar.cfg import load_config
 from radarize.radar.limits import check_limits
-from radarize.radar.presets import PRESETS
+from radarize.radar.presets import PRESETS, load_config
 
 BASE = PRESETS["radarize"]
 

@@ -4,7 +4,7 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.radar.array import BOARDS
-from radarize.radar.cfg import load_config
+from radarize.radar.presets import load_config
 from radarize.radar.studio import parse_studio
 
 

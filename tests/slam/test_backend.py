@@ -1,5 +1,6 @@
 """The whole back end: synthetic loops, real lidar, and input that is not as it should be."""
 
+import tracemalloc
 from dataclasses import replace
 from pathlib import Path
 
@@ -7,10 +8,10 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
+from radarize.log import Log
 from radarize.pose import between, compose
 from radarize.slam.backend import Slam
 from radarize.slam.config import PRESETS, SlamConfig
-from radarize.slam.log import Log
 from radarize.tum import planar, read_tum
 from tests.slam.world import align, ate, box, ring, scan, walk
 
@@ -251,3 +252,34 @@ def test_interleaving_does_not_matter():
 def test_presets_survive_a_round_trip(name):
     config = SlamConfig.preset(name)
     assert SlamConfig.model_validate_json(config.model_dump_json()) == config
+
+
+def test_standing_still_takes_no_nodes_and_hardly_any_memory():
+    """An hour at 30 Hz would take less than 20 MB, by the slope; and whoever walks on finds the map where it was."""
+    config, rng = SlamConfig.preset("radar"), np.random.default_rng(0)
+    azimuths = np.radians(np.linspace(-44, 44, 12))
+    wall = 3 / np.cos(azimuths)
+    slam, taken, pose = Slam(config), {}, np.zeros(3)
+
+    def push(k, step):
+        nonlocal pose
+        pose = compose(pose, step)
+        slam.add_odometry(k / 30, pose, np.diag([1e-6, 1e-6, 1e-8]))
+        slam.add_scan(k / 30, azimuths, wall + rng.normal(0, 0.02, len(wall)))
+
+    tracemalloc.start()
+    for k in range(3000):
+        push(k, rng.normal(0, [1e-4, 1e-4, 1e-5]))
+        if k in (500, 2999):
+            taken[k] = tracemalloc.get_traced_memory()[0]
+    tracemalloc.stop()
+    assert (taken[2999] - taken[500]) / 2499 * 108_000 < 20e6
+    assert len(slam.nodes) == 1
+    spread = slam.odometry.motion(slam.nodes[0].time, 2999 / 30)[1]
+    assert spread[0, 0] == pytest.approx(3000e-6, rel=0.05)  # no step's covariance is forgotten
+    for k in range(3000, 3060):
+        push(k, [0.02, 0, 0])
+    slam.finish()
+    times, poses = slam.trajectory()
+    assert len(times) == 3060 and len(slam.nodes) > 3
+    assert poses[-1] == pytest.approx(pose, abs=0.1) and np.abs(poses[:3000, :2]).max() < 0.1

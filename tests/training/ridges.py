@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from radarize.features.maps import AZIMUTHS, MAPS, MapMaker
 from radarize.mapping.scans import BEARINGS
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter, Stream
-from radarize.training.maps import AZIMUTHS, MAPS, MapMaker
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 16, "samples": 16})
 

@@ -15,24 +15,25 @@ from typer.testing import CliRunner
 
 from radarize.cli import app
 from radarize.errors import InputError
-from radarize.nets.weights import load, read
+from radarize.features.table import OCCUPANCY, VELOCITY, YAW, Table
+from radarize.methods.registry import find_task
+from radarize.nets import losses
+from radarize.nets.weights import header_of, load, read
 from radarize.recording import Recording
-from radarize.training import losses
-from radarize.training.table import Table
-from radarize.training.tasks import TASKS
 from radarize.training.team import Team
 from radarize.training.train import train
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 ROOT = Path(__file__).parents[2]
+TASKS = {kind: find_task(kind) for kind in ("translation", "rotation", "segmentation")}
 QUICK = {
     "translation": replace(TASKS["translation"].defaults, width=8, frames=1, epochs=10, batch=32, rate=3e-3),
     "rotation": replace(TASKS["rotation"].defaults, width=8, epochs=10, batch=32, rate=3e-3),
     "segmentation": replace(TASKS["segmentation"].defaults, width=4, epochs=3, batch=16, rate=3e-3),
 }
 TINY = replace(QUICK["translation"], width=2, epochs=4, batch=32)
-LAWS = {kind: task.truth[0] for kind, task in TASKS.items()}
+LAWS = {kind: task.truth[0].name for kind, task in TASKS.items()}
 
 
 @pytest.fixture(scope="module")
@@ -42,9 +43,10 @@ def small(tmp_path_factory):
 
 def judged(kind: str, weights: Path, recording: Path) -> dict[str, float]:
     """Metrics of a network on a recording it has not seen."""
-    net, header = load(weights, CONFIG)
     task = TASKS[kind]
-    table = Table.read([recording], header.maps, task.truth)
+    net, header = load(weights, task.network, CONFIG)
+    table = task.table([recording])
+    assert header.maps == tuple(table.maps)
     starts = table.starts((header.frames - 1) * max(header.spacings) + 1)
     frames = task.frames(starts, torch.full_like(starts, header.spacings[-1]), header.frames)
     with torch.no_grad():
@@ -53,8 +55,8 @@ def judged(kind: str, weights: Path, recording: Path) -> dict[str, float]:
 
 def hazards(weights: Path, recording: Path) -> tuple[float, float]:
     """Cells that hold the first surface, and how many of them the network expects."""
-    net, header = load(weights, CONFIG)
-    table = Table.read([recording], header.maps, ("occupancy",))
+    net, header = load(weights, TASKS["segmentation"].network, CONFIG)
+    table = Table.read([recording], header.maps, (OCCUPANCY,))
     label = table.truth["occupancy"]
     with torch.no_grad():
         likely = net.estimate(table.window(table.starts(1)[:, None]))
@@ -87,11 +89,11 @@ def test_uncertainty_follows_what_is_seen(tmp_path):
         write(tmp_path / "data" / f"{k}.h5", "velocity", 120, k, blank=0.4)
     settings = replace(QUICK["translation"], epochs=12)
     weights = train("translation", tmp_path / "data", tmp_path / "net.safetensors", settings=settings)
-    net, header = load(weights)
+    net, header = load(weights, TASKS["translation"].network)
     claimed = []
     for blank in (0, 1):
         path = write(tmp_path / f"{blank}.h5", "velocity", 100, 9, blank)
-        table = Table.read([path], header.maps, ("velocity",))
+        table = Table.read([path], header.maps, (VELOCITY,))
         with torch.no_grad():
             covariance = net.estimate(table.window(table.starts(1)[:, None]))[1]
         claimed.append(covariance.diagonal(dim1=1, dim2=2).median(dim=0).values.sqrt().numpy())
@@ -112,7 +114,7 @@ def test_resumed_is_uninterrupted(small, tmp_path):
 import os, torch
 torch.set_num_threads(1)
 from radarize.training.train import train
-from radarize.training.tasks import Settings
+from radarize.methods.task import Settings
 def stop(stage, done, total):
     if stage == "training" and done >= 0.6 * total:
         os.kill(os.getpid(), 9)
@@ -129,7 +131,7 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
     resumed = train("translation", small, tmp_path / "part.safetensors", settings=TINY, resume=True, say=said.append)
     assert said[0] == "resuming after epoch 2"
     assert same(whole, resumed)
-    assert load(whole)[1].metrics == load(resumed)[1].metrics
+    assert header_of(whole).metrics == header_of(resumed).metrics
     assert not same(whole, train("translation", small, tmp_path / "c.safetensors", settings=replace(TINY, seed=1)))
 
 
@@ -149,7 +151,7 @@ class Watched(module.Trainer):
             print(digest.hexdigest(), found["loss"], found["training_loss"], file=file)
         return found
 module.Trainer = Watched
-from radarize.training.tasks import Settings
+from radarize.methods.task import Settings
 module.train("translation", {str(small)!r}, {str(tmp_path / "net.safetensors")!r}, settings={TINY!r}, device="cpu")
 """
     (tmp_path / "both.py").write_text(code)
@@ -161,15 +163,14 @@ module.train("translation", {str(small)!r}, {str(tmp_path / "net.safetensors")!r
     assert first == second and len(first.splitlines()) == TINY.epochs
     losses = [float(line.split()[2]) for line in first.splitlines()]
     assert losses[-1] < losses[0]
-    load(tmp_path / "net.safetensors", CONFIG)
+    load(tmp_path / "net.safetensors", TASKS["translation"].network, CONFIG)
 
 
 def test_it_ends_when_it_gets_no_better(small, tmp_path, monkeypatch):
-    task = TASKS["translation"]
-    monkeypatch.setattr(type(task), "metrics", lambda self, means: {"loss": 1.0})
+    monkeypatch.setattr(type(TASKS["translation"]), "metrics", lambda self, means: {"loss": 1.0})
     settings = replace(TINY, epochs=50, patience=2)
     weights = train("translation", small, tmp_path / "net.safetensors", settings=settings)
-    assert load(weights)[1].epochs == 3
+    assert header_of(weights).epochs == 3
 
 
 def test_a_loss_that_is_no_number_is_said(small, tmp_path, monkeypatch):
@@ -181,7 +182,7 @@ def test_a_loss_that_is_no_number_is_said(small, tmp_path, monkeypatch):
 
 def test_workers_read_the_same(small):
     paths = sorted(small.glob("*.h5"))
-    alone, together = (Table.read(paths, ("doppler_azimuth",), ("velocity", "yaw"), workers) for workers in (1, 2))
+    alone, together = (Table.read(paths, ("doppler_azimuth",), (VELOCITY, YAW), workers=workers) for workers in (1, 2))
     assert alone.lengths == together.lengths == [60, 60, 60]
     assert torch.equal(alone.maps["doppler_azimuth"], together.maps["doppler_azimuth"])
     assert all(torch.equal(alone.truth[name], together.truth[name]) for name in ("velocity", "yaw"))
@@ -200,7 +201,7 @@ def test_the_command(tmp_path):
     done = CliRunner().invoke(app, [*arguments, *tiny])
     assert done.exit_code == 0 and done.stdout.strip() == str(tmp_path / "net.safetensors")
     assert "rmse_m_s" in done.stderr
-    header = load(tmp_path / "net.safetensors", CONFIG)[1]
+    header = load(tmp_path / "net.safetensors", TASKS["translation"].network, CONFIG)[1]
     assert (header.width, header.epochs, header.seed, header.data, header.split) == (2, 1, 1, "data", "random-0")
 
 
@@ -233,13 +234,13 @@ def test_recordings_of_two_radars_or_broken_truth_are_refused(tmp_path):
     from walks import walk
 
     with pytest.raises(InputError, match="b.h5: has maps of rows 8 instead of 16 as in a.h5, expected one radar's"):
-        Table.read([good, walk(tmp_path / "b.h5")], ("doppler_azimuth",), ("velocity",))
+        Table.read([good, walk(tmp_path / "b.h5")], ("doppler_azimuth",), (VELOCITY,))
     import h5py
 
     with h5py.File(good, "r+") as file:
         file["truth/velocity"][:] = np.nan
     with pytest.raises(InputError, match="a.h5: /truth/velocity lacks values or holds no numbers"):
-        Table.read([good], ("doppler_azimuth",), ("velocity",))
+        Table.read([good], ("doppler_azimuth",), (VELOCITY,))
 
 
 def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
@@ -250,7 +251,7 @@ def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
     with h5py.File(paths[0], "r+") as file:
         file["truth/velocity"][3, 1] = np.nan
         file["truth/pose"][7] = np.nan
-    table = Table.read(paths, ("doppler_azimuth",), ("velocity", "yaw"))
+    table = Table.read(paths, ("doppler_azimuth",), (VELOCITY, YAW))
     assert table.starts(1).tolist() == [0, 1, 2, 4, 5, 6, *range(8, 16)]
     assert table.starts(3).tolist() == [0, 4, *range(8, 14)]
     table.sensed = {"imu": torch.zeros(16, 15, 6)}

@@ -6,29 +6,14 @@ in percent. Row 0 is the top; ``origin`` is x, y, yaw of the lower left corner. 
 """
 
 from pathlib import Path
-from typing import Annotated, Literal
 
 import numpy as np
 from PIL import Image
-from pydantic import BaseModel, Field, ValidationError
 
 from radarize.errors import InputError
+from radarize.runfolder.occupancy import MapFile
 from radarize.yamlfile import read_yaml
 from radarsim.scene.importers.grid import OccupancyGrid
-
-Number = Annotated[float, Field(allow_inf_nan=False)]
-
-
-class MapFile(BaseModel):
-    """The keys of a map's .yaml; others are ignored."""
-
-    image: str
-    resolution: Annotated[float, Field(gt=0, le=1)]
-    origin: tuple[Number, Number, Number]
-    negate: Annotated[int, Field(ge=0, le=1)] = 0
-    occupied_thresh: Annotated[float, Field(ge=0, le=1)] = 0.65
-    free_thresh: Annotated[float, Field(ge=0, le=1)] = 0.196
-    mode: Literal["trinary", "scale", "raw"] = "trinary"
 
 
 def is_map(path: Path) -> bool:
@@ -51,12 +36,7 @@ def grid(path: Path) -> OccupancyGrid:
         if not beside.is_file():
             raise InputError(f"{path}: has no {beside.name} beside it, expected the map's resolution and origin there")
         path = beside
-    try:
-        about = MapFile.model_validate(read_yaml(path))
-    except ValidationError as error:
-        problem = error.errors()[0]
-        field = ".".join(str(part) for part in problem["loc"]) or "file"
-        raise InputError(f"{path}: {field} is {problem['input']!r}: {problem['msg'].lower()}") from error
+    about = MapFile.read(path)
     picture = path.parent / about.image
     try:
         with Image.open(picture) as image:

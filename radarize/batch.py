@@ -1,0 +1,163 @@
+"""What goes through the pipeline: a batch of frames, and what is made of them, once, when somebody asks for it."""
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
+
+from radarize.features.maps import MapMaker
+from radarize.heatmaps import HeatmapConfig, Heatmaps
+from radarize.points import DENSE, PointClouds
+from radarize.radar.config import RadarConfig
+from radarize.stopwatch import stage
+
+#: Frames a batch: enough to vectorise over, few enough to stay in cache.
+BATCH = 16
+#: A frame with a smaller share of its chirps is left out. On a simulated walk, with the rest of each burst lost, 95 %
+#: of Doppler velocities are within 0.02 m/s from whole bursts, 0.06 m/s from an eighth, 0.21 m/s from a sixteenth.
+LEAST_SHARE = 1 / 8
+
+Made = TypeVar("Made")
+
+
+class Signal:
+    """What turns samples of one radar into spectra, maps and points; all batches of a stream share it.
+
+    Args:
+        radar: configuration.
+        settings: of the heat maps.
+    """
+
+    def __init__(self, radar: RadarConfig, settings: HeatmapConfig | None = None):
+        self.radar = radar
+        self.heatmaps = Heatmaps(radar, settings=settings)
+
+    @cached_property
+    def maker(self) -> MapMaker:
+        """Of the maps that networks see."""
+        return MapMaker(self.radar)
+
+    @cached_property
+    def clouds(self) -> PointClouds:
+        """Of many sparse points.
+
+        Raises:
+            InputError: see `PointClouds`.
+        """
+        return PointClouds(self.radar, DENSE)
+
+
+class Batch:
+    """Consecutive frames, none of them lost or silent.
+
+    Args:
+        signal: what makes something of them.
+        samples: raw I/Q.
+        stamps: starts of the frames' first chirps, s.
+        valid: False where a chirp was lost; all true if None.
+        numbers: of the frames, counted as the radar delivered them; from 0 if None.
+        before: stamp of the frame before the first, s; None if there was none.
+    """
+
+    def __init__(
+        self,
+        signal: Signal,
+        samples: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        stamps: Float[np.ndarray, "frame"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+        numbers: Int[np.ndarray, "frame"] | None = None,
+        before: float | None = None,
+    ):
+        self.signal, self.samples, self.valid = signal, samples, valid
+        self.stamps = np.asarray(stamps, float)
+        self.numbers = np.arange(len(samples)) if numbers is None else numbers
+        self.before = before
+        self._made: dict[Callable, object] = {}
+
+    def __len__(self) -> int:
+        return len(self.samples)
+
+    @property
+    def centers(self) -> Float[np.ndarray, "frame"]:
+        """Burst centres, s: the instants that motion and scans belong to."""
+        return self.stamps + self.signal.radar.burst_center
+
+    @property
+    def gaps(self) -> Float[np.ndarray, "frame"]:
+        """Seconds since the frame before; not-a-number for the first of all."""
+        return np.diff(self.stamps, prepend=np.nan if self.before is None else self.before)
+
+    @cached_property
+    def spectrum(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
+        """See `Heatmaps.spectrum`."""
+        with stage("spectra"):
+            return self.signal.heatmaps.spectrum(self.samples, self.valid)
+
+    def maps(self, names: tuple[str, ...]) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
+        """Maps that networks see, dB, see `radarize.features.maps`."""
+        missing = tuple(name for name in names if name not in self._maps)
+        if missing:
+            self._maps.update(self.signal.maker.of(self.spectrum, missing))
+        return {name: self._maps[name] for name in names}
+
+    @cached_property
+    def _maps(self) -> dict[str, np.ndarray]:
+        return {}
+
+    @cached_property
+    def points(self) -> tuple[Float[np.ndarray, "point 6"], Int[np.ndarray, "point"]]:
+        """Sparse points and the frame of the batch that each belongs to, see `PointClouds`."""
+        with stage("points"):
+            return self.signal.clouds.of(self.signal.heatmaps, self.spectrum)
+
+    def made(self, by: Callable[["Batch"], Made]) -> Made:
+        """What `by` makes of the batch: called once, however many ask. Odometry and scans that several pipelines share
+        so move on once a batch."""
+        if by not in self._made:
+            self._made[by] = by(self)
+        return self._made[by]
+
+
+class Intake:
+    """Makes batches of what a radar delivers.
+
+    Args:
+        signal: that the batches share.
+
+    Attributes:
+        taken: frames so far.
+        lost: of these, frames that are lost, nearly lost, or silent: left out, for a gap says more than nothing does.
+    """
+
+    def __init__(self, signal: Signal):
+        self.signal = signal
+        self.taken = self.lost = 0
+        self._before: float | None = None
+
+    def take(
+        self,
+        samples: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        stamps: Float[np.ndarray, "frame"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+    ) -> Batch:
+        """The next frames, without those that are left out.
+
+        Args:
+            samples: raw I/Q.
+            stamps: starts of the frames' first chirps, s.
+            valid: False where a chirp was lost.
+        """
+        used = samples.reshape(len(samples), -1).any(axis=1)
+        if valid is not None:
+            used &= valid.mean(axis=(1, 2)) >= LEAST_SHARE
+            valid = valid[used]
+        numbers = self.taken + np.flatnonzero(used)
+        self.taken += len(used)
+        self.lost += int(np.count_nonzero(~used))
+        batch = Batch(self.signal, samples[used], np.asarray(stamps, float)[used], valid, numbers, self._before)
+        if len(batch):
+            self._before = float(batch.stamps[-1])
+        return batch

@@ -1,0 +1,210 @@
+"""Recordings' maps, other readings and truth in memory, ready to be indexed: an hour of two range maps takes 1.7 GB."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import psutil
+import torch
+from jaxtyping import Float, Int
+from torch import Tensor
+
+from radarize.errors import InputError
+from radarize.features.grid import Grid
+from radarize.features.maps import Maker, MapMaker, maps_of
+from radarize.recording import Recording
+from radarize.tum import planar
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What is read of a recording's frames: labels, or what networks see besides maps.
+
+    Attributes:
+        name: of it.
+        where: data set of the recording that it is made of.
+        of: makes it of some of a recording's frames, a row a frame.
+    """
+
+    name: str
+    where: str
+    of: Callable[[Recording, slice], np.ndarray]
+
+
+def _velocity(recording: Recording, frames: slice) -> np.ndarray:
+    return recording.read("truth/velocity")[frames, :2].astype(np.float32)
+
+
+def _yaw(recording: Recording, frames: slice) -> np.ndarray:
+    return planar(recording.read("truth/pose")[frames])[:, 2:].astype(np.float32)
+
+
+def _pose(recording: Recording, frames: slice) -> np.ndarray:
+    return recording.read("truth/pose")[frames]
+
+
+def _occupancy(recording: Recording, frames: slice) -> np.ndarray:
+    return recording.read("truth/occupancy")[frames]
+
+
+#: Truth that several methods learn from: m/s (forward, left); rad; m and quaternion; cells of `radarize.nets.losses`.
+VELOCITY = Reading("velocity", "truth/velocity", _velocity)
+YAW = Reading("yaw", "truth/pose", _yaw)
+POSE = Reading("pose", "truth/pose", _pose)
+OCCUPANCY = Reading("occupancy", "truth/occupancy", _occupancy)
+_BATCH = 32
+
+
+class Table:
+    """Frames of recordings, one after the other.
+
+    Attributes:
+        maps: by name, (frame, row, azimuth) float16, dB.
+        truth: labels by name, (frame, ...).
+        lengths: frames of each recording.
+        grid: of the maps; None without any.
+        frame_period: s.
+        sensed: what else networks see by name, (frame, ...).
+    """
+
+    def __init__(
+        self,
+        maps: dict[str, Tensor],
+        truth: dict[str, Tensor],
+        lengths: Sequence[int],
+        grid: Grid | None,
+        frame_period: float,
+        sensed: dict[str, Tensor] | None = None,
+    ):
+        self.maps, self.truth, self.lengths, self.grid = maps, truth, list(lengths), grid
+        self.frame_period, self.sensed = frame_period, sensed or {}
+
+    @classmethod
+    def read(
+        cls,
+        paths: Sequence[Path],
+        maps: Sequence[str],
+        truth: Sequence[Reading] = (),
+        sensed: Sequence[Reading] = (),
+        maker: type[Maker] = MapMaker,
+        workers: int = 1,
+        progress: Callable[..., None] = lambda *where: None,
+    ) -> "Table":
+        """Read recordings of maps, or make the maps of recordings of samples.
+
+        Args:
+            paths: recordings of one radar configuration.
+            maps: names of `maker`'s.
+            truth, sensed: what else to read.
+            maker: of the maps.
+            workers: processes that read; more than one pays where maps have to be made.
+            progress: called with (stage, recordings done, recordings in all).
+
+        Raises:
+            InputError: a recording lacks something, differs from the others in its maps' grid, has truth that is all
+                unknown, or memory does not suffice.
+        """
+        lengths, periods, grids = zip(*(_open(path, maps, maker) for path in paths), strict=True)
+        for path, period, grid in zip(paths, periods, grids, strict=True):
+            if grid and (difference := grids[0].difference(grid)):
+                raise InputError(f"{path}: has maps of {difference} as in {paths[0].name}, expected one radar's")
+            if abs(period - periods[0]) > 1e-6:
+                raise InputError(
+                    f"{path}: has frames every {period:g} s, expected {periods[0]:g} s as in {paths[0].name}"
+                )
+        shapes = _shapes(paths[0], maps, maker)
+        size = 2 * sum(lengths) * sum(rows * columns for rows, columns in shapes.values())
+        if size > (free := psutil.virtual_memory().available):
+            raise InputError(
+                f"{paths[0].parent}: its maps take {size / 1e9:.1f} GB, expected at most {free / 1e9:.1f} GB"
+            )
+        joined = {name: np.empty((sum(lengths), *shape), np.float16) for name, shape in shapes.items()}
+        others: dict[str, list[np.ndarray]] = {reading.name: [] for reading in (*truth, *sensed)}
+        read = partial(_read, maps=tuple(maps), readings=(*truth, *sensed), kind=maker)
+        pool = ProcessPoolExecutor(workers, get_context("spawn")) if workers > 1 and len(paths) > 1 else None
+        try:
+            first = 0
+            for done, (made, rows) in enumerate((pool.map if pool else map)(read, paths)):
+                for name in maps:
+                    joined[name][first : first + lengths[done]] = made[name]
+                for name in others:
+                    others[name].append(rows[name])
+                first += lengths[done]
+                progress("reading", done + 1, len(paths))
+        finally:
+            if pool:
+                pool.shutdown(cancel_futures=True)
+        rows = {name: torch.from_numpy(np.concatenate(values)) for name, values in others.items()}
+        return cls(
+            {name: torch.from_numpy(values) for name, values in joined.items()},
+            {reading.name: rows[reading.name] for reading in truth},
+            lengths,
+            grids[0],
+            periods[0],
+            {reading.name: rows[reading.name] for reading in sensed},
+        )
+
+    def starts(self, reach: int) -> Int[Tensor, "window"]:
+        """Frames that have `reach` - 1 more after them in their recording, with truth and readings that are known."""
+        first = np.cumsum([0, *self.lengths[:-1]])
+        windows = [np.arange(a, a + max(0, n - reach + 1)) for a, n in zip(first, self.lengths, strict=True)]
+        found = torch.from_numpy(np.concatenate(windows))
+        blind = torch.zeros(sum(self.lengths) + 1, dtype=torch.int64)  # unknown ones up to each frame
+        for values in (*self.truth.values(), *self.sensed.values()):
+            blind[1:] |= ~values.isfinite().flatten(1).all(dim=1)
+        blind = blind.cumsum(0)
+        return found[blind[found + reach] == blind[found]]
+
+    def divide(self, count: int) -> tuple["Table", "Table"]:
+        """The first `count` recordings, and the others."""
+        frame = sum(self.lengths[:count])
+        parts = (slice(frame), self.lengths[:count]), (slice(frame, None), self.lengths[count:])
+
+        def some(columns: dict[str, Tensor], part: slice) -> dict[str, Tensor]:
+            return {name: values[part] for name, values in columns.items()}
+
+        return tuple(
+            Table(
+                some(self.maps, part), some(self.truth, part), lengths, self.grid, self.frame_period,
+                some(self.sensed, part),
+            ) for part, lengths in parts
+        )  # fmt: skip
+
+    def window(self, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item frame map row azimuth"]:
+        """Maps of windows of frames."""
+        return torch.stack([values[frames] for values in self.maps.values()], dim=2).float()
+
+
+def _shapes(path: Path, maps: Sequence[str], maker: type[Maker]) -> dict[str, tuple[int, int]]:
+    with Recording(path) as recording:
+        axes = {name: maker.axes(recording.config, name) for name in maps}
+    return {name: (own.rows, len(own.azimuths)) for name, own in axes.items()}
+
+
+def _open(path: Path, maps: Sequence[str], maker: type[Maker]) -> tuple[int, float, Grid | None]:
+    """Frames that networks see, their period, and the grid of their maps, if they see any."""
+    with Recording(path) as recording:
+        stride = maker.stride(recording.config)
+        grid = Grid.of(recording.config, maps[0], maker) if maps else None
+        return -(-len(recording) // stride), stride * recording.config.frame_period, grid
+
+
+def _read(path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker]) -> tuple[dict, dict]:
+    """Maps, and all else, of one recording."""
+    with Recording(path) as recording:
+        maker, count = kind(recording.config), len(recording)
+        stride = maker.stride(recording.config)
+        size = _BATCH * stride
+        starts = range(0, count if maps else 0, size)
+        parts = [maps_of(recording, start, min(start + size, count), maps, maker, stride) for start in starts]
+        found, frames = {}, slice(0, count, stride)
+        for reading in readings:
+            rows = found[reading.name] = reading.of(recording, frames)
+            # Some may be unknown: a tracking camera is blind now and then.
+            if len(rows) < -(-count // stride) or not np.isfinite(rows).any():
+                raise InputError(f"{path}: /{reading.where} lacks values or holds no numbers, expected {count} frames")
+        return {name: np.concatenate([part[name] for part in parts]) for name in maps}, found

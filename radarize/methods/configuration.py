@@ -1,0 +1,76 @@
+"""All that somebody may want to set of the pipeline, in one place: ``radarize config`` prints it, and ``radarize run
+--config mine.yaml`` takes it."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from textwrap import wrap
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from radarize.errors import InputError
+from radarize.heatmaps import HeatmapConfig
+from radarize.mapping.scans import ScanConfig
+from radarize.methods.radarize.settings import FusionConfig, TurnConfig
+from radarize.odometry.doppler import DopplerConfig
+from radarize.odometry.integration import VelocityConfig
+from radarize.odometry.rotation import RotationConfig
+from radarize.slam.config import SlamConfig
+from radarize.yamlfile import read_yaml
+
+
+class Configuration(BaseModel):
+    """The pipeline's settings; each section belongs to one step, and is described where that step stands."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    heatmaps: HeatmapConfig = Field(HeatmapConfig(), description="spectra and beamformers of the classical methods")
+    scans: ScanConfig = Field(ScanConfig(), description="echoes in range-azimuth maps, of scans without networks")
+    doppler: DopplerConfig = Field(DopplerConfig(), description="velocity from single echoes")
+    rotation: RotationConfig = Field(RotationConfig(), description="turns by matching frames with a local map")
+    velocity: VelocityConfig = Field(VelocityConfig(), description="filter of velocities, whoever tells them")
+    fusion: FusionConfig = Field(FusionConfig(), description="velocities by network and Doppler together")
+    turns: TurnConfig = Field(TurnConfig(), description="turns by the network")
+    slam: SlamConfig = Field(
+        default_factory=lambda: SlamConfig.preset("radar"),
+        description="the back end",
+    )
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Configuration":
+        """The defaults with what a YAML file says otherwise: sections and fields named as here.
+
+        Raises:
+            InputError: no such file, or a field that does not exist or has an impossible value.
+        """
+        changes = read_yaml(path) or {}
+        if not isinstance(changes, dict):
+            raise InputError(f"{path}: holds a {type(changes).__name__}, expected sections as `radarize config` prints")
+        try:
+            return cls.model_validate(_merged(cls().model_dump(), changes))
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"]))
+            raise InputError(f"{path}: {where} is {first['input']!r}, expected: {first['msg']}") from error
+
+    def text(self) -> str:
+        """As YAML, with what each field means beside it."""
+        return "\n".join(_lines(self, "")) + "\n"
+
+
+def _merged(settings: dict, changes: dict) -> dict:
+    """Settings with some of them changed, however deep."""
+    both = {name for name in changes if isinstance(changes[name], dict) and isinstance(settings.get(name), dict)}
+    return settings | changes | {name: _merged(settings[name], changes[name]) for name in both}
+
+
+def _lines(section: BaseModel, indent: str) -> Iterator[str]:
+    for name, field in type(section).model_fields.items():
+        value = getattr(section, name)
+        if field.description:
+            yield from wrap(field.description, 118, initial_indent=f"{indent}# ", subsequent_indent=f"{indent}# ")
+        if isinstance(value, BaseModel):
+            yield f"{indent}{name}:"
+            yield from _lines(value, indent + "  ")
+        else:
+            yield f"{indent}{name}: {json.dumps(value)}"

@@ -1,0 +1,51 @@
+"""Scans by RadarHD: of the picture that it draws, the first surface on each bearing."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch.nn.functional import adaptive_max_pool2d
+
+from radarize.batch import Batch
+from radarize.mapping import echoes
+from radarize.mapping.scans import BEARINGS
+from radarize.methods.method import Inputs
+from radarize.methods.radarhd.network import RadarHdNet
+from radarize.nets.weights import load
+from radarize.radar.config import RadarConfig
+from radarize.stopwatch import stage
+
+
+class RadarHdScans:
+    """Scans of a stream's frames.
+
+    Args:
+        radar: configuration.
+        weights: file.
+
+    Raises:
+        InputError: no such weights, or they are for another radar.
+    """
+
+    def __init__(self, radar: RadarConfig, weights: Path):
+        self._net, header = load(weights, RadarHdNet, radar)
+        self._windows, self._ranges = header.windows(radar), radar.ranges - radar.range_bias
+
+    @torch.inference_mode()
+    def picture(self, batch: Batch) -> Float[torch.Tensor, "frame range direction"]:
+        """Probability of a surface in cells of range and `radarize.methods.radarhd.network.columns(DRAWN)`."""
+        # One by one: a window has 41 maps.
+        return torch.cat([self._net.estimate(window[None]) for window in self._windows.push(batch)[0].maps])
+
+    def scan(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
+        """Ranges on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen."""
+        with stage("scans"):
+            likely = adaptive_max_pool2d(self.picture(batch), (len(self._ranges), len(BEARINGS))).numpy()
+            bins = echoes.first(likely > float(self._net.least), likely)
+        return np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
+
+
+def scans(inputs: Inputs) -> RadarHdScans:
+    """By the inputs' weights."""
+    return RadarHdScans(inputs.radar, inputs.weights.of("radarhd"))

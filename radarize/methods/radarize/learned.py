@@ -1,0 +1,124 @@
+"""Velocity and turns by the networks (paper, sections 4.2 and 4.3), as estimators like any others."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float, Int
+
+from radarize.batch import Batch
+from radarize.methods.radarize.motion import RotationNet, TranslationNet
+from radarize.methods.radarize.settings import TurnConfig
+from radarize.nets.weights import load
+from radarize.odometry.doppler import Velocities
+from radarize.odometry.rotation import Rotations
+from radarize.odometry.ties import Ties
+from radarize.radar.config import RadarConfig
+
+#: m/s, standard deviation of a velocity of which a network says nothing.
+_ANY_VELOCITY = 2.0
+
+
+class LearnedVelocity:
+    """Velocity estimator by `TranslationNet`.
+
+    Args:
+        radar: configuration.
+        weights: file.
+
+    Raises:
+        InputError: no such weights, or they are for another radar.
+    """
+
+    #: m, see `VelocityEstimator`: it was taught the velocity of the origin.
+    lever = 0.0
+
+    def __init__(self, radar: RadarConfig, weights: Path):
+        self._net, header = load(weights, TranslationNet, radar)
+        self._windows = header.windows(radar)
+
+    @torch.inference_mode()
+    def estimate(self, batch: Batch) -> Velocities:
+        """Velocities of the next frames; no echoes are counted."""
+        shown = self._windows.push(batch)[0]
+        velocity = np.zeros((len(batch), 2))
+        covariance = np.tile(_ANY_VELOCITY**2 * np.eye(2), (len(batch), 1, 1))
+        if shown.whole.any():
+            mean, spread = self._net.estimate(shown.maps[shown.whole])
+            velocity[shown.whole], covariance[shown.whole] = mean.double().numpy(), spread.double().numpy()
+        return Velocities(velocity, covariance, np.zeros(len(batch), int), shown.whole)
+
+
+class LearnedRotation:
+    """Rotation estimator by `RotationNet`: turns over several spacings, reconciled by a filter.
+
+    The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
+    one Gaussian state (`Ties`), which goes on at its rate where frames are lost.
+
+    Args:
+        radar: configuration.
+        weights: file.
+        settings: of the filter.
+    """
+
+    def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):
+        settings = settings or TurnConfig()
+        self._net, header = load(weights, RotationNet, radar)
+        self._windows, known = header.windows(radar), header.spacings
+        self.spacings = [s for s in settings.spacings if s in known] or list(known)
+        size = max(self.spacings) * self._windows.stride + 1
+        self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
+        self._yaws = Ties(size, settings.wander, settings.fastest)
+
+    def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
+        """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
+        times = batch.centers
+        before = self._times[-1] if len(self._times) else times[0]
+        turns, back = self.turns(batch, velocities)
+        yaw, growth = np.zeros(len(times)), np.zeros(len(times))
+        for i, dt in enumerate(np.diff(times, prepend=before)):
+            last, known = self._yaws.values[-1], self._yaws.covariance[-2, -2]
+            self._yaws.predict(float(dt))
+            for ago, (turn, noise) in zip(back[:, i], turns[:, i], strict=True):
+                self._yaws.tie(int(ago), turn, noise)
+            yaw[i] = self._yaws.values[-1] - last
+            growth[i] = max(self._yaws.covariance[-2, -2] - known, 1e-8)
+        return Rotations(yaw, growth, (back > 0).any(axis=0))
+
+    @property
+    def stride(self) -> int:
+        """The radar's frames from one of the network's to the next."""
+        return self._windows.stride
+
+    @torch.inference_mode()
+    def turns(
+        self, batch: Batch, velocities: Velocities
+    ) -> tuple[Float[np.ndarray, "spacing frame 2"], Int[np.ndarray, "spacing frame"]]:
+        """What the network says of the next frames.
+
+        Returns:
+            Turns (rad) over each of `spacings` until them, and variances; NaN where frames are missing in between.
+            From how many frames ago; 0 where frames are missing.
+        """
+        windows = self._windows.push(batch, self.spacings)
+        whole = np.stack([shown.whole for shown in windows])
+        back = np.where(whole, np.stack([shown.back for shown in windows]), 0)
+        turns = np.full((*back.shape, 2), np.nan)
+        travel = self._travel(batch.centers, velocities.velocity, back)[whole]
+        if whole.any():
+            shown = torch.cat([shown.maps[shown.whole] for shown in windows])
+            mean, variance = self._net.estimate(shown, torch.from_numpy(travel).float())
+            turns[whole] = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy()
+        return turns, back
+
+    def _travel(
+        self, times: np.ndarray, velocities: np.ndarray, back: np.ndarray
+    ) -> Float[np.ndarray, "spacing frame 2"]:
+        """What `RotationNet` wants to be told of windows that began so many frames ago."""
+        kept = 1 - len(self._yaws.values)
+        self._times = np.concatenate([self._times[kept:], times])
+        self._velocities = np.concatenate([self._velocities[kept:], velocities])
+        newest = np.arange(len(self._times) - len(times), len(self._times))
+        first = newest - back
+        lasting = self._times[newest] - self._times[first]
+        return lasting[..., None] * (self._velocities[newest] + self._velocities[first]) / 2

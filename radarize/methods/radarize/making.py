@@ -1,0 +1,33 @@
+"""The methods, put together."""
+
+from radarize.methods.method import Inputs
+from radarize.methods.radarize.fused import FusedVelocity
+from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
+from radarize.methods.radarize.scans import Segmentation
+from radarize.odometry.doppler import DopplerVelocity
+from radarize.odometry.integration import Odometry
+from radarize.odometry.rotation import MapRotation
+
+
+def learned(inputs: Inputs) -> Odometry:
+    """Networks alone (the paper)."""
+    velocity = LearnedVelocity(inputs.radar, inputs.weights.of("translation"))
+    return Odometry(inputs.radar, velocity, _turns(inputs), inputs.configuration.velocity)
+
+
+def fused(inputs: Inputs) -> Odometry:
+    """Both: velocities by their covariances, and the map matched from where the network says that it has turned to."""
+    settings, heatmaps = inputs.configuration, inputs.signal.heatmaps
+    alone = LearnedVelocity(inputs.radar, inputs.weights.of("translation"))
+    velocity = FusedVelocity(alone, DopplerVelocity(heatmaps, settings.doppler), settings.fusion)
+    rotation = MapRotation(heatmaps, settings.rotation, _turns(inputs))
+    return Odometry(inputs.radar, velocity, rotation, settings.velocity)
+
+
+def _turns(inputs: Inputs) -> LearnedRotation:
+    return LearnedRotation(inputs.radar, inputs.weights.of("rotation"), inputs.configuration.turns)
+
+
+def segmentation(inputs: Inputs, first: bool = True) -> Segmentation:
+    """The network's first surfaces, or its likeliest cells."""
+    return Segmentation(inputs.radar, inputs.weights.of("segmentation"), first=first)

@@ -1,0 +1,87 @@
+"""Scans by the segmentation network: where each bearing's first surface is, if it can be told."""
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from radarize.batch import Batch
+from radarize.mapping import echoes
+from radarize.methods.radarize.segmentation import SegmentationNet
+from radarize.nets.weights import load
+from radarize.radar.config import RadarConfig
+from radarize.stopwatch import stage
+
+#: Least probability that a returned range is right.
+LEAST = 0.7
+#: Cells to either side that count as right: 9 cm of the preset's.
+NEAR = 2
+
+
+class Segmentation:
+    """Scans of a stream's frames.
+
+    Args:
+        radar: configuration.
+        weights: file.
+        least: least probability that a range is right within `NEAR` cells: higher leaves fewer ghosts and fewer
+            bearings.
+        first: take the first surface; False: the likeliest occupied cell of each bearing, wherever it is, for
+            comparison.
+
+    Raises:
+        InputError: no such weights, or they are for another radar.
+    """
+
+    def __init__(self, radar: RadarConfig, weights: Path, least: float = LEAST, first: bool = True):
+        self._net, header = load(weights, SegmentationNet, radar)
+        self._windows, self._ranges = header.windows(radar), radar.ranges - radar.range_bias
+        self.least, self.first = least, first
+
+    @torch.inference_mode()
+    def occupancy(self, batch: Batch) -> Float[np.ndarray, "frame range bearing"]:
+        """Probability that a cell holds a bearing's first surface, if nothing is before it."""
+        return self._net.estimate(self._windows.push(batch)[0].maps).numpy()
+
+    def scan(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
+        """Ranges on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen."""
+        with stage("scans"):
+            occupancy = self.occupancy(batch)
+            if self.first:
+                bins = first_surface(occupancy, self.least)
+            else:
+                bins = echoes.strongest(occupancy >= self.least, occupancy)
+        return np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
+
+
+def first_surface(
+    occupancy: Float[np.ndarray, "frame range bearing"], least: float
+) -> Float[np.ndarray, "frame bearing"]:
+    """Fractional range bin of every bearing's first surface, inf where none is likely enough."""
+    bins, probability = likeliest(occupancy)
+    return np.where(probability >= least, bins, np.inf)
+
+
+def likeliest(
+    occupancy: Float[np.ndarray, "frame range bearing"],
+) -> tuple[Float[np.ndarray, "frame bearing"], Float[np.ndarray, "frame bearing"]]:
+    """Fractional range bin where every bearing's first surface is likeliest, and how likely it is that near.
+
+    With h the probability of a cell if nothing is before it, the first surface is in a cell with probability
+    h * product over nearer cells of (1 - h): behind a surface hardly anything is left for ghosts, which is the
+    first-echo rule in terms of probability. The answer is the mean over the likeliest 2 `NEAR` + 1 cells in a row.
+    """
+    free = np.cumprod(1 - occupancy, axis=1)
+    here = occupancy * np.concatenate([np.ones_like(free[:, :1]), free[:, :-1]], axis=1)
+    place = here * np.arange(here.shape[1])[:, None]
+    mass, moment = (_stretches(values) for values in (here, place))
+    best = mass.argmax(axis=1)[:, None]
+    mass, moment = (np.take_along_axis(values, best, axis=1)[:, 0] for values in (mass, moment))
+    return moment / np.maximum(mass, 1e-12), mass
+
+
+def _stretches(values: Float[np.ndarray, "frame range bearing"]) -> Float[np.ndarray, "frame range bearing"]:
+    """Sums over each cell and its `NEAR` neighbours to either side."""
+    total = np.cumsum(np.pad(values, ((0, 0), (NEAR + 1, NEAR), (0, 0))), axis=1)
+    return total[:, 2 * NEAR + 1 :] - total[:, : -2 * NEAR - 1]

@@ -1,0 +1,115 @@
+"""Every way to odometry and to scans, by name: what ``--odometry`` and ``--scans`` accept and benchmarks compare; and
+the trainings of their networks. A method is a folder beside this file, loaded when somebody asks for it.
+"""
+
+from collections.abc import Callable
+
+from radarize.errors import InputError
+from radarize.methods import doppler, milliego, published, radarhd, radarize, ransac, rnin, scan_matching
+from radarize.methods.configuration import Configuration
+from radarize.methods.method import Inputs, Method, Weights, load
+from radarize.methods.task import Task
+from radarize.nets.weights import check
+from radarize.pipeline import Follower, Pipeline, Scanner
+from radarize.radar.config import RadarConfig
+
+_FOLDERS = (radarize, doppler, ransac, scan_matching, milliego, rnin, radarhd, published)
+
+
+def _all(what: str) -> dict:
+    return {name: each for folder in _FOLDERS for name, each in getattr(folder, what, {}).items()}
+
+
+ODOMETRY: dict[str, Method] = _all("ODOMETRY")
+SCANS: dict[str, Method] = _all("SCANS")
+#: Where the task of each network's training stands, see `Task`.
+TASKS: dict[str, str | Callable[[], Task]] = _all("TASKS")
+#: Methods of choice.
+BEST = {"odometry": "fused", "scans": "segmentation"}
+#: Methods without networks, for radars that the shipped ones do not fit.
+CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
+
+
+class Workshop:
+    """Makes methods, and pipelines of them. Pipelines of one workshop share what they have in common: pushed the same
+    batches, spectra, maps, scans and odometry are made once.
+
+    Args:
+        inputs: what all are made from.
+    """
+
+    def __init__(self, inputs: Inputs):
+        self.inputs = inputs
+        self._scanners: dict[str, Scanner] = {}
+        self._followers: dict[tuple[str, str | None], Follower] = {}
+
+    def scanner(self, name: str) -> Scanner:
+        """Scans by a key of `SCANS`.
+
+        Raises:
+            InputError: unknown name, or see `Method`.
+        """
+        if name not in self._scanners:
+            method = _method("scans", name, SCANS)
+            self._scanners[name] = method.maker(self.inputs, **method.options)
+        return self._scanners[name]
+
+    def odometry(self, name: str, scans: str) -> Follower:
+        """Odometry by a key of `ODOMETRY`.
+
+        Args:
+            name: of it.
+            scans: what it is made from, if it is made from scans.
+
+        Raises:
+            InputError: unknown name, or see `Method`.
+        """
+        method = _method("odometry", name, ODOMETRY)
+        key = name, scans if method.scans else None
+        if key not in self._followers:
+            taken = (self.scanner(scans),) if method.scans else ()
+            self._followers[key] = method.maker(self.inputs, *taken, **method.options)
+        return self._followers[key]
+
+    def pipeline(self, odometry: str, scans: str) -> Pipeline:
+        """A pipeline by the names of its methods.
+
+        Raises:
+            InputError: see `odometry` and `scanner`.
+        """
+        return Pipeline(self.odometry(odometry, scans), self.scanner(scans), self.inputs.configuration.slam)
+
+
+def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
+    """Odometry and scans of choice for a radar, and if these are the classical ones, why."""
+    networks = (*ODOMETRY[BEST["odometry"]].networks, *SCANS[BEST["scans"]].networks)
+    try:
+        for kind in networks:
+            check(Weights().of(kind), radar)
+    except InputError as error:
+        return CLASSICAL, str(error)
+    return BEST, ""
+
+
+def find_task(kind: str) -> Task:
+    """A network's training by name.
+
+    Raises:
+        InputError: there is none.
+    """
+    if kind not in TASKS:
+        raise InputError(f"task is {kind!r}, expected one of: {', '.join(TASKS)}")
+    place = TASKS[kind]
+    return (load(place) if isinstance(place, str) else place)()
+
+
+def _method(what: str, name: str, known: dict[str, Method]) -> Method:
+    if name not in known:
+        raise InputError(f"{what} is {name!r}, expected one of {', '.join(known)}")
+    return known[name]
+
+
+__all__ = [
+    "BEST", "CLASSICAL", "ODOMETRY", "SCANS", "TASKS", "Configuration", "Inputs", "Method", "Weights", "Workshop",
+    "best_methods", "find_task",
+]  # fmt: skip

@@ -1,0 +1,108 @@
+"""Odometry from scans alone: each is matched with a grid of the last few, where constant velocity puts it."""
+
+from collections import deque
+
+import numpy as np
+
+from radarize.batch import Batch
+from radarize.mapping.scans import BEARINGS
+from radarize.methods.method import Inputs
+from radarize.odometry.integration import Track, intervals
+from radarize.odometry.ties import wandered
+from radarize.pipeline import Scanner
+from radarize.pose import between, compose, exponential, transform
+from radarize.slam.config import SlamConfig
+from radarize.slam.grid import OccupancyGrid
+from radarize.slam.matcher import match
+from radarize.slam.node import Node, Scan
+from radarize.stopwatch import stage
+
+#: m/s^1.5 and rad/s^1.5: by how much velocity and rate of turn wander in a second.
+_WANDER = np.array([1.0, 1.0, 2.0])
+#: m/s and rad/s: standard deviations of a motion that nothing is known of.
+_ANY_RATE = np.array([1.0, 1.0, 1.0])
+
+
+class ScanMatching:
+    """Odometry of a stream of frames: a Kalman filter of pose and velocity, whose measurement is the match.
+
+    Args:
+        scanner: makes the scans.
+        settings: of node, grid and matcher.
+        keys: scans in the grid, each added once the sensor has moved by as much as the settings make a node of.
+        sigma: of the matcher, see `match`; a scan's errors are much the same in the next, so each counts little.
+    """
+
+    def __init__(
+        self,
+        scanner: Scanner,
+        settings: SlamConfig | None = None,
+        keys: int = 12,
+        sigma: float = 3.0,
+    ):
+        self.scanner, self.sigma = scanner, sigma
+        self.settings = settings or SlamConfig.preset("lidar")
+        self._keys: deque[tuple[np.ndarray, Node]] = deque(maxlen=keys)
+        self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
+        self._time: float | None = None
+        self._pose = np.zeros(3)
+        self._rate = np.zeros(3)  # m/s and rad/s, in the sensor's frame
+        self._spread = np.diag([*np.zeros(3), *_ANY_RATE**2])  # of pose and rate, in the sensor's frame
+
+    def follow(self, batch: Batch) -> Track:
+        """Poses of the next frames."""
+        centers = batch.centers
+        steps = intervals(centers, self._time)
+        ranges = batch.made(self.scanner.scan)
+        moved, seen = np.zeros((len(centers), 3)), np.zeros(len(centers), bool)
+        poses, rates, spreads = moved.copy(), moved.copy(), np.zeros((len(centers), 3, 3))
+        with stage("translation"):
+            for i, (time, dt) in enumerate(zip(centers, steps, strict=True)):
+                before = self._pose
+                seen[i] = self._step(Scan(time, np.zeros(3), BEARINGS, ranges[i]), dt)
+                poses[i], rates[i], spreads[i] = self._pose, self._rate, self._spread[3:, 3:]
+                moved[i] = between(before, self._pose)
+        spread = spreads * steps[:, None, None] ** 2
+        return Track(centers, poses, moved, spread, rates[:, :2], spreads[:, :2, :2], seen, seen)
+
+    def _step(self, scan: Scan, dt: float) -> bool:
+        """Move on to the next scan; whether it has enough points to be matched."""
+        first, self._time = self._time is None, scan.time
+        node = Node.gather([scan], self.settings)
+        seen = len(node.points) >= self.settings.node.min_points
+        if first:
+            self._add(node)
+            return seen
+        self._pose = compose(self._pose, exponential(self._rate[:2] * dt, self._rate[2] * dt))
+        move = np.eye(6) + dt * np.eye(6, k=3)
+        self._spread = move @ self._spread @ move.T + np.kron(wandered(1.0, dt), np.diag(_WANDER**2))
+        if seen:
+            self._correct(node)
+        x, y, yaw = between(self._keys[-1][0], self._pose)
+        if np.hypot(x, y) >= self.settings.node.distance or abs(yaw) >= self.settings.node.angle:
+            self._add(node)
+        return seen
+
+    def _correct(self, node: Node) -> None:
+        """Fit the pose to the grid; the rate follows as much as its error goes along with the pose's."""
+        prior = self._spread[:3, :3]
+        found = match(self._grid, node.points, self._pose, sigma=self.sigma, prior=self._pose, covariance=prior)
+        fitted = np.linalg.inv(np.linalg.inv(prior) + found.information)
+        along = self._spread[3:, :3] @ np.linalg.inv(prior)
+        self._rate = self._rate + along @ between(self._pose, found.pose)
+        rate = self._spread[3:, 3:] - along @ (prior - fitted) @ along.T
+        self._spread = np.block([[fitted, fitted @ along.T], [along @ fitted, rate]])
+        self._pose = found.pose
+
+    def _add(self, node: Node) -> None:
+        """A key scan joins the grid, which is drawn anew from those that are left."""
+        self._keys.append((self._pose, node))
+        self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
+        for pose, key in self._keys:
+            ends = transform(pose, key.origins), transform(pose, key.ends)
+            self._grid.insert(*ends, key.hits, self.settings.grid, spread=True)
+
+
+def odometry(inputs: Inputs, scanner: Scanner) -> ScanMatching:
+    """By the pipeline's scans."""
+    return ScanMatching(scanner)

@@ -1,0 +1,157 @@
+"""ROS maps: a picture (.pgm) and the .yaml that says what it means (http://wiki.ros.org/map_server).
+
+A pixel is occupied with probability p = (255 - value) / 255, or value / 255 if `negate`; above ``occupied_thresh`` it
+counts as occupied, below ``free_thresh`` as free, between them as unknown. Row 0 is the top; ``origin`` is x, y, yaw of
+the lower left corner.
+"""
+
+import reprlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import yaml
+from jaxtyping import Bool, Float, UInt8
+from pydantic import BaseModel, Field, ValidationError
+
+from radarize.errors import InputError
+from radarize.replacing import replacing
+from radarize.yamlfile import read_yaml
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+#: Bytes of a description, and of a picture's header, comments included.
+_DESCRIPTION, _HEADER = 16 << 10, 4 << 10
+
+
+class MapFile(BaseModel):
+    """The keys of a map's .yaml; others are ignored."""
+
+    image: str
+    resolution: Annotated[float, Field(gt=0, le=1)]
+    origin: tuple[Number, Number, Number]
+    negate: Annotated[int, Field(ge=0, le=1)] = 0
+    occupied_thresh: Annotated[float, Field(ge=0, le=1)] = 0.65
+    free_thresh: Annotated[float, Field(ge=0, le=1)] = 0.196
+    mode: Literal["trinary", "scale", "raw"] = "trinary"
+
+    @classmethod
+    def read(cls, path: Path) -> "MapFile":
+        """From a file.
+
+        Raises:
+            InputError: it is missing or unreadable, or a key is, with its value.
+        """
+        try:
+            return cls.model_validate(read_yaml(path, _DESCRIPTION))
+        except ValidationError as error:
+            problem = error.errors()[0]
+            field = ".".join(str(part) for part in problem["loc"]) or "file"
+            value = reprlib.repr(problem["input"])
+            raise InputError(f"{path}: {field} is {value}: {problem['msg'].lower()}") from error
+
+
+@dataclass(frozen=True)
+class OccupancyMap:
+    """A map as it lies in its files.
+
+    Attributes:
+        about: its description.
+        pixels: grey values, first row at the top (largest y).
+    """
+
+    about: MapFile
+    pixels: UInt8[np.ndarray, "row column"]
+
+    @classmethod
+    def read(cls, description: Path) -> "OccupancyMap":
+        """A map from its ``.yaml`` and the picture beside it.
+
+        Raises:
+            InputError: a file is missing or malformed; names file and field.
+        """
+        about = MapFile.read(description)
+        if Path(about.image).name != about.image:
+            raise InputError(f"{description}: image is {about.image!r}, expected the name of a file beside it")
+        return cls(about, read_pgm(description.parent / about.image))
+
+    @property
+    def resolution(self) -> float:
+        """m per cell."""
+        return self.about.resolution
+
+    @property
+    def origin(self) -> tuple[float, float, float]:
+        """(x, y, yaw) of the lower left corner in the map's frame, m and rad."""
+        return self.about.origin
+
+    @property
+    def occupied(self) -> Bool[np.ndarray, "row column"]:
+        """Cells that count as occupied."""
+        return (self._chances > self.about.occupied_thresh)[self.pixels]
+
+    @property
+    def free(self) -> Bool[np.ndarray, "row column"]:
+        """Cells that count as free."""
+        return (self._chances < self.about.free_thresh)[self.pixels]
+
+    @property
+    def _chances(self) -> Float[np.ndarray, "256"]:
+        """Probability that a cell is occupied, by its grey value."""
+        values = np.arange(256.0)
+        return (values if self.about.negate else 255 - values) / 255
+
+    def centers(self, cells: Bool[np.ndarray, "row column"]) -> Float[np.ndarray, "cell 2"]:
+        """Middles of the chosen cells in the map's frame, m."""
+        row, column = np.nonzero(cells)
+        inside = np.column_stack([column + 0.5, len(self.pixels) - row - 0.5]) * self.resolution
+        c, s = np.cos(self.origin[2]), np.sin(self.origin[2])
+        return inside @ np.array([[c, s], [-s, c]]) + self.origin[:2]
+
+    def save(self, description: Path) -> Path:
+        """Write it as ``NAME.yaml`` and ``NAME.pgm``.
+
+        Raises:
+            InputError: a file cannot be written.
+        """
+        image = description.with_suffix(".pgm")
+        with replacing(image) as part:
+            part.write_bytes(b"P5\n%d %d\n255\n" % self.pixels.shape[::-1] + self.pixels.tobytes())
+        with replacing(description) as part:
+            fields = self.about.model_dump() | {"image": image.name, "origin": list(self.origin)}
+            part.write_text(yaml.safe_dump(fields, sort_keys=False))
+        return description
+
+
+def read_pgm(path: Path) -> UInt8[np.ndarray, "row column"]:
+    """Pixels of a binary 8-bit PGM (``P5``).
+
+    Raises:
+        InputError: not such a file, or cut short.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected a map's picture (.pgm)")
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+    head, words, at = content[:_HEADER], [], 0
+    while len(words) < 4 and at < len(head):
+        if head[at : at + 1] == b"#":
+            at = (head.find(b"\n", at) + 1) or len(head)
+        elif head[at : at + 1].isspace():
+            at += 1
+        else:
+            end = at
+            while end < len(head) and not head[end : end + 1].isspace():
+                end += 1
+            words.append(head[at:end])
+            at = end
+    numbers = [int(word) for word in words[1:] if word.isdigit() and len(word) < 10]
+    if len(numbers) != 3 or words[0] != b"P5" or numbers[2] != 255:
+        raise InputError(f"{path}: starts with {head[:20]!r}, expected an 8-bit binary PGM (P5)")
+    width, height, _ = numbers
+    found = len(content) - at - 1
+    if found < width * height:
+        raise InputError(f"{path}: holds {found} pixels, expected {width} x {height}")
+    return np.frombuffer(content, np.uint8, width * height, at + 1).reshape(height, width)

@@ -1,0 +1,36 @@
+"""Batches for tests: of samples, of a spectrum at hand, or cut out of a stream."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import torch
+
+from radarize.batch import Batch, Intake, Signal
+from radarize.radar.config import RadarConfig
+
+
+def batch(radar: RadarConfig | Signal, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None = None) -> Batch:
+    """Of samples."""
+    return Batch(radar if isinstance(radar, Signal) else Signal(radar), adc, times, valid)
+
+
+def of_spectrum(signal: Signal, spectrum: torch.Tensor, times: np.ndarray) -> Batch:
+    """Of a spectrum that no samples were made into."""
+    found = Batch(signal, np.zeros((len(spectrum), 0)), times)
+    found.spectrum = spectrum
+    return found
+
+
+def parts(signal: Signal, spectrum: torch.Tensor, times: np.ndarray, cuts: list[int]) -> list[Batch]:
+    """A stream's spectra, cut."""
+    stamps = np.split(np.asarray(times, float), np.cumsum(cuts)[:-1])
+    return [of_spectrum(signal, *part) for part in zip(spectrum.split(cuts), stamps, strict=True)]
+
+
+def stream(
+    intake: Intake, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None = None, size: int = 16
+) -> Iterator[Batch]:
+    """What a radar delivers, some frames at a time."""
+    for start in range(0, len(adc), size):
+        part = slice(start, start + size)
+        yield intake.take(adc[part], times[part], None if valid is None else valid[part])

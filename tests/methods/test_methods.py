@@ -1,0 +1,135 @@
+"""The registry: every name makes something that works, what is made is made once, and what cannot work says why."""
+
+import numpy as np
+import pytest
+
+from radarize.batch import Intake
+from radarize.errors import InputError
+from radarize.heatmaps import Heatmaps
+from radarize.mapping.scans import BEARINGS, HeatmapScans
+from radarize.methods.registry import (
+    BEST,
+    CLASSICAL,
+    ODOMETRY,
+    SCANS,
+    TASKS,
+    Inputs,
+    Method,
+    Weights,
+    Workshop,
+    best_methods,
+    find_task,
+)
+from radarize.radar.presets import PRESETS
+from tests.batches import batch
+
+CONFIG = PRESETS["radarize"]
+
+
+@pytest.fixture(scope="module")
+def noise():
+    """Samples of three frames, and their stamps."""
+    adc = np.random.default_rng(0).integers(-100, 100, (3, *CONFIG.frame_shape), dtype=np.int16)
+    return adc, np.arange(3) * CONFIG.frame_period
+
+
+@pytest.mark.parametrize("name", [name for name in SCANS if name != "published"])  # which has no weights
+def test_every_scan_has_a_range_for_every_bearing(name, noise):
+    inputs = Inputs(CONFIG)
+    workshop = Workshop(inputs)
+    ranges = workshop.scanner(name).scan(batch(inputs.signal, *noise))
+    assert ranges.shape == (3, len(BEARINGS)) and not np.isnan(ranges).any()
+    assert workshop.scanner(name) is workshop.scanner(name)
+
+
+def test_scans_are_made_once_a_batch(noise, monkeypatch):
+    """Though the odometry asks for them, too."""
+    asked = []
+
+    class Counts:
+        def scan(self, batch):
+            asked.append(batch)
+            return np.full((len(batch), len(BEARINGS)), np.inf)
+
+    monkeypatch.setitem(SCANS, "counts", Method("counts", lambda inputs: Counts()))
+    inputs = Inputs(CONFIG)
+    pipeline = Workshop(inputs).pipeline("scan-matching", "counts")
+    first, second = batch(inputs.signal, *noise), batch(inputs.signal, noise[0], noise[1] + 1)
+    assert len(pipeline.push(first).ranges) == 3 and asked == [first]
+    pipeline.push(second)
+    assert asked == [first, second]
+
+
+def test_pipelines_of_a_workshop_share_what_they_can(noise, monkeypatch):
+    """Odometry moves on once a batch, scan matching once for each method of scans; and what comes out is what each
+    gives alone."""
+    spectra, asked = [], []
+    whole, scan = Heatmaps.spectrum, HeatmapScans.scan
+    monkeypatch.setattr(Heatmaps, "spectrum", lambda *of: spectra.append(1) or whole(*of))
+    monkeypatch.setattr(HeatmapScans, "scan", lambda self, of: asked.append(self.method) or scan(self, of))
+    pairs = [(o, s) for o in ("doppler", "scan-matching") for s in ("first-echo", "threshold")]
+    inputs = Inputs(CONFIG)
+    workshop, intake = Workshop(inputs), Intake(inputs.signal)
+    shared = [workshop.pipeline(*pair) for pair in pairs]
+    adc = np.concatenate([noise[0], 0 * noise[0][:1]])
+    times = np.arange(4) * CONFIG.frame_period
+    together = [[] for _ in pairs]
+    for k in range(2):
+        taken = intake.take(adc, times + k)
+        for pipeline, results in zip(shared, together, strict=True):
+            results.append(pipeline.push(taken))
+    assert len(spectra) == 2 and sorted(asked) == 2 * ["first-echo"] + 2 * ["threshold"]
+    assert shared[0].odometry is shared[1].odometry and shared[2].odometry is not shared[3].odometry
+    assert intake.lost == 2 and intake.taken == 8
+    samples = np.empty_like(adc)
+    for pair, pipeline, results in zip(pairs, shared, together, strict=True):
+        own = Inputs(CONFIG)
+        alone, intake = Workshop(own).pipeline(*pair), Intake(own.signal)
+        for k, result in enumerate(results):
+            samples[:] = adc  # a reader may use the same memory again
+            other = alone.push(intake.take(samples, times + k))
+            assert np.array_equal(result.frames, other.frames) and list(other.frames) == [4 * k, 4 * k + 1, 4 * k + 2]
+            assert np.array_equal(result.ranges, other.ranges)
+            for name, values in vars(other.track).items():
+                assert np.array_equal(getattr(result.track, name), values), name
+        assert np.array_equal(pipeline.slam.trajectory()[1], alone.slam.trajectory()[1])
+    assert len(spectra) == 2 + 8
+
+
+def test_unknown_names():
+    workshop = Workshop(Inputs(CONFIG))
+    with pytest.raises(InputError, match="odometry is 'wheel', expected one of fused, learned, doppler"):
+        workshop.odometry("wheel", "threshold")
+    with pytest.raises(InputError, match="scans is 'lidar', expected one of segmentation"):
+        workshop.scanner("lidar")
+    with pytest.raises(InputError, match="scans is 'lidar', expected one of segmentation"):
+        workshop.odometry("scan-matching", "lidar")
+    with pytest.raises(InputError, match="task is 'flight', expected one of: translation"):
+        find_task("flight")
+
+
+def test_networks_where_they_fit_and_classical_methods_elsewhere(tmp_path):
+    assert best_methods(CONFIG) == (BEST, "")
+    coarse = CONFIG.model_copy(update={"loops": CONFIG.loops // 2})
+    methods, why = best_methods(coarse)
+    assert methods == CLASSICAL and "translation.safetensors: does not fit this radar" in why
+    with pytest.raises(InputError, match="does not fit this radar"):
+        Workshop(Inputs(coarse)).odometry("fused", "threshold")
+    with pytest.raises(InputError, match="translation.safetensors: no such file"):
+        Workshop(Inputs(CONFIG, weights=Weights(tmp_path))).odometry("learned", "threshold")
+
+
+def test_every_choice_is_in_the_registry():
+    for choice in (BEST, CLASSICAL):
+        assert choice["odometry"] in ODOMETRY and choice["scans"] in SCANS
+
+
+def test_every_method_loads_and_every_network_has_a_task():
+    """Whose weights go by the name that the method asks for."""
+    for method in (*ODOMETRY.values(), *SCANS.values()):
+        assert callable(method.maker) and method.title
+        for kind in method.networks:
+            assert kind in TASKS
+    for name in TASKS:
+        network = find_task(name).network
+        assert name == network.kind if network.setting == "corrected" else name == f"published-{network.kind}"

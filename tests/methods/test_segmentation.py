@@ -1,0 +1,74 @@
+"""Scans from occupancy: where the first surface is, and what the threshold does."""
+
+import numpy as np
+import pytest
+import torch
+
+from radarize.batch import Signal
+from radarize.features.grid import Grid
+from radarize.mapping.scans import BEARINGS
+from radarize.methods.radarize.scans import NEAR, Segmentation, first_surface
+from radarize.methods.radarize.segmentation import SegmentationNet
+from radarize.nets.weights import Header, build, example, save
+from radarize.radar.presets import PRESETS
+from tests.batches import of_spectrum
+
+CONFIG = PRESETS["radarize"]
+
+
+class Says:
+    """A network with one answer."""
+
+    def __init__(self, likely: np.ndarray):
+        self.likely = torch.tensor(likely)
+
+    def estimate(self, maps: torch.Tensor) -> torch.Tensor:
+        return self.likely.expand(len(maps), -1, -1)
+
+
+def test_the_first_surface_is_where_it_is_likeliest():
+    """Against loops over cells: the distribution of the first occupied cell, and its likeliest five cells in a row."""
+    likely = np.random.default_rng(0).beta(0.05, 0.5, (2, 30, 4))
+    found = first_surface(likely, 0.4)
+    for frame in range(2):
+        for bearing in range(4):
+            left, first = 1.0, []
+            for h in likely[frame, :, bearing]:
+                first.append(h * left)
+                left *= 1 - h
+            rows = [range(max(0, k - NEAR), min(30, k + NEAR + 1)) for k in range(30)]
+            mass = [sum(first[i] for i in row) for row in rows]
+            best = int(np.argmax(mass))
+            expected = sum(i * first[i] for i in rows[best]) / mass[best] if mass[best] >= 0.4 else np.inf
+            assert found[frame, bearing] == pytest.approx(expected)
+
+
+def test_ghosts_behind_a_surface_and_guesses_are_not_returned(tmp_path):
+    header = Header(
+        kind="segmentation", frames=1, maps=("range_azimuth", "elevation_aware"), width=2,
+        grid=Grid.of(CONFIG, "range_azimuth"),
+    )  # fmt: skip
+    net = build(SegmentationNet, header)
+    net(*example(net, header))
+    signal = Signal(CONFIG)
+    ranges = signal.heatmaps.ranges
+    scans = Segmentation(CONFIG, save(net.eval(), header, tmp_path / "s.safetensors"))
+    zeros = torch.zeros(2, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)
+    batch = of_spectrum(signal, zeros, np.arange(2) * CONFIG.frame_period)
+    assert scans.scan(batch).shape == (2, len(BEARINGS))
+
+    likely = np.full((1, CONFIG.samples, len(BEARINGS)), 1e-4)
+    likely[0, 29:32, 10] = 0.4, 0.8, 0.5  # a surface
+    likely[0, 60, 10] = 0.99  # a ghost behind it
+    likely[0, 40, 20] = 0.45  # a guess
+    scans._net = Says(likely)
+    found = scans.scan(batch)
+    step = ranges[1] - ranges[0]
+    assert np.allclose(found[:, 10], ranges[30], atol=step / 2)
+    assert np.isinf(found[:, 20]).all() and np.isfinite(found).sum() == 2
+    scans.least = 0.4
+    assert np.allclose(scans.scan(batch)[:, 20], ranges[40], atol=step / 2)
+    alone = Segmentation(CONFIG, tmp_path / "s.safetensors", first=False)
+    alone._net = Says(likely)
+    found = alone.scan(batch)
+    assert np.allclose(found[:, 10], ranges[60], atol=step / 2) and np.isfinite(found).sum() == 2

@@ -1,0 +1,81 @@
+"""Spans over which odometry was blind, of tracks made by hand."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from radarize.odometry.blindness import Blindness
+
+PERIOD = 0.05
+
+
+def track(count, start=0.0, no_velocity=(), no_turn=()):
+    """A walk of 1 m/s forwards."""
+    frames = np.arange(count)
+    step = np.zeros((count, 3))
+    step[1:, 0] = PERIOD
+    return SimpleNamespace(
+        time=start + PERIOD * frames,
+        step=step,
+        velocity_seen=~np.isin(frames, no_velocity),
+        turn_seen=~np.isin(frames, no_turn),
+    )
+
+
+def found(*tracks, numbers=None):
+    blind = Blindness()
+    for each in tracks:
+        blind.add(np.arange(len(each.time)) if numbers is None else numbers, each)
+    return blind
+
+
+def test_a_span_goes_from_the_last_good_frame_to_the_last_bad_one():
+    summary = found(track(200, start=100, no_velocity=range(40, 60))).summary()
+    (span,) = summary["spans"]
+    assert span["why"] == "no velocity"
+    assert (span["start_s"], span["stop_s"]) == pytest.approx((100 + 39 * PERIOD, 100 + 59 * PERIOD))
+    assert span["way_m"] == summary["way_m"] == pytest.approx(20 * PERIOD)
+    assert summary["share_of_way"] == pytest.approx(20 / 199, abs=1e-4)
+
+
+def test_blinks_vanish_and_neighbours_join():
+    blinks = [*range(10, 15), *range(30, 35)]  # 0.25 s each, 0.8 s apart
+    assert found(track(200, no_velocity=blinks)).summary() == {"share_of_way": 0.0, "way_m": 0.0, "spans": []}
+    assert found(track(200, no_velocity=blinks)).warning is None
+    (span,) = found(track(200, no_velocity=range(10, 15), no_turn=range(19, 24))).spans
+    assert span.why == "no velocity and no turn"
+    assert span.way == pytest.approx(10 * PERIOD)  # sight between them is not blind
+
+
+def test_lost_frames_are_blind_and_frames_left_out_on_purpose_are_not():
+    whole = track(40)
+    rows = np.r_[0:10, 25:40]
+    gap = SimpleNamespace(**{name: values[rows] for name, values in vars(whole).items()})
+    gap.step[10] *= 16
+    (span,) = found(gap, numbers=rows).spans
+    assert span.why == "frames lost" and span.way == pytest.approx(16 * PERIOD)
+    assert (span.start, span.stop) == pytest.approx((9 * PERIOD, 25 * PERIOD))
+    assert found(whole, numbers=2 * np.arange(40)).spans == []
+    at_the_end = found(whole)
+    at_the_end.lost(39 * PERIOD, 5.0)
+    at_the_end.lost(-1.0, 0.0)
+    assert [span.start for span in at_the_end.spans] == pytest.approx([-1.0, 39 * PERIOD])
+    assert {span.why for span in at_the_end.spans} == {"frames lost"}
+
+
+def test_batches_do_not_matter():
+    whole = track(120, no_velocity=range(7, 31), no_turn=range(28, 90))
+    parts = Blindness()
+    for k in range(0, 120, 7):
+        part = SimpleNamespace(**{name: values[k : k + 7] for name, values in vars(whole).items()})
+        parts.add(np.arange(k, k + len(part.time)), part)
+    assert parts.summary() == found(whole).summary() and len(parts.spans) == 1
+
+
+def test_the_warning_counts_from_the_first_frame():
+    blind = found(track(200, start=1.7e9, no_velocity=range(100, 130), no_turn=range(20, 28)))
+    assert blind.warning == (
+        "odometry was blind 2 times, for 1.9 s and 19 % of the way; at the longest from 5.0 to 6.5 s (no velocity); "
+        "poses there are guessed"
+    )

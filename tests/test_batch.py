@@ -1,0 +1,90 @@
+"""What goes through the pipeline: which frames, how long after one another, and that each thing is made once."""
+
+import numpy as np
+import pytest
+import torch
+
+from radarize.batch import LEAST_SHARE, Batch, Intake, Signal
+from radarize.heatmaps import Heatmaps
+from radarize.points import PointClouds
+from radarize.radar.presets import PRESETS
+from tests.batches import batch, stream
+
+CONFIG = PRESETS["radarize"].model_copy(update={"loops": 16})
+FRAMES = 12
+
+
+@pytest.fixture(scope="module")
+def signal():
+    return Signal(CONFIG)
+
+
+@pytest.fixture(scope="module")
+def adc():
+    return np.random.default_rng(0).integers(-99, 99, (FRAMES, *CONFIG.frame_shape), dtype=np.int16)
+
+
+def test_what_is_made_is_made_once(signal, adc, monkeypatch):
+    """However many ask, and anew for the next batch; methods of two objects are two."""
+    asked = []
+
+    class Asks:
+        def of(self, one: Batch) -> list[int]:
+            asked.append((self, one))
+            return [len(one)]
+
+    first, second = (batch(signal, adc[:3], np.arange(3)) for _ in range(2))
+    mine, other = Asks(), Asks()
+    assert first.made(mine.of) is first.made(mine.of) and first.made(mine.of) == [3]
+    assert asked == [(mine, first)]
+    assert first.made(other.of) is not first.made(mine.of) and second.made(mine.of) is not first.made(mine.of)
+    assert asked == [(mine, first), (other, first), (mine, second)]
+
+    for where, name in ((Heatmaps, "spectrum"), (PointClouds, "of")):
+        whole = getattr(where, name)
+        monkeypatch.setattr(where, name, lambda *of, whole=whole, name=name: asked.append(name) or whole(*of))
+    asked.clear()
+    third = batch(signal, adc[:3], np.arange(3))
+    assert not asked and third.spectrum is third.spectrum and third.points is third.points
+    assert asked == ["spectrum", "of"]
+    assert torch.equal(third.spectrum, signal.heatmaps.spectrum(adc[:3]))
+
+
+def test_what_was_lost_is_told_to_the_spectrum(signal, adc):
+    valid = np.ones((3, 16, 3), bool)
+    valid[1, 2:] = False
+    found = batch(signal, adc[:3], np.arange(3), valid).spectrum
+    assert torch.equal(found, signal.heatmaps.spectrum(adc[:3], valid))
+    assert not torch.equal(found[1], signal.heatmaps.spectrum(adc[1:2])[0])
+
+
+@pytest.mark.parametrize("size", [1, 5, FRAMES])
+def test_gaps_are_since_the_frame_before_whatever_was_lost(signal, adc, size):
+    """Silent, lost, or nearly lost frames are left out; numbers go on counting them, and gaps bridge them."""
+    adc, valid = adc.copy(), np.ones((FRAMES, 16, 3), bool)
+    stamps = 10.0 + np.cumsum(np.linspace(0.03, 0.06, FRAMES))
+    adc[0] = 0
+    valid[4:7] = False
+    valid[9].flat[round(48 * LEAST_SHARE) - 1 :] = False
+    valid[10].flat[round(48 * LEAST_SHARE) :] = False
+    intake = Intake(signal)
+    batches = list(stream(intake, adc, stamps, valid, size))
+    used = np.array([1, 2, 3, 7, 8, 10, 11])
+    assert (intake.taken, intake.lost) == (FRAMES, 5)
+    assert [bool(one) for one in batches] == [len(one) > 0 for one in batches]
+    numbers, gaps, centers = (
+        np.concatenate([getattr(one, name) for one in batches]) for name in ("numbers", "gaps", "centers")
+    )
+    assert numbers.tolist() == used.tolist()
+    assert np.isnan(gaps[0]) and gaps[1:] == pytest.approx(np.diff(stamps[used]))
+    assert centers == pytest.approx(stamps[used] + CONFIG.burst_center)
+    assert np.array_equal(np.concatenate([one.samples for one in batches]), adc[used])
+    assert np.array_equal(np.concatenate([one.valid for one in batches]), valid[used])
+
+
+def test_batches_keep_their_samples(signal, adc):
+    """A reader may use its memory again."""
+    lent = adc[:2].copy()
+    taken = Intake(signal).take(lent, np.arange(2))
+    lent[:] = 1
+    assert np.array_equal(taken.samples, adc[:2])

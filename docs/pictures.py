@@ -11,10 +11,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
-from radarize.evaluation.drawings import draw_doppler, draw_fan, draw_scan
 from radarize.evaluation.evaluate import trajectory_errors
 from radarize.heatmaps import Heatmaps
 from radarize.recording import Recording
+from radarize.report.drawings import draw_doppler, draw_fan, draw_scan
 from radarize.runfolder import RunFolder
 from radarsim.scene.preview import preview
 from radarsim.scene.scene import Scene

@@ -338,15 +338,22 @@ def evaluate(
     as_json: AsJson = False,
 ):
     """Compare a run with the truth; writes metrics.json."""
-    from radarize.evaluation import comparison
-    from radarize.evaluation.evaluate import evaluate, show
+    from radarize.evaluation.evaluate import evaluate
+    from radarize.report.run import methods
+    from radarize.report.terminal import print_beside, print_metrics
+    from radarize.runfolder import RunFolder
 
     with working("evaluating"):
-        metrics = evaluate(run, reference)
-        rows = comparison.compare([run, *beside], reference) if beside else []
-    _print_json(metrics) if as_json else show(metrics)
-    if rows and not as_json:
-        comparison.show(rows)
+        folder, others = RunFolder(run), [RunFolder(other) for other in beside or ()]
+        metrics = evaluate(folder, reference)
+        compared = [(methods(other), evaluate(other, reference)) for other in others]
+        folder.write_metrics(metrics)
+    if as_json:
+        _print_json(metrics)
+        return
+    print_metrics(metrics)
+    if compared:
+        print_beside([(methods(folder), metrics), *compared])
 
 
 @app.command()
@@ -373,7 +380,8 @@ def report(
     beside: Beside = None,
 ):
     """Draw a run or a recording as one HTML page."""
-    from radarize.evaluation.report import report_recording, report_run
+    from radarize.report.recording import report_recording
+    from radarize.report.run import report_run
 
     with working("drawing"):
         written = report_run(source, output, beside or ()) if source.is_dir() else report_recording(source, output)

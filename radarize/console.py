@@ -4,7 +4,7 @@ import errno
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated
 
@@ -14,6 +14,8 @@ from radarize.errors import InputError
 
 #: Exit code of everything that ends in an error sentence.
 FAILED = 2
+#: Letters of a word that a table does not cut.
+_WORD = 32
 
 
 def new_app(about: str) -> typer.Typer:
@@ -111,6 +113,43 @@ def working(label: str) -> Iterator[None]:
 
     with Console(stderr=True).status(label):
         yield
+
+
+def printable(value: object) -> str:
+    """Data as text that does nothing to a terminal."""
+    return "".join(c if c.isprintable() or c == "\n" else repr(c)[1:-1] for c in str(value))
+
+
+def print_table(head: Sequence[str], rows: Iterable[Sequence[object]], numbers: Collection[int] = ()) -> None:
+    """Print a table that is no wider than the terminal; cells are data, never markup.
+
+    Lines break between words; a word of up to `_WORD` letters stays whole.
+
+    Args:
+        head: of the columns.
+        rows: of as many cells.
+        numbers: columns that are right-aligned.
+    """
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(markup=False, emoji=False, highlight=False)
+    cells = [[printable(value) for value in row] for row in rows]
+    table = Table(box=box.SIMPLE_HEAD, header_style="bold", show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
+    columns = list(zip(head, *cells, strict=True))
+    widths = [min(max(len(word) for cell in column for word in cell.split() or [""]), _WORD) for column in columns]
+    # Heads of figures may break; of the others, and of all cells, the one that breaks most gets the room that is left.
+    wanted = [max(map(len, column[k in numbers :]), default=0) for k, column in enumerate(columns)]
+    for _ in range(console.width - 2 * len(head) - sum(widths)):
+        most = max(range(len(head)), key=lambda k: wanted[k] / max(widths[k], 1))
+        widths[most] += wanted[most] > widths[most]
+    for k, name in enumerate(head):
+        table.add_column(name, width=widths[k], justify="right" if k in numbers else "left", overflow="fold")
+    for row in cells:
+        table.add_row(*row)
+    console.print(table)
+    console.print()
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from radarize.console import print_table, printable
 from radarize.recording import Recording
 
 #: Derived quantities of a configuration, with their units.
@@ -72,28 +73,19 @@ def _readable(value: float, unit: str) -> tuple[str, str]:
 
 def show(found: dict) -> None:
     """Print what `contents` found."""
-    from rich.console import Console
-    from rich.table import Column, Table
-
-    console = Console()
-    console.print(
-        f"[bold]{found['path']}[/]: {found['frames']} frames, {found['duration']:.2f} s, "
-        f"{found['lost_chirps']} chirps lost ({100 * found['lost_share']:.2f} %)",
-        highlight=False,
+    print(
+        f"{printable(found['path'])}: {found['frames']} frames, {found['duration']:.2f} s, "
+        f"{found['lost_chirps']} chirps lost ({100 * found['lost_share']:.2f} %)"
     )
-    derived = Table("derived", Column("value", justify="right"), "unit", header_style="bold")
-    for name, value in found["derived"].items():
-        derived.add_row(name, *_readable(value, DERIVED[name]))
-    given = Table("configuration", Column("value", overflow="fold"), header_style="bold")
-    for name, value in found["config"].items():
-        untouched = name == "channel_calibration" and all(tuple(pair) == (1.0, 0.0) for pair in value)
-        given.add_row(name, "none" if untouched else str(value))
-    data = Table("data set", "shape", "type", "unit", Column("about", overflow="fold"), header_style="bold")
-    for name, item in found["data_sets"].items():
-        shape = " x ".join(str(length) for length in item["shape"])
-        data.add_row(f"/{name}", shape, item["dtype"], str(item["unit"]), str(item["about"]))
-    attributes = Table("attribute", Column("value", overflow="fold"), header_style="bold")
-    for name, value in found["attributes"].items():
-        attributes.add_row(name, str(value))
-    for table in (given, derived, data, attributes):
-        console.print(table)
+    config = dict(found["config"])
+    if all(tuple(pair) == (1.0, 0.0) for pair in config.get("channel_calibration") or ()):
+        config["channel_calibration"] = "none"
+    print_table(("configuration", "value"), config.items())
+    derived = [(name, *_readable(value, DERIVED[name])) for name, value in found["derived"].items()]
+    print_table(("derived", "value", "unit"), derived, numbers=(1,))
+    data = [
+        (f"/{name}", " x ".join(map(str, item["shape"])), item["dtype"], item["unit"], item["about"])
+        for name, item in found["data_sets"].items()
+    ]
+    print_table(("data set", "shape", "type", "unit", "about"), data)
+    print_table(("attribute", "value"), found["attributes"].items())

@@ -10,7 +10,6 @@
 Everything is sent column-wise, in batches of frames.
 """
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,20 +17,20 @@ import numpy as np
 from jaxtyping import Float, Shaped, UInt8
 
 from radarize.errors import InputError
-from radarize.evaluation.drawings import LEAKAGE
 from radarize.evaluation.evaluate import trajectories
-from radarize.evaluation.page import COLORS
-from radarize.evaluation.trajectory import alignment, matched, planar, trajectory
+from radarize.evaluation.trajectory import fitted, trajectory
 from radarize.features.maps import MapMaker, maps_of
 from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
 from radarize.replacing import replacing
+from radarize.report.drawings import LEAKAGE
+from radarize.report.page import COLORS
 from radarize.runfolder import RunFolder
 
 _BATCH = 16
 _MAPS = ("range_azimuth", "doppler_azimuth")
-#: Colours of causes in the order of their labels: direct, then what is no wall.
-_CAUSES = ("#39d0d8", "#8b949e", "#e4572e", "#f2a33a", "#9a6fd0", "#2e9e6b", "#5c6570")
+#: Colours of causes in the order of their labels: direct, floor or ceiling, then what is no wall.
+_CAUSES = ("#39d0d8", "#8b949e", "#e4572e", "#f2703a", "#f2a33a", "#9a6fd0", "#2e9e6b", "#5c6570")
 
 
 def view(
@@ -205,9 +204,8 @@ def show_recording(screen: Screen, recording: Recording, progress: Callable[[int
         speeds = recording.rows("truth/velocity", 0, len(recording))[:, :2]
         screen.speeds(recording.times + config.burst_center, speeds, "truth")
     if recording.has("truth/cause"):
-        about = str(recording.describe("truth/cause")["about"])
-        names = [(int(label), name) for label, name in re.findall(r"\b(\d+) ([a-z ]+)", about)]
-        labels = [(k, name, _rgb(_CAUSES[k % len(_CAUSES)])) for k, name in names if name != "noise"]
+        names = recording.labels("truth/cause")
+        labels = [(k, name, _rgb(_CAUSES[k % len(_CAUSES)])) for k, name in enumerate(names)]
         screen.fixed("radar/cause", rr.AnnotationContext([*labels, (255, "noise", (0, 0, 0))]))
     if recording.has("truth/depth_mount") and recording.has("truth/depth_intrinsics"):
         _send_camera(screen, recording)
@@ -282,7 +280,7 @@ def show_run(screen: Screen, run: RunFolder) -> None:
     screen.fixed("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
     for name, path in paths.items():
         if reference is not None:
-            turn, shift = alignment(*matched(path, planar(reference)), in_plane=True)
+            turn, shift = fitted(path, reference)
             # SLAM's plane is the radar's: at the height that it was carried at.
             shift = shift + [0, 0, reference.positions_xyz[:, 2].mean()]
             screen.fixed(f"world/{name}", rr.Transform3D(translation=shift, mat3x3=turn))

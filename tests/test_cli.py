@@ -184,6 +184,19 @@ def test_info(capsys, tmp_path):
     assert code == 0 and "2 frames" in out and "range_resolution" in out and "nowhere" in out
 
 
+def test_info_shows_attributes_as_they_are(capsys, tmp_path):
+    """What looks like markup, an emoji or a terminal's command is data."""
+    odd = {"[imu]": "a [bold]plate[/bold]", "closing": "[/x]", "smile": ":smile:", "red": "\x1b[31mred"}
+    path, config = tmp_path / "[b]odd[imu].h5", PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
+    with RecordingWriter(path, config, attributes=odd) as writer:
+        writer.append(np.zeros((1, *config.frame_shape), np.int16), np.zeros(1))
+    code, out, err = call(capsys, "radarize info", path)
+    assert (code, err) == (0, "")
+    for words in (path.name, "[imu]", "a [bold]plate[/bold]", "[/x]", ":smile:", "\\x1b[31mred"):
+        assert words in out
+    assert "\x1b" not in out
+
+
 def test_a_full_disk_is_one_sentence(tmp_path):
     """Writes into a small tmpfs, where root can mount one."""
     disk = tmp_path / "disk"

@@ -23,6 +23,7 @@ COUNT = 20
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 4})
 CLOCK = 1.7e9
 BIN = 40
+CAUSES = ("direct", "floor_ceiling", "ghost_1", "ghost_2", "ghost_3", "through_slab", "moving", "leakage")
 
 
 class Entities:
@@ -72,8 +73,8 @@ def recording(tmp_path_factory):
         "truth/cause": rng.choice(np.array([0, 2, 255], np.uint8), (COUNT, n, 5)),
         "truth/depth": rng.integers(0, 4000, (COUNT, 6, 8)).astype(np.uint16),
     }
-    about = {"truth/cause": "strongest cause of a range-azimuth cell: 0 direct, 1 floor or ceiling, 2 ghost, 255 noise"}
-    streams = {k: Stream(v.shape[1:], v.dtype.str, "", about.get(k, "")) for k, v in rows.items()}
+    labels = {"truth/cause": CAUSES}
+    streams = {k: Stream(v.shape[1:], v.dtype.str, "", "", labels=labels.get(k, ())) for k, v in rows.items()}
     fixed = {
         "truth/scan_azimuths": np.linspace(-1, 1, 7), "truth/floor_plan": np.array([[0, 0, 4, 0], [4, 0, 4, 3.0]]),
         "truth/depth_mount": np.array([0.1, 0, 0.05, 0, 0, 0, 1]), "truth/depth_intrinsics": np.array([5, 5, 4, 3.0]),
@@ -142,7 +143,9 @@ def test_causes_and_depth_keep_their_values(recording, shown):
     assert np.array_equal(pixels(shown, "/radar/cause", "SegmentationImage")[..., 0], cause[:, ::-1, ::-1])
     context = shown["/radar/cause", "AnnotationContext:context"][0]
     labels = {item["class_id"]: item["class_description"]["info"]["label"] for item in context}
-    assert labels == {0: "direct", 1: "floor or ceiling", 2: "ghost", 255: "noise"}
+    assert labels == {**dict(enumerate(CAUSES)), 255: "noise"}
+    colors = [item["class_description"]["info"]["color"] for item in context]
+    assert len(set(colors)) == len(CAUSES) + 1
     camera = "/world/truth/radar/camera/depth"
     assert np.array_equal(pixels(shown, camera, "DepthImage", np.uint16)[..., 0], depth)
     assert shown[camera, "DepthImage:meter"] == [1000.0]

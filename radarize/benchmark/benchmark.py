@@ -10,8 +10,8 @@ from radarize.benchmark.runs import Pair, Run, Timing
 from radarize.benchmark.steps import Step, perform
 from radarize.benchmark.table import Table
 from radarize.errors import InputError
-from radarize.evaluation.page import Page
 from radarize.methods.registry import BEST, ODOMETRY, SCANS, best_methods
+from radarize.report.page import Page
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from radarize.benchmark.benchmark import Study
 from radarize.benchmark.results import Results
 from radarize.benchmark.table import cell
 from radarize.errors import InputError
-from radarize.evaluation.page import Page
 from radarize.jsonfile import read_json
+from radarize.report.page import Link, Page
 
 
 def write_page(study: Study, results: Results, path: Path) -> Path:
@@ -29,7 +29,7 @@ def write_page(study: Study, results: Results, path: Path) -> Path:
     page.section("Data, networks, machine")
     for note in results.notes:
         page.text(note)
-    page.settings("Made by", {"command": results.command, "seed": results.seed, **results.machine})
+    page.columns({"Made by": {"command": results.command, "seed": results.seed, **results.machine}})
     return page.write(path)
 
 
@@ -48,6 +48,6 @@ def write_index(folder: Path) -> Path:
             continue
         if "tables" in about:
             made = about.get("machine", {})
-            rows.append((about["title"], path.name, made.get("commit", "-"), made.get("processor", "-")))
-    page.links(("benchmark", "commit", "processor"), rows)
+            rows.append((Link(about["title"], path.name), made.get("commit", "-"), made.get("processor", "-")))
+    page.table(("benchmark", "commit", "processor"), rows)
     return page.write(folder / "index.html")

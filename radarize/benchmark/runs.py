@@ -21,6 +21,7 @@ from radarize.evaluation.evaluate import evaluate, trajectory_errors
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import missed, sources
 from radarize.methods.registry import ODOMETRY, SCANS, Inputs, Workshop
+from radarize.pipeline import Pipeline
 from radarize.recording import Recording
 from radarize.run import run_each
 from radarize.runfolder import RunFolder
@@ -159,6 +160,7 @@ def figures(run: Path, recording: Path) -> dict[str, object]:
         InputError: no truth.
     """
     found = evaluate(run)
+    RunFolder(run).write_metrics(found)
     settings = SlamConfig.preset("radar")
     log.run(run, None, run / OPEN, config=settings.model_copy(update={"loop": LoopConfig(enabled=False)}))
     errors = trajectory_errors(run, association="nearest")
@@ -222,7 +224,8 @@ def measure(
     start = time.perf_counter()
     for first in range(0, frames, BATCH):
         stop = min(first + BATCH, frames)
-        timed.push(intake.take(source.adc(first, stop), source.times[first:stop], source.valid(first, stop)))
+        if batch := intake.take(source.adc(first, stop), source.times[first:stop], source.valid(first, stop)):
+            timed.push(batch)
         report(stop / frames)
     timed.finish()
     whole = 1e3 * (time.perf_counter() - start) / frames

@@ -7,9 +7,10 @@ from radarize.benchmark.benchmark import Chosen, Study
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Table, at, mean
-from radarize.evaluation.page import Page
-from radarize.evaluation.stress import FIGURES, SOURCES, curves
+from radarize.evaluation.stress import FIGURES, SOURCES
 from radarize.methods.registry import CLASSICAL, ODOMETRY, SCANS
+from radarize.report.curves import curves
+from radarize.report.page import Page
 
 #: Where figures of `radarize.evaluation.stress` stand in those of a run.
 PLACES = {

@@ -6,7 +6,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 from radarize.errors import InputError
-from radarize.evaluation.page import STYLE
+from radarize.report.page import STYLE
 
 #: Events (HTML standard, section 9.2); a comment now and then tells whether the browser is still there.
 _KEEP_ALIVE = 5.0

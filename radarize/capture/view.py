@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from radarize.batch import Signal
-from radarize.evaluation.drawings import DEPTH, LEAKAGE, decibels
 from radarize.heatmaps import Heatmaps
 from radarize.pipeline import Pipeline, Result
 from radarize.pose import between, compose
+from radarize.report.drawings import DEPTH, LEAKAGE, decibels
 
 #: Pixels across the fan, and s over which figures are averaged.
 _FAN, _SPAN = 260, 2.0

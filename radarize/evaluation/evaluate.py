@@ -1,4 +1,4 @@
-"""A whole run against the truth: trajectories, map, scans, velocities; written as metrics.json."""
+"""A whole run against the truth: trajectories, map, scans, velocities."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -7,6 +7,7 @@ import numpy as np
 from evo.core.trajectory import PoseTrajectory3D
 
 from radarize.errors import InputError
+from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.motion import velocity_errors
@@ -61,30 +62,26 @@ def true_scans(scans: Mapping[str, np.ndarray], truth: TrajectoryErrors) -> tupl
     return poses.positions_xyz[:, :2], yaws(poses), azimuths[inside], scans["truth/scan"][rows][:, inside]
 
 
-def evaluate(run: Path | RunFolder, reference: Path | None = None) -> dict[str, object]:
-    """`assess` a run, and write ``metrics.json`` into it."""
-    run = run if isinstance(run, RunFolder) else RunFolder(run)
-    metrics = assess(run, reference)
-    run.write_metrics(metrics)
-    return metrics
-
-
-def assess(run: Path | RunFolder, reference: Path | None = None) -> dict[str, object]:
-    """Compare a run with the truth; nothing is written.
+def evaluate(
+    run: Path | RunFolder, reference: Path | None = None, errors: dict[str, TrajectoryErrors] | None = None
+) -> dict[str, object]:
+    """Compare a run with the truth. Nothing is written, see `RunFolder.write_metrics`.
 
     Args:
         run: a run, or its folder.
         reference: TUM file of the truth; by default the run's ``reference.tum``.
+        errors: of its trajectories (`trajectory_errors`), where they are at hand.
 
     Returns:
         ``slam`` and ``odometry``: `TrajectoryErrors.summary`. Where the run knows the truth about them, ``map``:
         `map_errors`, ``scans``: `scan_errors`, ``velocity``: `velocity_errors`. Numbers that do not exist are None.
+        Where the run tells it, ``blind``: `BlindSpans`.
 
     Raises:
         InputError: not a run, no truth, or nothing that matches.
     """
     run = run if isinstance(run, RunFolder) else RunFolder(run)
-    errors = trajectory_errors(run, reference)
+    errors = errors or trajectory_errors(run, reference)
     metrics: dict[str, object] = {name: item.summary() for name, item in errors.items()}
     metrics["reference"] = Path(reference).name if reference else "reference.tum"
     scans, grid, best = run.scans, run.map, errors["slam"]
@@ -101,70 +98,6 @@ def assess(run: Path | RunFolder, reference: Path | None = None) -> dict[str, ob
         metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
         if true is not None:
             metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
+    if blind := BlindSpans.of(run):
+        metrics["blind"] = blind.model_dump()
     return without_nan(metrics)
-
-
-def show(metrics: dict) -> None:
-    """Print what `evaluate` returned as tables."""
-    from rich.console import Console
-    from rich.table import Column, Table
-
-    console = Console()
-    names = [name for name in TRAJECTORIES if name in metrics]
-    table = Table("trajectory", *(Column(name, justify="right") for name in names), header_style="bold")
-
-    def row(label: str, unit: str, *path: str, factor: float = 1.0, digits: int = 3) -> None:
-        values = []
-        for name in names:
-            value = metrics[name]
-            for key in path:
-                value = value[key]
-            values.append("-" if value is None else f"{factor * value:.{digits}f} {unit}")
-        table.add_row(label, *values)
-
-    row("ATE position, mean", "m", "ate", "position", "mean")
-    row("ATE position, rmse", "m", "ate", "position", "rmse")
-    row("ATE position, max", "m", "ate", "position", "max")
-    row("ATE rotation, mean", "rad", "ate", "rotation", "mean")
-    for delta in ("frame", "second", "metre"):
-        row(f"RE position over a {delta}, mean", "m", "re", delta, "position", "mean", digits=4)
-        row(f"RE rotation over a {delta}, mean", "rad", "re", delta, "rotation", "mean", digits=4)
-    row("mean ATE / distance", "%", "ate_share", factor=100, digits=2)
-    row("end drift / distance", "%", "drift", factor=100, digits=2)
-    row("distance travelled", "m", "distance", digits=1)
-    console.print(table)
-    for name, words in {"map": MAP_WORDS, "scans": SCAN_WORDS, "velocity": VELOCITY_WORDS}.items():
-        if name in metrics:
-            table = Table(name, Column("value", justify="right"), header_style="bold")
-            for key, (label, unit, factor) in words.items():
-                value = metrics[name].get(key)
-                table.add_row(label, "-" if value is None else f"{factor * value:.3g} {unit}".strip())
-            console.print(table)
-
-
-#: Key of a figure to its label, unit and factor, for tables.
-MAP_WORDS = {
-    "precision": ("occupied cells within 10 cm of a wall (precision)", "%", 100),
-    "recall": ("visible wall within 10 cm of an occupied cell (recall)", "%", 100),
-    "f1": ("F1", "%", 100),
-    "chamfer": ("Chamfer distance", "m", 1),
-    "free_iou": ("free space, intersection over union", "%", 100),
-}
-SCAN_WORDS = {
-    "within_10cm": ("returned bearings within 10 cm of the truth", "%", 100),
-    "short": ("too near by more", "%", 100),
-    "beyond": ("too far by more", "%", 100),
-    "returned": ("bearings in reach that return anything", "%", 100),
-    "through": ("bearings in reach that carve through a surface", "%", 100),
-    "median": ("median range error", "m", 1),
-}
-VELOCITY_WORDS = {
-    "median": ("median error", "m/s", 1),
-    "p90": ("90 % within", "m/s", 1),
-    "forward": ("forward, rms", "m/s", 1),
-    "left": ("left, rms", "m/s", 1),
-    "missing": ("frames without an estimate", "%", 100),
-    "bias": ("mean along the motion", "m/s", 1),
-    "nees": ("mean squared error over covariance (1 if it is honest)", "", 1),
-    "nees_median": ("its median over that of honest ones", "", 1),
-}

@@ -133,6 +133,17 @@ def alignment(
     return turn, y.mean(axis=1) - turn @ x.mean(axis=1)
 
 
+def fitted(
+    estimate: PoseTrajectory3D, reference: PoseTrajectory3D
+) -> tuple[Float[np.ndarray, "3 3"], Float[np.ndarray, "3"]]:
+    """The `alignment` in the plane of what two trajectories have in common.
+
+    Raises:
+        InputError: fewer than three poses match.
+    """
+    return alignment(*map(planar, matched(estimate, reference)), in_plane=True)
+
+
 def moved(path: PoseTrajectory3D, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]) -> PoseTrajectory3D:
     """The trajectory in another frame: each pose T becomes (turn, shift) T."""
     attitudes = Rotation.from_matrix(turn) * Rotation.from_quat(path.orientations_quat_wxyz, scalar_first=True)

@@ -8,13 +8,13 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from radarize.evaluation.drawings import canvas, draw_doppler, draw_fan, draw_profiles, draw_scan
-from radarize.evaluation.page import COLORS, INK, Page
 from radarize.evaluation.twin import FIGURES, Comparison, compare
 from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS
 from radarize.recording import Recording
 from radarize.replacing import write_whole
+from radarize.report.drawings import canvas, draw_doppler, draw_fan, draw_profiles, draw_scan
+from radarize.report.page import COLORS, INK, Page
 
 #: Range profiles over time: a picture has no room for more.
 _PROFILES = 400

@@ -10,7 +10,7 @@ from fake_run import PLAN, write_run
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate
 from radarize.evaluation.mapping import distance_to_plan, segment_points
-from radarize.runfolder import OccupancyMap
+from radarize.runfolder import OccupancyMap, RunFolder
 from radarize.runfolder.occupancy import read_pgm
 
 
@@ -21,6 +21,8 @@ def run(tmp_path_factory):
 
 def test_metrics_of_a_known_run(run):
     metrics = evaluate(run)
+    assert not (run / "metrics.json").exists()
+    RunFolder(run).write_metrics(metrics)
     assert json.loads((run / "metrics.json").read_text()) == metrics
     # The trajectory wanders by centimetres; the odometry is 4 % too long and turns by 0.12 rad too much.
     assert metrics["slam"]["ate"]["position"]["mean"] < 0.05

@@ -9,8 +9,8 @@ import pytest
 
 from radarize.contents import contents
 from radarize.errors import InputError
-from radarize.evaluation.recording_report import report_recording
 from radarize.recording import Recording, RecordingWriter
+from radarize.report.recording import report_recording
 from radarsim.scene.scene import Scene
 from radarsim.sensors.suite import SENSORS, chosen
 from radarsim.simulate import simulate

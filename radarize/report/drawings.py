@@ -8,7 +8,7 @@ matplotlib.use("agg")
 
 import matplotlib.pyplot as plt  # noqa: E402
 
-from radarize.evaluation.page import COLORS, INK  # noqa: E402
+from radarize.report.page import COLORS, INK  # noqa: E402
 
 _STYLE = {
     "text.color": INK,

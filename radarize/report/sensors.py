@@ -1,12 +1,11 @@
-"""Pictures of what sensors beside the radar recorded, for the report of a recording."""
+"""Pictures of what sensors beside the radar recorded, for the page of a recording."""
 
 import numpy as np
-from jaxtyping import Float, Shaped
 from scipy.spatial.transform import Rotation
 
-from radarize.evaluation.drawings import canvas
-from radarize.evaluation.page import COLORS, Page
 from radarize.recording import Recording
+from radarize.report.drawings import canvas
+from radarize.report.page import COLORS, Page
 
 #: Value of cells that no cause fills (/truth/cause).
 _NONE = 255
@@ -25,61 +24,57 @@ def show_sensors(page: Page, recording: Recording, frames: list[int]) -> None:
             page.section(title, about or str(recording.describe(name)["about"]))
             figure, axes = canvas(len(frames), height=2.6)
             for axis, frame in zip(axes[0], frames, strict=True):
-                draw(axis, recording, frame)
+                draw(axis, recording, recording.rows(name, frame, frame + 1))
                 axis.set_title(f"frame {frame}")
             page.picture(figure)
     if recording.has("imu/time"):
         page.section("IMU", "Specific force and angular velocity; x, y, z.")
-        figure, axes = canvas(2)
-        time = recording.read("imu/time")
-        for axis, name in zip(axes[0], ("imu/accelerometer", "imu/gyroscope"), strict=True):
-            values = recording.read(name)
-            _lines(axis, time, values, f"{name.removeprefix('imu/')}, {recording.describe(name)['unit']}")
-        page.picture(figure)
+        names = ("imu/accelerometer", "imu/gyroscope")
+        lines = {f"{n.removeprefix('imu/')}, {recording.describe(n)['unit']}": recording.read(n) for n in names}
+        _draw_lines(page, recording.read("imu/time"), lines)
     if recording.has("tracking/pose") and recording.has("tracking/true_pose"):
         page.section("Tracking camera", "How far its poses are off: position, and rotation vector.")
-        figure, axes = canvas(2)
         time, tracked, truth = (recording.read(f"tracking/{n}") for n in ("time", "pose", "true_pose"))
         turn = (Rotation.from_quat(tracked[:, 3:]) * Rotation.from_quat(truth[:, 3:]).inv()).as_rotvec()
-        _lines(axes[0, 0], time, tracked[:, :3] - truth[:, :3], "position, m")
-        _lines(axes[0, 1], time, np.degrees(turn), "rotation, deg")
-        page.picture(figure)
+        off = tracked[:, :3] - truth[:, :3]
+        _draw_lines(page, time, {"position, m": off, "rotation, deg": np.degrees(turn)})
 
 
-def _depth(axis, recording: Recording, frame: int) -> None:
-    picture = recording.rows("truth/depth", frame, frame + 1)[0]
-    drawn = axis.imshow(np.where(picture > 0, picture / 1000, np.nan), cmap="viridis", aspect="auto")
+def _depth(axis, recording: Recording, pictures: np.ndarray) -> None:
+    drawn = axis.imshow(np.where(pictures[0] > 0, pictures[0] / 1000, np.nan), cmap="viridis", aspect="auto")
     axis.set(xticks=[], yticks=[])
     axis.figure.colorbar(drawn, ax=axis, label="m")
 
 
-def _occupancy(axis, recording: Recording, frame: int) -> None:
-    _polar(axis, recording, "truth/occupancy", recording.rows("truth/occupancy", frame, frame + 1)[0], "viridis", 2)
+def _occupancy(axis, recording: Recording, cells: np.ndarray) -> None:
+    _polar(axis, recording, "truth/occupancy", cells[0], "viridis", 2)
 
 
-def _cause(axis, recording: Recording, frame: int) -> None:
-    cause = recording.rows("truth/cause", frame, frame + 1)[0].astype(float)
-    drawn = _polar(axis, recording, "truth/cause", np.where(cause == _NONE, np.nan, cause), "tab10", 9)
-    axis.figure.colorbar(drawn, ax=axis)
+def _cause(axis, recording: Recording, cells: np.ndarray) -> None:
+    drawn = _polar(axis, recording, "truth/cause", np.where(cells[0] == _NONE, np.nan, cells[0]), "tab10", 9)
+    names = recording.labels("truth/cause")
+    axis.figure.colorbar(drawn, ax=axis).set_ticks(range(len(names)), labels=names, fontsize=7)
 
 
-def _polar(axis, recording: Recording, name: str, cells: Shaped[np.ndarray, "range azimuth"], colors: str, top: int):
+def _polar(axis, recording: Recording, name: str, cells: np.ndarray, colors: str, top: int):
     ranges, azimuths = recording.read(f"{name}_ranges"), recording.read(f"{name}_azimuths")
     x, y = -ranges[:, None] * np.sin(azimuths), ranges[:, None] * np.cos(azimuths)
     axis.set(aspect="equal", xlabel="to the right, m", ylabel="forward, m")
     return axis.pcolormesh(x, y, cells, cmap=colors, vmin=0, vmax=top, rasterized=True)
 
 
-def _points(axis, recording: Recording, frame: int) -> None:
-    cloud = recording.rows("points/cloud", frame, frame + 1)
-    limit = recording.config.max_velocity
+def _points(axis, recording: Recording, cloud: np.ndarray) -> None:
+    limit, reach = recording.config.max_velocity, recording.config.max_range
     drawn = axis.scatter(-cloud[:, 1], cloud[:, 0], c=cloud[:, 3], cmap="coolwarm", vmin=-limit, vmax=limit, s=14)
-    reach = recording.config.max_range
     axis.set(aspect="equal", xlim=(-reach, reach), ylim=(0, reach), xlabel="to the right, m", ylabel="forward, m")
     axis.figure.colorbar(drawn, ax=axis)
 
 
-def _lines(axis, time: Float[np.ndarray, "n"], values: Float[np.ndarray, "n 3"], label: str) -> None:
-    for column, color in zip(values.T, (COLORS["slam"], COLORS["good"], COLORS["odometry"]), strict=True):
-        axis.plot(time, column, color=color, lw=0.7)
-    axis.set(xlabel="time, s", ylabel=label)
+def _draw_lines(page: Page, time: np.ndarray, values: dict[str, np.ndarray]) -> None:
+    """Axes for each name with x, y, z over time."""
+    figure, axes = canvas(len(values))
+    for axis, (label, columns) in zip(axes[0], values.items(), strict=True):
+        for column, name in zip(columns.T, ("slam", "good", "odometry"), strict=True):
+            axis.plot(time, column, color=COLORS[name], lw=0.7)
+        axis.set(xlabel="time, s", ylabel=label)
+    page.picture(figure)

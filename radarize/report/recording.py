@@ -1,19 +1,19 @@
-"""A report of what a recording holds, real or simulated, as far as its antennas allow."""
+"""What a recording holds, real or simulated, as far as its antennas allow, as a page."""
 
 from pathlib import Path
 
 import numpy as np
-import plotly.graph_objects as go
 from scipy.signal import find_peaks
 
 from radarize.contents import contents
 from radarize.errors import InputError
-from radarize.evaluation.drawings import LEAKAGE, canvas, draw_doppler, draw_fan, draw_profiles
-from radarize.evaluation.page import COLORS, INK, Page
-from radarize.evaluation.sensors import show_sensors
 from radarize.heatmaps import Heatmaps
 from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
+from radarize.report.drawings import LEAKAGE, canvas, draw_doppler, draw_fan, draw_profiles
+from radarize.report.page import COLORS, INK, Page
+from radarize.report.plots import from_above, line, panels, walls
+from radarize.report.sensors import show_sensors
 
 #: At most so many profiles over time, and frames with maps: a picture has no room for more.
 _PROFILES, _FRAMES = 400, 3
@@ -95,14 +95,11 @@ def _profiles(page: Page, recording: Recording, maps: Heatmaps) -> None:
     level = 10 * np.log10(np.maximum(mean, top * 1e-9) / top) if top > 0 else np.zeros(len(mean))
     found, properties = find_peaks(np.where(far, level, level.min()), prominence=_PROMINENCE)
     strongest = np.sort(found[np.argsort(-properties["prominences"])[:_ECHOES]])
-    figure = go.Figure()
-    x, y = np.round(maps.ranges, 4), np.round(level, 2)
-    figure.add_scatter(x=x.tolist(), y=y.tolist(), line={"color": COLORS["odometry"]}, name="mean")
-    marker = {"color": COLORS["slam"], "size": 7}
-    echoes = (x[strongest].tolist(), y[strongest].tolist())
-    figure.add_scatter(x=echoes[0], y=echoes[1], mode="markers", marker=marker, name="echoes")
-    figure.update_xaxes(title="range, m")
-    figure.update_yaxes(title="mean power, dB", range=[max(level[far].min() - 3, -80) if far.any() else -80, 8])
+    figure = panels("mean power, dB", x="range, m")
+    line(figure, (maps.ranges, level), "mean", COLORS["odometry"])
+    echoes = maps.ranges[strongest], level[strongest]
+    line(figure, echoes, "echoes", COLORS["slam"], mode="markers", marker={"color": COLORS["slam"], "size": 7})
+    figure.update_yaxes(range=[max(level[far].min() - 3, -80) if far.any() else -80, 8])
     page.plot(figure, height=360)
     if len(strongest):
         page.text("Echoes: " + ", ".join(f"{r:.2f} m ({p:.0f} dB)" for r, p in zip(*echoes, strict=True)) + ".")
@@ -154,36 +151,26 @@ def _samples(page: Page, recording: Recording) -> None:
     step = max(1, largest // 60)
     edges = np.arange(-largest - step, largest + 2 * step, step)
     total, _ = np.histogram(values, edges, weights=counts)
-    figure = go.Figure()
-    figure.add_bar(x=edges[:-1].tolist(), y=total.tolist(), offset=0, marker={"color": COLORS["map"]})
+    figure = panels("samples", x="ADC counts (I and Q)")
+    figure.add_bar(x=edges[:-1], y=total, offset=0, marker={"color": COLORS["map"]})
     figure.update_layout(bargap=0.05)
-    figure.update_xaxes(title="ADC counts (I and Q)")
-    figure.update_yaxes(title="samples", type="log")
+    figure.update_yaxes(type="log")
     page.plot(figure, height=300)
-    valid = recording.valid(0, len(recording))
-    lost = (~valid).sum(axis=(1, 2))
+    lost = (~recording.valid(0, len(recording))).sum(axis=(1, 2))
     if lost.any():
-        figure = go.Figure()
-        time = np.round(recording.times - recording.times[0], 4).tolist()
-        figure.add_bar(x=time, y=lost.tolist(), marker={"color": COLORS["slam"]})
-        figure.update_xaxes(title="time, s")
-        figure.update_yaxes(title="lost chirps a frame")
+        figure = panels("lost chirps a frame")
+        figure.add_bar(x=recording.times - recording.times[0], y=lost, marker={"color": COLORS["slam"]})
         page.plot(figure, height=240)
 
 
 def _trajectory(page: Page, recording: Recording) -> None:
     page.section("True trajectory")
-    figure = go.Figure()
+    figure = from_above()
     if recording.has("truth/floor_plan"):
-        plan = recording.read("truth/floor_plan")
-        x, y = ([v for a, b in plan[:, (i, i + 2)].round(3).tolist() for v in (a, b, None)] for i in (0, 1))
-        figure.add_scatter(x=x, y=y, name="floor plan", mode="lines", line={"color": COLORS["truth"], "width": 1.2})
-    poses = recording.read("truth/pose")
-    x, y = np.round(poses[:, :2], 3).T.tolist()
-    figure.add_scatter(x=x, y=y, name="sensor", mode="lines", line={"color": COLORS["good"], "width": 2.4})
-    figure.add_scatter(x=x[:1], y=y[:1], name="start", mode="markers", marker={"color": INK, "size": 9})
-    figure.update_xaxes(title="x, m", constrain="domain")
-    figure.update_yaxes(title="y, m", scaleanchor="x")
+        line(figure, walls(recording.read("truth/floor_plan")), "floor plan", COLORS["truth"], 1.2)
+    path = recording.read("truth/pose")[:, :2]
+    line(figure, path, "sensor", COLORS["good"], 2.4)
+    line(figure, path[:1], "start", INK, mode="markers", marker={"color": INK, "size": 9})
     page.plot(figure, height=520)
 
 

@@ -1,0 +1,25 @@
+"""Figures of runs in the terminal."""
+
+from collections.abc import Mapping, Sequence
+
+from radarize.console import print_table
+from radarize.evaluation.blindness import BlindSpans
+from radarize.report import words
+
+
+def print_metrics(metrics: Mapping[str, object]) -> None:
+    """Print what `radarize.evaluation.evaluate` returned as tables."""
+    table = words.trajectories(metrics)
+    print_table(table.head[:-1], [row[:-1] for row in table.rows], table.numbers)
+    for table in words.parts(metrics):
+        print_table(*table)
+    if "blind" in metrics:
+        found = BlindSpans.model_validate(metrics["blind"])
+        print(words.blindness(found))
+        if found.spans:
+            print_table(*words.blind_spans(found))
+
+
+def print_beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> None:
+    """Print runs beside each other, as (methods, metrics)."""
+    print_table(*words.beside(runs))

@@ -1,0 +1,123 @@
+"""Figures of runs in words: the rows of tables, on a page and in the terminal alike."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from radarize.evaluation.blindness import BlindSpans
+from radarize.evaluation.metrics import at
+
+#: What stands where there is no figure.
+NONE = "-"
+
+
+class Figure(NamedTuple):
+    """A figure of `radarize.evaluation.evaluate`: words, where it stands, unit and factor, format, meaning."""
+
+    words: str
+    path: str
+    unit: str = ""
+    factor: float = 1
+    form: str = ".3g"
+    meaning: str = ""
+
+    def text(self, metrics: Mapping[str, object], unit: bool = True) -> str:
+        """Value and unit."""
+        value = at(metrics, *self.path.split("."))
+        return NONE if value is None else f"{self.factor * value:{self.form}} {self.unit * unit}".strip()
+
+
+_TRAJECTORY = (
+    Figure("ATE position, mean", "ate.position.mean", "m", 1, ".3f",
+           "distance to the truth after laying both trajectories upon each other"),
+    Figure("ATE position, rmse", "ate.position.rmse", "m", 1, ".3f"),
+    Figure("ATE position, max", "ate.position.max", "m", 1, ".3f"),
+    Figure("ATE rotation, mean", "ate.rotation.mean", "rad", 1, ".3f"),
+    *(Figure(f"RE {what} over a {delta}, mean", f"re.{delta}.{what}.mean", unit, 1, ".4f",
+             "error of the way from pose to pose, no alignment" if (delta, unit) == ("frame", "m") else "")
+      for delta in ("frame", "second", "metre") for what, unit in (("position", "m"), ("rotation", "rad"))),
+    Figure("mean ATE / distance", "ate_share", "%", 100, ".2f"),
+    Figure("end drift / distance", "drift", "%", 100, ".2f", "how far the ends are apart if the starts agree"),
+    Figure("distance travelled", "distance", "m", 1, ".1f"),
+)  # fmt: skip
+_PARTS = {
+    "map": (
+        Figure("occupied cells within 10 cm of a wall (precision)", "precision", "%", 100),
+        Figure("visible wall within 10 cm of an occupied cell (recall)", "recall", "%", 100),
+        Figure("F1", "f1", "%", 100),
+        Figure("Chamfer distance", "chamfer", "m"),
+        Figure("free space, intersection over union", "free_iou", "%", 100),
+    ),
+    "scans": (
+        Figure("returned bearings within 10 cm of the truth", "within_10cm", "%", 100),
+        Figure("too near by more", "short", "%", 100),
+        Figure("too far by more", "beyond", "%", 100),
+        Figure("bearings in reach that return anything", "returned", "%", 100),
+        Figure("bearings in reach that carve through a surface", "through", "%", 100),
+        Figure("median range error", "median", "m"),
+    ),
+    "velocity": (
+        Figure("median error", "median", "m/s"),
+        Figure("90 % within", "p90", "m/s"),
+        Figure("forward, rms", "forward", "m/s"),
+        Figure("left, rms", "left", "m/s"),
+        Figure("frames without an estimate", "missing", "%", 100),
+        Figure("mean along the motion", "bias", "m/s"),
+        Figure("mean squared error over covariance (1 if it is honest)", "nees"),
+        Figure("its median over that of honest ones", "nees_median"),
+    ),
+}
+#: What methods are compared by.
+_BESIDE = (
+    Figure("velocity RMSE", "velocity.rmse", "m/s"),
+    Figure("odometry ATE", "odometry.ate.position.mean", "m"),
+    Figure("odometry ATE", "odometry.ate.rotation.mean", "rad"),
+    Figure("SLAM ATE", "slam.ate.position.mean", "m"),
+    Figure("SLAM ATE", "slam.ate.rotation.mean", "rad"),
+    Figure("bearings within 10 cm", "scans.within_10cm", "%", 100),
+    Figure("map F1", "map.f1", "%", 100),
+)
+
+
+class Table(NamedTuple):
+    """Words in columns; `numbers` are the columns that hold figures."""
+
+    head: Sequence[str]
+    rows: list[tuple[str, ...]]
+    numbers: Sequence[int] = (1,)
+
+
+def trajectories(metrics: Mapping[str, object]) -> Table:
+    """Errors of a run's trajectories; the last column says what they mean."""
+    names = [name for name in ("odometry", "slam") if name in metrics]
+    rows = [(f.words, *(f.text(metrics[name]) for name in names), f.meaning) for f in _TRAJECTORY]
+    return Table(("trajectory", *names, "what it means"), rows, range(1, 1 + len(names)))
+
+
+def parts(metrics: Mapping[str, object]) -> Iterator[Table]:
+    """Errors of a run's map, scans and velocities, as far as they are known."""
+    for name, figures in _PARTS.items():
+        if name in metrics:
+            yield Table((name, "value"), [(figure.words, figure.text(metrics[name])) for figure in figures])
+
+
+def beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> Table:
+    """Runs of one recording beside each other, by what they were made with."""
+    head = ("method", *(f"{figure.words}, {figure.unit}" for figure in _BESIDE))
+    rows = [(name, *(figure.text(metrics, unit=False) for figure in _BESIDE)) for name, metrics in runs]
+    return Table(head, rows, range(1, len(head)))
+
+
+def blindness(found: BlindSpans) -> str:
+    """A sentence on how much of the way odometry was blind."""
+    if not found.spans:
+        return "Odometry was blind nowhere."
+    return (
+        f"Odometry was blind (no match believed, no velocity) over {found.way_m:.1f} m, "
+        f"{100 * found.share_of_way:.0f} % of the way."
+    )
+
+
+def blind_spans(found: BlindSpans) -> Table:
+    """Where odometry was blind."""
+    rows = [(f"{s.start_s:.1f}", f"{s.stop_s:.1f}", f"{s.way_m:.2f}", s.why) for s in found.spans]
+    return Table(("blind from, s", "to, s", "way, m", "why"), rows, (0, 1, 2))

@@ -1,6 +1,7 @@
 """Trained networks as files: safetensors in float16, with a header that says what they were trained on and for."""
 
 import json
+import warnings
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -67,7 +68,6 @@ class Header(BaseModel):
     def windows(self, config: RadarConfig) -> Windows:
         """Of a radar's frames, as the network was trained on them."""
         return Windows(self.maps, self.frames, self.stride(config), config.frame_period, max(self.spacings))
-
 
 #: Bytes of a file's header: ours have some thousands.
 _HEADER = 1 << 20
@@ -138,7 +138,8 @@ def load(path: Path, network: type[Network], config: RadarConfig | None = None) 
             f"({network.setting})"
         )
     try:
-        with torch.device("meta"):  # sizes that the header makes up take no memory
+        with torch.device("meta"), warnings.catch_warnings():  # sizes that the header makes up take no memory
+            warnings.simplefilter("ignore")  # nothing is copied
             build(network, header).load_state_dict(tensors)
         net = build(network, header)
         net.load_state_dict(tensors)

@@ -11,10 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from radarize.errors import InputError
 from radarize.heatmaps import HeatmapConfig
 from radarize.mapping.scans import ScanConfig
-from radarize.methods.radarize.settings import FusionConfig, TurnConfig
 from radarize.odometry.doppler import DopplerConfig
 from radarize.odometry.integration import VelocityConfig
 from radarize.odometry.rotation import RotationConfig
+from radarize.odometry.settings import FusionConfig, TurnConfig
 from radarize.slam.config import SlamConfig
 from radarize.yamlfile import read_yaml
 

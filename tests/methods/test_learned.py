@@ -10,9 +10,9 @@ from radarize.features.grid import Grid
 from radarize.methods.radarize.fused import FusedVelocity
 from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
-from radarize.methods.radarize.settings import FusionConfig
 from radarize.nets.weights import Header, build, example, load, save
 from radarize.odometry.doppler import Velocities
+from radarize.odometry.settings import FusionConfig
 from radarize.radar.presets import PRESETS
 from tests.batches import of_spectrum, parts
 

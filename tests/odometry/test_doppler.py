@@ -65,7 +65,7 @@ def test_standing_still_is_exactly_zero(room):
 def test_a_walk_that_sets_in_is_not_standing(room):
     """15 mm/s are slower than the threshold of standing, but many times what echoes are known to."""
     maps = Heatmaps(CONFIG)
-    found = DopplerVelocity(maps).estimate(maps.spectrum(burst(room, (0.015, 0.0))))
+    found = DopplerVelocity(maps).estimate(batch(CONFIG, burst(room, (0.015, 0.0)), np.zeros(1)))
     assert found.velocity[0] == pytest.approx([0.015, 0.0], abs=0.006)
     error = found.velocity[0] - [0.015, 0.0]
     assert error @ np.linalg.solve(found.covariance[0], error) < 9

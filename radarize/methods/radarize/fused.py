@@ -4,8 +4,8 @@ import numpy as np
 
 from radarize.batch import Batch
 from radarize.methods.radarize.learned import LearnedVelocity
-from radarize.methods.radarize.settings import FusionConfig
 from radarize.odometry.doppler import DopplerVelocity, Velocities
+from radarize.odometry.settings import FusionConfig
 
 
 class FusedVelocity:

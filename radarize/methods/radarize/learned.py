@@ -8,10 +8,10 @@ from jaxtyping import Float, Int
 
 from radarize.batch import Batch
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
-from radarize.methods.radarize.settings import TurnConfig
 from radarize.nets.weights import load
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
+from radarize.odometry.settings import TurnConfig
 from radarize.odometry.ties import Ties
 from radarize.radar.config import RadarConfig
 

@@ -1,11 +1,11 @@
-"""What may be set of Radarize's networks at run time."""
+"""What may be set where networks tell motion, beside the classical estimators or alone."""
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 
 class FusionConfig(BaseModel):
-    """Two estimates of the same samples (`FusedVelocity`)."""
+    """Two estimates of the same samples (`radarize.methods.radarize.fused`)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -22,7 +22,7 @@ class FusionConfig(BaseModel):
 
 
 class TurnConfig(BaseModel):
-    """Turns by the network over several spacings (`LearnedRotation`)."""
+    """Turns by the network over several spacings (`radarize.methods.radarize.learned`)."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

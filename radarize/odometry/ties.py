@@ -47,6 +47,10 @@ class Ties:
         self.covariance = move @ self.covariance @ move.T
         self.covariance[-2:, -2:] += wandered(self._wander, duration)
 
+    def part(self) -> None:
+        """What follows tells no more of what was, nor of how the value came to be what it is."""
+        self.covariance = np.diag(np.diag(self.covariance) * (np.arange(len(self._state)) >= len(self._state) - 2))
+
     def tie(self, back: int, difference: float, variance: float) -> None:
         """Kalman update by a difference from `back` frames ago to now; none if there was no such frame."""
         if not 0 < back < self.seen:

@@ -142,6 +142,8 @@ def test_a_second_lost_while_turning_is_not_asked_about(tmp_path, rate):
     assert abs(found.yaw[60] - over) < 3 * spread and np.radians(20) < spread < np.radians(60)
     assert np.degrees(found.yaw[60]) == pytest.approx(np.degrees(over), abs=25)
     assert not found.seen[60:62].any() and found.seen[2:60].all() and found.seen[62:].all()
+    # No frame's turn makes up for what was wrong with the gap's.
+    assert np.degrees(np.abs(found.yaw[61:] - rate * CONFIG.frame_period)).max() < 4
     assert np.degrees(found.yaw[75:].sum()) == pytest.approx(np.degrees(rate * (times[-1] - times[74])), abs=2)
 
 

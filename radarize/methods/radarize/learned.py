@@ -67,6 +67,7 @@ class LearnedRotation:
         self._windows, known = header.windows(radar), header.spacings
         self.spacings = [s for s in settings.spacings if s in known] or list(known)
         size = max(self.spacings) * self._windows.stride + 1
+        self._longest = (size - 0.5) * radar.frame_period
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
         self._yaws = Ties(size, settings.wander, settings.fastest)
 
@@ -79,6 +80,10 @@ class LearnedRotation:
         for i, dt in enumerate(np.diff(times, prepend=before)):
             last, known = self._yaws.values[-1], self._yaws.covariance[-2, -2]
             self._yaws.predict(float(dt))
+            if dt > self._longest:
+                # What comes after a gap does say how fast the sensor may have turned within; but that would be told as
+                # a turn of a later frame.
+                self._yaws.part()
             for ago, (turn, noise) in zip(back[:, i], turns[:, i], strict=True):
                 self._yaws.tie(int(ago), turn, noise)
             yaw[i] = self._yaws.values[-1] - last

@@ -48,7 +48,8 @@ def test_windows_are_frames_of_the_trained_rate(tmp_path):
     level = torch.from_numpy(SIGNAL.maker.of(everything, ("range_azimuth",))["range_azimuth"]).float().mean(dim=(1, 2))
     for cuts in ([12], [5, 7], [1] * 12):
         windows = load(weights(tmp_path, "rotation"), RotationNet, CONFIG)[1].windows(CONFIG)
-        pushed = [windows.push(part.maps(windows.maps), part.stamps, (1, 4)) for part in parts(SIGNAL, everything, times, cuts)]
+        batches = parts(SIGNAL, everything, times, cuts)
+        pushed = [windows.push(batch.maps(windows.maps), batch.stamps, (1, 4)) for batch in batches]
         for k, spacing in enumerate((1, 4)):
             shown = torch.cat([part[k].maps for part in pushed]).mean(dim=(2, 3, 4))
             whole = np.concatenate([part[k].whole for part in pushed])

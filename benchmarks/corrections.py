@@ -13,8 +13,8 @@ from radarize.heatmaps import Heatmaps
 from radarize.methods.published import labels
 from radarize.methods.published import maps as published
 from radarize.methods.published.training import pooled_dice
+from radarize.methods.radarize.segmentation import SegmentationNet
 from radarize.methods.task import first_cell
-from radarize.nets import SegmentationNet
 from radarize.nets.losses import SURFACE, surfaces
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.presets import PRESETS

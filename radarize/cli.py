@@ -286,7 +286,7 @@ def train(
     from dataclasses import replace
 
     from radarize.methods.registry import find_task
-    from radarize.training.train import train
+    from radarize.training.train import Options, train
 
     choices = {
         "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
@@ -298,8 +298,8 @@ def train(
     try:
         with progress("train") as report:
             written = train(
-                task, data, output, split=split, settings=hyper, device=device, workers=workers, resume=resume,
-                onnx=onnx, progress=report, say=lambda line: typer.echo(line, err=True),
+                task, data, output, hyper, Options(split, device, workers, resume, onnx),
+                progress=report, say=lambda line: typer.echo(line, err=True),
             )  # fmt: skip
     except KeyboardInterrupt:
         raise InputError("stopped; with --resume the same command goes on after the last whole epoch") from None

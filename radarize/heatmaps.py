@@ -53,9 +53,7 @@ class Heatmaps:
         azimuths: (azimuth,) rad.
     """
 
-    def __init__(
-        self, config: RadarConfig, azimuths: np.ndarray = AZIMUTHS, settings: HeatmapConfig | None = None
-    ):
+    def __init__(self, config: RadarConfig, azimuths: np.ndarray = AZIMUTHS, settings: HeatmapConfig | None = None):
         self.config, self.settings = config, settings or HeatmapConfig()
         self.azimuths = np.asarray(azimuths, float)
         self.ranges = config.ranges - config.range_bias

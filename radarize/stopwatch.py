@@ -37,6 +37,8 @@ def stage(name: str) -> Iterator[None]:
         yield
         return
     start, others = time.perf_counter(), sum(watch.seconds.values())
-    yield
-    within = sum(watch.seconds.values()) - others
-    watch.seconds[name] += time.perf_counter() - start - within
+    try:
+        yield
+    finally:
+        within = sum(watch.seconds.values()) - others
+        watch.seconds[name] += time.perf_counter() - start - within

@@ -15,7 +15,7 @@ from radarize.methods.registry import Weights, find_task
 from radarize.methods.task import Settings
 from radarize.replacing import write_whole
 from radarize.training.dataset import recordings
-from radarize.training.train import train
+from radarize.training.train import Options, train
 
 #: File with what a training began with, so that no other goes on from its checkpoint.
 BEGUN = "begun.json"
@@ -116,7 +116,7 @@ class Training:
             output.with_suffix(".checkpoint").unlink(missing_ok=True)
             write_whole(begun, json.dumps(self.identity(), indent=1))
         try:
-            train(self.kind, self.data, output, split=self.split, settings=self.settings, resume=True, say=say)
+            train(self.kind, self.data, output, self.settings, Options(self.split, resume=True), say=say)
         except InputError as error:
             raise InputError(f"{self.kind} could not be trained: {error}") from error
         return {"log": lines}

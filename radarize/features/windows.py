@@ -1,15 +1,31 @@
 """Windows of a stream: the maps of a frame and of some before it, as networks see them.
 
-Networks know the frame rate they were trained at; a radar whose frames come twice as often shows them every second one.
+Networks know the time between their frames from training, not from what they see: a radar whose frames come twice as
+often shows them every second one, and where frames are lost, they see no window that spans the gap.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
+import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Float16, Int
 
-from radarize.batch import Batch
-from radarize.features.maps import FLOOR
+
+@dataclass(frozen=True)
+class Shown:
+    """Windows of one spacing that end at consecutive frames.
+
+    Attributes:
+        maps: (frame, window, map, row, azimuth); a frame that is not there looks as the one after the gap, or as the
+            stream's first.
+        whole: (frame,) every frame of the window is there.
+        back: (frame,) frames from the window's first to its last; of no meaning unless it is whole.
+    """
+
+    maps: Float[torch.Tensor, "frame window map row azimuth"]
+    whole: Bool[np.ndarray, "frame"]
+    back: Int[np.ndarray, "frame"]
 
 
 class Windows:
@@ -19,31 +35,51 @@ class Windows:
         maps: names of a frame's.
         frames: of a window.
         stride: the radar's frames from one of the network's to the next.
+        period: s, from one of the radar's frames to the next.
         spacing: most frames of the network's from one of a window to the next.
     """
 
-    def __init__(self, maps: Sequence[str], frames: int, stride: int, spacing: int = 1):
+    def __init__(self, maps: Sequence[str], frames: int, stride: int, period: float, spacing: int = 1):
         self.maps, self.frames, self.stride = tuple(maps), frames, stride
-        self._reach = (frames - 1) * stride * spacing
+        self._period, self._reach = period, (frames - 1) * stride * spacing
         self._past: torch.Tensor | None = None
+        self._stamps = np.zeros(0)  # of the past frames
 
     def push(
-        self, batch: Batch, spacings: Sequence[int] = (1,)
-    ) -> list[Float[torch.Tensor, "frame window map row azimuth"]]:
+        self,
+        made: Mapping[str, Float16[np.ndarray, "frame row azimuth"]],
+        stamps: Float[np.ndarray, "frame"],
+        spacings: Sequence[int] = (1,),
+    ) -> list[Shown]:
         """Windows that end at the next frames, for each spacing (frames of the network's) between their frames.
 
-        Before the stream began everything looked as in its first frame.
+        Args:
+            made: `maps` of the next frames.
+            stamps: of them, s.
+            spacings: see above.
         """
-        made = batch.maps(self.maps)
         new = torch.stack([torch.from_numpy(made[name]) for name in self.maps], dim=1).float()
-        past = new[:1].expand(self._reach, -1, -1, -1) if self._past is None else self._past
-        everything = torch.cat([past, new])
-        self._past = everything[len(everything) - self._reach :]
-        newest = torch.arange(self._reach, self._reach + len(new))[:, None]
-        back = torch.arange(self.frames - 1, -1, -1) * self.stride
-        return [everything[newest - back * spacing] for spacing in spacings]
+        frames = new if self._past is None else torch.cat([self._past, new])
+        stamps = np.concatenate([self._stamps, stamps])
+        found = []
+        for spacing in spacings:
+            apart = spacing * self.stride * self._period
+            rows, there = spaced(stamps, len(new), self.frames, apart, self._period)
+            found.append(Shown(frames[torch.from_numpy(rows)], there.all(axis=1), rows[:, -1] - rows[:, 0]))
+        kept = max(len(frames) - self._reach, 0)
+        self._past, self._stamps = frames[kept:], stamps[kept:]
+        return found
 
 
-def silent(windows: Float[torch.Tensor, "frame window map row azimuth"]) -> Bool[torch.Tensor, "frame"]:
-    """Windows of which a frame shows nothing at all: networks were not trained to say that they know nothing."""
-    return (windows <= FLOOR).flatten(2).all(dim=2).any(dim=1)
+def spaced(
+    stamps: Float[np.ndarray, "frame"], new: int, frames: int, apart: float, period: float
+) -> tuple[Int[np.ndarray, "new window"], Bool[np.ndarray, "new window"]]:
+    """Windows of so many frames, `apart` seconds from one to the next, that end at each of the `new` last ones.
+
+    Returns:
+        Rows, of a frame that is not there that of the one after the gap; and which are there, give or take half of the
+        radar's frame period.
+    """
+    wanted = stamps[len(stamps) - new :, None] - apart * np.arange(frames - 1, -1, -1)
+    rows = np.searchsorted(stamps, wanted - period / 2)
+    return rows, stamps[rows] < wanted + period / 2

@@ -11,6 +11,10 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from radarize.errors import InputError
 from radarize.heatmaps import HeatmapConfig
 from radarize.mapping.scans import ScanConfig
+from radarize.odometry.doppler import DopplerConfig
+from radarize.odometry.integration import VelocityConfig
+from radarize.odometry.rotation import RotationConfig
+from radarize.odometry.settings import FusionConfig, TurnConfig
 from radarize.slam.config import SlamConfig
 from radarize.yamlfile import read_yaml
 
@@ -22,6 +26,11 @@ class Configuration(BaseModel):
 
     heatmaps: HeatmapConfig = Field(HeatmapConfig(), description="spectra and beamformers of the classical methods")
     scans: ScanConfig = Field(ScanConfig(), description="echoes in range-azimuth maps, of scans without networks")
+    doppler: DopplerConfig = Field(DopplerConfig(), description="velocity from single echoes")
+    rotation: RotationConfig = Field(RotationConfig(), description="turns by matching frames with a local map")
+    velocity: VelocityConfig = Field(VelocityConfig(), description="filter of velocities, whoever tells them")
+    fusion: FusionConfig = Field(FusionConfig(), description="velocities by network and Doppler together")
+    turns: TurnConfig = Field(TurnConfig(), description="turns by the network")
     slam: SlamConfig = Field(
         default_factory=lambda: SlamConfig.preset("radar"),
         description="the back end",

@@ -67,10 +67,7 @@ class Header(BaseModel):
 
     def windows(self, config: RadarConfig) -> Windows:
         """Of a radar's frames, as the network was trained on them."""
-        return Windows(self.maps, self.frames, self.stride(config), max(self.spacings))
-
-#: Bytes of a file's header: ours have some thousands.
-_HEADER = 1 << 20
+        return Windows(self.maps, self.frames, self.stride(config), config.frame_period, max(self.spacings))
 
 
 #: Bytes of a file's header: ours have some thousands.

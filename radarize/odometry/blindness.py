@@ -55,7 +55,7 @@ class Blindness:
         """Take in the next frames, by their numbers in the recording."""
         ways = np.hypot(track.step[:, 0], track.step[:, 1])
         self.way += float(ways.sum())
-        seen = (getattr(track, name, np.ones(len(frames), bool)) for name in ("velocity_seen", "turn_seen"))
+        seen = track.velocity_seen, track.turn_seen
         for number, time, way, velocity, turn in zip(frames, track.time, ways, *seen, strict=True):
             if self._last is None:
                 self._first, self._last = float(time), (number - 1, time)

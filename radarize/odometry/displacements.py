@@ -6,49 +6,74 @@ cloned states. Windows overlap, so that as many of them as fit into one are beli
 
 import numpy as np
 
+from radarize.features.windows import spaced
+from radarize.odometry.integration import Track
 from radarize.odometry.ties import Ties
 from radarize.pose import between
 
-#: m/s^2 and m/s: standard deviations of a walker's acceleration, and of a speed that nothing is known of.
-_ACCELERATION, _FASTEST = 2.0, 1.0
+#: m/s^1.5 and m/s: by how much a walker's speed wanders in a second, and standard deviation of one not known at all.
+_WANDER, _FASTEST = 0.37, 1.0
 
 
 class Displacements:
     """Positions of the last frames, and the track that the newest ones make.
 
     Args:
-        reach: frames over which displacements are told.
-        period: s, from frame to frame.
+        lasts: s, over which displacements are told.
+        period: s, from frame to frame, as far as none is lost.
+
+    Attributes:
+        reach: frames in that time.
+        time: s, of the newest frame.
     """
 
-    def __init__(self, reach: int, period: float):
-        self.reach, self._period = reach, period
-        self._axes = [Ties(reach + 1, _ACCELERATION * period, _FASTEST) for _ in range(2)]
+    def __init__(self, lasts: float, period: float):
+        self.reach = max(1, round(lasts / period))
+        self._apart, self._period = self.reach * period, period
+        self._axes = [Ties(self.reach + 1, _WANDER, _FASTEST) for _ in range(2)]
+        self._times = np.zeros(0)
         self._first: np.ndarray | None = None
         self._pose = np.zeros(3)
-        self.time: float | None = None
+
+    @property
+    def time(self) -> float | None:
+        return float(self._times[-1]) if len(self._times) else None
+
+    def arrive(self, time: float) -> int:
+        """The next frame; how many frames ago displacements until it began, 0 if that frame was lost."""
+        self._times = np.append(self._times[-self.reach :], time)
+        rows, there = spaced(self._times, 1, 2, self._apart, self._period)
+        return int(rows[0, 1] - rows[0, 0]) if there.all() else 0
 
     def next(
-        self, dt: float, displacement: np.ndarray, covariance: np.ndarray, yaw: float, doubt: float
+        self, dt: float, back: int, displacement: np.ndarray, covariance: np.ndarray, yaw: float, doubt: float
     ) -> tuple[np.ndarray, ...]:
-        """Pose, step, its covariance, velocity and its covariance of the next frame.
+        """Pose, step, its covariance, velocity, its covariance, and whether a displacement told of it, of the frame
+        that has arrived.
 
         Args:
             dt: s, since the frame before.
-            displacement: m, since `reach` frames ago, on axes that do not turn with the sensor.
+            back: frames ago that the displacement began, 0 if it tells nothing.
+            displacement: m, since then, on axes that do not turn with the sensor.
             covariance: of it.
             yaw: rad, on these axes; doubt: variance of its change since the frame before.
         """
         for axis, ties in enumerate(self._axes):
             ties.predict(dt)
-            ties.tie(self.reach, displacement[axis], self.reach * covariance[axis, axis])
+            ties.tie(back, displacement[axis], self.reach * covariance[axis, axis])
         place = np.array([*(ties.values[-1] for ties in self._axes), yaw])
         self._first = place if self._first is None else self._first
         before, self._pose = self._pose, between(self._first, place)
         spread = np.diag([*(ties.variance(1) for ties in self._axes), 0.0])
         cos, sin = np.cos(yaw), np.sin(yaw)
         turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
-        spread = turned @ spread @ turned.T
-        rate = turned[:2, :2] @ [ties.values[-1] - ties.values[-2] for ties in self._axes] / self._period
-        known = spread[:2, :2] / self._period**2
-        return self._pose, between(before, self._pose), spread + np.diag([1e-8, 1e-8, doubt]), rate, known
+        spread = turned @ spread @ turned.T + np.diag([1e-8, 1e-8, min(doubt, np.pi**2)])
+        rate = turned[:2, :2] @ [ties.rate for ties in self._axes]
+        known = turned[:2, :2] @ np.diag([ties.covariance[-1, -1] for ties in self._axes]) @ turned[:2, :2].T
+        return self._pose, between(before, self._pose), spread, rate, known, back > 0
+
+
+def joined(times: np.ndarray, track: list[tuple[np.ndarray, ...]], turn_seen: bool = False) -> Track:
+    """What `Displacements.next` said of every frame; turns are seen with displacements, or always."""
+    *values, seen = (np.stack(each) for each in zip(*track, strict=True))
+    return Track(times, *values, seen, seen | turn_seen)

@@ -16,16 +16,17 @@ nonlinear models", 2006, ch. 4),
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Complex64, Float, Int
+from jaxtyping import Bool, Complex64, Float, Int
 from numba import njit
+from pydantic import BaseModel, ConfigDict, Field
 
 from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
 from radarize.radar.array import virtual_positions
-from radarize.radar.config import RadarConfig
 
 
 @dataclass(frozen=True)
@@ -36,46 +37,60 @@ class Velocities:
         velocity: (frame, 2) m/s, sensor frame (x forward, y left).
         covariance: (frame, 2, 2) (m/s)^2; large where the echoes do not determine a velocity.
         inliers: (frame,) echoes that agree with the velocity.
+        seen: (frame,) False where nothing determines a velocity, and what is given here is as good as none.
     """
 
     velocity: Float[np.ndarray, "frame 2"]
     covariance: Float[np.ndarray, "frame 2 2"]
     inliers: Int[np.ndarray, "frame"]
+    seen: Bool[np.ndarray, "frame"]
 
 
-@dataclass(frozen=True)
-class DopplerSettings:
-    """Settings of `DopplerVelocity`.
+class DopplerConfig(BaseModel):
+    """Velocity from the Doppler shifts of single echoes (`DopplerVelocity`)."""
 
-    Attributes:
-        beams: azimuth beams of the cube, uniform in u_y.
-        echoes: strongest peaks kept per frame.
-        threshold: least peak power over the cube's median.
-        min_range: m; nearer peaks are leakage.
-        inlier: m/s, RANSAC's limit on the residual.
-        hypotheses: pairs of echoes that RANSAC tries.
-        speed_noise: m/s, standard deviation of a strong echo's speed.
-        power_noise: m/s, the same of an echo no stronger than the median of the cube, falling with its amplitude.
-        azimuth_noise: standard deviation of an echo's u_y.
-        elevation: standard deviation of u_z over all echoes; readings are drawn towards the horizon accordingly.
-        beam: the most that u_z varies within one echo, which the antennas' beam limits; taken where it is not known.
-        climb: m/s, expected vertical speed (handheld bobbing); its mean is zero.
-        still: m/s; below it, and with most echoes still as well, the sensor counts as standing (zero-velocity test).
-    """
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
-    beams: int = 48
-    echoes: int = 160
-    threshold: float = 20.0
-    min_range: float = 0.25
-    inlier: float = 0.15
-    hypotheses: int = 200
-    speed_noise: float = 0.003
-    power_noise: float = 0.1
-    azimuth_noise: float = 0.005
-    elevation: float = 0.4
-    beam: float = 0.25
-    climb: float = 0.15
-    still: float = 0.02
+    beams: int = Field(48, ge=8, description="azimuth beams of the cube, uniform in u_y")
+    echoes: int = Field(160, ge=4, description="strongest peaks kept per frame")
+    threshold: float = Field(20.0, gt=1, description="least peak power over the cube's median")
+    min_range: float = Field(0.25, ge=0, description="m; nearer peaks are leakage")
+    inlier: float = Field(0.15, gt=0, description="m/s, RANSAC's limit on the residual")
+    hypotheses: int = Field(200, ge=1, description="pairs of echoes that RANSAC tries")
+    speed_noise: float = Field(0.003, gt=0, description="m/s, standard deviation of a strong echo's speed")
+    power_noise: float = Field(
+        0.1,
+        gt=0,
+        description="m/s, the same of an echo no stronger than the median of the cube, falling with its amplitude",
+    )
+    azimuth_noise: float = Field(0.005, gt=0, description="standard deviation of an echo's u_y")
+    elevation: float = Field(
+        0.4,
+        gt=0,
+        description="standard deviation of u_z over all echoes, by which readings are drawn to the horizon",
+    )
+    beam: float = Field(
+        0.25, gt=0, description="the most that u_z varies within one echo, which the beam limits; taken if not known"
+    )
+    climb: float = Field(0.15, gt=0, description="m/s, expected vertical speed (handheld bobbing); its mean is zero")
+    still: float = Field(
+        0.02,
+        ge=0,
+        description="m/s; below it and within the fit's own error, if most echoes are still, the sensor stands",
+    )
+    independent: float = Field(
+        0.25,
+        gt=0,
+        description="of the covariance of the fit, what is left where errors that echoes share are told apart; chosen "
+        "with the next two on data set odometry-choice, six walks of 20 s (by hand, cart, robot; A and B of seed 201)",
+    )
+    scale_noise: float = Field(
+        0.003, ge=0, description="of the speed, standard deviation of what echoes share along it: their elevation"
+    )
+    course_noise: float = Field(
+        0.0065, ge=0, description="rad, of what they share across it: azimuths that are off to one side"
+    )
+    floor: float = Field(0.0005, ge=0, description="m/s, least standard deviation of a velocity")
 
 
 class DopplerVelocity:
@@ -83,17 +98,22 @@ class DopplerVelocity:
 
     Speeds beyond `config.max_velocity` alias. Residuals are taken modulo the unambiguous span, so a faster walk is
     still found from the echoes to the side, which close slowly enough.
+
+    Attributes:
+        lever: m, see `VelocityEstimator`.
     """
 
-    def __init__(self, heatmaps: Heatmaps, settings: DopplerSettings | None = None, seed: int = 0):
-        self.settings = settings or DopplerSettings()
+    def __init__(self, heatmaps: Heatmaps, settings: DopplerConfig | None = None, seed: int = 0):
+        self.settings = settings or DopplerConfig()
         self.config = heatmaps.config
         self.row, self.pairs = heatmaps.row, heatmaps.pairs
         self._heatmaps = heatmaps
         self._u = np.linspace(-0.94, 0.94, self.settings.beams)
         self._steering = torch.as_tensor(heatmaps.steering(self.row, self._u))
         self._steering = self._steering.to(torch.complex64)
-        self._geometry = _geometry(self.config)
+        self._array = _array(heatmaps, self._u)
+        # An echo's phase turns with its way to the transmitter and back to the receiver: it is the middle that moves.
+        self.lever = float(virtual_positions(self.config).reshape(-1, 3)[self.row, 1].mean()) / 2
         self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
         # One table of random numbers for all frames: the same frame gives the same answer in any batch.
         self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 2))
@@ -110,7 +130,16 @@ class DopplerVelocity:
             echoes = self._echoes(cells[frame], power[frame])
             solution = self._solve(echoes)
             velocity[frame], covariance[frame], inliers[frame] = solution
-        return Velocities(velocity, covariance, inliers)
+        seen = (np.linalg.eigvalsh(covariance)[:, -1] < _DETERMINED**2) & (inliers >= _ECHOES)
+        covariance[seen] = self.settings.independent * covariance[seen] + self._shared(velocity[seen])
+        return Velocities(velocity, covariance, inliers, seen)
+
+    def _shared(self, velocity: Float[np.ndarray, "frame 2"]) -> Float[np.ndarray, "frame 2 2"]:
+        """Covariance of the errors that all echoes of a frame have in common: none of the fit's residuals tells."""
+        s = self.settings
+        across = np.stack([-velocity[:, 1], velocity[:, 0]], axis=1)
+        along, side = (v[:, :, None] * v[:, None] for v in (velocity, across))
+        return s.scale_noise**2 * along + s.course_noise**2 * side + s.floor**2 * np.eye(2)
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 6"]:
         """Peaks of one frame: range bin, closing speed (m/s), u_y, u_z and its variance, power over the median."""
@@ -123,9 +152,7 @@ class DopplerVelocity:
         if len(found) > self.settings.echoes:
             strength = power[found[:, 0], found[:, 1], found[:, 2]]
             found = found[np.argsort(-strength, kind="stable")[: self.settings.echoes]]
-        pairs = np.zeros((0, 2), np.int64) if self.pairs is None else self.pairs.astype(np.int64)
-        geometry = (self._u, self._heatmaps.velocities, pairs, *self._geometry)
-        echoes = _refine(found, power, cells, *geometry, self.settings.beam)
+        echoes = _refine(found, power, cells, self._array, self.settings.beam)
         echoes[:, 5] /= max(level, 1e-12)
         return echoes
 
@@ -136,21 +163,42 @@ class DopplerVelocity:
         noise = np.array([s.speed_noise, s.power_noise, s.azimuth_noise, s.elevation, climb])
         velocity, covariance, inliers = _fit(echoes[:, 1:], self._draws, noise, s.inlier, 2 * self.config.max_velocity)
         if inliers and np.hypot(*velocity) < s.still and np.median(np.abs(echoes[:, 1])) < 2 * s.still:
-            velocity = np.zeros(2)
+            if velocity @ np.linalg.solve(covariance, velocity) < _SIGMAS**2:
+                velocity = np.zeros(2)
         return velocity, covariance, inliers
 
 
-def _geometry(config: RadarConfig) -> tuple[np.ndarray, np.ndarray, float, float]:
-    """Per antenna y / wavelength and TDM phase per speed (rad s/m); height of a pair / wavelength; Doppler bin."""
+class _Array(NamedTuple):
+    """What `_refine` knows of the radar: direction cosines of beams and speeds of bins, with the bins' width (m/s);
+    antennas of the elevation pairs and their height / wavelength; per antenna y / wavelength and TDM phase per speed
+    (rad s/m)."""
+
+    u: np.ndarray
+    velocities: np.ndarray
+    bin_width: float
+    pairs: np.ndarray
+    height: float
+    y: np.ndarray
+    tdm: np.ndarray
+
+
+def _array(heatmaps: Heatmaps, u: np.ndarray) -> _Array:
+    config = heatmaps.config
     positions = virtual_positions(config).reshape(-1, 3) / config.wavelength
     delay = np.repeat(np.asarray(config.slot) * config.chirp_time, len(config.rx))
     heights = np.unique(np.round(positions[:, 2], 6))
     height = float(heights[1] - heights[0]) if len(heights) > 1 else 0.5
-    return positions[:, 1].copy(), 4 * np.pi / config.wavelength * delay, height, config.velocity_resolution
+    pairs = np.zeros((0, 2), np.int64) if heatmaps.pairs is None else heatmaps.pairs.astype(np.int64)
+    tdm = 4 * np.pi / config.wavelength * delay
+    return _Array(u, heatmaps.velocities, config.velocity_resolution, pairs, height, positions[:, 1].copy(), tdm)
 
 
 #: m/s, what nobody walks: keeps the fit regular where all echoes come from one direction.
 UNKNOWN_SPEED = 10.0
+#: Fewer echoes than these determine no velocity; nor do those that leave a standard deviation, m/s, as large as that.
+_ECHOES, _DETERMINED = 4, 0.3
+#: Standard deviations from which a velocity is not zero: a walk that sets in is slow, but its speed is well known.
+_SIGMAS = 3.0
 #: A weaker peak beside a stronger one of the same range and Doppler may be its sidelobe (-25 dB, and mismatch).
 SIDELOBE = 0.1
 
@@ -190,8 +238,9 @@ def _vertex(left, middle, right):
 
 
 @njit(cache=True)
-def _refine(found, power, cells, u, velocities, pairs, y, tdm, height, bin_width, beam):
+def _refine(found, power, cells, array, beam):
     """Echoes between bins: (range bin, speed, u_y, u_z, variance of u_z, power)."""
+    u, velocities, bin_width, pairs, height, y, tdm = array
     echoes = np.empty((len(found), 6))
     bins = power.shape[1]
     for i in range(len(found)):
@@ -234,7 +283,7 @@ def _fit(echoes, draws, noise, inlier, span):
     """RANSAC over pairs of echoes, then iteratively reweighted least squares for (vx, vy, vz)."""
     count = len(echoes)
     unknown = np.array([[1.0, 0.0], [0.0, 1.0]])
-    if count < 4:
+    if count < _ECHOES:
         return np.zeros(2), unknown, 0
     speed, spread, power = echoes[:, 0], echoes[:, 3], echoes[:, 4]
     speed_noise, power_noise, azimuth_noise, elevation, climb = noise

@@ -19,13 +19,25 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from jaxtyping import Complex64, Float, Float32
-from numba import njit
+from jaxtyping import Bool, Complex64, Float, Float32
+from pydantic import BaseModel, ConfigDict, Field
 from torch.nn.functional import avg_pool1d
 
 from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import Velocities
+from radarize.odometry.localmap import LocalMap, View
+from radarize.odometry.ties import wandered
+
+#: Half widths of the high-pass over range bins and azimuth columns.
+_TEXTURE = (12, 12)
+#: Of the predicted yaw's standard deviations, how many are searched to either side.
+_SIGMAS = 3.0
+#: Cells of a frame that speak independently of the others. Of those that the map knows, a correlation c is so much
+#: likelier for a match than by chance: (1 - c^2)^(-cells / 2).
+_INDEPENDENT = 50
+#: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
+_ASTRAY = np.radians(45.0)
 
 
 @dataclass(frozen=True)
@@ -35,56 +47,54 @@ class Rotations:
     Attributes:
         yaw: (frame,) rad, positive to the left; zero for the very first frame.
         variance: (frame,) rad^2.
-        correlation: (frame,) of the match, -1...1; zero for the very first frame.
+        seen: (frame,) False where nothing was measured of it: the turn is what went before, or nothing.
     """
 
     yaw: Float[np.ndarray, "frame"]
     variance: Float[np.ndarray, "frame"]
-    correlation: Float[np.ndarray, "frame"]
+    seen: Bool[np.ndarray, "frame"]
 
 
-@dataclass(frozen=True)
-class RotationSettings:
-    """Settings of `MapRotation`.
+class RotationConfig(BaseModel):
+    """Matching of frames with a local map (`MapRotation`)."""
 
-    Attributes:
-        field: largest |sin azimuth| used.
-        columns: azimuth columns, uniform in sin azimuth.
-        min_range: m; nearer bins are leakage.
-        limit: power over the noise floor at which a range-Doppler cell is limited.
-        contrast: dB over the surroundings at which a map cell is clipped.
-        texture: half widths of the high-pass over range bins and azimuth columns.
-        cell: m, side of a map cell.
-        memory: frames over which the map forgets.
-        fan, step: rad, half width and spacing of the yaws tried around the prediction.
-        jerk: rad/s, standard deviation of the change of turning rate from frame to frame.
-        yaw_noise: rad, standard deviation of a match at full correlation.
-        least_correlation: a match below it is not believed: turning is taken to go on as before, or as the prior says.
-        unseen: rad/s^0.5, by how much yaw may wander where no match is believed, beside what the filter or the prior
-            says: what is not seen turning is missed for a second or more, and steps are claimed as independent.
-    """
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
-    field: float = 0.85
-    columns: int = 69
-    min_range: float = 0.2
-    limit: float = 300.0
-    contrast: float = 15.0
-    texture: tuple[int, int] = (12, 12)
-    cell: float = 0.05
-    memory: int = 20
-    fan: float = np.radians(5.0)
-    step: float = np.radians(0.5)
-    jerk: float = np.radians(12.0)
-    yaw_noise: float = np.radians(0.3)
-    least_correlation: float = 0.15
-    unseen: float = np.radians(20.0)
+    field: float = Field(0.85, gt=0, lt=1, description="largest |sin azimuth| used")
+    columns: int = Field(69, ge=8, description="azimuth columns, uniform in sin azimuth")
+    min_range: float = Field(0.2, ge=0, description="m; nearer bins are leakage")
+    limit: float = Field(300.0, gt=0, description="power over the noise floor at which a range-Doppler cell is limited")
+    contrast: float = Field(15.0, gt=0, description="dB over the surroundings at which a map cell is clipped")
+    cell: float = Field(0.05, gt=0, description="m, side of a map cell")
+    memory: float = Field(0.65, gt=0, description="s over which the map forgets")
+    fan: float = Field(np.radians(5.0), gt=0, description="rad, least half width of the yaws tried")
+    widest: float = Field(np.radians(75.0), gt=0, le=np.pi, description="rad, the most, however unsure the prediction")
+    step: float = Field(np.radians(0.5), gt=0, description="rad, spacing of the yaws tried; thrice that at first")
+    wander: float = Field(
+        np.radians(66.0), gt=0, description="rad/s^1.5, by how much the turning rate of a handheld radar wanders in 1 s"
+    )
+    fastest: float = Field(np.radians(60.0), gt=0, description="rad/s, standard deviation of a rate not known at all")
+    yaw_noise: float = Field(np.radians(0.3), gt=0, description="rad, standard deviation of a match of correlation 1")
+    guided_yaw_noise: float = Field(
+        np.radians(0.8),
+        gt=0,
+        description="rad, the same beside a network: a map that lags in a turn misleads many matches alike",
+    )
+    least_correlation: float = Field(0.15, ge=0, lt=1, description="a match below it is not believed")
+    unseen: float = Field(
+        np.radians(20.0),
+        ge=0,
+        description="rad/s^0.5, by how much yaw may wander where no match is believed, beside what the filter or the "
+        "network says",
+    )
 
 
 class MapRotation:
     """Rotation estimator with a local map; frames are pushed in order, in batches of any size.
 
-    The pose inside the local map is a running one: x, y from the velocities, yaw and turning rate from a filter with a
-    constant rate, which the matches correct; or, where another estimator says how far the sensor has turned, by that.
+    The pose inside the local map is a running one: x, y from the velocities, yaw and turning rate from a filter whose
+    rate is a random walk, which the matches correct; or, where another estimator says how far the sensor has turned,
+    by that. Yaws are searched as far as the filter is unsure of its own; where it knows nothing, the map starts anew.
 
     Args:
         heatmaps: of the radar.
@@ -93,21 +103,19 @@ class MapRotation:
     """
 
     def __init__(
-        self, heatmaps: Heatmaps, settings: RotationSettings | None = None, prior: "RotationEstimator | None" = None
+        self, heatmaps: Heatmaps, settings: RotationConfig | None = None, prior: "RotationEstimator | None" = None
     ):
-        s = self.settings = settings or RotationSettings()
-        sines = np.linspace(-s.field, s.field, s.columns)
-        self._sines = sines
-        self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(sines), heatmaps.settings)
+        s = self.settings = settings or RotationConfig()
+        self._sines = np.linspace(-s.field, s.field, s.columns)
+        self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(self._sines), heatmaps.settings)
         self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
         self._ranges = heatmaps.ranges[self._first :]
-        side = 2 * int((self._ranges[-1] + 2.0) / s.cell)
-        self._map = np.zeros((2, side, side), np.float32)  # mean, count
-        self._offsets = np.arange(-round(s.fan / s.step), round(s.fan / s.step) + 1) * s.step
-        self._state: tuple | None = None  # time, velocity
-        self._position = np.zeros(2)
-        self._heading = np.zeros(2)  # yaw, rate
-        self._spread = np.diag([0.0, 1.0])
+        self._map = LocalMap(self._ranges[-1], s.cell)
+        self._noise = s.yaw_noise if prior is None else s.guided_yaw_noise
+        self._time: float | None = None
+        self._velocity = self._position = np.zeros(2)
+        self._heading = np.zeros(2)  # yaw in the map, rate
+        self._spread = np.diag([0.0, s.fastest**2])
         self._prior = prior
 
     def features(
@@ -122,7 +130,7 @@ class MapRotation:
         level = level - level.median(dim=2, keepdim=True).values
         level = level - level.median(dim=1, keepdim=True).values
         level = level.clamp(0, s.contrast)
-        surroundings = _box_mean(_box_mean(level, s.texture[1]).mT, s.texture[0]).mT
+        surroundings = _box_mean(_box_mean(level, _TEXTURE[1]).mT, _TEXTURE[0]).mT
         return (level - surroundings).contiguous().numpy(), self._elevation(spectrum).numpy()
 
     def _elevation(self, spectrum: torch.Tensor) -> torch.Tensor:
@@ -134,160 +142,79 @@ class MapRotation:
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Yaw increments of the next frames, given their velocities."""
-        prior = None if self._prior is None else self._prior.estimate(batch, velocities)
-        result = np.zeros((3, len(batch)))
+        told = None if self._prior is None else self._prior.estimate(batch, velocities)
+        yaw, variance, seen = np.zeros(len(batch)), np.zeros(len(batch)), np.ones(len(batch), bool)
         for i, (feature, u_z) in enumerate(zip(*self.features(batch.spectrum), strict=True)):
-            turn = None if prior is None else (prior.yaw[i], prior.variance[i])
-            result[:, i] = self._push(feature, u_z, float(batch.centers[i]), velocities.velocity[i], turn)
-        return Rotations(*result)
+            view = View(feature, u_z, self._ranges, self._sines)
+            time, velocity = float(batch.centers[i]), velocities.velocity[i]
+            if self._time is not None:
+                turn = None if told is None else (told.yaw[i], told.variance[i])
+                yaw[i], variance[i], seen[i] = self._turn(view, time - self._time, velocity, turn)
+            dt = self.settings.memory if self._time is None else time - self._time
+            self._position = self._map.follow(self._position)
+            self._map.blend(view, self._position, self._heading[0], -np.expm1(-dt / self.settings.memory))
+            self._time, self._velocity = time, velocity
+        return Rotations(yaw, variance, seen if told is None else seen | told.seen)
 
-    def _push(
-        self,
-        feature: np.ndarray,
-        u_z: np.ndarray,
-        time: float,
-        velocity: np.ndarray,
-        turn: tuple[float, float] | None,
-    ) -> tuple[float, float, float]:
-        s = self.settings
-        if self._state is None:
-            self._renew(feature, u_z, time, velocity)
-            return 0.0, 0.0, 0.0
-        before, last_velocity = self._state
-        dt = time - before
-        transition = np.array([[1.0, dt], [0.0, 1.0]])
-        start = self._heading[0]
-        if turn is None:
-            self._heading = transition @ self._heading
-            change = (s.jerk * dt / 0.033) ** 2 * np.array([[dt**2 / 4, dt / 2], [dt / 2, 1]])
-            self._spread = transition @ self._spread @ transition.T + change
-        else:
-            self._heading = np.array([start + turn[0], turn[0] / dt])
-            self._spread = np.diag([self._spread[0, 0] + turn[1], turn[1] / dt**2])
+    def _turn(
+        self, view: View, dt: float, velocity: Float[np.ndarray, "2"], told: tuple[float, float] | None
+    ) -> tuple[float, float, bool]:
+        """Yaw increment to a frame `dt` s after the last one, its variance, and whether a match was believed."""
+        start, known = self._heading[0], self._spread[0, 0]
+        self._predict(dt, told)
         middle = (start + self._heading[0]) / 2
         c, d = np.cos(middle), np.sin(middle)
-        self._position += dt * np.array([[c, -d], [d, c]]) @ ((last_velocity + velocity) / 2)
-
-        yaws = self._heading[0] + self._offsets
-        correlation = _correlate(feature, u_z, self._ranges, self._sines, *self._map, *self._position, yaws, s.cell)
-        offset, noise, peak, believed = self._peak(correlation)
-        gain = self._spread[:, 0] / (self._spread[0, 0] + noise)
+        self._position = self._position + dt * np.array([[c, -d], [d, c]]) @ ((self._velocity + velocity) / 2)
+        growth = max(self._spread[0, 0] - known, 0.0) + self.settings.unseen**2 * dt
+        if self._spread[0, 0] > _ASTRAY**2:
+            self._map.forget()
+            turned = self._heading[0] - start
+            self._heading, self._spread = np.zeros(2), np.diag([0.0, self.settings.fastest**2])
+            return turned, growth, False
+        offset, correlation = self._match(view)
+        if correlation < self.settings.least_correlation:
+            return self._heading[0] - start, growth, False
+        gain = self._spread[:, 0] / (self._spread[0, 0] + (self._noise / correlation) ** 2)
         self._heading = self._heading + gain * offset
         self._spread = self._spread - np.outer(gain, self._spread[0])
-        self._renew(feature, u_z, time, velocity)
         # The spread is that of the yaw in the map. Half of it cancels in the sum of steps: the next frame, matched with
         # the same map, takes it back.
-        spread = self._spread[0, 0]
-        return self._heading[0] - start, spread / 2 if believed else spread + s.unseen**2 * dt, peak
+        return self._heading[0] - start, self._spread[0, 0] / 2, True
 
-    def _peak(self, correlation: np.ndarray) -> tuple[float, float, float, bool]:
-        """Yaw offset (rad) of the best match, its variance and height; if it is not believed, the variance is large."""
+    def _predict(self, dt: float, told: tuple[float, float] | None) -> None:
+        """Yaw and rate `dt` s later: by the rate, or by what another estimator says of the turn and its variance."""
+        if told is None:
+            transition = np.array([[1.0, dt], [0.0, 1.0]])
+            self._heading = transition @ self._heading
+            self._spread = transition @ self._spread @ transition.T + wandered(self.settings.wander, dt)
+        else:
+            turn, variance = told
+            self._heading = np.array([self._heading[0] + turn, turn / dt])
+            self._spread = np.diag([self._spread[0, 0] + variance, variance / dt**2])
+
+    def _match(self, view: View) -> tuple[float, float]:
+        """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is
+        none."""
         s = self.settings
+        fan = np.clip(_SIGMAS * np.sqrt(self._spread[0, 0]), s.fan, s.widest)
+
+        def correlate(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            return self._map.correlate(view, self._position, self._heading[0] + offsets)
+
+        coarse = 3 * s.step * np.arange(-np.ceil(fan / (3 * s.step)), np.ceil(fan / (3 * s.step)) + 1)
+        correlation, overlap = correlate(coarse)
+        odds = -_INDEPENDENT * overlap / 2 * np.log1p(-(np.clip(correlation, 0, 0.999) ** 2))
+        fine = coarse[np.argmax(odds - (coarse * _SIGMAS / fan) ** 2 / 2)] + s.step * np.arange(-4, 5)
+        correlation, _ = correlate(fine)
         best = int(np.argmax(correlation))
-        peak = float(correlation[best])
-        if not 0 < best < len(correlation) - 1 or peak < s.least_correlation:
-            return 0.0, (2 * s.fan) ** 2, peak, False
-        left, right = correlation[best - 1], correlation[best + 1]
+        if not 0 < best < len(fine) - 1:
+            return 0.0, 0.0
+        left, peak, right = correlation[best - 1 : best + 2]
         bend = left - 2 * peak + right
         slip = 0.5 * (left - right) / bend if bend < -1e-9 else 0.0
-        return float(self._offsets[best] + s.step * np.clip(slip, -1, 1)), (s.yaw_noise / peak) ** 2, peak, True
-
-    def _renew(self, feature: np.ndarray, u_z: np.ndarray, time: float, velocity: np.ndarray) -> None:
-        """Blend the frame into the map at the current pose, keeping the sensor in the map's middle metre."""
-        s = self.settings
-        shift = np.rint(self._position / s.cell).astype(int)
-        if np.abs(shift).max() * s.cell > 1.0:
-            self._map = _shifted(self._map, -shift)
-            self._position = self._position - shift * s.cell
-        spacing = self._ranges[1] - self._ranges[0]
-        pose = (*self._position, self._heading[0])
-        if feature.any():  # a frame lost as a whole has nothing to say
-            _blend(feature, u_z, self._ranges[0], spacing, s.field, *self._map, *pose, s.cell, 1 / s.memory)
-        self._state = (time, np.asarray(velocity, float))
+        return float(fine[best] + s.step * np.clip(slip, -1, 1)), float(peak)
 
 
 def _box_mean(values: torch.Tensor, half: int) -> torch.Tensor:
     """Mean over the 2 half + 1 neighbours along the last axis, fewer at the ends."""
     return avg_pool1d(values, 2 * half + 1, stride=1, padding=half, count_include_pad=False)
-
-
-def _shifted(grid: np.ndarray, shift: np.ndarray) -> np.ndarray:
-    """Grid moved by whole cells, zeros coming in."""
-    moved = np.zeros_like(grid)
-    source, target = [slice(None)], [slice(None)]
-    for step, size in zip(shift, grid.shape[1:], strict=True):
-        source.append(slice(max(-step, 0), size - max(step, 0)))
-        target.append(slice(max(step, 0), size - max(-step, 0)))
-    moved[tuple(target)] = grid[tuple(source)]
-    return moved
-
-
-@njit(cache=True, fastmath=True)
-def _correlate(feature, u_z, ranges, sines, mean, count, x, y, yaws, cell):
-    """Normalised correlation of a polar map with the grid map, seen from (x, y) at each yaw; cells weigh by area."""
-    side = mean.shape[0]
-    result = np.zeros(len(yaws))
-    origin_x, origin_y = x / cell + side / 2, y / cell + side / 2
-    ahead, left = np.empty(feature.shape, np.float32), np.empty(feature.shape, np.float32)
-    for i in range(len(ranges)):
-        for j in range(len(sines)):
-            ahead[i, j] = ranges[i] / cell * np.sqrt(max(1 - sines[j] ** 2 - u_z[i, j] ** 2, 0.0))
-            left[i, j] = ranges[i] / cell * sines[j]
-    for k in range(len(yaws)):
-        c, s = np.cos(yaws[k]), np.sin(yaws[k])
-        n = sum_f = sum_m = sum_ff = sum_mm = sum_fm = 0.0
-        for i in range(len(ranges)):
-            w = ranges[i]
-            for j in range(len(sines)):
-                at_x, at_y = origin_x + c * ahead[i, j] - s * left[i, j], origin_y + s * ahead[i, j] + c * left[i, j]
-                ix, iy = int(at_x), int(at_y)
-                if ix < 0 or iy < 0 or ix >= side - 1 or iy >= side - 1:
-                    continue
-                if min(count[ix, iy], count[ix + 1, iy], count[ix, iy + 1], count[ix + 1, iy + 1]) <= 0:
-                    continue
-                u, v = at_x - ix, at_y - iy
-                m = (mean[ix, iy] * (1 - u) + mean[ix + 1, iy] * u) * (1 - v)
-                m += (mean[ix, iy + 1] * (1 - u) + mean[ix + 1, iy + 1] * u) * v
-                f = feature[i, j]
-                n += w
-                sum_f += w * f
-                sum_m += w * m
-                sum_ff += w * f * f
-                sum_mm += w * m * m
-                sum_fm += w * f * m
-        if n > 0:
-            f_var, m_var = sum_ff - sum_f * sum_f / n, sum_mm - sum_m * sum_m / n
-            result[k] = (sum_fm - sum_f * sum_m / n) / np.sqrt(max(f_var * m_var, 1e-12))
-    return result
-
-
-@njit(cache=True, fastmath=True)
-def _blend(feature, u_z, nearest, spacing, field, mean, count, x, y, yaw, cell, least):
-    """Running mean of polar maps on the grid; a cell's newest value weighs 1/count, but no less than `least`."""
-    side, (rows, columns) = mean.shape[0], feature.shape
-    c, s = np.cos(yaw), np.sin(yaw)
-    reach = int((nearest + spacing * rows) / cell) + 1
-    middle_x, middle_y = int(x / cell + side / 2), int(y / cell + side / 2)
-    for ix in range(max(0, middle_x - reach), min(side, middle_x + reach)):
-        for iy in range(max(0, middle_y - reach), min(side, middle_y + reach)):
-            dx, dy = (ix - side / 2) * cell - x, (iy - side / 2) * cell - y
-            ahead, left = c * dx + s * dy, c * dy - s * dx
-            ground = np.sqrt(dx * dx + dy * dy)
-            if ahead <= 0:
-                continue
-            # Which polar cell lies over this spot depends on its elevation: look at the horizon first, then there.
-            flat = 1.0
-            for look in range(2):
-                i = (ground / flat - nearest) / spacing
-                j = (left / ground * flat + field) / (2 * field) * (columns - 1)
-                if i < 0 or j < 0 or i >= rows - 1 or j >= columns - 1:
-                    break
-                if look == 0:
-                    flat = np.sqrt(1 - u_z[int(i + 0.5), int(j + 0.5)] ** 2)
-            else:
-                a, b = int(i), int(j)
-                u, v = i - a, j - b
-                f = (feature[a, b] * (1 - v) + feature[a, b + 1] * v) * (1 - u)
-                f += (feature[a + 1, b] * (1 - v) + feature[a + 1, b + 1] * v) * u
-                count[ix, iy] += 1
-                mean[ix, iy] += max(1 / count[ix, iy], least) * (f - mean[ix, iy])

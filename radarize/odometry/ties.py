@@ -5,48 +5,60 @@ from jaxtyping import Float
 
 
 class Ties:
-    """A Kalman filter of a number (a yaw, a coordinate) at the last frames: a difference that is measured ties two of
-    them, and all that are tied to them move along.
+    """A Kalman filter of a number (a yaw, a coordinate) at the last frames and of its rate: a difference that is
+    measured ties two of the frames, and all that are tied to them move along.
 
-    Chains of differences of one spacing would drift apart.
+    Chains of differences of one spacing would drift apart. Frames may come at any times.
 
     Args:
         size: frames, oldest first.
-        change: per second, standard deviation of the rate's change from frame to frame.
-        fastest: per second, the same of the rate before anything is known.
+        wander: per second^1.5, by how much the rate wanders in a second.
+        fastest: per second, standard deviation of the rate before anything is known.
 
     Attributes:
         values: (frame,); the newest is the answer.
-        covariance: (frame, frame).
+        rate: per second, now.
+        covariance: (frame and rate, frame and rate).
         seen: frames so far, at most all.
     """
 
-    def __init__(self, size: int, change: float, fastest: float):
-        self.values, self.covariance = np.zeros(size), np.zeros((size, size))
-        self.change, self.fastest, self.seen = change, fastest, 0
+    def __init__(self, size: int, wander: float, fastest: float):
+        self._state = np.zeros(size + 1)
+        self.covariance = np.zeros((size + 1, size + 1))
+        self.covariance[-1, -1] = fastest**2
+        self._wander, self.seen = wander, 0
+
+    @property
+    def values(self) -> Float[np.ndarray, "frame"]:
+        return self._state[:-1]
+
+    @property
+    def rate(self) -> float:
+        return float(self._state[-1])
 
     def predict(self, duration: float) -> None:
-        """The next frame, `duration` seconds later, at which the value has gone on at the last rate, more or less."""
-        move, noise = np.eye(len(self.values), k=1), 0.0
-        move[-1, -1] = 1.0
+        """The next frame, `duration` seconds later, to which the value has gone on at its rate; the first is zero."""
+        size, self.seen = len(self.values), min(self.seen + 1, len(self.values))
         if self.seen == 1:
-            noise = (self.fastest * duration) ** 2
-        elif self.seen > 1:
-            move[-1, -2:] = -1.0, 2.0
-            noise = (self.change * duration) ** 2
-        self.values = move @ self.values
+            return
+        move = np.eye(size + 1, k=1)
+        move[size - 1 :, size - 1 :] = [[1.0, duration], [0.0, 1.0]]
+        self._state = move @ self._state
         self.covariance = move @ self.covariance @ move.T
-        self.covariance[-1, -1] += noise
-        self.seen = min(self.seen + 1, len(self.values))
+        self.covariance[-2:, -2:] += wandered(self._wander, duration)
+
+    def part(self) -> None:
+        """What follows tells no more of what was, nor of how the value came to be what it is."""
+        self.covariance = np.diag(np.diag(self.covariance) * (np.arange(len(self._state)) >= len(self._state) - 2))
 
     def tie(self, back: int, difference: float, variance: float) -> None:
         """Kalman update by a difference from `back` frames ago to now; none if there was no such frame."""
-        if back >= self.seen:
+        if not 0 < back < self.seen:
             return
         row = self._difference(back)
         spread = self.covariance @ row
         gain = spread / (row @ spread + variance)
-        self.values = self.values + gain * (difference - row @ self.values)
+        self._state = self._state + gain * (difference - row @ self._state)
         self.covariance = self.covariance - np.outer(gain, spread)
 
     def variance(self, back: int) -> float:
@@ -54,7 +66,15 @@ class Ties:
         row = self._difference(back)
         return float(row @ self.covariance @ row)
 
-    def _difference(self, back: int) -> Float[np.ndarray, "frame"]:
-        row = np.zeros(len(self.values))
-        row[-1], row[-1 - back] = 1.0, -1.0
+    def _difference(self, back: int) -> Float[np.ndarray, "frame_and_rate"]:
+        row = np.zeros(len(self._state))
+        row[-2], row[-2 - back] = 1.0, -1.0
         return row
+
+
+def wandered(wander: float, duration: float) -> Float[np.ndarray, "2 2"]:
+    """Covariance of what a value and its rate have changed by, if the rate is a random walk of `wander` per root second
+    (Bar-Shalom, Li and Kirubarajan, "Estimation with applications to tracking and navigation", 2001, section 6.2.2).
+    """
+    third, half = duration**3 / 3, duration**2 / 2
+    return wander**2 * np.array([[third, half], [half, duration]])

@@ -3,6 +3,7 @@
 import csv
 import io
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -23,17 +24,32 @@ from radarize.training.trainer import Trainer
 _TENTH = 10
 
 
+@dataclass(frozen=True)
+class Options:
+    """How a training is run.
+
+    Attributes:
+        split: of the data set; every tenth recording validates if None.
+        device: ``cpu`` or ``cuda``; a GPU where there is one if None.
+        workers: processes that read.
+        resume: go on from the checkpoint, if there is one.
+        onnx: write the network as ONNX as well.
+    """
+
+    split: str | None = None
+    device: str | None = None
+    workers: int = 1
+    resume: bool = False
+    onnx: bool = False
+
+
 def train(
     kind: str,
     data: Path,
     output: Path,
-    *,
-    split: str | None = None,
     settings: Settings | None = None,
-    device: str | None = None,
-    workers: int = 1,
-    resume: bool = False,
-    onnx: bool = False,
+    options: Options | None = None,
+    *,
     progress: Callable[..., None] = lambda *where: None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Path:
@@ -44,12 +60,8 @@ def train(
         data: folder of recordings, of samples or of maps.
         output: weights to write (.safetensors). The log is beside it (.csv), and so is the checkpoint of the last
             epoch (.checkpoint) until training has ended.
-        split: of the data set; every tenth recording validates if None.
         settings: hyper-parameters; the task's own if None.
-        device: ``cpu`` or ``cuda``; a GPU where there is one if None.
-        workers: processes that read.
-        resume: go on from the checkpoint, if there is one.
-        onnx: write the network as ONNX as well.
+        options: how it is run.
         progress: called with (stage, done, in all).
         say: takes a line for every epoch.
 
@@ -60,56 +72,42 @@ def train(
         InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
             is no number.
     """
-    task, output, data = find_task(kind), Path(output), Path(data)
+    task, output, data, options = find_task(kind), Path(output), Path(data), options or Options()
     settings = settings or task.defaults
     _check(kind, settings, output)
-    checkpoint = output.with_suffix(".checkpoint")
-    if checkpoint.exists() and not resume:
-        raise InputError(f"{checkpoint}: is left of a training that did not end; --resume goes on, or remove it")
-    with team(device) as crew:
-        lead = crew.rank == 0
-        report, note = (progress, say) if lead else (_nothing, _nothing)
-        parts = _read(task, data, split, settings.seed, workers, report)
-        _fit(Trainer(task, settings, *parts, crew), output, data, split, resume, onnx, report, note)
-    return output
-
-
-def _fit(
-    trainer: Trainer,
-    output: Path,
-    data: Path,
-    split: str | None,
-    resume: bool,
-    onnx: bool,
-    progress: Callable[..., None],
-    say: Callable[[str], None],
-) -> None:
     checkpoint, log = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
-    network = trainer.task.network
-    about = {"kind": network.kind, "setting": network.setting, "data": data.resolve().name, "split": split}
-    lead, settings = trainer.team.rank == 0, trainer.settings
-    if resume and checkpoint.exists():
-        trainer.restore(checkpoint, about)
-        say(f"resuming after epoch {len(trainer.history)}")
-    trainer.team.wait()  # before the first one replaces what the others read
-    while not trainer.finished:
-        found = trainer.train_epoch(partial(progress, "training"))
+    if checkpoint.exists() and not options.resume:
+        raise InputError(f"{checkpoint}: is left of a training that did not end; --resume goes on, or remove it")
+    network = task.network
+    about = {"kind": network.kind, "setting": network.setting, "data": data.resolve().name, "split": options.split}
+    with team(options.device) as crew:
+        lead = crew.rank == 0
+        progress, say = (progress, say) if lead else (_nothing, _nothing)
+        parts = _read(task, data, options, settings.seed, progress)
+        trainer = Trainer(task, settings, *parts, crew)
+        if options.resume and checkpoint.exists():
+            trainer.restore(checkpoint, about)
+            say(f"resuming after epoch {len(trainer.history)}")
+        crew.wait()  # before the first one replaces what the others read
+        while not trainer.finished:
+            found = trainer.train_epoch(partial(progress, "training"))
+            if lead:
+                trainer.save(checkpoint, about)
+                _write_log(trainer.history, log)
+                say(_words(found))
         if lead:
-            trainer.save(checkpoint, about)
-            _write_log(trainer.history, log)
-            say(_words(found))
-    if lead:
-        metrics = trainer.finish()
-        header = trainer.task.header(
-            settings, trainer.training.grid, data=about["data"], split=split, spacings=tuple(trainer.spacings),
-            epochs=len(trainer.history), metrics=metrics,
-        )  # fmt: skip
-        save(trainer.net, header, output)
-        if onnx:
-            export_onnx(trainer.net, header, output.with_suffix(".onnx"))
-        checkpoint.unlink(missing_ok=True)
-        say("calibrated: " + _words(metrics))
-    trainer.team.wait()
+            metrics = trainer.finish()
+            header = task.header(
+                settings, trainer.training.grid, data=about["data"], split=options.split,
+                spacings=tuple(trainer.spacings), epochs=len(trainer.history), metrics=metrics,
+            )  # fmt: skip
+            save(trainer.net, header, output)
+            if options.onnx:
+                export_onnx(trainer.net, header, output.with_suffix(".onnx"))
+            checkpoint.unlink(missing_ok=True)
+            say("calibrated: " + _words(metrics))
+        crew.wait()
+    return output
 
 
 def _words(numbers: dict[str, float]) -> str:
@@ -120,19 +118,17 @@ def _nothing(*where) -> None:
     pass
 
 
-def _read(
-    task: Task, data: Path, split: str | None, seed: int, workers: int, progress: Callable[..., None]
-) -> tuple[Table, Table]:
+def _read(task: Task, data: Path, options: Options, seed: int, progress: Callable[..., None]) -> tuple[Table, Table]:
     """Training and validation data."""
-    if split is None:
+    if options.split is None:
         found = recordings(data)
         if len(found) < 2:
             raise InputError(f"{data}: holds one recording, expected at least two, one of which validates")
         apart = set(np.random.default_rng(seed).permutation(len(found))[: max(1, len(found) // _TENTH)])
         parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
     else:
-        parts = [recordings(data, split, part) for part in ("train", "validation")]
-    return task.table(parts[0] + parts[1], workers, progress).divide(len(parts[0]))
+        parts = [recordings(data, options.split, part) for part in ("train", "validation")]
+    return task.table(parts[0] + parts[1], options.workers, progress).divide(len(parts[0]))
 
 
 def _check(kind: str, settings: Settings, output: Path) -> None:

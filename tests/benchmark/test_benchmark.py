@@ -133,11 +133,11 @@ def test_a_remade_recording_is_run_again(toys, tmp_path):
 def test_networks_are_trained_on_each_split(rooms, toys, monkeypatch, tmp_path):
     asked = []
 
-    def train(kind, data, output, *, split, settings, resume, say):
-        asked.append((kind, split, settings.epochs, resume))
+    def train(kind, data, output, settings, options, *, say):
+        asked.append((kind, options.split, settings.epochs, options.resume))
         if kind == "rotation":
             raise InputError(f"{data}: holds too little")
-        output.write_text(split)
+        output.write_text(options.split)
         say("epoch 1: loss 1")
 
     monkeypatch.setattr(networks, "train", train)
@@ -163,7 +163,7 @@ def training(rooms, tmp_path, monkeypatch):
     shutil.copytree(rooms, data)
     begun = []
 
-    def train(kind, data, output, **choices):
+    def train(kind, data, output, *choices, **reports):
         begun.append(not output.with_suffix(".checkpoint").exists())
         output.with_suffix(".checkpoint").touch()
         output.touch()

@@ -22,8 +22,8 @@ class Scaled:
     def follow(self, batch: Batch) -> Track:
         rows = np.searchsorted(self.times, batch.stamps)
         velocity = self.steps[rows, :2] / self.period
-        square = np.tile(np.eye(3) * 1e-4, (len(batch), 1, 1))
-        return Track(batch.centers, self.poses[rows], self.steps[rows], square, velocity, square[:, :2, :2])
+        square, seen = np.tile(np.eye(3) * 1e-4, (len(batch), 1, 1)), np.ones((2, len(batch)), bool)
+        return Track(batch.centers, self.poses[rows], self.steps[rows], square, velocity, square[:, :2, :2], *seen)
 
 
 class Metre:

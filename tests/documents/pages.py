@@ -13,6 +13,8 @@ THEN = (("docs/simulating.md", "docs/radar.md", "docs/physics.md"), ("docs/learn
 PAGES = (FIRST, *THEN[0], *THEN[1])
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 _OWN = re.compile(r"`((?:radarize|radarsim|torchrun|make|python) [^`]+)`")
+#: What a command has that can be typed: an option, a file, or a name in capitals.
+_WHOLE = re.compile(r" -|[./A-Z]|^make")
 #: First line of the block that is no command: the tree of the house.
 _TREE = "radarize/ "
 
@@ -24,10 +26,12 @@ class Command:
     Attributes:
         text: the line, without its comment; of a script all of it.
         script: it is Python.
+        mentioned: it is a command's name alone, in a sentence.
     """
 
     text: str
     script: bool = False
+    mentioned: bool = False
 
 
 def commands(page: str) -> list[Command]:
@@ -35,8 +39,8 @@ def commands(page: str) -> list[Command]:
     text = (ROOT / page).read_text()
     found = [command for block in _FENCE.finditer(text) for command in _of(block)]
     known = {command.text for command in found}
-    sentences = [Command(" ".join(words.split())) for words in _OWN.findall(_FENCE.sub("", text))]
-    return found + [command for command in dict.fromkeys(sentences) if command.text not in known]
+    sentences = dict.fromkeys(" ".join(words.split()) for words in _OWN.findall(_FENCE.sub("", text)))
+    return found + [Command(words, mentioned=not _WHOLE.search(words)) for words in sentences if words not in known]
 
 
 def _of(block: re.Match) -> Iterator[Command]:

@@ -102,13 +102,13 @@ class Reader:
             line = typed(command.text).replace("{tty}", str(self.folder / "tty")).replace("{ports}", ports)
             words = shlex.split(line)
             if words[0] not in ("radarize", "radarsim", "torchrun"):
-                return f"nobody knows how to run it; {Path(__file__).name} has tables for that"
-            if words[1] == "emulate" or "--port" in words:
-                self.switch_on(words if words[1] == "emulate" else None)
-            if words[1] == "emulate":
-                return None
-            if all(re.fullmatch("[a-z]+", word) for word in words) and "list" not in words:
-                words.append("--help")  # only mentioned
+                return f"{line}: nobody knows how to run it; {Path(__file__).name} has tables for that"
+            if command.mentioned:
+                words = [*shlex.split(command.text), "--help"]
+            elif words[1] == "emulate":
+                return self.switch_on(words)
+            elif "--port" in words:
+                self.switch_on()
             for option, name in zip(["", *words], words, strict=False):
                 if option not in OUTPUT:
                     self.prepare(name)
@@ -138,7 +138,7 @@ class Reader:
             if given in GIVEN and not (self.folder / given).exists():
                 GIVEN[given](self.folder / given)
 
-    def switch_on(self, words: list[str] | None) -> None:
+    def switch_on(self, words: list[str] | None = None) -> None:
         """The virtual radar, with the words of a page if they come first."""
         if self.radar:
             return

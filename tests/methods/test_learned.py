@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from radarize.batch import Signal
+from radarize.batch import Batch, Signal
 from radarize.errors import InputError
 from radarize.features.grid import Grid
 from radarize.methods.radarize.fused import FusedVelocity
@@ -12,6 +12,7 @@ from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
 from radarize.nets.weights import Header, build, example, load, save
 from radarize.odometry.doppler import Velocities
+from radarize.odometry.settings import FusionConfig
 from radarize.radar.presets import PRESETS
 from tests.batches import of_spectrum, parts
 
@@ -47,9 +48,12 @@ def test_windows_are_frames_of_the_trained_rate(tmp_path):
     level = torch.from_numpy(SIGNAL.maker.of(everything, ("range_azimuth",))["range_azimuth"]).float().mean(dim=(1, 2))
     for cuts in ([12], [5, 7], [1] * 12):
         windows = load(weights(tmp_path, "rotation"), RotationNet, CONFIG)[1].windows(CONFIG)
-        pushed = [windows.push(part, (1, 4)) for part in parts(SIGNAL, everything, times, cuts)]
+        batches = parts(SIGNAL, everything, times, cuts)
+        pushed = [windows.push(batch.maps(windows.maps), batch.stamps, (1, 4)) for batch in batches]
         for k, spacing in enumerate((1, 4)):
-            shown = torch.cat([part[k] for part in pushed]).mean(dim=(2, 3, 4))
+            shown = torch.cat([part[k].maps for part in pushed]).mean(dim=(2, 3, 4))
+            whole = np.concatenate([part[k].whole for part in pushed])
+            assert (whole == (np.arange(12) >= 2 * spacing)).all()
             expected = [(max(0, frame - 2 * spacing), frame) for frame in range(12)]
             assert torch.allclose(shown, level[torch.tensor(expected)], atol=0.01)
 
@@ -76,45 +80,48 @@ def test_batches_do_not_matter(tmp_path):
         assert np.allclose(a, b, atol=1e-4)
 
 
-def test_silence_says_nothing(tmp_path):
-    """A lost frame is no motion of its own: neither network has seen one that should have been believed."""
-    zeros = torch.zeros(4, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)
-    nothing = of_spectrum(SIGNAL, zeros, np.arange(4) * CONFIG.frame_period)
-    found = LearnedVelocity(CONFIG, weights(tmp_path, "translation")).estimate(nothing)
-    assert (found.velocity == 0).all() and np.allclose(found.covariance, 4 * np.eye(2))
-    turns = LearnedRotation(CONFIG, weights(tmp_path, "rotation")).estimate(nothing, found)
-    assert np.allclose(turns.yaw, 0)
+def numbered(numbers: np.ndarray, times: np.ndarray) -> Batch:
+    """Frames whose maps are their numbers."""
+    batch = of_spectrum(SIGNAL, numbers, times)
+    batch.maps = lambda names: {name: np.asarray(numbers, np.float32)[:, None, None] for name in names}
+    return batch
 
 
 class Oracle:
-    """Answers with true turns between the frames it is shown, plus noise that it knows of."""
+    """Answers with true velocities, or with true turns and noise that it knows of; of frames that are not as far apart
+    as it was taught, with confident nonsense."""
 
-    def __init__(self, yaw: np.ndarray, noise: float, rng: np.random.Generator):
-        self.yaw, self.noise, self.rng = torch.tensor(yaw), noise, rng
+    def __init__(self, times: np.ndarray, truth: np.ndarray, noise: float, rng: np.random.Generator):
+        self.times, self.truth, self.noise, self.rng = times, truth, noise, rng
 
-    def estimate(self, frames: torch.Tensor, travel: torch.Tensor):
-        first, last = frames.long().T
-        turn = self.yaw[last] - self.yaw[first] + torch.tensor(self.rng.normal(0, self.noise, len(first)))
-        return turn[:, None], torch.full((len(first), 1, 1), self.noise**2)
+    def estimate(self, maps: torch.Tensor, travel: torch.Tensor | None = None):
+        first, last = maps[:, :, 0, 0, 0].long().numpy().T
+        apart = (self.times[last] - self.times[first]) / SLOW.frame_period
+        known = (abs(apart - apart.round()) < 0.01) & (0.5 < apart) & (apart < 4.5)
+        if travel is None:
+            mean = np.where(known[:, None], self.truth[last], -3.0)
+            return torch.tensor(mean), torch.eye(2).double().repeat(len(mean), 1, 1) * self.noise**2
+        turn = self.truth[last] - self.truth[first] + self.rng.normal(0, self.noise, len(first))
+        mean = torch.tensor(np.where(known, turn, -0.5))[:, None]
+        return mean, torch.full((len(first), 1, 1), self.noise**2).double()
 
 
-def test_turns_of_several_spacings_make_one_yaw(tmp_path, monkeypatch):
+def nowhere(count: int) -> Velocities:
+    return Velocities(*np.zeros((2, count, 2)), np.zeros(count), np.ones(count, bool))
+
+
+def test_turns_of_several_spacings_make_one_yaw(tmp_path):
     """Better than chains of one spacing (the paper's), and as sure of it as it may be."""
     count, noise, stride = 300, np.radians(1.0), 2
     times = np.arange(count) * CONFIG.frame_period
     truth = np.cumsum(np.radians(40) * np.sin(times) * CONFIG.frame_period)
     ends, honest, chained = [], [], []
-    path, frames = weights(tmp_path, "rotation"), of_spectrum(SIGNAL, torch.zeros(count), times)
+    path = weights(tmp_path, "rotation")
     for seed in range(40):
         rng = np.random.default_rng(seed)
         rotation = LearnedRotation(CONFIG, path)
-        rotation._net = Oracle(truth, noise, rng)
-        seen = "radarize.methods.radarize.learned.silent"
-        monkeypatch.setattr(seen, lambda shown: torch.zeros(len(shown), dtype=torch.bool))
-        at = torch.arange(count)
-        shown = [torch.stack([(at - stride * s).clamp_min(0), at], dim=1) for s in rotation.spacings]
-        monkeypatch.setattr(rotation._windows, "push", lambda batch, spacings, shown=shown: shown)
-        found = rotation.estimate(frames, Velocities(*np.zeros((3, count, 2))))
+        rotation._net = Oracle(times, truth, noise, rng)
+        found = rotation.estimate(numbered(np.arange(count), times), nowhere(count))
         error = np.cumsum(found.yaw)[-1] - (truth[-1] - truth[0])
         ends.append(error)
         honest.append(error**2 / found.variance.sum())
@@ -123,23 +130,88 @@ def test_turns_of_several_spacings_make_one_yaw(tmp_path, monkeypatch):
     assert 0.3 < np.mean(honest) < 1.2  # below 1, for it began without knowing its rate
 
 
-class Says:
-    """An estimator with one answer."""
+@pytest.mark.parametrize("rate", np.radians([40, -70]))
+def test_a_second_lost_while_turning_is_not_asked_about(tmp_path, rate):
+    """What spans the gap says nothing: the turn goes on as before, and is claimed as unsure as that is."""
+    kept = np.r_[0:60, 90:150]
+    times = kept * CONFIG.frame_period
+    rotation = LearnedRotation(CONFIG, weights(tmp_path, "rotation"))
+    rotation._net = Oracle(times, rate * times, np.radians(0.5), np.random.default_rng(0))
+    found = rotation.estimate(numbered(np.arange(120), times), nowhere(120))
+    over = rate * (times[60] - times[59])
+    spread = np.sqrt(found.variance[60])
+    assert abs(found.yaw[60] - over) < 3 * spread and np.radians(20) < spread < np.radians(60)
+    assert np.degrees(found.yaw[60]) == pytest.approx(np.degrees(over), abs=25)
+    assert not found.seen[60:62].any() and found.seen[2:60].all() and found.seen[62:].all()
+    # No frame's turn makes up for what was wrong with the gap's.
+    assert np.degrees(np.abs(found.yaw[61:] - rate * CONFIG.frame_period)).max() < 4
+    assert np.degrees(found.yaw[75:].sum()) == pytest.approx(np.degrees(rate * (times[-1] - times[74])), abs=2)
 
-    def __init__(self, velocity, covariance):
-        self.answer = Velocities(np.array([velocity]), np.array([covariance]), np.array([3]))
+
+def test_a_lost_frame_is_in_no_window(tmp_path):
+    """At twice the trained rate every second frame makes a window: that of the frame two later has a hole."""
+    kept = np.r_[0:10, 11:20]
+    times = kept * CONFIG.frame_period
+    truth = np.stack([np.full(19, 1.0), np.zeros(19)], axis=1)
+    for cuts in ([19], [9, 3, 7]):
+        velocity = LearnedVelocity(CONFIG, weights(tmp_path, "translation"))
+        velocity._net = Oracle(times, truth, 0.01, np.random.default_rng(0))
+        parts = [
+            velocity.estimate(numbered(rows, times[rows])) for rows in np.split(np.arange(19), np.cumsum(cuts)[:-1])
+        ]
+        seen = np.concatenate([part.seen for part in parts])
+        assert (kept[~seen] == [0, 1, 12]).all()
+        assert np.allclose(np.concatenate([part.velocity for part in parts])[seen], [1.0, 0.0])
+        unknown = np.concatenate([part.covariance for part in parts])[~seen]
+        assert (np.linalg.eigvalsh(unknown) > 1.0).all()
+
+
+class Says:
+    """An estimator whose answers are given."""
+
+    lever = 0.0
+
+    def __init__(self, velocity, covariance, seen=True):
+        velocity = np.atleast_2d(velocity)
+        count = len(velocity)
+        self.answer = Velocities(
+            velocity, np.tile(covariance, (count, 1, 1)), np.full(count, 3), np.full(count, seen, bool)
+        )
 
     def estimate(self, batch):
         return self.answer
 
 
-def test_fusion_is_the_product_of_the_two():
+A, P = np.array([1.0, 0.2]), np.array([[0.04, 0.01], [0.01, 0.09]])
+B, Q = np.array([1.1, 0.1]), np.array([[0.01, 0.0], [0.0, 0.04]])
+
+
+def test_fusion_of_what_has_nothing_in_common_is_the_product():
     """Against the information form; and two that contradict each other leave more doubt than either admits."""
-    a, p = np.array([1.0, 0.2]), np.array([[0.04, 0.01], [0.01, 0.09]])
-    b, q = np.array([1.1, 0.1]), np.array([[0.01, 0.0], [0.0, 0.04]])
-    found = FusedVelocity(Says(a, p), Says(b, q)).estimate(None)
-    covariance = np.linalg.inv(np.linalg.inv(p) + np.linalg.inv(q))
+    alone = FusionConfig(correlation=0.0)
+    found = FusedVelocity(Says(A, P), Says(B, Q), alone).estimate(None)
+    covariance = np.linalg.inv(np.linalg.inv(P) + np.linalg.inv(Q))
     assert np.allclose(found.covariance[0], covariance)
-    assert np.allclose(found.velocity[0], covariance @ (np.linalg.inv(p) @ a + np.linalg.inv(q) @ b))
-    apart = FusedVelocity(Says(a, p), Says(b + 3, q)).estimate(None)
+    assert np.allclose(found.velocity[0], covariance @ (np.linalg.inv(P) @ A + np.linalg.inv(Q) @ B))
+    apart = FusedVelocity(Says(A, P), Says(B + 3, Q), alone).estimate(None)
     assert np.linalg.eigvalsh(apart.covariance[0] - covariance)[0] > 5 * np.linalg.eigvalsh(covariance)[-1]
+
+
+@pytest.mark.parametrize("correlation", [0.0, 0.3, 0.6])
+def test_fusion_claims_what_correlated_errors_leave(correlation):
+    rng, count = np.random.default_rng(0), 4000
+    same, one, other = rng.normal(size=(3, count, 2))
+    one, other = (np.sqrt(correlation) * same + np.sqrt(1 - correlation) * own for own in (one, other))
+    says = Says(one @ np.linalg.cholesky(P).T, P), Says(other @ np.linalg.cholesky(Q).T, Q)
+    found = FusedVelocity(*says, FusionConfig(correlation=correlation, gate=100)).estimate(None)
+    error = found.velocity[:, :, None]
+    nees = (error.mT @ np.linalg.solve(found.covariance, error)).mean() / 2
+    assert nees == pytest.approx(1, abs=0.04)
+
+
+def test_fusion_with_one_that_knows_nothing_is_the_other():
+    nothing = Says([0.0, 0.0], 4 * np.eye(2), seen=False)
+    for pair in ((nothing, Says(B, Q)), (Says(B, Q), nothing)):
+        found = FusedVelocity(*pair).estimate(None)
+        assert found.seen[0] and np.allclose(found.velocity[0], B, atol=0.02)
+    assert not FusedVelocity(nothing, nothing).estimate(None).seen[0]

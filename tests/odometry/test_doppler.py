@@ -62,6 +62,15 @@ def test_standing_still_is_exactly_zero(room):
     assert found.covariance[0].max() < 0.01
 
 
+def test_a_walk_that_sets_in_is_not_standing(room):
+    """15 mm/s are slower than the threshold of standing, but many times what echoes are known to."""
+    maps = Heatmaps(CONFIG)
+    found = DopplerVelocity(maps).estimate(batch(CONFIG, burst(room, (0.015, 0.0)), np.zeros(1)))
+    assert found.velocity[0] == pytest.approx([0.015, 0.0], abs=0.006)
+    error = found.velocity[0] - [0.015, 0.0]
+    assert error @ np.linalg.solve(found.covariance[0], error) < 9
+
+
 def test_people_are_outliers(room):
     points, amplitudes = room
     rng = np.random.default_rng(5)
@@ -81,6 +90,7 @@ def test_without_echoes_the_covariance_is_large():
     found = DopplerVelocity(maps).estimate(batch(CONFIG, noise, np.arange(2)))
     assert np.isfinite(found.velocity).all()
     assert (np.linalg.eigvalsh(found.covariance)[:, 0] > 0.2).all()
+    assert not found.seen.any()
 
 
 def test_faster_than_the_unambiguous_speed(room):

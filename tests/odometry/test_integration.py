@@ -6,11 +6,11 @@ import pytest
 from radarize.batch import Signal
 from radarize.errors import InputError
 from radarize.odometry.doppler import DopplerVelocity, Velocities
-from radarize.odometry.integration import Odometry, VelocityFilter
+from radarize.odometry.integration import Odometry, VelocityConfig, VelocityFilter
 from radarize.odometry.rotation import MapRotation, Rotations
 from radarize.pose import compose, exponential
 from radarize.radar.presets import PRESETS
-from tests.batches import batch
+from tests.batches import batch, of_spectrum
 from tests.echoes import record
 from tests.rooms import antenna_gain, furnished_room, walk
 
@@ -130,9 +130,11 @@ def test_estimators_can_be_swapped(walked):
     adc, stamps, _ = walked
 
     class Forward:
+        lever = 0.0
+
         def estimate(self, batch):
-            n = len(batch)
-            return Velocities(np.tile([1.0, 0.0], (n, 1)), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.ones(n, int))
+            n, seen = len(batch), np.ones(len(batch), bool)
+            return Velocities(np.tile([1.0, 0.0], (n, 1)), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.ones(n, int), seen)
 
     result = classical(velocity=Forward()).follow(batch(SIGNAL, adc[:20], stamps[:20]))
     np.testing.assert_allclose(result.velocity[5:], np.tile([1.0, 0.0], (15, 1)), atol=0.02)
@@ -154,7 +156,7 @@ def test_filter_rejects_an_outlier_and_follows_a_step():
     truth = np.where(times < 1, 1.0, -0.5)
     velocity = np.stack([truth, np.zeros(60)], axis=1)
     velocity[15] = (-1.5, 2.0)
-    measured = Velocities(velocity, np.tile(1e-4 * np.eye(2), (60, 1, 1)), np.full(60, 50))
+    measured = Velocities(velocity, np.tile(1e-4 * np.eye(2), (60, 1, 1)), np.full(60, 50), np.ones(60, bool))
     found = VelocityFilter().filter(times, measured).velocity
     assert np.abs(found[15] - velocity[14]).max() < 0.3
     np.testing.assert_allclose(found[-1], velocity[-1], atol=0.02)
@@ -168,9 +170,66 @@ def test_a_turn_that_nothing_is_seen_of_is_claimed():
 
     class Sure:
         def estimate(self, batch, velocities):
-            return Rotations(np.zeros(len(batch)), np.full(len(batch), 1e-8), np.zeros(len(batch)))
+            return Rotations(np.zeros(len(batch)), np.full(len(batch), 1e-8), np.ones(len(batch), bool))
 
     adc = record(CONFIG, nowhere, np.array([[2.0, 0.0, 0.0]]), np.zeros(1), stamps, rng, 20.0, block=16)
     result = classical(rotation=MapRotation(SIGNAL.heatmaps, prior=Sure())).follow(batch(SIGNAL, adc, stamps))
     # People turn by 20 deg in a second, and more; and it is noise, so some frames match by chance.
     assert np.sqrt(result.covariance[1:, 2, 2].sum()) > np.radians(15)
+
+
+class Told:
+    """Estimators whose answers are known: a velocity straight ahead, a rate of turning."""
+
+    def __init__(self, speed=1.0, rate=0.0, lever=0.0, variance=1e-6):
+        self.speed, self.rate, self.lever, self.variance, self.last = speed, rate, lever, variance, 0.0
+
+    def velocity(self) -> "Told":
+        self.estimate = lambda batch: Velocities(
+            np.tile([self.speed, 0.0], (len(batch), 1)),
+            np.tile(self.variance * np.eye(2), (len(batch), 1, 1)),
+            np.full(len(batch), 50),
+            np.ones(len(batch), bool),
+        )
+        return self
+
+    def rotation(self) -> "Told":
+        self.estimate = lambda batch, velocities: Rotations(
+            self.rate * np.diff(batch.stamps, prepend=batch.stamps[0]),
+            np.full(len(batch), 1e-6),
+            np.ones(len(batch), bool),
+        )
+        return self
+
+
+def test_the_antennas_swing_about_the_origin():
+    """Their middle is 1 cm to the left: turning to the left at 1.5 rad/s, it goes backward by 1.5 cm/s."""
+    times = np.arange(60) * CONFIG.frame_period
+    odometry = Odometry(CONFIG, Told(1.0 - 0.015, lever=0.01).velocity(), Told(rate=1.5).rotation())
+    found = odometry.follow(of_spectrum(SIGNAL, times, times))
+    assert found.velocity[30:, 0] == pytest.approx(1.0, abs=1e-3)
+    antennas = DopplerVelocity(SIGNAL.heatmaps).lever
+    # Eight of them half a wavelength apart, of which each is the sum of a transmitter's place and a receiver's.
+    assert antennas == pytest.approx(3.5 * CONFIG.wavelength / 2 / 2, rel=0.05)
+
+
+@pytest.mark.parametrize("gap", [0.2, 0.5, 1.0, 2.0])
+def test_a_gap_is_claimed_by_its_length(gap):
+    """As much as walks by hand change their speed meanwhile; within it, no step claims more than its velocities'."""
+    times = np.concatenate([np.arange(10) * CONFIG.frame_period, 9 * CONFIG.frame_period + gap * np.array([1.0])])
+    found = Odometry(CONFIG, Told().velocity(), Told().rotation()).follow(of_spectrum(SIGNAL, times, times))
+    spread = np.sqrt(found.covariance[:, 0, 0])
+    by_hand = {0.2: 0.0015, 0.5: 0.018, 1.0: 0.072, 2.0: 0.263}
+    assert spread[10] == pytest.approx(by_hand[gap], rel=0.25)
+    assert (spread[1:10] < 1e-4).all()
+
+
+@pytest.mark.parametrize("rate", [5, 15, 30])
+def test_velocity_is_forgotten_by_the_second_not_by_the_frame(rate):
+    count = rate + 1
+    blind = np.arange(count) > 0
+    covariance = np.where(blind, 1e9, 1e-6)[:, None, None] * np.eye(2)
+    measured = Velocities(np.zeros((count, 2)), covariance, np.where(blind, 0, 50), ~blind)
+    filtered = VelocityFilter().filter(np.arange(count) / rate, measured)
+    assert filtered.covariance[-1, 0, 0] == pytest.approx(VelocityConfig().wander ** 2, rel=1e-3)
+    assert (filtered.seen == ~blind).all()

@@ -21,15 +21,17 @@ from radarize.nets import losses
 from radarize.nets.weights import header_of, load, read
 from radarize.recording import Recording
 from radarize.training.team import Team
-from radarize.training.train import train
+from radarize.training.train import Options, train
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 ROOT = Path(__file__).parents[2]
 TASKS = {kind: find_task(kind) for kind in ("translation", "rotation", "segmentation")}
 QUICK = {
-    "translation": replace(TASKS["translation"].defaults, width=8, frames=1, epochs=10, batch=32, rate=3e-3),
-    "rotation": replace(TASKS["rotation"].defaults, width=8, epochs=10, batch=32, rate=3e-3),
+    "translation": replace(
+        TASKS["translation"].defaults, width=8, frames=1, epochs=10, batch=32, rate=3e-3, schedule="cosine"
+    ),
+    "rotation": replace(TASKS["rotation"].defaults, width=8, epochs=10, batch=32, rate=3e-3, schedule="cosine"),
     "segmentation": replace(TASKS["segmentation"].defaults, width=4, epochs=3, batch=16, rate=3e-3),
 }
 TINY = replace(QUICK["translation"], width=2, epochs=4, batch=32)
@@ -126,9 +128,22 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
     with pytest.raises(InputError, match="part.checkpoint: is left of a training that did not end; --resume goes on"):
         train("translation", small, tmp_path / "part.safetensors", settings=TINY)
     with pytest.raises(InputError, match="is of a training with seed 0, expected 1"):
-        train("translation", small, tmp_path / "part.safetensors", settings=replace(TINY, seed=1), resume=True)
+        train(
+            "translation",
+            small,
+            tmp_path / "part.safetensors",
+            settings=replace(TINY, seed=1),
+            options=Options(resume=True),
+        )
     said = []
-    resumed = train("translation", small, tmp_path / "part.safetensors", settings=TINY, resume=True, say=said.append)
+    resumed = train(
+        "translation",
+        small,
+        tmp_path / "part.safetensors",
+        settings=TINY,
+        options=Options(resume=True),
+        say=said.append,
+    )
     assert said[0] == "resuming after epoch 2"
     assert same(whole, resumed)
     assert header_of(whole).metrics == header_of(resumed).metrics
@@ -152,7 +167,8 @@ class Watched(module.Trainer):
         return found
 module.Trainer = Watched
 from radarize.methods.task import Settings
-module.train("translation", {str(small)!r}, {str(tmp_path / "net.safetensors")!r}, settings={TINY!r}, device="cpu")
+options = module.Options(device="cpu")
+module.train("translation", {str(small)!r}, {str(tmp_path / "net.safetensors")!r}, settings={TINY!r}, options=options)
 """
     (tmp_path / "both.py").write_text(code)
     command = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node", "2"]
@@ -212,9 +228,9 @@ def test_the_command(tmp_path):
         ({"settings": replace(TINY, batch=0)}, "batch is 0, expected a positive number"),
         ({"settings": replace(TINY, frames=70)}, "training has 0 windows of 70 frames"),
         ({"kind": "rotation", "settings": replace(TINY, frames=1)}, "frames is 1, expected at least two"),
-        ({"device": "abacus"}, "device is 'abacus', expected cpu or cuda"),
+        ({"options": Options(device="abacus")}, "device is 'abacus', expected cpu or cuda"),
         ({"output": Path("net.pt")}, "output is net.pt, expected a file NAME.safetensors"),
-        ({"split": "random-0"}, "dataset.json: is no readable data set"),
+        ({"options": Options("random-0")}, "dataset.json: is no readable data set"),
         ({"data": Path("nowhere")}, "nowhere: holds no recordings"),
     ],
 )

@@ -9,8 +9,9 @@ from radarize.odometry.rotation import MapRotation
 
 def doppler(inputs: Inputs) -> Odometry:
     """Least squares over Doppler peaks, and matching against a local map."""
-    heatmaps = inputs.signal.heatmaps
-    return Odometry(inputs.radar, DopplerVelocity(heatmaps), MapRotation(heatmaps))
+    settings, heatmaps = inputs.configuration, inputs.signal.heatmaps
+    velocity, rotation = DopplerVelocity(heatmaps, settings.doppler), MapRotation(heatmaps, settings.rotation)
+    return Odometry(inputs.radar, velocity, rotation, settings.velocity)
 
 
 def scans(inputs: Inputs, method: str) -> HeatmapScans:

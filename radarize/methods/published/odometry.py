@@ -45,7 +45,7 @@ class PublishedOdometry:
         used, made = batch.made(self._stream.maps)
         if not len(used):
             none = np.zeros((0, 3))
-            return Track(np.zeros(0), none, none, np.zeros((0, 3, 3)), none[:, :2], np.zeros((0, 2, 2)))
+            return Track(np.zeros(0), none, none, np.zeros((0, 3, 3)), none[:, :2], np.zeros((0, 2, 2)), *_sure(0))
         with stage("translation"):
             velocity, velocity_noise = self._translation.estimate(window(self._translation, made)[:, None])
         with stage("rotation"):
@@ -72,9 +72,14 @@ class PublishedOdometry:
                 steps[i] = between(before, poses[i])
                 spreads[i, :2, :2] = dt**2 * velocity_noise[0].numpy()
             self._past = [*self._past[-CHAINS + 1 :], (time, poses[i].copy(), maps[i])]
-        return Track(times, poses, steps, spreads, velocity, velocity_noise.double().numpy())
+        return Track(times, poses, steps, spreads, velocity, velocity_noise.double().numpy(), *_sure(len(times)))
 
 
 def window(net: torch.nn.Module, made: dict[str, Float16[np.ndarray, "frame row azimuth"]]) -> torch.Tensor:
     """What a network reads of frames: (frame, map, row, azimuth)."""
     return torch.stack([torch.from_numpy(made[name]).float() for name in net.maps], dim=1)
+
+
+def _sure(frames: int) -> np.ndarray:
+    """(2, frame): the artefact always takes velocity and turn for seen."""
+    return np.ones((2, frames), bool)

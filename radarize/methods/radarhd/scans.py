@@ -35,8 +35,9 @@ class RadarHdScans:
     @torch.inference_mode()
     def picture(self, batch: Batch) -> Float[torch.Tensor, "frame range direction"]:
         """Probability of a surface in cells of range and `radarize.methods.radarhd.network.columns(DRAWN)`."""
+        shown = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
         # One by one: a window has 41 maps.
-        return torch.cat([self._net.estimate(window[None]) for window in self._windows.push(batch)[0]])
+        return torch.cat([self._net.estimate(window[None]) for window in shown.maps])
 
     def scan(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen."""

@@ -5,29 +5,41 @@ import numpy as np
 from radarize.batch import Batch
 from radarize.methods.radarize.learned import LearnedVelocity
 from radarize.odometry.doppler import DopplerVelocity, Velocities
+from radarize.odometry.settings import FusionConfig
 
 
 class FusedVelocity:
-    """Velocity estimator that weighs two others by their covariances.
+    """Velocity estimator that weighs two others by their covariances and the correlation of their errors: both look at
+    the same samples (Bar-Shalom and Campo, "The effect of the common process noise on the two-sensor fused-track
+    covariance", 1986).
 
     Where they contradict each other by more than both admit, at least one is wrong without knowing: then both are
     believed less.
 
     Args:
         learned, doppler: the two.
-        gate: squared Mahalanobis distance between them from which covariances grow.
+        settings: of the fusion.
+
+    Attributes:
+        lever: m, see `VelocityEstimator`: that of least squares, which has most of the say.
     """
 
-    def __init__(self, learned: LearnedVelocity, doppler: DopplerVelocity, gate: float = 9.0):
-        self.learned, self.doppler, self.gate = learned, doppler, gate
+    def __init__(self, learned: LearnedVelocity, doppler: DopplerVelocity, settings: FusionConfig | None = None):
+        self.learned, self.doppler, self.settings = learned, doppler, settings or FusionConfig()
+        self.lever = doppler.lever
 
     def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames."""
         one, other = self.learned.estimate(batch), self.doppler.estimate(batch)
+        roots = np.linalg.cholesky(one.covariance), np.linalg.cholesky(other.covariance)
+        # What one estimator knows nothing of has no error in common with the other.
+        both = self.settings.correlation * (one.seen & other.seen)
+        common = both[:, None, None] * roots[0] @ roots[1].mT
         apart = (one.velocity - other.velocity)[:, :, None]
-        total = one.covariance + other.covariance
+        total = one.covariance + other.covariance - common - common.mT
         distance = (apart.mT @ np.linalg.solve(total, apart))[:, 0, 0]
-        weight = one.covariance @ np.linalg.inv(total)
+        weight = (one.covariance - common) @ np.linalg.inv(total)
         velocity = one.velocity - (weight @ apart)[:, :, 0]
-        covariance = (one.covariance - weight @ one.covariance) * np.maximum(distance / self.gate, 1.0)[:, None, None]
-        return Velocities(velocity, covariance, other.inliers)
+        covariance = one.covariance - weight @ (one.covariance - common.mT)
+        covariance *= np.maximum(distance / self.settings.gate, 1.0)[:, None, None]
+        return Velocities(velocity, (covariance + covariance.mT) / 2, other.inliers, one.seen | other.seen)

@@ -1,23 +1,22 @@
 """Velocity and turns by the networks (paper, sections 4.2 and 4.3), as estimators like any others."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from radarize.batch import Batch
-from radarize.features.windows import silent
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
 from radarize.nets.weights import load
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
+from radarize.odometry.settings import TurnConfig
 from radarize.odometry.ties import Ties
 from radarize.radar.config import RadarConfig
 
-#: m/s and rad, standard deviations of what may have happened meanwhile.
-_ANY_VELOCITY, _ANY_TURN = 2.0, 1.0
+#: m/s, standard deviation of a velocity of which a network says nothing.
+_ANY_VELOCITY = 2.0
 
 
 class LearnedVelocity:
@@ -31,6 +30,9 @@ class LearnedVelocity:
         InputError: no such weights, or they are for another radar.
     """
 
+    #: m, see `VelocityEstimator`: it was taught the velocity of the origin.
+    lever = 0.0
+
     def __init__(self, radar: RadarConfig, weights: Path):
         self._net, header = load(weights, TranslationNet, radar)
         self._windows = header.windows(radar)
@@ -38,55 +40,55 @@ class LearnedVelocity:
     @torch.inference_mode()
     def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames; no echoes are counted."""
-        shown = self._windows.push(batch)[0]
-        mean, covariance = self._net.estimate(shown)
-        lost = silent(shown)
-        mean[lost], covariance[lost] = 0.0, _ANY_VELOCITY**2 * torch.eye(2)
-        return Velocities(mean.double().numpy(), covariance.double().numpy(), np.zeros(len(mean), int))
+        shown = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
+        velocity = np.zeros((len(batch), 2))
+        covariance = np.tile(_ANY_VELOCITY**2 * np.eye(2), (len(batch), 1, 1))
+        if shown.whole.any():
+            mean, spread = self._net.estimate(shown.maps[shown.whole])
+            velocity[shown.whole], covariance[shown.whole] = mean.double().numpy(), spread.double().numpy()
+        return Velocities(velocity, covariance, np.zeros(len(batch), int), shown.whole)
 
 
 class LearnedRotation:
     """Rotation estimator by `RotationNet`: turns over several spacings, reconciled by a filter.
 
     The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
-    one Gaussian state (`Ties`).
+    one Gaussian state (`Ties`), which goes on at its rate where frames are lost.
 
     Args:
         radar: configuration.
         weights: file.
-        spacings: of the network's frames, over which turns are measured; some of those it was trained on.
-        jerk: rad/s, standard deviation of the change of turning rate from frame to frame.
-        fastest: rad/s, standard deviation of the turning rate before anything is known.
+        settings: of the filter.
     """
 
-    def __init__(
-        self,
-        radar: RadarConfig,
-        weights: Path,
-        spacings: Sequence[int] = (1, 2, 4),
-        jerk: float = np.radians(12.0),
-        fastest: float = np.radians(60.0),
-    ):
+    def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):
+        settings = settings or TurnConfig()
         self._net, header = load(weights, RotationNet, radar)
         self._windows, known = header.windows(radar), header.spacings
-        self.spacings = [s for s in spacings if s in known] or list(known)
+        self.spacings = [s for s in settings.spacings if s in known] or list(known)
         size = max(self.spacings) * self._windows.stride + 1
+        self._longest = (size - 0.5) * radar.frame_period
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
-        self._yaws = Ties(size, jerk, fastest)
+        self._yaws = Ties(size, settings.wander, settings.fastest)
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
-        times, turns = batch.centers, self.turns(batch, velocities)
+        times = batch.centers
+        before = self._times[-1] if len(self._times) else times[0]
+        turns, back = self.turns(batch, velocities)
         yaw, growth = np.zeros(len(times)), np.zeros(len(times))
-        for i in range(len(times)):
-            before, known = self._yaws.values[-1], self._yaws.covariance[-1, -1]
-            now = len(self._times) - len(times) + i
-            self._yaws.predict(float(self._times[now] - self._times[max(now - 1, 0)]))
-            for spacing, (turn, noise) in zip(self.spacings, turns[:, i], strict=True):
-                self._yaws.tie(spacing * self._windows.stride, turn, noise)
-            yaw[i] = self._yaws.values[-1] - before
-            growth[i] = max(self._yaws.covariance[-1, -1] - known, 1e-8)
-        return Rotations(yaw, growth, np.zeros(len(times)))
+        for i, dt in enumerate(np.diff(times, prepend=before)):
+            last, known = self._yaws.values[-1], self._yaws.covariance[-2, -2]
+            self._yaws.predict(float(dt))
+            if dt > self._longest:
+                # What comes after a gap does say how fast the sensor may have turned within; but that would be told as
+                # a turn of a later frame.
+                self._yaws.part()
+            for ago, (turn, noise) in zip(back[:, i], turns[:, i], strict=True):
+                self._yaws.tie(int(ago), turn, noise)
+            yaw[i] = self._yaws.values[-1] - last
+            growth[i] = max(self._yaws.covariance[-2, -2] - known, 1e-8)
+        return Rotations(yaw, growth, (back > 0).any(axis=0))
 
     @property
     def stride(self) -> int:
@@ -94,23 +96,34 @@ class LearnedRotation:
         return self._windows.stride
 
     @torch.inference_mode()
-    def turns(self, batch: Batch, velocities: Velocities) -> Float[np.ndarray, "spacing frame 2"]:
-        """What the network says of the next frames: turns (rad) over each of `spacings` until them, and variances."""
-        windows = self._windows.push(batch, self.spacings)
-        travel = self._travel(batch.centers, velocities.velocity)
-        shown = torch.cat(windows)
-        mean, variance = self._net.estimate(shown, torch.from_numpy(travel).float())
-        lost = silent(shown)
-        mean[lost], variance[lost] = 0.0, _ANY_TURN**2
-        return torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy().reshape(len(windows), -1, 2)
+    def turns(
+        self, batch: Batch, velocities: Velocities
+    ) -> tuple[Float[np.ndarray, "spacing frame 2"], Int[np.ndarray, "spacing frame"]]:
+        """What the network says of the next frames.
 
-    def _travel(self, times: np.ndarray, velocities: np.ndarray) -> Float[np.ndarray, "window 2"]:
-        """What `RotationNet` wants to be told of the windows, spacing by spacing."""
-        new, size = len(times), len(self._yaws.values)
-        self._times = np.concatenate([self._times[1 - size :], times])
-        self._velocities = np.concatenate([self._velocities[1 - size :], velocities])
-        newest = np.arange(len(self._times) - new, len(self._times))
-        first = [np.maximum(newest - spacing * self._windows.stride, 0) for spacing in self.spacings]
-        lasting = [self._times[newest] - self._times[start] for start in first]
-        mean = [(self._velocities[newest] + self._velocities[start]) / 2 for start in first]
-        return np.concatenate(lasting)[:, None] * np.concatenate(mean)
+        Returns:
+            Turns (rad) over each of `spacings` until them, and variances; NaN where frames are missing in between.
+            From how many frames ago; 0 where frames are missing.
+        """
+        windows = self._windows.push(batch.maps(self._windows.maps), batch.stamps, self.spacings)
+        whole = np.stack([shown.whole for shown in windows])
+        back = np.where(whole, np.stack([shown.back for shown in windows]), 0)
+        turns = np.full((*back.shape, 2), np.nan)
+        travel = self._travel(batch.centers, velocities.velocity, back)[whole]
+        if whole.any():
+            shown = torch.cat([shown.maps[shown.whole] for shown in windows])
+            mean, variance = self._net.estimate(shown, torch.from_numpy(travel).float())
+            turns[whole] = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy()
+        return turns, back
+
+    def _travel(
+        self, times: np.ndarray, velocities: np.ndarray, back: np.ndarray
+    ) -> Float[np.ndarray, "spacing frame 2"]:
+        """What `RotationNet` wants to be told of windows that began so many frames ago."""
+        kept = 1 - len(self._yaws.values)
+        self._times = np.concatenate([self._times[kept:], times])
+        self._velocities = np.concatenate([self._velocities[kept:], velocities])
+        newest = np.arange(len(self._times) - len(times), len(self._times))
+        first = newest - back
+        lasting = self._times[newest] - self._times[first]
+        return lasting[..., None] * (self._velocities[newest] + self._velocities[first]) / 2

@@ -1,31 +1,31 @@
 """The methods, put together."""
 
-import numpy as np
-
 from radarize.methods.method import Inputs
 from radarize.methods.radarize.fused import FusedVelocity
 from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
 from radarize.methods.radarize.scans import Segmentation
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.odometry.integration import Odometry
-from radarize.odometry.rotation import MapRotation, RotationSettings
+from radarize.odometry.rotation import MapRotation
 
 
 def learned(inputs: Inputs) -> Odometry:
     """Networks alone (the paper)."""
-    radar, weights = inputs.radar, inputs.weights
-    velocity = LearnedVelocity(radar, weights.of("translation"))
-    return Odometry(radar, velocity, LearnedRotation(radar, weights.of("rotation")))
+    velocity = LearnedVelocity(inputs.radar, inputs.weights.of("translation"))
+    return Odometry(inputs.radar, velocity, _turns(inputs), inputs.configuration.velocity)
 
 
 def fused(inputs: Inputs) -> Odometry:
     """Both: velocities by their covariances, and the map matched from where the network says that it has turned to."""
-    radar, weights, heatmaps = inputs.radar, inputs.weights, inputs.signal.heatmaps
-    velocity = FusedVelocity(LearnedVelocity(radar, weights.of("translation")), DopplerVelocity(heatmaps))
-    # A map that lags in a turn misleads many matches alike: beside the network each must claim more than its own noise.
-    settings = RotationSettings(yaw_noise=np.radians(0.8))
-    rotation = MapRotation(heatmaps, settings, LearnedRotation(radar, weights.of("rotation")))
-    return Odometry(radar, velocity, rotation)
+    settings, heatmaps = inputs.configuration, inputs.signal.heatmaps
+    alone = LearnedVelocity(inputs.radar, inputs.weights.of("translation"))
+    velocity = FusedVelocity(alone, DopplerVelocity(heatmaps, settings.doppler), settings.fusion)
+    rotation = MapRotation(heatmaps, settings.rotation, _turns(inputs))
+    return Odometry(inputs.radar, velocity, rotation, settings.velocity)
+
+
+def _turns(inputs: Inputs) -> LearnedRotation:
+    return LearnedRotation(inputs.radar, inputs.weights.of("rotation"), inputs.configuration.turns)
 
 
 def segmentation(inputs: Inputs, first: bool = True) -> Segmentation:

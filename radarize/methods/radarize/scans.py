@@ -42,7 +42,8 @@ class Segmentation:
     @torch.inference_mode()
     def occupancy(self, batch: Batch) -> Float[np.ndarray, "frame range bearing"]:
         """Probability that a cell holds a bearing's first surface, if nothing is before it."""
-        return self._net.estimate(self._windows.push(batch)[0]).numpy()
+        shown = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
+        return self._net.estimate(shown.maps).numpy()
 
     def scan(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen."""

@@ -52,6 +52,9 @@ class RansacVelocity:
         seed: of the triples, one table for all frames.
     """
 
+    #: m, see `VelocityEstimator`; as published.
+    lever = 0.0
+
     def __init__(self, settings: RansacSettings | None = None, seed: int = 0):
         self.settings = settings or RansacSettings()
         self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 3))
@@ -65,7 +68,8 @@ class RansacVelocity:
         points, frame = batch.points
         found = [self.solve(points[frame == k]) for k in range(len(batch))]
         velocity, covariance, inliers = zip(*found, strict=True)
-        return Velocities(np.stack(velocity), np.stack(covariance), np.array(inliers))
+        inliers = np.array(inliers)
+        return Velocities(np.stack(velocity), np.stack(covariance), inliers, inliers > 0)
 
     def solve(
         self, points: Float[np.ndarray, "point 6"]
@@ -96,4 +100,6 @@ class RansacVelocity:
 
 def odometry(inputs: Inputs) -> Odometry:
     """Least squares over a sparse point cloud, in the place of `doppler`'s."""
-    return Odometry(inputs.radar, RansacVelocity(), MapRotation(inputs.signal.heatmaps))
+    settings = inputs.configuration
+    rotation = MapRotation(inputs.signal.heatmaps, settings.rotation)
+    return Odometry(inputs.radar, RansacVelocity(), rotation, settings.velocity)

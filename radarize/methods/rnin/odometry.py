@@ -9,7 +9,7 @@ from radarize.batch import Batch
 from radarize.methods.method import Inputs
 from radarize.methods.rnin.network import LASTS, SAMPLES, RninNet
 from radarize.nets.weights import load
-from radarize.odometry.displacements import Displacements
+from radarize.odometry.displacements import Displacements, joined
 from radarize.odometry.inertial import Imu
 from radarize.odometry.integration import Track, intervals
 from radarize.pose import wrap
@@ -37,7 +37,7 @@ class RninOdometry:
         self._imu = Imu.of(recording)
         self.net, header = load(weights, RninNet)
         self._ago = LASTS * np.arange(header.frames - 1, -1, -1)  # ends of windows before now
-        self._path = Displacements(max(1, round(LASTS / radar.frame_period)), radar.frame_period)
+        self._path = Displacements(LASTS, radar.frame_period)
 
     @torch.inference_mode()
     def follow(self, batch: Batch) -> Track:
@@ -47,11 +47,10 @@ class RninOdometry:
         with stage("translation"):
             yaw = wrap(self._imu.yaw(centers))
             track = [
-                self._path.next(dt, *self._displacement(center), heading, _DRIFT**2 * dt)
+                self._path.next(dt, self._path.arrive(center), *self._displacement(center), heading, _DRIFT**2 * dt)
                 for dt, center, heading in zip(steps, centers, yaw, strict=True)
             ]
-        self._path.time = centers[-1]
-        return Track(centers, *(np.stack(each) for each in zip(*track, strict=True)))
+        return joined(centers, track, turn_seen=True)
 
     def _displacement(self, instant: float) -> tuple[np.ndarray, np.ndarray]:
         """Displacement in the last window, and its covariance, from as many windows as there are by now."""

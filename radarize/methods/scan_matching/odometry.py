@@ -8,6 +8,7 @@ from radarize.batch import Batch
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.method import Inputs
 from radarize.odometry.integration import Track, intervals
+from radarize.odometry.ties import wandered
 from radarize.pipeline import Scanner
 from radarize.pose import between, compose, exponential, transform
 from radarize.slam.config import SlamConfig
@@ -53,31 +54,34 @@ class ScanMatching:
         centers = batch.centers
         steps = intervals(centers, self._time)
         ranges = batch.made(self.scanner.scan)
-        moved = np.zeros((len(centers), 3))
+        moved, seen = np.zeros((len(centers), 3)), np.zeros(len(centers), bool)
         poses, rates, spreads = moved.copy(), moved.copy(), np.zeros((len(centers), 3, 3))
         with stage("translation"):
             for i, (time, dt) in enumerate(zip(centers, steps, strict=True)):
                 before = self._pose
-                self._step(Scan(time, np.zeros(3), BEARINGS, ranges[i]), dt)
+                seen[i] = self._step(Scan(time, np.zeros(3), BEARINGS, ranges[i]), dt)
                 poses[i], rates[i], spreads[i] = self._pose, self._rate, self._spread[3:, 3:]
                 moved[i] = between(before, self._pose)
-        return Track(centers, poses, moved, spreads * steps[:, None, None] ** 2, rates[:, :2], spreads[:, :2, :2])
+        spread = spreads * steps[:, None, None] ** 2
+        return Track(centers, poses, moved, spread, rates[:, :2], spreads[:, :2, :2], seen, seen)
 
-    def _step(self, scan: Scan, dt: float) -> None:
-        """Move on to the next scan."""
+    def _step(self, scan: Scan, dt: float) -> bool:
+        """Move on to the next scan; whether it has enough points to be matched."""
         first, self._time = self._time is None, scan.time
         node = Node.gather([scan], self.settings)
+        seen = len(node.points) >= self.settings.node.min_points
         if first:
-            return self._add(node)
+            self._add(node)
+            return seen
         self._pose = compose(self._pose, exponential(self._rate[:2] * dt, self._rate[2] * dt))
         move = np.eye(6) + dt * np.eye(6, k=3)
-        noise = np.kron([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]], np.diag(_WANDER**2))
-        self._spread = move @ self._spread @ move.T + noise
-        if len(node.points) >= self.settings.node.min_points:
+        self._spread = move @ self._spread @ move.T + np.kron(wandered(1.0, dt), np.diag(_WANDER**2))
+        if seen:
             self._correct(node)
         x, y, yaw = between(self._keys[-1][0], self._pose)
         if np.hypot(x, y) >= self.settings.node.distance or abs(yaw) >= self.settings.node.angle:
             self._add(node)
+        return seen
 
     def _correct(self, node: Node) -> None:
         """Fit the pose to the grid; the rate follows as much as its error goes along with the pose's."""

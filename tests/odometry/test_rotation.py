@@ -1,0 +1,135 @@
+"""Yaw from a local map, in a world that is a texture: what a frame sees of it is known without any radar."""
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter, map_coordinates
+
+from radarize.batch import Signal
+from radarize.odometry.doppler import Velocities
+from radarize.odometry.localmap import LocalMap, View
+from radarize.odometry.rotation import MapRotation, Rotations
+from radarize.pose import wrap
+from radarize.radar.presets import PRESETS
+from tests.batches import of_spectrum
+
+CONFIG = PRESETS["radarize"]
+SIGNAL = Signal(CONFIG)
+CELL = 0.05
+WORLD = gaussian_filter(np.random.default_rng(0).normal(size=(400, 400)), 2.5, mode="wrap")
+WORLD = np.clip(WORLD / WORLD.std() - 1, 0, None)
+
+
+def see(rotation: MapRotation, poses: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Features and elevations of frames at poses (x, y, yaw), half of them noise."""
+    bearing = np.arcsin(rotation._sines) + poses[:, None, None, 2]
+    x = poses[:, None, None, 0] + rotation._ranges[:, None] * np.cos(bearing)
+    y = poses[:, None, None, 1] + rotation._ranges[:, None] * np.sin(bearing)
+    seen = map_coordinates(WORLD, [x / CELL + 200, y / CELL + 200], order=1, mode="grid-wrap")
+    noise = gaussian_filter(rng.normal(size=seen.shape), (0, 1, 1))
+    seen = seen + noise * WORLD.std() / noise.std()
+    return (seen - seen.mean()).astype(np.float32), np.zeros(seen.shape, np.float32)
+
+
+def follow(times: np.ndarray, poses: np.ndarray, prior=None) -> Rotations:
+    """What `MapRotation` makes of frames at true poses whose velocities are known."""
+    rotation = MapRotation(SIGNAL.heatmaps, prior=prior)
+    rotation.features = lambda poses: see(rotation, poses, np.random.default_rng(1))
+    velocity = np.gradient(poses[:, :2], times, axis=0)
+    cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
+    velocity = np.stack([cos * velocity[:, 0] + sin * velocity[:, 1], cos * velocity[:, 1] - sin * velocity[:, 0]], 1)
+    count = len(times)
+    known = Velocities(velocity, np.tile(1e-4 * np.eye(2), (count, 1, 1)), np.full(count, 50), np.ones(count, bool))
+    return rotation.estimate(of_spectrum(SIGNAL, poses, times - CONFIG.burst_center), known)
+
+
+@pytest.mark.parametrize("rate", [5, 10, 15, 30])
+def test_swinging_to_and_fro_at_any_frame_rate(rate):
+    """40 deg to either side at 0.4 Hz: up to 20 deg from frame to frame at 5 Hz, and to 100 deg/s."""
+    times = np.arange(0, 7.5, 1 / rate)
+    yaw = np.radians(40) * np.sin(2 * np.pi * 0.4 * times)
+    poses = np.stack([0.3 * times, np.zeros(len(times)), yaw], axis=1)
+    found = follow(times, poses)
+    error = np.cumsum(found.yaw) - (yaw - yaw[0])
+    assert np.degrees(np.sqrt((error**2).mean())) < 1.5
+    assert found.seen.mean() > 0.95
+
+
+def test_fifteen_seconds_lost_leave_the_map():
+    """At 1.2 m/s dead reckoning is 18 m from a map that reaches 6: it starts anew, and the turn is unknown."""
+    times = np.concatenate([np.arange(15), np.arange(15) + 465]) / 30
+    found = follow(times, np.stack([1.2 * times, np.zeros(30), np.zeros(30)], axis=1))
+    assert not found.seen[15] and np.sqrt(found.variance[15]) > np.radians(90)
+    after = slice(17, None)
+    assert found.seen[after].all()
+    assert np.degrees(np.abs(np.cumsum(found.yaw[after]))).max() < 1.5
+
+
+@pytest.mark.parametrize("rate", np.radians([0, 40, -70]))
+def test_a_second_lost_while_turning(rate):
+    """The frame after the gap is searched as far as the turn is unsure, and found."""
+    times = np.concatenate([np.arange(30), np.arange(30) + 60]) / 30
+    found = follow(times, np.stack([np.zeros(60), np.zeros(60), rate * times], axis=1))
+    turned = found.yaw[30:33].sum()
+    assert np.degrees(wrap(turned - rate * (times[32] - times[29]))) == pytest.approx(0, abs=3)
+
+
+class Unsure:
+    """A prior that knows nothing of one frame's turn, and is right about all others."""
+
+    def __init__(self, turns: np.ndarray, lost: int):
+        self.turns, self.lost = turns.copy(), lost
+        self.turns[lost] = 0.0
+
+    def estimate(self, batch, velocities) -> Rotations:
+        at = np.arange(len(batch)) == self.lost
+        return Rotations(self.turns, np.where(at, np.radians(30) ** 2, 1e-5), ~at)
+
+
+def test_the_search_goes_as_far_as_the_prior_is_unsure():
+    times, turn = np.arange(40) / 30, np.full(40, np.radians(1.0))
+    turn[20] = np.radians(35)
+    yaw = np.cumsum(turn)
+    found = follow(times, np.stack([np.zeros(40), np.zeros(40), yaw], axis=1), Unsure(turn, 20))
+    assert np.degrees(found.yaw[20]) == pytest.approx(35, abs=1.5)
+    assert found.seen[20] and found.variance[20] < np.radians(5) ** 2
+
+
+@pytest.mark.parametrize("rate", [5, 15, 30])
+def test_what_a_blind_second_claims_does_not_depend_on_the_frame_rate(rate):
+    rotation = MapRotation(SIGNAL.heatmaps)
+    shape = len(rotation._ranges), len(rotation._sines)
+    rotation.features = lambda frames: (np.zeros((len(frames), *shape), np.float32),) * 2
+    count = rate + 1
+    nothing = Velocities(np.zeros((count, 2)), np.tile(np.eye(2), (count, 1, 1)), np.zeros(count, int), np.zeros(count))
+    rotation._spread[1, 1] = np.radians(5) ** 2
+    found = rotation.estimate(of_spectrum(SIGNAL, np.arange(count), np.arange(count) / rate), nothing)
+    s = rotation.settings
+    assert not found.seen[1:].any()
+    assert found.variance.sum() == pytest.approx(np.radians(5) ** 2 + s.wander**2 / 3 + s.unseen**2, rel=1e-6)
+
+
+def test_a_map_that_is_left_behind_is_empty():
+    rng = np.random.default_rng(3)
+    ranges, sines = np.arange(0.2, 4, 0.045), np.linspace(-0.85, 0.85, 69)
+    feature = rng.normal(size=(len(ranges), len(sines))).astype(np.float32)
+    view = View(feature, np.zeros_like(feature), ranges, sines)
+    grid, yaws = LocalMap(4.0, CELL), np.zeros(1)
+    grid.blend(view, np.zeros(2), 0.0, 0.05)
+    assert grid.correlate(view, np.zeros(2), yaws)[0][0] > 0.5
+    near = grid.follow(np.array([1.5, 0.0]))
+    assert np.abs(near).max() < CELL
+    assert grid.correlate(view, near - [1.5, 0.0], yaws)[0][0] > 0.5
+    for far in ([18.0, 0.0], [-6.0, 400.0], [0.0, -11.9]):
+        place = grid.follow(np.array(far))
+        assert np.abs(place).max() < CELL
+        assert grid.correlate(view, place, yaws)[0][0] == 0
+        grid.blend(view, place, 0.0, 0.05)
+        assert grid.correlate(view, place, yaws)[0][0] > 0.5
+
+
+def test_a_corner_of_the_map_that_fits_by_chance_is_no_match():
+    """Half a turn too far only a few cells are left to correlate: they prove little."""
+    times = np.concatenate([np.arange(30), np.arange(30) + 60]) / 30
+    yaw = np.radians(np.concatenate([75 * times[:30], 75 * times[29] + 40 + 20 * (times[30:] - times[30])]))
+    found = follow(times, np.stack([np.zeros(60), np.zeros(60), yaw], axis=1))
+    assert np.degrees(found.yaw[30]) == pytest.approx(40, abs=3)

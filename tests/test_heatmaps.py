@@ -207,6 +207,8 @@ def test_batches_equal_single_frames_and_wrong_shapes_are_named():
     maps = Heatmaps(CONFIG)
     adc = np.concatenate([frame(point(2.0, a)) for a in (-20, 0, 20)])
     together = maps.range_azimuth(adc)
-    torch.testing.assert_close(together[1:2], maps.range_azimuth(adc[1:2]))
+    # How sums are ordered differs with the size of a batch on some processors: alike to single precision of the peak.
+    peak = float(together.max())
+    torch.testing.assert_close(together[1:2], maps.range_azimuth(adc[1:2]), rtol=1e-5, atol=1e-6 * peak)
     with pytest.raises(InputError, match="expected"):
         maps.range_azimuth(adc[:, :, :2])

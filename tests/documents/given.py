@@ -11,6 +11,7 @@ import yaml
 from PIL import Image
 
 from radarize.exporters import export
+from radarize.methods.configuration import Configuration
 from radarize.recording import Recording
 from radarsim.scene.description import shipped
 from tests.importers.ros import write_published
@@ -144,5 +145,6 @@ GIVEN: dict[str, Callable[[Path], object]] = {
     "ODOMETRY.tum": _odometry,
     "intel-corrected.log.gz": _carmen,
     "replica/mesh_semantic.ply": _mesh,
+    "mine.yaml": lambda path: path.write_text(Configuration().text()),
     "materials.yaml": lambda path: path.write_text('"*": brick\n'),
 }

@@ -1,13 +1,12 @@
 """What each correction of the published pipeline is worth: the default one, and the same with one correction undone."""
 
-import argparse
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import torch
 
-from benchmarks.results import Data, publish
+from benchmarks.results import Data, command_line, publish
 from radarize.features.maps import MapMaker, maps_of
 from radarize.heatmaps import Heatmaps
 from radarize.methods.published import labels
@@ -299,18 +298,17 @@ def row(correction: str, measure: str, unit: str, without, with_) -> dict:
     return {"correction": correction, "measured": measure, "without": values[0], "with": values[1], "unit": unit}
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("recording", nargs="?", type=Path, help="a handheld walk with occupancy; else one is simulated")
-    found.add_argument("--duration", type=float, default=15.0, help="of the simulated walk, s")
-    found.add_argument("--steps", type=int, default=60, help="of the small segmentation trainings")
-    found.add_argument("--seed", type=int, default=0)
-    return found
+PARSER = command_line(
+    __doc__,
+    duration=(15.0, "of the simulated walk, s"),
+    steps=(60, "of the small segmentation trainings"),
+    seed=(0, "of everything"),
+)
+PARSER.add_argument("recording", nargs="?", type=Path, help="a handheld walk with occupancy; else one is simulated")
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     rng = np.random.default_rng(options.seed)
     with tempfile.TemporaryDirectory() as folder:
         path = options.recording or simulate(

@@ -1,7 +1,6 @@
 """Data sets end to end: what sensors and writing cost beside the simulation, how workers share the cores, and what the
 paper's data set would take on this machine, from a sample of one in ten of its recordings."""
 
-import argparse
 import os
 import tempfile
 import time
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from benchmarks.results import Data, publish
+from benchmarks.results import Data, command_line, publish
 from radarize.jobs import perform
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
@@ -111,19 +110,18 @@ def shortened(tasks: Iterable[Task], seconds: float, storage: str) -> list[Task]
     ]
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--every", type=int, default=10, help=f"one in so many recordings of {BIG} is made")
-    found.add_argument("--seconds", type=float, default=60.0, help="of each at most")
-    found.add_argument("--frames", type=int, default=240, help="of the comparison with the simulation alone")
-    found.add_argument("--few", type=int, default=4, help="recordings by which workers and storage are compared")
-    found.add_argument("--seed", type=int, default=0)
-    return found
+PARSER = command_line(
+    __doc__,
+    every=(10, f"one in so many recordings of {BIG} is made"),
+    seconds=(60.0, "of each at most"),
+    frames=(240, "of the comparison with the simulation alone"),
+    few=(4, "recordings by which workers and storage are compared"),
+    seed=(0, "of the walk in that comparison"),
+)
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     cores = len(os.sched_getaffinity(0))
     tasks = Specification.load(BIG).tasks
     sample = tasks[:: options.every]

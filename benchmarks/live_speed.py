@@ -3,7 +3,6 @@
 Wall time says whether this machine keeps up with whatever else it does; processor time what it takes of a free one.
 """
 
-import argparse
 import tempfile
 import threading
 import time
@@ -12,7 +11,7 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.results import Data, publish, surroundings
+from benchmarks.results import Data, command_line, publish, surroundings
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.capture.live import Live, prepare
@@ -65,17 +64,16 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     }
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("recording", nargs="?", type=Path, help="a recording; by default one is simulated")
-    found.add_argument("--duration", type=float, default=20.0)
-    found.add_argument("--seed", type=int, default=0)
-    return found
+PARSER = command_line(
+    __doc__,
+    duration=(20.0, "of the simulated recording, s"),
+    seed=(0, "of it"),
+)
+PARSER.add_argument("recording", nargs="?", type=Path, help="a recording; by default one is simulated")
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         path = options.recording or simulate(
             "office", Path(folder) / "office.h5", duration=options.duration, seed=options.seed

@@ -1,12 +1,11 @@
 """How the platforms move, beside the figures of the paper's data set, over buildings of all styles."""
 
-import argparse
 import time
 
 import numpy as np
 from rich.progress import track
 
-from benchmarks.results import Data, Walk, publish
+from benchmarks.results import Data, Walk, command_line, publish
 from radarize.benchmark.table import PAPER
 from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
@@ -65,17 +64,16 @@ def row(platform: str, found: list[Statistics]) -> dict[str, object]:
     }
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--buildings", type=int, default=20)
-    found.add_argument("--seed", type=int, default=0)
-    return found
+PARSER = command_line(
+    __doc__,
+    buildings=(20, "walked through"),
+    seed=(0, "that they are drawn from"),
+)
 
 
 def main() -> None:
     """Walk and publish."""
-    arguments = parser().parse_args()
+    arguments = PARSER.parse_args()
     found, made, times = walks(arguments.buildings, arguments.seed)
     publish(
         "motion_statistics",

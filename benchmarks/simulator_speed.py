@@ -4,13 +4,12 @@ Three ways to the frames of the first scene in one run: this simulator; the same
 numpy; and `--engine sionna`, the paths of Sionna RT's own solver at the same poses.
 """
 
-import argparse
 import time
 from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.results import Data, memory_mb, peak_memory_mb, publish, walked
+from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, walked
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.physics.pathsolver import DEPTH, RAYS
@@ -149,21 +148,20 @@ def density_error(name: str, draws: int, seed: int, frames: int = 8, factor: int
     )
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor"], help="the first in detail")
-    found.add_argument("--frames", type=int, default=240)
-    found.add_argument("--naive-frames", type=int, default=2)
-    found.add_argument("--sionna-frames", type=int, default=20)
-    found.add_argument("--memory-frames", type=int, default=0, help="frames of a long run that watches memory")
-    found.add_argument("--draws", type=int, default=0, help="worlds compared with as many of ten times the scatterers")
-    found.add_argument("--seed", type=int, default=0)
-    return found
+PARSER = command_line(
+    __doc__,
+    frames=(240, "of a walk"),
+    naive_frames=(2, "summed naively"),
+    sionna_frames=(20, "by Sionna's paths"),
+    memory_frames=(0, "frames of a long run that watches memory"),
+    draws=(0, "worlds compared with as many of ten times the scatterers"),
+    seed=(0, "of walks and worlds"),
+)
+PARSER.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor"], help="the first in detail")
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
 
     rows, notes, walks = [], [], []
     for name in options.scenes:

@@ -1,6 +1,5 @@
 """The SLAM back end: real lidar logs, graphs with false loops, simulated radar, time and memory."""
 
-import argparse
 import tempfile
 import time
 from dataclasses import replace
@@ -8,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import Data, Walk, memory_mb, publish
+from benchmarks.results import SHARED, Data, Walk, command_line, memory_mb, publish
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Beside
@@ -24,7 +23,7 @@ from radarize.slam.posegraph import PoseGraph
 from radarize.tum import planar, read_tum
 from radarsim.simulate import simulate
 
-RADISH = Path(__file__).parents[2] / "shared" / "recordings" / "radish"
+RADISH = SHARED / "radish"
 #: Cartographer on the same files, its best settings: mean ATE in m and rad, and s.
 THEIRS = Beside("Cartographer", "lidar logs, the very same files", simulated=False)
 CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "orebro": (0.149, 0.0138, 19)}
@@ -223,19 +222,18 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
     return rows, walks
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--data", type=Path, help="folder of runs (radarize run -o); by default some are made")
-    found.add_argument("--record", action="store_true", help="make those that --data lacks, and keep them")
-    found.add_argument("--no-radar", action="store_true")
-    found.add_argument("--seeds", type=int, default=3, help="of disturbances, for each log")
-    found.add_argument("--seed", type=int, default=7)
-    return found
+PARSER = command_line(
+    __doc__,
+    data=(Path, "folder of runs (radarize run -o); by default some are made"),
+    record=(False, "make those that --data lacks, and keep them"),
+    no_radar=(False, "lidar and graphs alone"),
+    seeds=(3, "of disturbances, for each log"),
+    seed=(7, "the first of them"),
+)
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     lidar_preset, rows, walks, notes = SlamConfig.preset("lidar"), [], [], []
     warm, _ = lidar("orebro")
     play(replace(warm, times=warm.times[:60], ranges=warm.ranges[:60]), lidar_preset)

@@ -223,8 +223,9 @@ def grids(source: Recording) -> list[dict]:
     """Cells of the published occupancy label against those of its maps; and pictures of the next frame."""
     turned = np.degrees(labels.BEARINGS - published.BEARINGS)
     farthest = 95 * (labels.RANGES[1] - CONFIG.range_resolution)
-    moved = np.abs(np.diff(source.read("truth/scan"), axis=0))
-    moved = np.quantile(moved[np.isfinite(moved)], 0.9)
+    scan = source.read("truth/scan")
+    both = np.isfinite(scan[1:]) & np.isfinite(scan[:-1])
+    moved = np.quantile(np.abs(scan[1:][both] - scan[:-1][both]), 0.9)
     return [
         row("one angle grid", "label's column against the map's", "deg", turned),
         row("one range grid", "label's farthest row against the map's", "m", farthest),

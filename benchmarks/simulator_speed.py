@@ -148,6 +148,12 @@ def density_error(name: str, draws: int, seed: int, frames: int = 8, factor: int
     )
 
 
+def row(way: str, seconds: float, echoes: float, gives: str) -> dict[str, object]:
+    """A row of the table, from seconds a frame; how many times slower it is than the first is for later."""
+    pace = {"way": way, "ms per frame": 1e3 * float(seconds), "frames/s": 1 / float(seconds), "times slower": 1.0}
+    return pace | {"echoes or paths": int(echoes), "gives": gives}
+
+
 PARSER = command_line(
     __doc__,
     frames=(240, "of a walk"),
@@ -169,8 +175,8 @@ def main() -> None:
         walks.append(walked(name, options.seed, rest[0].motion))
         if not rows:
             main_pace, simulator, times = found, *rest
-        rows.append(row(f"{name}: radarsim", found.frame, main_pace, found.echoes, "int16 I/Q with noise"))
-        rows.append(row(f"{name}: of it, finding echoes", found.finding, main_pace, found.echoes, "echoes"))
+        rows.append(row(f"{name}: radarsim", found.frame, found.echoes, "int16 I/Q with noise"))
+        rows.append(row(f"{name}: of it, finding echoes", found.finding, found.echoes, "echoes"))
         notes.append(
             f"{name}: first {BATCH} frames after {found.first:.1f} s; peak memory {found.memory:.0f} MB so far."
         )
@@ -185,8 +191,8 @@ def main() -> None:
         naive_seconds.append(time.perf_counter() - start)
         error.append(10 * np.log10(np.sum(np.abs(fast - truth) ** 2) / np.sum(np.abs(truth) ** 2)))
     first = options.scenes[0]
-    seconds = float(np.median(naive_seconds))
-    rows.append(row(f"{first}: naive float64 numpy", seconds, main_pace, main_pace.echoes, "the same echoes, samples"))
+    seconds = np.median(naive_seconds)
+    rows.append(row(f"{first}: naive float64 numpy", seconds, main_pace.echoes, "the same echoes, samples"))
 
     _, physics = np.random.default_rng(options.seed).spawn(2)
     other = Simulator(Scene.load(first), simulator.motion, CONFIG, physics, engine="sionna")
@@ -197,9 +203,9 @@ def main() -> None:
         if k >= 2:  # the first calls compile kernels
             seconds.append(time.perf_counter() - start)
             counts.append(len(paths[0]))
-    rows.append(
-        row(f"{first}: --engine sionna", float(np.median(seconds)), main_pace, np.mean(counts), "int16 I/Q with noise")
-    )
+    rows.append(row(f"{first}: --engine sionna", np.median(seconds), np.mean(counts), "int16 I/Q with noise"))
+    for each in rows:
+        each["times slower"] = each["ms per frame"] / rows[0]["ms per frame"]
 
     notes += [
         f"Fast synthesis against the naive sum of the same echoes: error power {max(error):.1f} dB (worst frame).",
@@ -216,18 +222,6 @@ def main() -> None:
         notes.append(f"{first}: diffuse power per cell against ten times the scatterers {off}.")
     data = Data("handheld walks", tuple(walks), options.seed)
     publish("simulator_speed", "Simulator speed, preset radarize", rows, data=data, networks=(), notes=notes)
-
-
-def row(way: str, seconds: float, ours: Pace, echoes: float, gives: str) -> dict[str, object]:
-    """A row of the table."""
-    return {
-        "way": way,
-        "ms per frame": 1e3 * seconds,
-        "frames/s": 1 / seconds,
-        "times slower": seconds / ours.frame,
-        "echoes or paths": int(echoes),
-        "gives": gives,
-    }
 
 
 if __name__ == "__main__":

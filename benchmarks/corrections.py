@@ -171,7 +171,7 @@ def windows_and_loading(rng: np.random.Generator) -> list[dict]:
         channels = np.exp(1j * np.radians(rng.normal(0, 3, (3, 4))))
         adc = turned(frames(rng.uniform(-30, 30), (0.3, 0, 0), amplitude=3000.0), channels)
         cell = maps.covariance(maps.spectrum(adc).to(torch.complex128), maps.row)[0, CELL].numpy()
-        for found, loading in zip(left, (0.0, maps.loading), strict=True):
+        for found, loading in zip(left, (0.0, maps.settings.loading), strict=True):
             loaded = cell + loading * np.trace(cell).real / len(cell) * np.eye(len(cell))
             power = 1 / np.einsum("ab,ac,cb->b", beams.conj(), np.linalg.inv(loaded), beams).real
             found.append(10 * np.log10(power.max()) - 20 * np.log10(3000.0))

@@ -17,8 +17,8 @@ from radarize.benchmark.runs import Pair
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
-from radarize.methods.registry import CLASSICAL, best_methods
-from radarize.pipeline import Pipeline
+from radarize.methods.registry import CLASSICAL, Inputs, best_methods
+from radarize.stopwatch import Stopwatch
 from radarsim.simulate import simulate
 
 
@@ -32,12 +32,12 @@ def look_on(url: str) -> None:
 def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     """One replay; a row of the table."""
     stream = Replay(path)
-    pipeline = prepare(stream.config, lambda: Pipeline(stream.config, **methods))
+    inputs, watch = prepare(Inputs(stream.config), methods), Stopwatch()
     with Page("127.0.0.1:0") as page, stream:
         viewer = threading.Thread(target=look_on, args=(page.url,), daemon=True)
         viewer.start()
         (reader,) = [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
-        live, last, instants = Live(pipeline, page), [0.0], []
+        live, last, instants = Live(inputs, methods, page), [0.0], []
 
         def note(done: int, total: int) -> None:
             instants.append((time.monotonic(), done))
@@ -48,7 +48,8 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
         start = time.process_time()
         note(0, 0)
         reading = last[0]
-        live.run(stream, threading.Event(), progress=note)
+        with watch.running():
+            live.run(stream, threading.Event(), progress=note)
         used = time.process_time() - start
     (began, first), (ended, final) = instants[1], instants[-1]
     frames, counts = max(live.losses.frames, 1), stream.counts
@@ -58,7 +59,7 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
         "dropped": f"{counts.dropped} of {counts.frames}",
         "ms a frame": 1e3 * live.busy / frames,
         "processor ms a frame": 1e3 * used / frames,
-        "of it the page": 1e3 * pipeline.stage_seconds["page"] / frames,
+        "of it the page": 1e3 * watch.seconds["page"] / frames,
         "reading process": 1e3 * (last[0] - reading) / counts.frames,
         "budget, ms": 1e3 * stream.config.frame_period,
     }

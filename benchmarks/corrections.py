@@ -7,6 +7,7 @@ import numpy as np
 import torch
 
 from benchmarks.results import Data, command_line, publish
+from radarize.batch import Intake, Signal
 from radarize.features.maps import MapMaker, maps_of
 from radarize.heatmaps import Heatmaps
 from radarize.methods.published import labels
@@ -188,10 +189,13 @@ def ego_velocity(source: Recording) -> list[dict]:
     swapped = source.config.model_copy(update={"channel_calibration": _typical(np.random.default_rng(0))})
 
     def median(maps: Heatmaps) -> float:
-        estimator = DopplerVelocity(maps)
-        spectra = (maps.spectrum(source.adc(k, min(k + _BATCH, count))) for k in range(0, count, _BATCH))
-        found = np.concatenate([estimator.estimate(spectrum).velocity for spectrum in spectra])
-        return np.median(np.linalg.norm(found - truth, axis=1))
+        signal, estimator, found = Signal(source.config), DopplerVelocity(maps), []
+        signal.heatmaps = maps
+        intake = Intake(signal)
+        for first in range(0, count, _BATCH):
+            stop = min(first + _BATCH, count)
+            found.append(estimator.estimate(intake.take(source.adc(first, stop), source.times[first:stop])).velocity)
+        return np.median(np.linalg.norm(np.concatenate(found) - truth, axis=1))
 
     variants = {
         "TDM phase": Uncompensated(source.config),

@@ -1,6 +1,5 @@
 """`radarize capture` against `radarsim emulate`, each a process of its own: frames lost, and what each side costs."""
 
-import argparse
 import re
 import signal
 import subprocess
@@ -13,7 +12,7 @@ import numpy as np
 import psutil
 from jaxtyping import Bool
 
-from benchmarks.results import Data, publish, surroundings
+from benchmarks.results import Data, command_line, publish, surroundings
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import MAX_PAYLOAD
 from radarize.radar.presets import load_config
@@ -128,19 +127,18 @@ def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: in
     }
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--seconds", type=float, default=300.0, help="length of the capture")
-    found.add_argument("--config", default="radarize", help="preset or .cfg")
-    found.add_argument("--seed", type=int, default=0)
-    found.add_argument("--bad-seconds", type=float, default=60.0, help="length of another one over a bad network")
-    return found
+PARSER = command_line(
+    __doc__,
+    seconds=(300.0, "length of the capture"),
+    config=("radarize", "preset or .cfg"),
+    bad_seconds=(60.0, "length of another one over a bad network"),
+    seed=(0, "of noise and network"),
+)
 
 
 def main() -> None:
     """The table."""
-    arguments = parser().parse_args()
+    arguments = PARSER.parse_args()
     config, _ = load_config(arguments.config)
     runs = [(arguments.seconds, {})]
     if arguments.bad_seconds:

@@ -3,12 +3,11 @@
 `radarize benchmark uncertainty` says the same of odometry, which is made of them.
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import publish
+from benchmarks.results import command_line, publish
 from radarize.batch import BATCH, Intake
 from radarize.benchmark.dataset import Case, DataSet, groups
 from radarize.benchmark.networks import Networks
@@ -76,16 +75,15 @@ def row(name: str, found: list[tuple[dict[str, float], np.ndarray]]) -> dict[str
     }
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--data", type=Path, required=True, help="folder of recordings")
-    found.add_argument("--weights", type=Path, metavar="DIR", help="of the networks; by default the shipped ones")
-    return found
+PARSER = command_line(
+    __doc__,
+    weights=(Path, "folder of the networks; by default the shipped ones"),
+)
+PARSER.add_argument("--data", type=Path, required=True, help="folder of recordings")
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     data = DataSet.load(options.data)
     networks = Networks("given", options.weights) if options.weights else Networks()
     judged = {}

@@ -1,13 +1,13 @@
 """What each correction of the published pipeline is worth: the default one, and the same with one correction undone."""
 
-import argparse
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import torch
 
-from benchmarks.results import Data, publish
+from benchmarks.results import Data, command_line, publish
+from radarize.batch import Intake, Signal
 from radarize.features.maps import MapMaker, maps_of
 from radarize.heatmaps import Heatmaps
 from radarize.methods.published import labels
@@ -28,6 +28,8 @@ from tests.echoes import record
 
 CONFIG = PRESETS["radarize"]
 SCENE, PLATFORM = "office", "handheld"
+#: Where targets are: m, and in cells.
+AWAY, CELL = 2.5, round(2.5 / CONFIG.range_resolution)
 #: Azimuths to read bearings off, rad.
 FINE = np.radians(np.arange(-60, 60.1, 0.1))
 _BATCH = 16
@@ -64,10 +66,10 @@ class Interleaved(Heatmaps):
         return super().covariance(spectrum, antennas) * (transmitter[:, None] == transmitter)
 
 
-def frames(azimuths, velocity=(0.0, 0.0, 0.0), count=1, config=CONFIG, distance=2.5, amplitude=1000.0, noise=20.0):
+def frames(azimuths, velocity=(0.0, 0.0, 0.0), count=1, config=CONFIG, amplitude=1000.0, noise=20.0):
     """Frames of targets (bearings in deg) seen by a radar that moves evenly, the last one at the origin."""
     a = np.radians(np.atleast_1d(azimuths))
-    points = distance * np.stack([np.cos(a), np.sin(a), 0 * a], axis=1)
+    points = AWAY * np.stack([np.cos(a), np.sin(a), 0 * a], axis=1)
     amplitudes = np.broadcast_to(amplitude, len(a)).astype(complex)
     stamps = (np.arange(count) - count + 1) * config.frame_period
 
@@ -81,10 +83,6 @@ def strongest_azimuth(maps: Heatmaps, adc: np.ndarray) -> float:
     """Bearing of the strongest cell of the Doppler-azimuth map, deg."""
     power = maps.doppler_azimuth(adc)[0]
     return float(np.degrees(maps.azimuths)[int(power.amax(dim=0).argmax())])
-
-
-def rms(values) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def calibration(rng: np.random.Generator) -> dict:
@@ -112,15 +110,12 @@ def pairs(factors: np.ndarray) -> tuple[tuple[float, float], ...]:
 
 def tdm_phase() -> dict:
     """Bearings of targets that close."""
-    errors = {}
-    for kind in (Uncompensated, Heatmaps):
-        maps = kind(CONFIG, FINE)
-        errors[kind] = [
-            strongest_azimuth(maps, frames(a, (v / np.cos(np.radians(a)), 0, 0))) - a
-            for a in (-30, -15, 0, 15, 30)
-            for v in (-1.2, 1.2)
-        ]
-    return row("TDM phase", "bearing error, target closing at 1.2 m/s", "deg", errors[Uncompensated], errors[Heatmaps])
+    targets = [(a, frames(a, (v / np.cos(np.radians(a)), 0, 0))) for a in (-30, -15, 0, 15, 30) for v in (-1.2, 1.2)]
+    errors = [
+        [strongest_azimuth(maps, adc) - azimuth for azimuth, adc in targets]
+        for maps in (Uncompensated(CONFIG, FINE), Heatmaps(CONFIG, FINE))
+    ]
+    return row("TDM phase", "bearing error, target closing at 1.2 m/s", "deg", *errors)
 
 
 def aperture() -> dict:
@@ -137,7 +132,7 @@ def aperture() -> dict:
 def _two(maps: Heatmaps, apart: float) -> bool:
     """Whether two targets have a valley of 1 dB between them."""
     adc = frames([-apart / 2, apart / 2], (0, 1.0, 0))  # across: their phases differ from loop to loop
-    ring = 10 * maps.range_azimuth(adc, method="capon")[0, round(2.5 / CONFIG.range_resolution)].log10().numpy()
+    ring = 10 * maps.range_azimuth(adc, method="capon")[0, CELL].log10().numpy()
     near = [ring[np.abs(FINE - np.radians(b)) < np.radians(apart / 4)] for b in (-apart / 2, 0, apart / 2)]
     return bool(min(near[0].max(), near[2].max()) > near[1].min() + 1)
 
@@ -157,10 +152,10 @@ def pauses(rng: np.random.Generator) -> list[dict]:
                 grid = found + np.arange(-reach, reach, step)
                 found = grid[np.abs(np.exp(4j * np.pi / CONFIG.wavelength * grid[:, None] * times) @ samples).argmax()]
             errors[name].append(found - speed)
-    what, together = "speed error of a target 14 dB above noise: three bursts end to end, ", errors["together"]
+    what = "speed error of a target 14 dB above noise: three bursts end to end, or"
     return [
-        row("gap-aware Doppler", what + "or one alone (default)", "m/s", together, errors["one"]),
-        row("gap-aware Doppler", what + "or at their true times", "m/s", together, errors["times"]),
+        row("gap-aware Doppler", f"{what} {how}", "m/s", errors["together"], errors[name])
+        for name, how in (("one", "one alone (default)"), ("times", "at their true times"))
     ]
 
 
@@ -176,11 +171,9 @@ def windows_and_loading(rng: np.random.Generator) -> list[dict]:
     for _ in range(20):
         channels = np.exp(1j * np.radians(rng.normal(0, 3, (3, 4))))
         adc = turned(frames(rng.uniform(-30, 30), (0.3, 0, 0), amplitude=3000.0), channels)
-        cell = maps.covariance(maps.spectrum(adc).to(torch.complex128), maps.row)[
-            0, round(2.5 / CONFIG.range_resolution)
-        ]
-        for found, loading in zip(left, (0.0, maps.loading), strict=True):
-            loaded = cell.numpy() + loading * np.trace(cell.numpy()).real / len(cell) * np.eye(len(cell))
+        cell = maps.covariance(maps.spectrum(adc).to(torch.complex128), maps.row)[0, CELL].numpy()
+        for found, loading in zip(left, (0.0, maps.settings.loading), strict=True):
+            loaded = cell + loading * np.trace(cell).real / len(cell) * np.eye(len(cell))
             power = 1 / np.einsum("ab,ac,cb->b", beams.conj(), np.linalg.inv(loaded), beams).real
             found.append(10 * np.log10(power.max()) - 20 * np.log10(3000.0))
     return [
@@ -194,25 +187,23 @@ def ego_velocity(source: Recording) -> list[dict]:
     count = min(len(source), 120)
     truth = source.read("truth/velocity")[:count, :2]
     swapped = source.config.model_copy(update={"channel_calibration": _typical(np.random.default_rng(0))})
+
+    def median(maps: Heatmaps) -> float:
+        signal, estimator, found = Signal(source.config), DopplerVelocity(maps), []
+        signal.heatmaps = maps
+        intake = Intake(signal)
+        for first in range(0, count, _BATCH):
+            stop = min(first + _BATCH, count)
+            found.append(estimator.estimate(intake.take(source.adc(first, stop), source.times[first:stop])).velocity)
+        return np.median(np.linalg.norm(np.concatenate(found) - truth, axis=1))
+
     variants = {
-        "all": Heatmaps(source.config),
         "TDM phase": Uncompensated(source.config),
         "windows": Unwindowed(source.config),
         "calibration in physical order": Heatmaps(swapped),
     }
-    errors = {}
-    for name, maps in variants.items():
-        estimator, found = DopplerVelocity(maps), []
-        for k in range(0, count, _BATCH):
-            adc = source.adc(k, min(k + _BATCH, count))
-            found.append(estimator.estimate(maps.spectrum(adc)).velocity)
-        errors[name] = np.linalg.norm(np.concatenate(found) - truth, axis=1)
-    what = "ego-velocity error by Doppler least squares, median"
-    return [
-        row(name, what, "m/s", np.median(found), np.median(errors["all"]))
-        for name, found in errors.items()
-        if name != "all"
-    ]
+    what, best = "ego-velocity error by Doppler least squares, median", median(Heatmaps(source.config))
+    return [row(name, what, "m/s", median(maps), best) for name, maps in variants.items()]
 
 
 def _typical(rng: np.random.Generator) -> tuple[tuple[float, float], ...]:
@@ -225,32 +216,24 @@ def centred(source: Recording) -> list[dict]:
     """Published velocity labels against the true velocity."""
     stride = published.PublishedMaps.stride(source.config)
     told = labels.velocity(source, slice(0, len(source), stride))[2:]
-    truth = source.read("truth/velocity")[:, :2]
-    at = np.arange(len(source))[::stride][2:]
-    stamp, middle = (np.linalg.norm(told - truth[k], axis=1) for k in (at, at - 1))
+    truth, at = source.read("truth/velocity")[:, :2], np.arange(len(source))[::stride][2:]
     return [
-        row("centred labels", "label against the velocity at its stamp", "m/s", stamp, 0.0),
-        row("centred labels", "label against the velocity in the middle of its three bursts", "m/s", middle, 0.0),
+        row("centred labels", f"label against the velocity {where}", "m/s", np.linalg.norm(told - truth[k], axis=1))
+        for where, k in (("at its stamp", at), ("in the middle of its three bursts", at - 1))
     ]
 
 
 def grids(source: Recording) -> list[dict]:
     """Cells of the published occupancy label against those of its maps; and pictures of the next frame."""
     turned = np.degrees(labels.BEARINGS - published.BEARINGS)
-    shifted = np.arange(96) * (labels.RANGES[1] - CONFIG.range_resolution)
+    farthest = 95 * (labels.RANGES[1] - CONFIG.range_resolution)
     scan = source.read("truth/scan")
     both = np.isfinite(scan[1:]) & np.isfinite(scan[:-1])
     moved = np.quantile(np.abs(scan[1:][both] - scan[:-1][both]), 0.9)
     return [
-        row("one angle grid", "label's column against the map's", "deg", turned, 0.0),
-        row("one range grid", "label's farthest row against the map's", "m", shifted[-1], 0.0),
-        row(
-            "depth of the same frame",
-            "range of a bearing's first surface, 90th percentile",
-            "m",
-            np.quantile(moved, 0.9),
-            0.0,
-        ),
+        row("one angle grid", "label's column against the map's", "deg", turned),
+        row("one range grid", "label's farthest row against the map's", "m", farthest),
+        row("depth of the same frame", "range of a bearing's first surface, 90th percentile", "m", moved),
     ]
 
 
@@ -264,7 +247,7 @@ def levelled(scene: Scene, duration: float, seed: int) -> dict:
     tilted = sight.distance(motion.position(times), directions, times)
     seen = (level < CONFIG.max_range) | (tilted < CONFIG.max_range)
     wrong = np.abs(np.minimum(level, 9) - np.minimum(tilted, 9))[seen] > 0.1
-    return row("levelled labels", "first surfaces off by more than 10 cm", "share", float(wrong.mean()), 0.0)
+    return row("levelled labels", "first surfaces off by more than 10 cm", "share", wrong.mean())
 
 
 def balanced(source: Recording, steps: int, seed: int) -> dict:
@@ -293,24 +276,25 @@ def balanced(source: Recording, steps: int, seed: int) -> dict:
     return row("class-balanced loss", f"first surfaces found within 9 cm after {steps} steps", "share", *shares)
 
 
-def row(correction: str, measure: str, unit: str, without, with_) -> dict:
-    """A line of the table; of several errors, their RMS."""
-    values = [rms(v) if np.size(v) > 1 else float(np.squeeze(v)) for v in (without, with_)]
-    return {"correction": correction, "measured": measure, "without": values[0], "with": values[1], "unit": unit}
+def row(correction: str, measure: str, unit: str, without, with_=0.0) -> dict:
+    """A line of the table; of several errors, their RMS. `with_` is zero where the correction takes the truth."""
+    without, with_ = (
+        float(np.sqrt(np.mean(np.square(v))) if np.size(v) > 1 else np.squeeze(v)) for v in (without, with_)
+    )
+    return {"correction": correction, "measured": measure, "without": without, "with": with_, "unit": unit}
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("recording", nargs="?", type=Path, help="a handheld walk with occupancy; else one is simulated")
-    found.add_argument("--duration", type=float, default=15.0, help="of the simulated walk, s")
-    found.add_argument("--steps", type=int, default=60, help="of the small segmentation trainings")
-    found.add_argument("--seed", type=int, default=0)
-    return found
+PARSER = command_line(
+    __doc__,
+    duration=(15.0, "of the simulated walk, s"),
+    steps=(60, "of the small segmentation trainings"),
+    seed=(0, "of everything"),
+)
+PARSER.add_argument("recording", nargs="?", type=Path, help="a handheld walk with occupancy; else one is simulated")
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     rng = np.random.default_rng(options.seed)
     with tempfile.TemporaryDirectory() as folder:
         path = options.recording or simulate(

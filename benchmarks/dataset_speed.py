@@ -1,7 +1,6 @@
 """Data sets end to end: what sensors and writing cost beside the simulation, how workers share the cores, and what the
 paper's data set would take on this machine, from a sample of one in ten of its recordings."""
 
-import argparse
 import os
 import tempfile
 import time
@@ -12,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import psutil
 
-from benchmarks.results import Data, publish
+from benchmarks.results import Data, command_line, publish
 from radarize.jobs import perform
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
@@ -87,7 +86,8 @@ def run(tasks: list[Task], folder: Path, workers: int) -> Run:
         if not news.ended:
             last[news.name] = time.perf_counter(), news.done
             first.setdefault(news.name, last[news.name])
-        memory = max(memory, *(process.memory_info().rss / 1e6 for process in _workers()))
+        workers_now = psutil.Process().children() or [psutil.Process()]
+        memory = max(memory, *(process.memory_info().rss / 1e6 for process in workers_now))
     wall = time.perf_counter() - begin
     span = sum(last[name][0] - first[name][0] for name in first)
     frame = span / sum(last[name][1] - first[name][1] for name in first)
@@ -96,34 +96,30 @@ def run(tasks: list[Task], folder: Path, workers: int) -> Run:
     return Run(wall, frame, (workers * wall - frames * frame) / len(tasks), size, memory, frames)
 
 
-def _workers() -> Iterable[psutil.Process]:
-    found = psutil.Process().children()
-    return found or [psutil.Process()]
-
-
 def shortened(tasks: Iterable[Task], seconds: float, storage: str) -> list[Task]:
     """The same recordings, but shorter."""
-    return [
-        replace(task, duration=seconds, frames=CONFIG.frames_within(seconds), storage=storage)
-        if seconds < task.duration
-        else replace(task, storage=storage)
-        for task in tasks
-    ]
+    shorter = {"duration": seconds, "frames": CONFIG.frames_within(seconds)}
+    return [replace(task, storage=storage, **(shorter if seconds < task.duration else {})) for task in tasks]
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--every", type=int, default=10, help=f"one in so many recordings of {BIG} is made")
-    found.add_argument("--seconds", type=float, default=60.0, help="of each at most")
-    found.add_argument("--frames", type=int, default=240, help="of the comparison with the simulation alone")
-    found.add_argument("--few", type=int, default=4, help="recordings by which workers and storage are compared")
-    found.add_argument("--seed", type=int, default=0)
-    return found
+def row(what: str, seconds: float) -> dict[str, object]:
+    """A row of the table, from seconds a frame; its other columns are empty."""
+    pace = {"what": what, "ms per frame": 1e3 * seconds, "frames/s": 1 / seconds}
+    return pace | dict.fromkeys(("of simulation", "kB per frame", "MB per worker"), "")
+
+
+PARSER = command_line(
+    __doc__,
+    every=(10, f"one in so many recordings of {BIG} is made"),
+    seconds=(60.0, "of each at most"),
+    frames=(240, "of the comparison with the simulation alone"),
+    few=(4, "recordings by which workers and storage are compared"),
+    seed=(0, "of the walk in that comparison"),
+)
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     cores = len(os.sched_getaffinity(0))
     tasks = Specification.load(BIG).tasks
     sample = tasks[:: options.every]
@@ -132,16 +128,7 @@ def main() -> None:
         folder = Path(name)
         share = steps(options.frames, options.seed, folder)
         for what, seconds in share.items():
-            rows.append(
-                {
-                    "what": f"one process: {what}",
-                    "ms per frame": 1e3 * seconds,
-                    "frames/s": 1 / seconds,
-                    "of simulation": seconds / share["simulation"],
-                    "kB per frame": "",
-                    "MB per worker": "",
-                }
-            )
+            rows.append(row(f"one process: {what}", seconds) | {"of simulation": seconds / share["simulation"]})
         runs = {}
         few = sample[:: max(1, len(sample) // options.few)][: options.few]
         short = min(options.seconds, 10.0)
@@ -151,19 +138,9 @@ def main() -> None:
             (f"{cores} workers x 1 thread, heatmaps", few, short, "heatmaps", cores),
             (f"{cores} workers: sample of {BIG}, raw", sample, options.seconds, "raw", cores),
         ):
-            made = run(shortened(chosen, seconds, storage), folder / str(len(runs)), workers)
-            runs[label] = made
-            pace = made.frame / workers
-            rows.append(
-                {
-                    "what": label,
-                    "ms per frame": 1e3 * pace,
-                    "frames/s": 1 / pace,
-                    "of simulation": "",
-                    "kB per frame": made.size / 1e3,
-                    "MB per worker": made.memory,
-                }
-            )
+            made = runs[label] = run(shortened(chosen, seconds, storage), folder / str(len(runs)), workers)
+            size = {"kB per frame": made.size / 1e3, "MB per worker": made.memory}
+            rows.append(row(label, made.frame / workers) | size)
         heat, measured = list(runs.values())[-2:]
         data = Data.of(f"sample of {BIG}", sorted((folder / "3").glob("*.h5")), options.seed)
     total = sum(task.frames for task in tasks)

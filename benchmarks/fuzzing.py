@@ -4,7 +4,6 @@ Inputs and what a reader may take are those of `tests/fuzzing/readers.py`. Each 
 which dies of a crash in a library, of a hang, or of memory without end; its input then lies where the message says.
 """
 
-import argparse
 import json
 import resource
 import signal
@@ -18,7 +17,7 @@ from pathlib import Path
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from rich.progress import track
 
-from benchmarks.results import Data, publish, surroundings
+from benchmarks.results import Data, command_line, publish, surroundings
 from tests.fuzzing.readers import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, READERS, attempt
 
 #: Inputs by reader, at --scale 1: more than 100,000 in all.
@@ -83,18 +82,17 @@ def try_all(name: str, count: int, first: int, folder: Path, answer: Connection)
     )
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--scale", type=float, default=1.0, help="times the usual number of inputs")
-    found.add_argument("--seed", type=int, default=0)
-    found.add_argument("--reader", choices=list(READERS), help="this one alone, without a table")
-    return found
+PARSER = command_line(
+    __doc__,
+    scale=(1.0, "times the usual number of inputs"),
+    seed=(0, "of hypothesis"),
+)
+PARSER.add_argument("--reader", choices=list(READERS), help="this one alone, without a table")
 
 
 def main() -> None:
     """The table; ends at the first input that a reader fails on."""
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     context, rows = get_context("spawn"), []
     for name in track([options.reader] if options.reader else list(INPUTS), "readers"):
         folder = Path(tempfile.mkdtemp(prefix="fuzzing-"))

@@ -3,7 +3,6 @@
 Wall time says whether this machine keeps up with whatever else it does; processor time what it takes of a free one.
 """
 
-import argparse
 import tempfile
 import threading
 import time
@@ -12,14 +11,14 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.results import Data, publish, surroundings
+from benchmarks.results import Data, command_line, publish, surroundings
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
-from radarize.methods.registry import CLASSICAL, best_methods
-from radarize.pipeline import Pipeline
+from radarize.methods.registry import CLASSICAL, Inputs, best_methods
+from radarize.stopwatch import Stopwatch
 from radarsim.simulate import simulate
 
 
@@ -33,12 +32,12 @@ def look_on(url: str) -> None:
 def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     """One replay; a row of the table."""
     stream = Replay(path)
-    pipeline = prepare(stream.config, lambda: Pipeline(stream.config, **methods))
+    inputs, watch = prepare(Inputs(stream.config), methods), Stopwatch()
     with Page("127.0.0.1:0") as page, stream:
         viewer = threading.Thread(target=look_on, args=(page.url,), daemon=True)
         viewer.start()
         (reader,) = [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
-        live, last, instants = Live(pipeline, page), [0.0], []
+        live, last, instants = Live(inputs, methods, page), [0.0], []
 
         def note(done: int, total: int) -> None:
             instants.append((time.monotonic(), done))
@@ -49,7 +48,8 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
         start = time.process_time()
         note(0, 0)
         reading = last[0]
-        live.run(stream, threading.Event(), progress=note)
+        with watch.running():
+            live.run(stream, threading.Event(), progress=note)
         used = time.process_time() - start
     (began, first), (ended, final) = instants[1], instants[-1]
     frames, counts = max(live.losses.frames, 1), stream.counts
@@ -59,23 +59,22 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
         "dropped": f"{counts.dropped} of {counts.frames}",
         "ms a frame": 1e3 * live.busy / frames,
         "processor ms a frame": 1e3 * used / frames,
-        "of it the page": 1e3 * pipeline.stage_seconds["page"] / frames,
+        "of it the page": 1e3 * watch.seconds["page"] / frames,
         "reading process": 1e3 * (last[0] - reading) / counts.frames,
         "budget, ms": 1e3 * stream.config.frame_period,
     }
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("recording", nargs="?", type=Path, help="a recording; by default one is simulated")
-    found.add_argument("--duration", type=float, default=20.0)
-    found.add_argument("--seed", type=int, default=0)
-    return found
+PARSER = command_line(
+    __doc__,
+    duration=(20.0, "of the simulated recording, s"),
+    seed=(0, "of it"),
+)
+PARSER.add_argument("recording", nargs="?", type=Path, help="a recording; by default one is simulated")
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         path = options.recording or simulate(
             "office", Path(folder) / "office.h5", duration=options.duration, seed=options.seed

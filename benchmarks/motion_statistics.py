@@ -1,12 +1,12 @@
 """How the platforms move, beside the figures of the paper's data set, over buildings of all styles."""
 
-import argparse
 import time
 
 import numpy as np
+import pandas as pd
 from rich.progress import track
 
-from benchmarks.results import Data, Walk, publish
+from benchmarks.results import Data, Walk, command_line, publish
 from radarize.benchmark.table import PAPER
 from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
@@ -41,41 +41,35 @@ def walks(count: int, seed: int) -> tuple[dict[str, list[Statistics]], list[Walk
 
 def row(platform: str, found: list[Statistics]) -> dict[str, object]:
     """Means over the walks, or the extreme where it says so."""
-
-    def mean(name: str) -> float:
-        return float(np.mean([getattr(one, name) for one in found]))
-
-    paper = THEIRS[platform]
-    ways = ("forward", "backward", "sideways", "standing")
-    distances = [one.distance for one in found]
+    walks = pd.DataFrame(list(map(vars, found)))
+    mean, top, least, paper = walks.mean(), walks.max(), walks.min(), THEIRS[platform]
+    ways = mean[["forward", "backward", "sideways", "standing"]]
     return {
         "platform": platform,
         "walks": len(found),
-        "distance m": f"{np.mean(distances):.1f} ({min(distances):.0f} to {max(distances):.0f})",
+        "distance m": f"{mean['distance']:.1f} ({least['distance']:.0f} to {top['distance']:.0f})",
         "paper": paper["distance"],
-        "mean speed m/s": mean("mean_speed"),
-        "top speed m/s": max(one.top_speed for one in found),
+        "mean speed m/s": mean["mean_speed"],
+        "top speed m/s": top["top_speed"],
         "paper's top": paper["top"],
-        "turn rate RMS, top deg/s": f"{np.rad2deg(mean('rms_turn_rate')):.0f}, "
-        f"{np.rad2deg(max(one.top_turn_rate for one in found)):.0f}",
-        "roll, pitch RMS deg": f"{np.rad2deg(mean('rms_roll')):.1f}, {np.rad2deg(mean('rms_pitch')):.1f}",
-        "forward, backward, sideways, standing": ", ".join(f"{mean(way):.0%}" for way in ways),
+        "turn rate RMS, top deg/s": f"{np.rad2deg(mean['rms_turn_rate']):.0f}, {np.rad2deg(top['top_turn_rate']):.0f}",
+        "roll, pitch RMS deg": f"{np.rad2deg(mean['rms_roll']):.1f}, {np.rad2deg(mean['rms_pitch']):.1f}",
+        "forward, backward, sideways, standing": ", ".join(f"{share:.0%}" for share in ways),
         "paper's ways": paper["ways"],
-        "least clearance m": min(one.clearance for one in found),
+        "least clearance m": least["clearance"],
     }
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--buildings", type=int, default=20)
-    found.add_argument("--seed", type=int, default=0)
-    return found
+PARSER = command_line(
+    __doc__,
+    buildings=(20, "walked through"),
+    seed=(0, "that they are drawn from"),
+)
 
 
 def main() -> None:
     """Walk and publish."""
-    arguments = parser().parse_args()
+    arguments = PARSER.parse_args()
     found, made, times = walks(arguments.buildings, arguments.seed)
     publish(
         "motion_statistics",

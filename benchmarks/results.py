@@ -1,5 +1,7 @@
-"""Where the scripts put their figures: a page each, with all that `radarize.benchmark.results` wants it to say."""
+"""What all scripts share: their options, and where they put their figures, a page each, with all that
+`radarize.benchmark.results` wants it to say."""
 
+import argparse
 import os
 import resource
 from collections.abc import Mapping, Sequence
@@ -10,7 +12,24 @@ from radarize.benchmark.table import Beside, Table
 from radarsim.motion import Motion
 
 FOLDER = Path(__file__).parent / "results"
+#: Captures and logs that others made, beside the checkout.
+SHARED = Path(__file__).parents[2] / "shared" / "recordings"
 machine()  # as things are now: sources may change while a script runs
+
+
+def command_line(about: str | None, **options: tuple[object, str]) -> argparse.ArgumentParser:
+    """A script's parser.
+
+    Args:
+        about: what it does.
+        options: by name a default, or the type of one that has none, and what it is; False stands for a flag.
+    """
+    parser = argparse.ArgumentParser(description=about)
+    for name, (default, words) in options.items():
+        kind, value = (default, None) if isinstance(default, type) else (type(default), default)
+        how = {"action": "store_true"} if default is False else {"type": kind, "default": value}
+        parser.add_argument("--" + name.replace("_", "-"), help=words, **how)
+    return parser
 
 
 def publish(

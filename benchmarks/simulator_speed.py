@@ -4,13 +4,12 @@ Three ways to the frames of the first scene in one run: this simulator; the same
 numpy; and `--engine sionna`, the paths of Sionna RT's own solver at the same poses.
 """
 
-import argparse
 import time
 from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.results import Data, memory_mb, peak_memory_mb, publish, walked
+from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, walked
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.physics.pathsolver import DEPTH, RAYS
@@ -149,21 +148,26 @@ def density_error(name: str, draws: int, seed: int, frames: int = 8, factor: int
     )
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor"], help="the first in detail")
-    found.add_argument("--frames", type=int, default=240)
-    found.add_argument("--naive-frames", type=int, default=2)
-    found.add_argument("--sionna-frames", type=int, default=20)
-    found.add_argument("--memory-frames", type=int, default=0, help="frames of a long run that watches memory")
-    found.add_argument("--draws", type=int, default=0, help="worlds compared with as many of ten times the scatterers")
-    found.add_argument("--seed", type=int, default=0)
-    return found
+def row(way: str, seconds: float, echoes: float, gives: str) -> dict[str, object]:
+    """A row of the table, from seconds a frame; how many times slower it is than the first is for later."""
+    pace = {"way": way, "ms per frame": 1e3 * float(seconds), "frames/s": 1 / float(seconds), "times slower": 1.0}
+    return pace | {"echoes or paths": int(echoes), "gives": gives}
+
+
+PARSER = command_line(
+    __doc__,
+    frames=(240, "of a walk"),
+    naive_frames=(2, "summed naively"),
+    sionna_frames=(20, "by Sionna's paths"),
+    memory_frames=(0, "frames of a long run that watches memory"),
+    draws=(0, "worlds compared with as many of ten times the scatterers"),
+    seed=(0, "of walks and worlds"),
+)
+PARSER.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor"], help="the first in detail")
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
 
     rows, notes, walks = [], [], []
     for name in options.scenes:
@@ -171,8 +175,8 @@ def main() -> None:
         walks.append(walked(name, options.seed, rest[0].motion))
         if not rows:
             main_pace, simulator, times = found, *rest
-        rows.append(row(f"{name}: radarsim", found.frame, main_pace, found.echoes, "int16 I/Q with noise"))
-        rows.append(row(f"{name}: of it, finding echoes", found.finding, main_pace, found.echoes, "echoes"))
+        rows.append(row(f"{name}: radarsim", found.frame, found.echoes, "int16 I/Q with noise"))
+        rows.append(row(f"{name}: of it, finding echoes", found.finding, found.echoes, "echoes"))
         notes.append(
             f"{name}: first {BATCH} frames after {found.first:.1f} s; peak memory {found.memory:.0f} MB so far."
         )
@@ -187,8 +191,8 @@ def main() -> None:
         naive_seconds.append(time.perf_counter() - start)
         error.append(10 * np.log10(np.sum(np.abs(fast - truth) ** 2) / np.sum(np.abs(truth) ** 2)))
     first = options.scenes[0]
-    seconds = float(np.median(naive_seconds))
-    rows.append(row(f"{first}: naive float64 numpy", seconds, main_pace, main_pace.echoes, "the same echoes, samples"))
+    seconds = np.median(naive_seconds)
+    rows.append(row(f"{first}: naive float64 numpy", seconds, main_pace.echoes, "the same echoes, samples"))
 
     _, physics = np.random.default_rng(options.seed).spawn(2)
     other = Simulator(Scene.load(first), simulator.motion, CONFIG, physics, engine="sionna")
@@ -199,9 +203,9 @@ def main() -> None:
         if k >= 2:  # the first calls compile kernels
             seconds.append(time.perf_counter() - start)
             counts.append(len(paths[0]))
-    rows.append(
-        row(f"{first}: --engine sionna", float(np.median(seconds)), main_pace, np.mean(counts), "int16 I/Q with noise")
-    )
+    rows.append(row(f"{first}: --engine sionna", np.median(seconds), np.mean(counts), "int16 I/Q with noise"))
+    for each in rows:
+        each["times slower"] = each["ms per frame"] / rows[0]["ms per frame"]
 
     notes += [
         f"Fast synthesis against the naive sum of the same echoes: error power {max(error):.1f} dB (worst frame).",
@@ -218,18 +222,6 @@ def main() -> None:
         notes.append(f"{first}: diffuse power per cell against ten times the scatterers {off}.")
     data = Data("handheld walks", tuple(walks), options.seed)
     publish("simulator_speed", "Simulator speed, preset radarize", rows, data=data, networks=(), notes=notes)
-
-
-def row(way: str, seconds: float, ours: Pace, echoes: float, gives: str) -> dict[str, object]:
-    """A row of the table."""
-    return {
-        "way": way,
-        "ms per frame": 1e3 * seconds,
-        "frames/s": 1 / seconds,
-        "times slower": seconds / ours.frame,
-        "echoes or paths": int(echoes),
-        "gives": gives,
-    }
 
 
 if __name__ == "__main__":

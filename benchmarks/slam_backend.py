@@ -1,6 +1,5 @@
 """The SLAM back end: real lidar logs, graphs with false loops, simulated radar, time and memory."""
 
-import argparse
 import tempfile
 import time
 from dataclasses import replace
@@ -8,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import Data, Walk, memory_mb, publish
+from benchmarks.results import SHARED, Data, Walk, command_line, memory_mb, publish
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Beside
@@ -21,10 +20,10 @@ from radarize.run import run
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.slam.posegraph import PoseGraph
-from radarize.tum import planar, read_tum
+from radarize.tum import planar, planar_poses, read_tum, write_tum
 from radarsim.simulate import simulate
 
-RADISH = Path(__file__).parents[2] / "shared" / "recordings" / "radish"
+RADISH = SHARED / "radish"
 #: Cartographer on the same files, its best settings: mean ATE in m and rad, and s.
 THEIRS = Beside("Cartographer", "lidar logs, the very same files", simulated=False)
 CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "orebro": (0.149, 0.0138, 19)}
@@ -67,36 +66,27 @@ def loop_length(truth: np.ndarray) -> float:
     return float((np.abs(along[:, None] - along) * same).max())
 
 
-def length(poses: np.ndarray) -> float:
-    """From the first pose to the one farthest from it, m."""
-    return float(np.hypot(*(poses[:, :2] - poses[0, :2]).T).max())
-
-
 def play(log: Log, config: SlamConfig) -> tuple[Slam, dict[str, float]]:
-    """Feed a log; times of every call of the session while it runs, and of its end."""
-    slam, took = Slam(config), []
-    thread, start, cpu = [], time.perf_counter(), time.process_time()
-    odometry = iter(zip(log.odometry_times, log.odometry, strict=True))
-    k = -1
-    for instant, ranges in zip(log.times, log.ranges, strict=True):
-        before, busy = time.perf_counter(), time.thread_time()
-        while k + 1 < len(log.odometry_times) and log.odometry_times[k + 1] <= instant:
-            k += 1
-            stamp, pose = next(odometry)
-            slam.add_odometry(stamp, pose, None if log.covariances is None else log.covariances[k])
-        slam.add_scan(instant, log.azimuths, ranges)
-        took.append(time.perf_counter() - before)
-        thread.append(time.thread_time() - busy)
-    online = time.process_time() - cpu
-    slam.finish()
+    """Feed a log; times of every scan, with the odometry up to it, and of all."""
+
+    def clocks(done: int = 0, total: int = 0) -> None:
+        instants.append((time.perf_counter(), time.thread_time(), time.process_time()))
+
+    slam, instants = Slam(config), []
+    clocks()
+    log.feed(slam, clocks)
+    wall, thread, _ = 1e3 * np.diff(instants, axis=0).T
+    online = instants[-1][2] - instants[0][2]
+    clocks()
+    whole, _, used = np.subtract(instants[-1], instants[0])
     return slam, {
-        "s": time.perf_counter() - start,
-        "CPU s": time.process_time() - cpu,
-        "CPU ms per scan, all threads": 1e3 * online / len(took),
-        "ms per scan": 1e3 * float(np.mean(took)),
-        "p99 ms": 1e3 * float(np.percentile(took, 99)),
-        "CPU ms per scan": 1e3 * float(np.mean(thread)),
-        "p99 CPU ms": 1e3 * float(np.percentile(thread, 99)),
+        "s": whole,
+        "CPU s": used,
+        "CPU ms per scan, all threads": 1e3 * online / len(wall),
+        "ms per scan": wall.mean(),
+        "p99 ms": np.percentile(wall, 99),
+        "CPU ms per scan": thread.mean(),
+        "p99 CPU ms": np.percentile(thread, 99),
     }
 
 
@@ -108,6 +98,7 @@ def row(case: str, log: Log, truth: np.ndarray, config: SlamConfig, against: str
     alone = np.array([slam.odometry.pose(t) for t in times])
     position, heading = ate(truth[kept], poses)
     before, _ = ate(truth[kept], alone)
+    farthest, true = (np.hypot(*(path - path[0])[:, :2].T).max() for path in (poses, truth[kept]))
     return {
         "case": case,
         "path m": float(np.hypot(*np.diff(truth[:, :2], axis=0).T).sum()),
@@ -116,7 +107,7 @@ def row(case: str, log: Log, truth: np.ndarray, config: SlamConfig, against: str
         "ATE m": position,
         "ATE rad": heading,
         "ratio": position / before,
-        "length %": 100 * length(poses) / length(truth[kept]) - 100,
+        "length %": 100 * farthest / true - 100,
         "to beat": against,
         "closures": f"{int(slam.graph.accepted.sum())}/{len(slam.graph.closures)}",
         "submaps": len(slam.submaps),
@@ -126,10 +117,8 @@ def row(case: str, log: Log, truth: np.ndarray, config: SlamConfig, against: str
 
 def lidar(name: str) -> tuple[Log, np.ndarray]:
     """A log of the Radish repository and its corrected poses."""
-    return (
-        Log.read(RADISH / f"{name}.scans.npz", RADISH / f"{name}.odometry.tum"),
-        planar(read_tum(RADISH / f"{name}.truth.tum")[1]),
-    )
+    scans, odometry, truth = (RADISH / f"{name}.{what}" for what in ("scans.npz", "odometry.tum", "truth.tum"))
+    return Log.read(scans, odometry), planar(read_tum(truth)[1])
 
 
 def noisier(log: Log, truth: np.ndarray, rng: np.random.Generator) -> Log:
@@ -147,9 +136,8 @@ def to_and_fro(log: Log, truth: np.ndarray, legs: int) -> tuple[Log, np.ndarray]
     """A log forward, backward, forward...: as long as one likes, and closing loops all the time."""
     order = np.concatenate([np.arange(len(truth))[:: 1 if leg % 2 == 0 else -1][leg > 0 :] for leg in range(legs)])
     times = np.arange(float(len(order)))
-    return replace(log, times=times, ranges=log.ranges[order], odometry_times=times, odometry=log.odometry[order]), (
-        truth[order]
-    )
+    there = replace(log, times=times, ranges=log.ranges[order], odometry_times=times, odometry=log.odometry[order])
+    return there, truth[order]
 
 
 def graph_rows(seed: int) -> list[dict[str, object]]:
@@ -191,12 +179,11 @@ def simulated(folder: Path) -> Path:
     t = np.arange(0, 41.01, 0.05)
     x = np.where(t < 1, t**2 / 2, np.where(t < 40, t - 0.5, 39.5 + (t - 40) - (t - 40) ** 2 / 2))
     yaw = 0.05 * np.sin(2 * np.pi * 0.9 * t) * np.minimum(t, 1)
-    zero = np.zeros_like(t)
-    route = np.column_stack([t, x, 0.05 * np.sin(t / 2), zero + 1.2, zero, zero, np.sin(yaw / 2), np.cos(yaw / 2)])
-    np.savetxt(folder / "plain.tum", route)
-    jobs = [("plain", str(folder / "plain.yaml"), {"trajectory": folder / "plain.tum", "duration": 41, "seed": 1})]
-    jobs += [(f"{s}_{p}{n}", s, {"platform": p, "duration": d, "seed": n}) for s, p, d, n in RECORDINGS]
-    for name, scene, settings in jobs:
+    poses = planar_poses(np.column_stack([x, 0.05 * np.sin(t / 2), yaw])) + [0, 0, 1.2, 0, 0, 0, 0]
+    route = write_tum(folder / "plain.tum", t, poses)
+    jobs = {"plain": (str(folder / "plain.yaml"), {"trajectory": route, "duration": 41, "seed": 1})}
+    jobs |= {f"{s}_{p}{n}": (s, {"platform": p, "duration": d, "seed": n}) for s, p, d, n in RECORDINGS}
+    for name, (scene, settings) in jobs.items():
         if not (folder / name / "run.json").is_file():
             recording = folder / f"{name}.h5"
             if not recording.is_file():
@@ -212,9 +199,8 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
     """Every run in a folder, its own odometry and scans; and what it is of."""
     rows, walks = [], []
     for path in sorted(p.parent for p in folder.glob("*/reference.tum")):
-        log = Log.read(path)
-        times, truth = read_tum(path / "reference.tum")
-        truth = planar(truth)[np.abs(times[None] - log.times[:, None]).argmin(axis=1)]
+        log, (times, poses) = Log.read(path), read_tum(path / "reference.tum")
+        truth = planar(poses)[np.abs(times[None] - log.times[:, None]).argmin(axis=1)]
         entry = row(f"radar, {path.name}", log, truth, SlamConfig.preset("radar"))
         about = read_json(path / "run.json")["recording_attributes"]
         walks.append(Walk(about.get("scene", "-"), about.get("seed"), entry["path m"], "engine" in about))
@@ -223,19 +209,18 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
     return rows, walks
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--data", type=Path, help="folder of runs (radarize run -o); by default some are made")
-    found.add_argument("--record", action="store_true", help="make those that --data lacks, and keep them")
-    found.add_argument("--no-radar", action="store_true")
-    found.add_argument("--seeds", type=int, default=3, help="of disturbances, for each log")
-    found.add_argument("--seed", type=int, default=7)
-    return found
+PARSER = command_line(
+    __doc__,
+    data=(Path, "folder of runs (radarize run -o); by default some are made"),
+    record=(False, "make those that --data lacks, and keep them"),
+    no_radar=(False, "lidar and graphs alone"),
+    seeds=(3, "of disturbances, for each log"),
+    seed=(7, "the first of them"),
+)
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     lidar_preset, rows, walks, notes = SlamConfig.preset("lidar"), [], [], []
     warm, _ = lidar("orebro")
     play(replace(warm, times=warm.times[:60], ranges=warm.ranges[:60]), lidar_preset)
@@ -245,19 +230,15 @@ def main() -> None:
         rows.append(row(f"lidar, {name}", log, truth, lidar_preset, target))
         walks.append(Walk(name, None, rows[-1]["path m"], simulated=False))
         rows.append(row(f"lidar, {name}, {CLASSIC}", log, truth, SlamConfig.preset("cartographer")))
-        disturbed: dict[str, list[float]] = {"odometry noise x 2": [], "a third of the scans lost": []}
+        disturbed: dict[str, list[str]] = {"odometry noise x 2": [], "a third of the scans lost": []}
         for seed in range(options.seeds):
             rng = np.random.default_rng(options.seed + seed)
-            entry = row("", noisier(log, truth, rng), truth, lidar_preset)
-            disturbed["odometry noise x 2"].append(entry["ATE m"])
+            noise = noisier(log, truth, rng), truth
             keep = np.sort(rng.permutation(len(truth))[: 2 * len(truth) // 3])
-            fewer = replace(log, times=log.times[keep], ranges=log.ranges[keep])
-            entry = row("", fewer, truth[keep], lidar_preset)
-            disturbed["a third of the scans lost"].append(entry["ATE m"])
-        notes += [
-            f"{name}, {what}, {options.seeds} seeds: ATE " + ", ".join(f"{v:.3f}" for v in values) + " m."
-            for what, values in disturbed.items()
-        ]
+            fewer = replace(log, times=log.times[keep], ranges=log.ranges[keep]), truth[keep]
+            for errors, case in zip(disturbed.values(), (noise, fewer), strict=True):
+                errors.append(f"{row('', *case, lidar_preset)['ATE m']:.3f}")
+        notes += [f"{name}, {what}, {options.seeds} seeds: ATE {', '.join(disturbed[what])} m." for what in disturbed]
     rows += graph_rows(options.seed)
     log, truth = to_and_fro(*lidar("intel"), legs=3)
     resident = memory_mb()
@@ -271,11 +252,10 @@ def main() -> None:
             data = options.data or Path(folder)
             found, simulations = radar_rows(simulated(data) if options.record or not options.data else data)
             rows, walks = rows + found, walks + simulations
-    columns = dict.fromkeys(key for entry in rows for key in entry)
     publish(
         "slam_backend",
         "SLAM back end",
-        [{column: entry.get(column, "-") for column in columns} for entry in rows],
+        rows,
         data=Data("lidar logs of Radish and radar walks", tuple(walks), options.seed),
         networks=() if options.no_radar else Networks().used(Pair(**BEST).networks),
         beside=[THEIRS],

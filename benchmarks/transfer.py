@@ -5,7 +5,6 @@ that stands at many places, first with the default board's front end, then with 
 are about each map's mean, as the networks see them.
 """
 
-import argparse
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from benchmarks.results import FOLDER, Data, Walk, publish
+from benchmarks.results import FOLDER, SHARED, Data, Walk, command_line, publish
 from radarize.console import progress
 from radarize.errors import InputError
 from radarize.features.maps import MapMaker, maps_of
@@ -30,7 +29,6 @@ from radarsim.scene.scene import Scene
 from radarsim.simulate import Simulator
 from radarsim.twin.likeness import frechet_distance, patch_statistics
 
-CAPTURES = Path(__file__).parents[2] / "shared" / "recordings"
 SCENES = ("office", "visitors", "buildings/b")
 #: s that the radar stands at a place.
 STAY = 1.0
@@ -158,18 +156,17 @@ def draw(shown: dict[str, dict[str, dict[str, np.ndarray]]], path: Path) -> None
     figure.savefig(path, dpi=80)
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--captures", type=Path, default=CAPTURES, help="folder of the public captures")
-    found.add_argument("--data", type=Path, help="a data set that networks were trained on, to compare with as well")
-    found.add_argument("--places", type=int, default=8, help="in each scene")
-    found.add_argument("--seed", type=int, default=0)
-    return found
+PARSER = command_line(
+    __doc__,
+    captures=(SHARED, "folder of the public captures"),
+    data=(Path, "a data set that networks were trained on, to compare with as well"),
+    places=(8, "in each scene"),
+    seed=(0, "of places and worlds"),
+)
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     rows, notes, shown = [], [], {}
     with tempfile.TemporaryDirectory() as temporary, progress("captures") as report:
         found = captures(options.captures, Path(temporary))
@@ -190,14 +187,10 @@ def main() -> None:
             for name, maps in real.items():
                 first, _ = distances(before[name], maps)
                 second, among = distances(after[name], maps)
-                row = {
-                    "capture": capture,
-                    "map": name,
-                    "before dB": first,
-                    "after dB": second,
-                    "simulated frames: median, 95 % dB": f"{np.median(among):.2f}, {np.quantile(among, 0.95):.2f}",
-                    "inside": "yes" if second <= np.quantile(among, 0.95) else "no",
-                }
+                most = np.quantile(among, 0.95)
+                row = {"capture": capture, "map": name, "before dB": first, "after dB": second}
+                row["simulated frames: median, 95 % dB"] = f"{np.median(among):.2f}, {most:.2f}"
+                row["inside"] = "yes" if second <= most else "no"
                 if trained:
                     third, among = distances(np.concatenate([frame[name] for frame in trained]), maps)
                     row["from training data; 95 % of its own dB"] = f"{third:.2f}; {np.quantile(among, 0.95):.2f}"

@@ -1,6 +1,5 @@
 """Twins of a walk that plays the real one, each with one error: what the figures of `radarsim twin` make of it."""
 
-import argparse
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
@@ -12,7 +11,7 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from benchmarks.results import Data, publish
+from benchmarks.results import Data, command_line, publish
 from radarize.console import progress
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene
@@ -63,16 +62,15 @@ def row(name: str, found: Comparison) -> dict[str, object]:
     return {"twin": name, **medians, "Fréchet distance dB": found.frechet["range_azimuth"][0]}
 
 
-def parser() -> argparse.ArgumentParser:
-    """The command line."""
-    found = argparse.ArgumentParser(description=__doc__)
-    found.add_argument("--duration", type=float, default=20.0, help="of the walk, s")
-    found.add_argument("--seed", type=int, default=3)
-    return found
+PARSER = command_line(
+    __doc__,
+    duration=(20.0, "of the walk, s"),
+    seed=(3, "of walk and twins"),
+)
 
 
 def main() -> None:
-    options = parser().parse_args()
+    options = PARSER.parse_args()
     place = Scene.load("office")
 
     def all_of(material: str) -> Scene:

@@ -57,11 +57,6 @@ def tables(study: Study, paper: dict[str, tuple[float, ...]] = PAPER) -> list[Ta
     return [*trajectory_tables(study, "odometry", labels, known, "Odometry"), steps_table(study)]
 
 
-def platform_tables(study: Study) -> list[Table]:
-    """The same beside the paper's table 3."""
-    return tables(study, PAPER_PLATFORMS)
-
-
 def steps_table(study: Study) -> Table:
     """Figures of all frames, by platform, by building and of all."""
     rows, found = [], {pair: study.of(pair) for pair in study.pairs}

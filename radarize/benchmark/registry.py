@@ -4,6 +4,8 @@ A new one is a file with a `pairs` and a `tables`, and an entry here; new method
 entries in `radarize.methods`.
 """
 
+from functools import partial
+
 from radarize.benchmark import mapping, odometry, runtime, slam, uncertainty, varied
 from radarize.benchmark.drawings import draw_maps, draw_odometry, draw_slam
 from radarize.benchmark.study import Benchmark
@@ -21,7 +23,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         "Odometry on unseen platforms",
         "Tested on platforms that, with --train, no training saw (the paper's table 3).",
         odometry.pairs,
-        odometry.platform_tables,
+        partial(odometry.tables, paper=odometry.PAPER_PLATFORMS),
         "platform",
         draw=draw_odometry,
     ),

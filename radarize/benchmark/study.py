@@ -223,16 +223,16 @@ class Study:
         """Runs of a pair that ended well, each once, in the order of recordings."""
         return self.of(pair)["run"].to_list()
 
-    def publish(self, title: str = "") -> Results:
+    def publish(self) -> Results:
         """Tables, and all that tells what they are worth."""
-        titles = f"Tested in splits {', '.join(self.splits)}." if len(self.splits) > 1 else ""
+        splits = [f"Tested in splits {', '.join(self.splits)}."] if len(self.splits) > 1 else []
         return Results(
-            title or self.benchmark.title,
+            self.benchmark.title,
             self.benchmark.tables(self),
             self.data.data([self.timings[0].case] if self.benchmark.timed else self.cases),
             self.used,
             self.options.command,
-            [*([titles] if titles else []), *self.shortfalls],
+            [*splits, *self.shortfalls],
         )
 
     @property

@@ -2,13 +2,13 @@
 
 import pandas as pd
 
-from radarize.benchmark.protocol import Protocol
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.study import Study
 from radarize.benchmark.table import PAPER, Table
 
 #: What the paper says beside: ATE in m and rad, RE between frames in m.
 PAPER_COLUMNS = ("paper: ATE m", "paper: ATE rad", "paper: RE frame m")
+GYROSCOPE = "Turns of rnin are those of the IMU's gyroscope, which from frame to frame no radar reaches."
 #: By method.
 Figures = dict[Pair, tuple[float, ...]]
 
@@ -25,29 +25,23 @@ def trajectory_tables(
         paper: its figures of a pair.
         about: what the titles begin with.
     """
-    return [_table(study, protocol, trajectory, labels, paper, about) for protocol in study.options.protocols]
-
-
-def _table(
-    study: Study, protocol: Protocol, trajectory: str, labels: dict[Pair, dict[str, object]], paper: Figures, about: str
-) -> Table:
-    rows = []
-    for pair, label in labels.items():
-        runs = study.of(pair, once=False)
-        figures = protocol.average(runs, pair, trajectory)
-        rows.append({**label, "recordings": runs["run"].nunique(), **figures, **beside(paper.get(pair))})
-    table = Table(f"{about}, {protocol.title}", rows, [protocol.note], (PAPER,))
-    pairs = list(labels)
-    if study.chosen.partner in pairs and len(pairs) > 1:
-        ours = pairs.index(study.chosen.partner)
-        table.notes.append(table.ahead(ours, " + ".join(map(str, labels[pairs[ours]].values()))))
-    if any(pair.odometry == "rnin" for pair in pairs):
-        table.notes.append(
-            "Turns of rnin are those of the IMU's gyroscope, which from frame to frame no radar reaches."
-        )
-    if trajectory == "slam":
-        table.notes.append(protocol.loops)
-    return table
+    pairs, found = list(labels), []
+    runs = {pair: study.of(pair, once=False) for pair in pairs}
+    for protocol in study.options.protocols:
+        rows = []
+        for pair, label in labels.items():
+            figures = protocol.average(runs[pair], pair, trajectory)
+            rows.append({**label, "recordings": runs[pair]["run"].nunique(), **figures, **beside(paper.get(pair))})
+        table = Table(f"{about}, {protocol.title}", rows, [protocol.note], (PAPER,))
+        if study.chosen.partner in pairs and len(pairs) > 1:
+            ours = pairs.index(study.chosen.partner)
+            table.notes.append(table.ahead(ours, " + ".join(map(str, labels[pairs[ours]].values()))))
+        if any(pair.odometry == "rnin" for pair in pairs):
+            table.notes.append(GYROSCOPE)
+        if trajectory == "slam":
+            table.notes.append(protocol.loops)
+        found.append(table)
+    return found
 
 
 def beside(paper: tuple[float, ...] | None) -> dict[str, float | None]:

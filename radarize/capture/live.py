@@ -14,6 +14,7 @@ from radarize.capture.view import View
 from radarize.methods.registry import Inputs, Workshop
 from radarize.odometry.blindness import Blindness
 from radarize.recording import Losses, RecordingWriter
+from radarize.stopwatch import stage
 
 #: s between pictures of a frame, and of the map; redrawing the map takes at most this share of the time.
 _FRAME_INTERVAL, _MAP_INTERVAL, _MAP_SHARE = 0.2, 1.0, 0.05
@@ -70,11 +71,13 @@ class Live:
             if batch := self.intake.take(adc, stamps, valid):
                 result = self.pipeline.push(batch)
                 self.blindness.add(result.frames, result.track)
-                self.view.add(result)
+                with stage("page"):
+                    self.view.add(result)
             self.losses.add(valid)
             if writer:
                 writer.append(adc, stamps, valid)
-            self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
+            with stage("page"):
+                self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
             self.busy += time.monotonic() - start
             if progress:
                 progress(int(came["number"][-1]) + 1, frames or 0)

@@ -15,9 +15,6 @@ from radarize.evaluation.scans import scan_errors, true_ranges
 from radarize.evaluation.trajectory import Association, load, matched, trajectory, yaws
 from radarize.runfolder import RunFolder
 
-#: Trajectories of a run by what the metrics call them, the best last.
-TRAJECTORIES = ("odometry", "slam")
-
 
 def trajectory_errors(
     run: Path | RunFolder, reference: Path | None = None, association: Association = "interpolate"

@@ -11,6 +11,7 @@ Everything is sent column-wise, in batches of frames.
 """
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +52,7 @@ def view(
         InputError: rerun-sdk is not installed, unusable source, or the file cannot be written.
     """
     try:
-        import rerun  # noqa: F401
+        import rerun
     except ImportError as error:
         raise InputError("viewing needs rerun-sdk, which is not installed; type: pip install 'radarize[viewer]'") from (
             error
@@ -62,38 +63,25 @@ def view(
             raise InputError(f"{source} is a run, and --run {run} another, expected a recording with --run")
         source, run = None, source
     folder = None if run is None else RunFolder(run)
-    if save is None:
-        _show(source, folder, None, progress)
-        return None
-    with replacing(save) as part:
-        _show(source, folder, part, progress)
-    return Path(save)
-
-
-def _show(source: Path | None, run: RunFolder | None, save: Path | None, progress) -> None:
-    import rerun as rr
-
-    recording = None if source is None else Recording(source)
-    try:
-        stream = rr.RecordingStream("radarize", recording_id=str((source or run.path).resolve()))
-        if save is None:
-            stream.spawn(default_blueprint=_layout())
-        else:
-            stream.save(save, default_blueprint=_layout())
-        screen = Screen(stream)
-        if recording is not None:
-            if not len(recording):
-                raise InputError(f"{source}: has no whole frame, expected at least one")
-            screen.start = float(recording.times[0])
-        if run is not None:
-            show_run(screen, run)
-        if recording is not None:
-            show_recording(screen, recording, progress)
-        stream.flush()
-        stream.disconnect()
-    finally:
-        if recording is not None:
-            recording.file.close()
+    with Recording(source) if source else nullcontext() as recording:
+        if recording is not None and not len(recording):
+            raise InputError(f"{source}: has no whole frame, expected at least one")
+        stream = rerun.RecordingStream("radarize", recording_id=str((source or run).resolve()))
+        with replacing(save) if save else nullcontext() as part:
+            if part:
+                stream.save(part, default_blueprint=_layout())
+            else:
+                stream.spawn(default_blueprint=_layout())
+            screen = Screen(stream)
+            if recording is not None:
+                screen.start = float(recording.times[0])
+            if folder is not None:
+                show_run(screen, folder)
+            if recording is not None:
+                show_recording(screen, recording, progress)
+            stream.flush()
+            stream.disconnect()
+    return Path(save) if save else None
 
 
 def _layout():

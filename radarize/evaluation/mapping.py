@@ -5,6 +5,7 @@ import shapely
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
+from radarize.pose import inverse, transform
 from radarize.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid
@@ -78,20 +79,15 @@ def map_errors(
     walls = segment_points(plan)
     if seen is not None:
         walls = walls[cKDTree(seen).query(walls)[0] <= TOLERANCE]  # what the sensor had a chance to map
+    about = {"cells": len(cells), "seen_length": len(walls) * SPACING}
     if not len(cells) or not len(walls):
-        score = {"precision": np.nan, "recall": 0.0 if len(walls) else np.nan, "f1": np.nan, "chamfer": np.nan}
-        return {**score, "cells": len(cells), "seen_length": len(walls) * SPACING}
+        return {"precision": np.nan, "recall": 0.0 if len(walls) else np.nan, "f1": np.nan, "chamfer": np.nan} | about
     off_wall = distance_to_plan(cells, plan)
     off_map, _ = cKDTree(cells).query(walls)
-    precision, recall = float(np.mean(off_wall <= TOLERANCE)), float(np.mean(off_map <= TOLERANCE))
-    return {
-        "precision": precision,
-        "recall": recall,
-        "f1": 2 * precision * recall / max(precision + recall, 1e-12),
-        "chamfer": float((off_wall.mean() + off_map.mean()) / 2),
-        "cells": len(cells),
-        "seen_length": len(walls) * SPACING,
-    }
+    precision, recall = np.mean(off_wall <= TOLERANCE), np.mean(off_map <= TOLERANCE)
+    f1 = 2 * precision * recall / max(precision + recall, 1e-12)
+    chamfer = (off_wall.mean() + off_map.mean()) / 2
+    return {"precision": precision, "recall": recall, "f1": f1, "chamfer": chamfer} | about
 
 
 def free_space_iou(
@@ -122,8 +118,7 @@ def free_space_iou(
     row, column = np.nonzero((truth.probability > 0) & (truth.probability < 0.5))
     points = truth.origin + (np.column_stack([column, row]) + 0.5) * truth.resolution
     there = (np.column_stack([points, np.zeros(len(points))]) - shift) @ turn
-    c, s = np.cos(grid.origin[2]), np.sin(grid.origin[2])
-    at = np.floor((there[:, :2] - grid.origin[:2]) @ np.array([[c, -s], [s, c]]) / grid.resolution).astype(int)
+    at = np.floor(transform(inverse(grid.origin), there[:, :2]) / grid.resolution).astype(int)
     rows, columns = grid.free.shape
     inside = (at >= 0).all(axis=1) & (at[:, 0] < columns) & (at[:, 1] < rows)
     both = grid.free[rows - 1 - at[inside, 1], at[inside, 0]].sum()

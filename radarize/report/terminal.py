@@ -1,6 +1,6 @@
 """Figures of runs in the terminal."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from radarize.console import print_table
 from radarize.evaluation.blindness import BlindSpans
@@ -14,12 +14,7 @@ def print_metrics(metrics: Mapping[str, object]) -> None:
     for table in words.parts(metrics):
         print_table(*table)
     if "blind" in metrics:
-        found = BlindSpans.model_validate(metrics["blind"])
-        print(words.blindness(found))
-        if found.spans:
-            print_table(*words.blind_spans(found))
-
-
-def print_beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> None:
-    """Print runs beside each other, as (methods, metrics)."""
-    print_table(*words.beside(runs))
+        sentence, spans = words.blindness(BlindSpans.model_validate(metrics["blind"]))
+        print(sentence)
+        if spans.rows:
+            print_table(*spans)

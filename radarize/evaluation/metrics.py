@@ -71,20 +71,19 @@ class TrajectoryErrors:
     def summary(self) -> dict[str, object]:
         """Figures for metrics.json; None where there is nothing to average."""
         relative = {
-            name: {"position": asdict(self.relative_position[name]), "rotation": asdict(self.relative_rotation[name])}
-            for name in self.relative_position
+            name: {"position": asdict(position), "rotation": asdict(self.relative_rotation[name])}
+            for name, position in self.relative_position.items()
         }
-        return without_nan(
-            {
-                "ate": {"position": asdict(self.position), "rotation": asdict(self.rotation)},
-                "re": relative,
-                "distance": self.distance,
-                "duration": self.duration,
-                "ate_share": self.share,
-                "drift": self.drift,
-                "matched": len(self.time),
-            }
-        )
+        figures = {
+            "ate": {"position": asdict(self.position), "rotation": asdict(self.rotation)},
+            "re": relative,
+            "distance": self.distance,
+            "duration": self.duration,
+            "ate_share": self.share,
+            "drift": self.drift,
+            "matched": len(self.time),
+        }
+        return without_nan(figures)
 
 
 def evaluate_trajectory(

@@ -147,12 +147,10 @@ def _odometry_message(
 
 
 def _transform(time: float, frame: str, child: str, pose: Float[np.ndarray, "7"]) -> object:
-    motion = message(
-        "geometry_msgs/msg/Transform", translation=vector(pose[:3]), rotation=vector(pose[3:], "Quaternion")
-    )
-    return message(
-        "geometry_msgs/msg/TransformStamped", header=header(time, frame), child_frame_id=child, transform=motion
-    )
+    place = {"translation": vector(pose[:3]), "rotation": vector(pose[3:], "Quaternion")}
+    motion = message("geometry_msgs/msg/Transform", **place)
+    stamp = header(time, frame)
+    return message("geometry_msgs/msg/TransformStamped", header=stamp, child_frame_id=child, transform=motion)
 
 
 # --- of a recording ---------------------------------------------------------------------------------------------------

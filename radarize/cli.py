@@ -341,7 +341,6 @@ def evaluate(
     from radarize.evaluation.evaluate import evaluate
     from radarize.report import words
     from radarize.report.run import methods
-    from radarize.report.terminal import print_metrics
     from radarize.runfolder import RunFolder
 
     with working("evaluating"):
@@ -352,7 +351,8 @@ def evaluate(
     if as_json:
         _print_json(metrics)
         return
-    print_metrics(metrics)
+    for part in words.everything(metrics):
+        print(part) if isinstance(part, str) else print_table(*part)
     if compared:
         print_table(*words.beside([(methods(folder), metrics), *compared]))
 

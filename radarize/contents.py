@@ -55,10 +55,10 @@ def contents(path: Path) -> dict[str, object]:
 def _plain(value: object) -> object:
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, tuple | list | np.ndarray):
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, tuple | list):
         return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return value.item()
     return value if isinstance(value, bool | int | float | str) or value is None else str(value)
 
 

@@ -183,11 +183,9 @@ def show_recording(screen: Screen, recording: Recording, progress: Callable[[int
         ends = recording.read("truth/floor_plan").reshape(-1, 2, 2)
         walls = np.concatenate([ends, np.zeros((len(ends), 2, 1))], axis=2)
         screen.fixed("world/floor_plan", rr.LineStrips3D(walls, colors=_rgb(COLORS["truth"]), radii=0.01))
-    if recording.has("truth/pose") and recording.has("truth/time"):
-        stamps, poses = recording.read("truth/time"), recording.read("truth/pose")
-        known = np.isfinite(poses).all(axis=1)
-        screen.line("world/truth/path", poses[known, :3], COLORS["good"])
-        screen.poses("world/truth/radar", stamps[known], poses[known])
+    if truth := recording.true_poses():
+        screen.line("world/truth/path", truth[1][:, :3], COLORS["good"])
+        screen.poses("world/truth/radar", *truth)
     if recording.has("truth/velocity"):
         speeds = recording.rows("truth/velocity", 0, len(recording))[:, :2]
         screen.speeds(recording.times + config.burst_center, speeds, "truth")

@@ -48,7 +48,14 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
             f"{len(recording)} frames in {found['duration']:.2f} s · {config.board} · {len(config.tx)} transmitters, "
             f"{len(config.rx)} receivers, {config.loops} loops, {config.samples} samples",
         )
-        _headline(page, found, config)
+        page.headline(
+            [
+                (f"{100 * config.range_resolution:.2f} cm", "range resolution"),
+                (f"{config.max_range:.2f} m", "largest range"),
+                (f"±{config.max_velocity:.2f} m/s", "unambiguous radial speed"),
+                (f"{100 * found['lost_share']:.2g} %", f"chirps lost ({found['lost_chirps']})"),
+            ]
+        )
         maps = Heatmaps(config)
         _profiles(page, recording, maps)
         _maps(page, recording, maps)
@@ -61,17 +68,6 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
     config = {name: value for name, value in found["config"].items() if name != "channel_calibration"}
     page.columns({"configuration (SI units)": config, "derived": found["derived"], "attributes": found["attributes"]})
     return page.write(output)
-
-
-def _headline(page: Page, found: dict, config) -> None:
-    page.headline(
-        [
-            (f"{100 * config.range_resolution:.2f} cm", "range resolution"),
-            (f"{config.max_range:.2f} m", "largest range"),
-            (f"±{config.max_velocity:.2f} m/s", "unambiguous radial speed"),
-            (f"{100 * found['lost_share']:.2g} %", f"chirps lost ({found['lost_chirps']})"),
-        ]
-    )
 
 
 def _batches(recording: Recording, count: int):

@@ -100,6 +100,18 @@ def parts(metrics: Mapping[str, object]) -> Iterator[Table]:
             yield Table((name, "value"), [(figure.words, figure.text(metrics[name])) for figure in figures])
 
 
+def everything(metrics: Mapping[str, object]) -> Iterator[Table | str]:
+    """Tables and sentences of all that `radarize.evaluation.evaluate` returned, without what figures mean."""
+    head, rows, numbers = trajectories(metrics)
+    yield Table(head[:-1], [row[:-1] for row in rows], numbers)
+    yield from parts(metrics)
+    if "blind" in metrics:
+        sentence, spans = blindness(BlindSpans.model_validate(metrics["blind"]))
+        yield sentence
+        if spans.rows:
+            yield spans
+
+
 def beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> Table:
     """Runs of one recording beside each other, by what they were made with."""
     head = ("method", *(f"{figure.words}, {figure.unit}" for figure in _BESIDE))

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from radarize.console import new_app, progress, run, until_interrupted, working
+from radarize.console import new_app, print_table, progress, run, until_interrupted, working
 from radarize.errors import InputError
 
 app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
@@ -339,8 +339,8 @@ def evaluate(
 ):
     """Compare a run with the truth; writes metrics.json."""
     from radarize.evaluation.evaluate import evaluate
+    from radarize.report import words
     from radarize.report.run import methods
-    from radarize.report.terminal import print_beside, print_metrics
     from radarize.runfolder import RunFolder
 
     with working("evaluating"):
@@ -351,9 +351,10 @@ def evaluate(
     if as_json:
         _print_json(metrics)
         return
-    print_metrics(metrics)
+    for part in words.everything(metrics):
+        print(part) if isinstance(part, str) else print_table(*part)
     if compared:
-        print_beside([(methods(folder), metrics), *compared])
+        print_table(*words.beside([(methods(folder), metrics), *compared]))
 
 
 @app.command()

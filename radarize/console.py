@@ -1,6 +1,5 @@
 """What both command lines share: errors as one sentence, progress bars, and how a command is stopped."""
 
-import errno
 import signal
 import sys
 import threading
@@ -10,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from radarize.errors import InputError
+from radarize.errors import InputError, first_line, reason
 
 #: Exit code of everything that ends in an error sentence.
 FAILED = 2
@@ -61,15 +60,10 @@ def _sentence(error: BaseException) -> str:
     if hasattr(error, "format_message"):  # the parser's own: a wrong option, a missing argument
         return " ".join(error.format_message().split())
     if isinstance(error, MemoryError) or type(error).__name__ == "OutOfMemoryError":
-        return f"not enough memory ({_first_line(error)}); a shorter recording or a smaller scene needs less"
+        return f"not enough memory ({first_line(error)}); a shorter recording or a smaller scene needs less"
     if isinstance(error, OSError):
-        reason = "no space left on the device" if error.errno == errno.ENOSPC else error.strerror or _first_line(error)
-        return f"{error.filename}: {reason}" if error.filename else reason
-    return f"internal error, {type(error).__name__}: {_first_line(error)}; --debug shows where"
-
-
-def _first_line(error: BaseException) -> str:
-    return str(error).strip().split("\n", 1)[0] or type(error).__name__
+        return f"{error.filename}: {reason(error)}" if error.filename else reason(error)
+    return f"internal error, {type(error).__name__}: {first_line(error)}; --debug shows where"
 
 
 @contextmanager

@@ -38,7 +38,6 @@ def contents(path: Path) -> dict[str, object]:
     with Recording(path) as recording:
         config, times = recording.config, recording.times
         valid = recording.valid(0, len(recording))
-        attributes = {name: value for name, value in recording.attributes.items()}
         return {
             "path": str(path),
             "frames": len(recording),
@@ -49,17 +48,17 @@ def contents(path: Path) -> dict[str, object]:
             "config": recording.config_json(),
             "derived": {name: float(getattr(config, name)) for name in DERIVED},
             "data_sets": {name: _plain(recording.describe(name)) for name in recording.names()},
-            "attributes": {name: _plain(value) for name, value in attributes.items()},
+            "attributes": {name: _plain(value) for name, value in recording.attributes.items()},
         }
 
 
 def _plain(value: object) -> object:
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, tuple | list | np.ndarray):
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, tuple | list):
         return [_plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return value.item()
     return value if isinstance(value, bool | int | float | str) or value is None else str(value)
 
 
@@ -69,6 +68,15 @@ def _readable(value: float, unit: str) -> tuple[str, str]:
         if abs(value) >= factor * 0.9999:
             return f"{value / factor:.5g}", prefix + unit
     return f"{value:.5g}", unit
+
+
+def data_sets(found: dict) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Head and rows of a table of the data sets that `contents` found."""
+    rows = [
+        (f"/{name}", " x ".join(map(str, item["shape"])), item["dtype"], item["unit"], item["about"])
+        for name, item in found["data_sets"].items()
+    ]
+    return ("data set", "shape", "type", "unit", "about"), rows
 
 
 def show(found: dict) -> None:
@@ -83,9 +91,5 @@ def show(found: dict) -> None:
     print_table(("configuration", "value"), config.items())
     derived = [(name, *_readable(value, DERIVED[name])) for name, value in found["derived"].items()]
     print_table(("derived", "value", "unit"), derived, numbers=(1,))
-    data = [
-        (f"/{name}", " x ".join(map(str, item["shape"])), item["dtype"], item["unit"], item["about"])
-        for name, item in found["data_sets"].items()
-    ]
-    print_table(("data set", "shape", "type", "unit", "about"), data)
+    print_table(*data_sets(found))
     print_table(("attribute", "value"), found["attributes"].items())

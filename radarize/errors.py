@@ -18,6 +18,11 @@ class InputError(Exception):
         return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
+def first_line(error: BaseException) -> str:
+    """The first line of an error's own words, or what kind it is if it has none."""
+    return str(error).strip().split("\n", 1)[0] or type(error).__name__
+
+
 def reason(error: Exception) -> str:
     """What a library or the system says went wrong with a file, in a few printable words."""
     text = str(error)

@@ -11,6 +11,7 @@ Everything is sent column-wise, in batches of frames.
 """
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -51,7 +52,7 @@ def view(
         InputError: rerun-sdk is not installed, unusable source, or the file cannot be written.
     """
     try:
-        import rerun  # noqa: F401
+        import rerun
     except ImportError as error:
         raise InputError("viewing needs rerun-sdk, which is not installed; type: pip install 'radarize[viewer]'") from (
             error
@@ -62,38 +63,25 @@ def view(
             raise InputError(f"{source} is a run, and --run {run} another, expected a recording with --run")
         source, run = None, source
     folder = None if run is None else RunFolder(run)
-    if save is None:
-        _show(source, folder, None, progress)
-        return None
-    with replacing(save) as part:
-        _show(source, folder, part, progress)
-    return Path(save)
-
-
-def _show(source: Path | None, run: RunFolder | None, save: Path | None, progress) -> None:
-    import rerun as rr
-
-    recording = None if source is None else Recording(source)
-    try:
-        stream = rr.RecordingStream("radarize", recording_id=str((source or run.path).resolve()))
-        if save is None:
-            stream.spawn(default_blueprint=_layout())
-        else:
-            stream.save(save, default_blueprint=_layout())
-        screen = Screen(stream)
-        if recording is not None:
-            if not len(recording):
-                raise InputError(f"{source}: has no whole frame, expected at least one")
-            screen.start = float(recording.times[0])
-        if run is not None:
-            show_run(screen, run)
-        if recording is not None:
-            show_recording(screen, recording, progress)
-        stream.flush()
-        stream.disconnect()
-    finally:
-        if recording is not None:
-            recording.file.close()
+    with Recording(source) if source else nullcontext() as recording:
+        if recording is not None and not len(recording):
+            raise InputError(f"{source}: has no whole frame, expected at least one")
+        stream = rerun.RecordingStream("radarize", recording_id=str((source or run).resolve()))
+        with replacing(save) if save else nullcontext() as part:
+            if part:
+                stream.save(part, default_blueprint=_layout())
+            else:
+                stream.spawn(default_blueprint=_layout())
+            screen = Screen(stream)
+            if recording is not None:
+                screen.start = float(recording.times[0])
+            if folder is not None:
+                show_run(screen, folder)
+            if recording is not None:
+                show_recording(screen, recording, progress)
+            stream.flush()
+            stream.disconnect()
+    return Path(save) if save else None
 
 
 def _layout():
@@ -195,11 +183,9 @@ def show_recording(screen: Screen, recording: Recording, progress: Callable[[int
         ends = recording.read("truth/floor_plan").reshape(-1, 2, 2)
         walls = np.concatenate([ends, np.zeros((len(ends), 2, 1))], axis=2)
         screen.fixed("world/floor_plan", rr.LineStrips3D(walls, colors=_rgb(COLORS["truth"]), radii=0.01))
-    if recording.has("truth/pose") and recording.has("truth/time"):
-        stamps, poses = recording.read("truth/time"), recording.read("truth/pose")
-        known = np.isfinite(poses).all(axis=1)
-        screen.line("world/truth/path", poses[known, :3], COLORS["good"])
-        screen.poses("world/truth/radar", stamps[known], poses[known])
+    if truth := recording.true_poses():
+        screen.line("world/truth/path", truth[1][:, :3], COLORS["good"])
+        screen.poses("world/truth/radar", *truth)
     if recording.has("truth/velocity"):
         speeds = recording.rows("truth/velocity", 0, len(recording))[:, :2]
         screen.speeds(recording.times + config.burst_center, speeds, "truth")

@@ -47,20 +47,19 @@ class Sensor(Stream):
         port: str,
         *,
         baud: int = BAUD,
-        network: Network | None = None,
+        network: Network,
         slots: int = 64,
     ):
         check_limits(config)
         self.text, self.version = text_for(config, text, name), ""
-        self._notes: list[str] = []
         self._running = False
-        self.port, network = port, network or Network()
+        self.port = port
         with contextlib.ExitStack() as stack:
             self._uart = stack.enter_context(Uart(port, baud))
             self._board = stack.enter_context(Board(network))
             self._receiver = stack.enter_context(network.bind(network.data_port))
             self._open = stack.pop_all()
-        self._notes += buffer_warning(enlarge(self._receiver), config)
+        self._notes = buffer_warning(enlarge(self._receiver), config)
         super().__init__(config, receive, self._receiver, network.dca, config, slots=slots)
 
     def __enter__(self) -> "Sensor":

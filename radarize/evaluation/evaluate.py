@@ -15,9 +15,6 @@ from radarize.evaluation.scans import scan_errors, true_ranges
 from radarize.evaluation.trajectory import Association, load, matched, trajectory, yaws
 from radarize.runfolder import RunFolder
 
-#: Trajectories of a run by what the metrics call them, the best last.
-TRAJECTORIES = ("odometry", "slam")
-
 
 def trajectory_errors(
     run: Path | RunFolder, reference: Path | None = None, association: Association = "interpolate"
@@ -49,10 +46,8 @@ def trajectories(run: RunFolder) -> dict[str, PoseTrajectory3D]:
     return {name: trajectory(*poses) for name, poses in found.items() if poses is not None}
 
 
-def true_scans(scans: Mapping[str, np.ndarray], truth: TrajectoryErrors) -> tuple[np.ndarray, ...] | None:
-    """Positions, yaw, azimuths and ranges of what the radar could return, in the reference's frame; None if unknown."""
-    if "truth/scan" not in scans or "truth/scan_azimuths" not in scans:
-        return None
+def true_scans(scans: Mapping[str, np.ndarray], truth: TrajectoryErrors) -> tuple[np.ndarray, ...]:
+    """Positions, yaw, azimuths and ranges of what the radar could return, in the reference's frame."""
     azimuths = scans["truth/scan_azimuths"]
     inside = (azimuths >= scans["azimuths"].min()) & (azimuths <= scans["azimuths"].max())
     still = np.zeros((len(scans["time"]), 7))
@@ -85,7 +80,7 @@ def evaluate(
     metrics: dict[str, object] = {name: item.summary() for name, item in errors.items()}
     metrics["reference"] = Path(reference).name if reference else "reference.tum"
     scans, grid, best = run.scans, run.map, errors["slam"]
-    if {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
+    if scans_known := {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
         there = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
         metrics["scans"] = scan_errors(scans["ranges"], there)
     if {"velocity", "truth/velocity"} <= scans.keys():
@@ -93,10 +88,10 @@ def evaluate(
             scans["velocity"][:, :2], scans["truth/velocity"][:, :2], scans.get("velocity_covariance")
         )
     if "truth/floor_plan" in scans and grid is not None:
-        true = true_scans(scans, best)
-        seen = None if true is None else scan_endpoints(*true)
+        true = true_scans(scans, best) if scans_known else None
+        seen = scan_endpoints(*true) if true else None
         metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
-        if true is not None:
+        if true:
             metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
     if blind := BlindSpans.of(run):
         metrics["blind"] = blind.model_dump()

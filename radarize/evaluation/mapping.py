@@ -5,6 +5,7 @@ import shapely
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
+from radarize.pose import inverse, transform
 from radarize.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid
@@ -29,20 +30,9 @@ def distance_to_plan(
     points: Float[np.ndarray, "point 2"], plan: Float[np.ndarray, "segment 4"]
 ) -> Float[np.ndarray, "point"]:
     """Distance of each point to the nearest segment, m."""
-    segments = shapely.linestrings(np.asarray(plan, float).reshape(-1, 2, 2))
-    _, distances = shapely.STRtree(segments).query_nearest(
-        shapely.points(points), return_distance=True, all_matches=False
-    )
-    return distances
-
-
-def visible_part(
-    plan_points: Float[np.ndarray, "point 2"], endpoints: Float[np.ndarray, "end 2"], reach: float = TOLERANCE
-) -> np.ndarray:
-    """Which points of the plan some true beam ended near to: what the sensor had a chance to map."""
-    if not len(endpoints):
-        return np.zeros(len(plan_points), bool)
-    return cKDTree(endpoints).query(plan_points, distance_upper_bound=reach)[0] <= reach
+    walls = shapely.multilinestrings(shapely.linestrings(np.reshape(plan, (-1, 2, 2)).astype(float)))
+    shapely.prepare(walls)
+    return shapely.distance(walls, shapely.points(points))
 
 
 def scan_endpoints(
@@ -52,12 +42,14 @@ def scan_endpoints(
     ranges: Float[np.ndarray, "scan beam"],
 ) -> Float[np.ndarray, "end 2"]:
     """Where the beams that returned anything end, m, in the frame of the poses."""
-    bearing = yaw[:, None] + azimuths
     hit = np.isfinite(ranges) & (ranges > 0)
-    ends = positions[:, None] + np.where(hit, ranges, 0)[..., None] * np.stack(
-        [np.cos(bearing), np.sin(bearing)], axis=-1
-    )
-    return ends[hit]
+    return _ends(positions, yaw, azimuths, np.where(hit, ranges, 0))[hit]
+
+
+def _ends(positions: np.ndarray, yaw: np.ndarray, azimuths: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Ends of beams of some lengths, (scan, beam, 2); arguments as of `scan_endpoints`."""
+    bearing = yaw[:, None] + azimuths
+    return positions[:, None] + lengths[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
 
 
 def map_errors(
@@ -86,21 +78,16 @@ def map_errors(
     cells = (np.column_stack([cells, np.zeros(len(cells))]) @ turn.T + shift)[:, :2]
     walls = segment_points(plan)
     if seen is not None:
-        walls = walls[visible_part(walls, seen)]
+        walls = walls[cKDTree(seen).query(walls)[0] <= TOLERANCE]  # what the sensor had a chance to map
+    about = {"cells": len(cells), "seen_length": len(walls) * SPACING}
     if not len(cells) or not len(walls):
-        score = {"precision": np.nan, "recall": 0.0 if len(walls) else np.nan, "f1": np.nan, "chamfer": np.nan}
-        return {**score, "cells": len(cells), "seen_length": len(walls) * SPACING}
+        return {"precision": np.nan, "recall": 0.0 if len(walls) else np.nan, "f1": np.nan, "chamfer": np.nan} | about
     off_wall = distance_to_plan(cells, plan)
     off_map, _ = cKDTree(cells).query(walls)
-    precision, recall = float(np.mean(off_wall <= TOLERANCE)), float(np.mean(off_map <= TOLERANCE))
-    return {
-        "precision": precision,
-        "recall": recall,
-        "f1": 2 * precision * recall / max(precision + recall, 1e-12),
-        "chamfer": float((off_wall.mean() + off_map.mean()) / 2),
-        "cells": len(cells),
-        "seen_length": len(walls) * SPACING,
-    }
+    precision, recall = np.mean(off_wall <= TOLERANCE), np.mean(off_map <= TOLERANCE)
+    f1 = 2 * precision * recall / max(precision + recall, 1e-12)
+    chamfer = (off_wall.mean() + off_map.mean()) / 2
+    return {"precision": precision, "recall": recall, "f1": f1, "chamfer": chamfer} | about
 
 
 def free_space_iou(
@@ -125,16 +112,13 @@ def free_space_iou(
         return float("nan")
     config = GridConfig()
     truth = OccupancyGrid.empty(grid.resolution)
-    bearing = yaw[:, None] + azimuths
-    lengths = np.where(met, ranges, ranges[met].max())
-    ends = positions[:, None] + lengths[..., None] * np.stack([np.cos(bearing), np.sin(bearing)], axis=-1)
+    ends = _ends(positions, yaw, azimuths, np.where(met, ranges, ranges[met].max()))
     for origin, end, hits in zip(positions, ends, met, strict=True):
         truth.insert(np.broadcast_to(origin, end.shape), end, hits, config)
     row, column = np.nonzero((truth.probability > 0) & (truth.probability < 0.5))
     points = truth.origin + (np.column_stack([column, row]) + 0.5) * truth.resolution
     there = (np.column_stack([points, np.zeros(len(points))]) - shift) @ turn
-    c, s = np.cos(grid.origin[2]), np.sin(grid.origin[2])
-    at = np.floor((there[:, :2] - grid.origin[:2]) @ np.array([[c, -s], [s, c]]) / grid.resolution).astype(int)
+    at = np.floor(transform(inverse(grid.origin), there[:, :2]) / grid.resolution).astype(int)
     rows, columns = grid.free.shape
     inside = (at >= 0).all(axis=1) & (at[:, 0] < columns) & (at[:, 1] < rows)
     both = grid.free[rows - 1 - at[inside, 1], at[inside, 0]].sum()

@@ -7,6 +7,7 @@ published tables, relative rotation is a true relative error. Transformations an
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
+import pandas as pd
 from evo.core.metrics import APE, RPE, PoseRelation
 from evo.core.trajectory import PoseTrajectory3D
 from jaxtyping import Float
@@ -30,10 +31,8 @@ class Statistics:
     @classmethod
     def of(cls, errors: np.ndarray) -> "Statistics":
         """Statistics of finite errors."""
-        errors = np.asarray(errors, float)
-        if not len(errors):
-            return cls(np.nan, np.nan, np.nan, 0)
-        return cls(float(errors.mean()), float(np.sqrt(np.mean(errors**2))), float(errors.max()), len(errors))
+        errors = pd.Series(errors, dtype=float)  # whose mean of nothing is NaN
+        return cls(errors.mean(), float(np.sqrt((errors**2).mean())), errors.max(), len(errors))
 
 
 @dataclass(frozen=True)
@@ -72,20 +71,19 @@ class TrajectoryErrors:
     def summary(self) -> dict[str, object]:
         """Figures for metrics.json; None where there is nothing to average."""
         relative = {
-            name: {"position": asdict(self.relative_position[name]), "rotation": asdict(self.relative_rotation[name])}
-            for name in self.relative_position
+            name: {"position": asdict(position), "rotation": asdict(self.relative_rotation[name])}
+            for name, position in self.relative_position.items()
         }
-        return without_nan(
-            {
-                "ate": {"position": asdict(self.position), "rotation": asdict(self.rotation)},
-                "re": relative,
-                "distance": self.distance,
-                "duration": self.duration,
-                "ate_share": self.share,
-                "drift": self.drift,
-                "matched": len(self.time),
-            }
-        )
+        figures = {
+            "ate": {"position": asdict(self.position), "rotation": asdict(self.rotation)},
+            "re": relative,
+            "distance": self.distance,
+            "duration": self.duration,
+            "ate_share": self.share,
+            "drift": self.drift,
+            "matched": len(self.time),
+        }
+        return without_nan(figures)
 
 
 def evaluate_trajectory(
@@ -148,10 +146,12 @@ def _absolute_errors(estimate: PoseTrajectory3D, reference: PoseTrajectory3D, re
 
 def _pairs(reference: PoseTrajectory3D) -> dict[str, np.ndarray]:
     """Index pairs (first, second) of poses one frame, one second and one metre of the reference apart."""
-    count = reference.num_poses
-    frames = np.column_stack([np.arange(count - 1), np.arange(1, count)])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(reference.positions_xyz, axis=0), axis=1))])
-    return {"frame": frames, "second": _apart(reference.timestamps, SECOND), "metre": _apart(along, METRE)}
+    frames = np.arange(reference.num_poses)
+    return {
+        "frame": np.column_stack([frames[:-1], frames[1:]]),
+        "second": _apart(reference.timestamps, SECOND),
+        "metre": _apart(reference.distances, METRE),
+    }
 
 
 def _apart(values: np.ndarray, delta: float) -> np.ndarray:

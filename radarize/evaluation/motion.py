@@ -3,6 +3,7 @@ uncertainties are honest.
 """
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from radarize.evaluation.metrics import Statistics
@@ -32,7 +33,7 @@ def velocity_errors(
     """
     known = np.isfinite(estimate).all(axis=1) & np.isfinite(true).all(axis=1)
     difference, motion = (estimate - true)[known], true[known]
-    length, speed = np.linalg.norm(difference, axis=1), np.linalg.norm(motion, axis=1)
+    length, speed = pd.Series(np.linalg.norm(difference, axis=1)), np.linalg.norm(motion, axis=1)
     moving = speed > MOVING
     along = (difference[moving] * motion[moving]).sum(axis=1) / speed[moving]
     statistics = Statistics.of(length)
@@ -40,12 +41,12 @@ def velocity_errors(
         "mean": statistics.mean,
         "rmse": statistics.rmse,
         "max": statistics.max,
-        "median": float(np.median(length)) if len(length) else np.nan,
-        "p90": float(np.percentile(length, 90)) if len(length) else np.nan,
+        "median": length.median(),
+        "p90": length.quantile(0.9),
         "forward": Statistics.of(difference[:, 0]).rmse,
         "left": Statistics.of(difference[:, 1]).rmse,
         "bias": Statistics.of(along).mean,
-        "missing": float(1 - known.mean()) if len(known) else np.nan,
+        "missing": 1 - pd.Series(known).mean(),
     }
     if covariance is not None and len(length):
         try:

@@ -6,6 +6,7 @@ Where the truth has no surface in reach, whatever is measured is too short.
 from collections.abc import Sequence
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float, Int, UInt8
 
 from radarize.evaluation.mapping import TOLERANCE
@@ -42,21 +43,15 @@ def scan_errors(measured: Float[np.ndarray, "scan beam"], true: Float[np.ndarray
     hit, reach = _returned(measured), np.isfinite(true)
     length = np.where(hit, measured, 0.0)
     far, distance = _beside(length, true)
-    difference = np.where(reach, length - np.where(reach, true, 0), -np.inf)[hit]
-    through = hit & (length > far + THROUGH)
-    some = len(difference) > 0
-
-    def share(wrong: np.ndarray) -> float:
-        return float(np.mean(wrong)) if some else np.nan
-
+    difference = pd.Series(np.where(reach, length - np.where(reach, true, 0), -np.inf)[hit])
     return {
-        "within_10cm": share(np.abs(difference) <= TOLERANCE),
-        "beside": share(distance[hit] <= TOLERANCE),
-        "returned": float(hit[reach].mean()) if reach.any() else np.nan,
-        "median": float(np.median(np.abs(difference))) if some else np.nan,
-        "beyond": share(difference > TOLERANCE),
-        "short": share(difference < -TOLERANCE),
-        "through": float(through[reach].mean()) if reach.any() else np.nan,
+        "within_10cm": (difference.abs() <= TOLERANCE).mean(),
+        "beside": pd.Series(distance[hit] <= TOLERANCE).mean(),
+        "returned": pd.Series(hit[reach]).mean(),
+        "median": difference.abs().median(),
+        "beyond": (difference > TOLERANCE).mean(),
+        "short": (difference < -TOLERANCE).mean(),
+        "through": pd.Series((hit & (length > far + THROUGH))[reach]).mean(),
     }
 
 
@@ -90,8 +85,7 @@ def wrong_by_cause(
     column = _nearest(cause_azimuths, azimuths)[beam]
     found = cause[scan, row, column]
     counts = np.bincount(np.minimum(found, len(names)), minlength=len(names) + 1)
-    total = hit.sum()
-    return {name: float(n / total) if total else np.nan for name, n in zip([*names, "noise"], counts, strict=True)}
+    return (pd.Series(counts, [*names, "noise"]) / hit.sum()).to_dict()
 
 
 def _returned(measured: np.ndarray) -> np.ndarray:

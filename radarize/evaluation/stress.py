@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from radarize.evaluation.mapping import TOLERANCE
@@ -49,7 +50,7 @@ def missed(measured: Float[np.ndarray, "scan beam"], true: Float[np.ndarray, "sc
     """
     reach = np.isfinite(true)
     seen = np.isfinite(measured) & (measured > 0) & (measured <= true + TOLERANCE)
-    return float(1 - seen[reach].mean()) if reach.any() else np.nan
+    return 1 - pd.Series(seen[reach]).mean()
 
 
 def sources(scans: Mapping[str, np.ndarray], true: Float[np.ndarray, "scan beam"], recording: Path) -> dict[str, float]:

@@ -78,20 +78,12 @@ def matched(
             f"{names[0]}: {len(used)} of {len(times)} poses have a counterpart in {names[1]}, expected at least 3; "
             f"{_span(names[0], times)}, {_span(names[1], known)}"
         )
-    positions = reference.positions_xyz[nearest]
-    turns = Rotation.from_quat(reference.orientations_quat_wxyz[nearest], scalar_first=True)
-    if between.any():
-        shares = (times - known[before]) / (known[after] - known[before])
-        start, end = reference.positions_xyz[before], reference.positions_xyz[after]
-        positions = np.where(between[:, None], start + shares[:, None] * (end - start), positions)
-        attitude = Slerp(known, Rotation.from_quat(reference.orientations_quat_wxyz, scalar_first=True))
-        turns = Rotation.concatenate(
-            [attitude(t) if b else turn for t, b, turn in zip(times, between, turns, strict=True)]
-        )
-    quaternions = turns.as_quat(scalar_first=True)
+    instants = np.where(between, times, known[nearest])[used]
+    positions = np.column_stack([np.interp(instants, known, axis) for axis in reference.positions_xyz.T])
+    turns = Slerp(known, Rotation.from_quat(reference.orientations_quat_wxyz, scalar_first=True))(instants)
     return (
         PoseTrajectory3D(estimate.positions_xyz[used], estimate.orientations_quat_wxyz[used], times[used]),
-        PoseTrajectory3D(positions[used], quaternions[used], times[used]),
+        PoseTrajectory3D(positions, turns.as_quat(scalar_first=True), times[used]),
     )
 
 

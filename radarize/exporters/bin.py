@@ -1,6 +1,7 @@
 """Raw samples as an IWR1843 with a DCA1000 leaves them: ``NAME.bin`` and ``NAME.cfg``."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from radarize.errors import InputError
@@ -24,8 +25,9 @@ def export_bin(source: Path, output: Path, *, run: None, progress: Callable[[int
         stem = output.with_suffix("") if output.suffix in (".bin", ".cfg") else output
         binary, settings = stem.with_name(stem.name + ".bin"), stem.with_name(stem.name + ".cfg")
         text = write_cfg(config)
-        if recording.cfg_text and _says_the_same(recording.cfg_text, config):
-            text = recording.cfg_text
+        with suppress(InputError):
+            if recording.cfg_text and parse_cfg(recording.cfg_text) == config:
+                text = recording.cfg_text  # with its own comments, since it says the same
 
         with replacing(settings) as part:
             part.write_bytes(text.encode())
@@ -34,10 +36,3 @@ def export_bin(source: Path, output: Path, *, run: None, progress: Callable[[int
                 file.write(encode(adc, config).astype("<i2", copy=False).data)
                 progress(frames.stop, len(recording))
     return binary
-
-
-def _says_the_same(text: str, config: object) -> bool:
-    try:
-        return parse_cfg(text) == config
-    except InputError:
-        return False

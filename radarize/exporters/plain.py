@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
 from radarize.errors import InputError
 from radarize.recording import Recording
 from radarize.runfolder import RunFolder
@@ -20,12 +18,9 @@ def export_tum(source: Path, output: Path, *, run: None, progress: Callable[[int
     if source.is_dir():
         return write_tum(output, *RunFolder(source).trajectory)
     with Recording(source) as recording:
-        if not (recording.has("truth/time") and recording.has("truth/pose")):
+        if (truth := recording.true_poses()) is None:
             raise InputError(f"{source}: has no true poses (/truth/time and /truth/pose) to write as TUM")
-        times, poses = recording.read("truth/time"), recording.read("truth/pose")
-    shared = min(len(times), len(poses))
-    known = np.isfinite(poses[:shared]).all(axis=1)
-    return write_tum(output, times[:shared][known], poses[:shared][known])
+    return write_tum(output, *truth)
 
 
 def export_map(source: Path, output: Path, *, run: None, progress: Callable[[int, int], None]) -> Path:

@@ -85,7 +85,7 @@ def _write(
 
 
 def _check_pair(recording: Recording, log: Log, run: Path) -> None:
-    middle = recording.times + recording.config.burst_center
+    middle = _middles(recording)
     if len(log.times) != len(middle) or np.abs(log.times - middle).max() > recording.config.frame_period:
         raise InputError(
             f"{run}: has {len(log.times)} scans from {log.times[0]:.3f} s on, expected the run of {recording.path} "
@@ -147,15 +147,18 @@ def _odometry_message(
 
 
 def _transform(time: float, frame: str, child: str, pose: Float[np.ndarray, "7"]) -> object:
-    motion = message(
-        "geometry_msgs/msg/Transform", translation=vector(pose[:3]), rotation=vector(pose[3:], "Quaternion")
-    )
-    return message(
-        "geometry_msgs/msg/TransformStamped", header=header(time, frame), child_frame_id=child, transform=motion
-    )
+    place = {"translation": vector(pose[:3]), "rotation": vector(pose[3:], "Quaternion")}
+    motion = message("geometry_msgs/msg/Transform", **place)
+    stamp = header(time, frame)
+    return message("geometry_msgs/msg/TransformStamped", header=stamp, child_frame_id=child, transform=motion)
 
 
 # --- of a recording ---------------------------------------------------------------------------------------------------
+def _middles(recording: Recording) -> Float[np.ndarray, "frame"]:
+    """Stamps of the middles of the bursts, s, which is what frames are of."""
+    return recording.times + recording.config.burst_center
+
+
 def _mounts(recording: Recording) -> list[tuple[str, str, np.ndarray]]:
     """Places of the other sensors on the radar, where the recording has them."""
     found = [(BASE, frame, recording.read(name)) for name, frame in _MOUNTS.items() if recording.has(name)]
@@ -169,17 +172,15 @@ def _heatmaps(recording: Recording) -> Iterator[Event]:
     for frames, adc in recording.batches(_BATCH):
         power = maps.range_azimuth(adc, recording.valid(frames.start, frames.stop)).numpy()
         decibels = 10 * np.log10(np.maximum(np.nan_to_num(power), 1e-9))
-        for stamp, picture in zip(recording.times[frames], decibels, strict=True):
+        for time, picture in zip(_middles(recording)[frames], decibels, strict=True):
             cells[..., 3] = picture
-            time = stamp + recording.config.burst_center
             yield time, "/radar/heatmap", _cloud(time, cells, ("x", "y", "z", "intensity"))
 
 
 def _points(recording: Recording) -> Iterator[Event]:
     if not (recording.has("points/frame") and recording.has("points/cloud")):
         return
-    for k, stamp in enumerate(recording.times):
-        time = stamp + recording.config.burst_center
+    for k, time in enumerate(_middles(recording)):
         cloud = recording.rows("points/cloud", k, k + 1).astype(np.float32)
         yield time, "/radar/points", _cloud(time, cloud[None], COLUMNS)
 
@@ -212,8 +213,7 @@ def _depth(recording: Recording) -> Iterator[Event]:
     if not recording.has("truth/depth"):
         return
     pinhole = recording.read("truth/depth_intrinsics") if recording.has("truth/depth_intrinsics") else None
-    for k, stamp in enumerate(recording.times):
-        time = stamp + recording.config.burst_center
+    for k, time in enumerate(_middles(recording)):
         picture = recording.rows("truth/depth", k, k + 1)[0]
         height, width = picture.shape
         about = header(time, OPTICAL)

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from radarize.errors import InputError
+from radarize.errors import InputError, first_line
 from radarize.jobs.job import Job, News, Report, attempt
 
 #: How often Ray begins a job again whose worker or node died.
@@ -67,8 +67,7 @@ def perform(jobs: Mapping[str, Job], address: str, alone: bool) -> Iterator[News
                 try:
                     yield ray.get(reference)
                 except ray.exceptions.RayError as error:
-                    reason = str(error).strip().splitlines()[0]
-                    yield News(name, ended=True, error=f"{name}: {reason} ({RETRIES + 1} attempts)")
+                    yield News(name, ended=True, error=f"{name}: {first_line(error)} ({RETRIES + 1} attempts)")
             left = set(running.values())
             for name, done in ray.get(board.read.remote()).items():
                 if name in left:
@@ -96,7 +95,7 @@ def _connect(address: str):
         try:
             ray.init(address=address, log_to_driver=False, logging_level="ERROR")
         except (ConnectionError, ValueError, RuntimeError) as error:
-            raise InputError(f"--ray {address}: no cluster answers ({str(error).strip().splitlines()[0]})") from error
+            raise InputError(f"--ray {address}: no cluster answers ({first_line(error)})") from error
     return ray
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from radarize.errors import InputError
+from radarize.errors import InputError, first_line
 
 #: Takes how far a job is, in units of its own.
 Report = Callable[[float], None]
@@ -36,5 +36,4 @@ def attempt(name: str, job: Job, report: Report) -> News:
     except InputError as error:
         return News(name, ended=True, error=str(error))
     except Exception as error:  # one broken job must not end the others
-        line = (str(error).strip().splitlines() or [""])[0]
-        return News(name, ended=True, error=f"{name}: internal error, {type(error).__name__}: {line}")
+        return News(name, ended=True, error=f"{name}: internal error, {type(error).__name__}: {first_line(error)}")

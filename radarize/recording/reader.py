@@ -127,6 +127,15 @@ class Recording:
         clock = self._clock(data)
         return self._slice(data, slice(0, self._row(data, clock, len(self))) if clock else ...)
 
+    def true_poses(self) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]] | None:
+        """Stamps (s) and poses (position m, quaternion x y z w) of the truth where it is known; None without truth."""
+        if not (self.has("truth/time") and self.has("truth/pose")):
+            return None
+        times, poses = self.read("truth/time"), self.read("truth/pose")
+        shared = min(len(times), len(poses))
+        seen = np.isfinite(poses[:shared]).all(axis=1)  # a tracking camera may have been blind for a while
+        return times[:shared][seen], poses[:shared][seen]
+
     def rows(self, name: str, start: int, stop: int) -> np.ndarray:
         """Rows of a stream that belong to frames start...stop-1.
 

@@ -54,12 +54,11 @@ def draw_fan(
     level = decibels(power, np.nanmax(power[far], initial=0.0) if far.any() else None)
     edges_r, edges_a = _edges(ranges), _edges(azimuths)
     x, y = -edges_r[:, None] * np.sin(edges_a), edges_r[:, None] * np.cos(edges_a)
-    drawn = axis.pcolormesh(x, y, level, cmap=_MAP, vmin=-DEPTH, vmax=0, rasterized=True)
+    _draw_cells(axis, x, y, level)
     reach = reach or ranges[-1]
     half = reach * np.sin(min(np.abs(azimuths).max(), np.pi / 2))
     axis.set(aspect="equal", title=title, xlim=(-half, half), ylim=(0, reach))
     axis.set(xlabel="to the right, m", ylabel="forward, m")
-    _bar(axis, drawn)
 
 
 def draw_doppler(
@@ -72,7 +71,7 @@ def draw_doppler(
 ) -> None:
     """Doppler-azimuth power; left is left. `velocity` (forward, left; m/s) adds the ridge v cos(phi - theta)."""
     x, y = -np.degrees(_edges(azimuths)), _edges(velocities)
-    drawn = axis.pcolormesh(x, y, decibels(power), cmap=_MAP, vmin=-DEPTH, vmax=0, rasterized=True)
+    _draw_cells(axis, x, y, decibels(power))
     if velocity is not None and np.isfinite(velocity).all():
         closing = velocity[0] * np.cos(azimuths) + velocity[1] * np.sin(azimuths)
         span = velocities[-1] - velocities[0] + velocities[1] - velocities[0] if len(velocities) > 1 else np.inf
@@ -85,7 +84,6 @@ def draw_doppler(
     axis.set_xticks(-ticks, ticks)
     axis.set_xlim(-np.degrees(azimuths[-1]), -np.degrees(azimuths[0]))
     axis.set_box_aspect(0.6)  # about that of a fan, so that a row of pictures is one
-    _bar(axis, drawn)
 
 
 def draw_scan(axis, azimuths: np.ndarray, ranges: np.ndarray, kind: str, label: str) -> None:
@@ -102,11 +100,8 @@ def draw_profiles(axis, times: np.ndarray, ranges: np.ndarray, power: Float[np.n
     """Range profiles side by side over time."""
     far = ranges >= LEAKAGE
     level = decibels(power, power[:, far].max() if far.any() and power.size else None)
-    # A lone frame gets a width of its own.
-    edges = _edges(times) if len(times) > 1 else times[0] + np.array([-0.5, 0.5])
-    drawn = axis.pcolormesh(edges, _edges(ranges), level.T, cmap=_MAP, vmin=-DEPTH, vmax=0, rasterized=True)
+    _draw_cells(axis, _edges(times), _edges(ranges), level.T)
     axis.set(xlabel="time, s", ylabel="range, m")
-    _bar(axis, drawn)
 
 
 def _edges(values: np.ndarray) -> np.ndarray:
@@ -118,7 +113,9 @@ def _edges(values: np.ndarray) -> np.ndarray:
     return np.concatenate([[2 * values[0] - inner[0]], inner, [2 * values[-1] - inner[-1]]])
 
 
-def _bar(axis, drawn) -> None:
+def _draw_cells(axis, x: np.ndarray, y: np.ndarray, level: np.ndarray) -> None:
+    """Cells of some dB between borders, and what their colours mean."""
+    drawn = axis.pcolormesh(x, y, level, cmap=_MAP, vmin=-DEPTH, vmax=0, rasterized=True)
     bar = axis.figure.colorbar(drawn, ax=axis, pad=0.02, aspect=28)
     bar.outline.set_visible(False)
     bar.ax.tick_params(labelsize=7, color=INK, labelcolor=INK)

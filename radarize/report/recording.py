@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import find_peaks
 
-from radarize.contents import contents
+from radarize.contents import contents, data_sets
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.radar.array import azimuth_row
@@ -48,7 +48,14 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
             f"{len(recording)} frames in {found['duration']:.2f} s · {config.board} · {len(config.tx)} transmitters, "
             f"{len(config.rx)} receivers, {config.loops} loops, {config.samples} samples",
         )
-        _headline(page, found, config)
+        page.headline(
+            [
+                (f"{100 * config.range_resolution:.2f} cm", "range resolution"),
+                (f"{config.max_range:.2f} m", "largest range"),
+                (f"±{config.max_velocity:.2f} m/s", "unambiguous radial speed"),
+                (f"{100 * found['lost_share']:.2g} %", f"chirps lost ({found['lost_chirps']})"),
+            ]
+        )
         maps = Heatmaps(config)
         _profiles(page, recording, maps)
         _maps(page, recording, maps)
@@ -56,19 +63,11 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
         show_sensors(page, recording, [index for index, *_ in _batches(recording, _FRAMES)])
         if recording.has("truth/pose"):
             _trajectory(page, recording)
-    _contents(page, found)
+    page.section("What is in it")
+    page.table(*data_sets(found))
+    config = {name: value for name, value in found["config"].items() if name != "channel_calibration"}
+    page.columns({"configuration (SI units)": config, "derived": found["derived"], "attributes": found["attributes"]})
     return page.write(output)
-
-
-def _headline(page: Page, found: dict, config) -> None:
-    page.headline(
-        [
-            (f"{100 * config.range_resolution:.2f} cm", "range resolution"),
-            (f"{config.max_range:.2f} m", "largest range"),
-            (f"±{config.max_velocity:.2f} m/s", "unambiguous radial speed"),
-            (f"{100 * found['lost_share']:.2g} %", f"chirps lost ({found['lost_chirps']})"),
-        ]
-    )
 
 
 def _batches(recording: Recording, count: int):
@@ -78,12 +77,9 @@ def _batches(recording: Recording, count: int):
 
 
 def _profiles(page: Page, recording: Recording, maps: Heatmaps) -> None:
-    indices, profiles = [], []
-    for index, adc, valid in _batches(recording, _PROFILES):
-        indices.append(index)
-        profiles.append(maps.range_profile(adc, valid)[0].numpy())
-    power = np.stack(profiles)
-    times = recording.times[indices] - recording.times[0]
+    profiles = {k: maps.range_profile(adc, valid)[0].numpy() for k, adc, valid in _batches(recording, _PROFILES)}
+    power = np.stack(list(profiles.values()))
+    times = recording.times[list(profiles)] - recording.times[0]
     page.section("Range", "Power over range, all antennas and speeds together; dB below the strongest echo.")
     if len(times) > 1:
         figure, axes = canvas(1, height=3.0)
@@ -117,24 +113,17 @@ def _maps(page: Page, recording: Recording, maps: Heatmaps) -> None:
         about += f", and {len(maps.pairs)} vertical pairs that weaken ceiling and floor"
     page.section("Azimuth", about + ". From above: forward is up, left is left. dB below the strongest cell.")
     for index, adc, valid in _batches(recording, _FRAMES):
-        figure, axes = canvas(2 if maps.pairs is None else 3)
-        axes = list(axes[0])
-        power = maps.range_azimuth(adc, valid)[0].numpy()
-        draw_fan(axes.pop(0), power, maps.ranges, maps.azimuths, "range-azimuth")
+        fans = {"range-azimuth": maps.range_azimuth}
         if maps.pairs is not None:
-            level = maps.elevation_aware(adc, valid)[0].numpy()
-            draw_fan(axes.pop(0), level, maps.ranges, maps.azimuths, "elevation aware")
-        velocity = _true_velocity(recording, index)
+            fans["elevation aware"] = maps.elevation_aware
+        figure, axes = canvas(len(fans) + 1)
+        for axis, (title, make) in zip(axes[0], fans.items(), strict=False):
+            draw_fan(axis, make(adc, valid)[0].numpy(), maps.ranges, maps.azimuths, title)
+        known = recording.rows("truth/velocity", index, index + 1) if recording.has("truth/velocity") else ()
+        velocity = known[0, :2] if len(known) else None
         speeds = maps.doppler_azimuth(adc, valid)[0].numpy()
-        draw_doppler(axes.pop(0), speeds, maps.velocities, maps.azimuths, "Doppler-azimuth", velocity)
+        draw_doppler(axes[0, -1], speeds, maps.velocities, maps.azimuths, "Doppler-azimuth", velocity)
         page.picture(figure, f"Frame {index}, {recording.times[index] - recording.times[0]:.2f} s after the start")
-
-
-def _true_velocity(recording: Recording, index: int) -> np.ndarray | None:
-    if not recording.has("truth/velocity"):
-        return None
-    velocity = recording.read("truth/velocity")
-    return velocity[index, :2] if index < len(velocity) else None
 
 
 def _samples(page: Page, recording: Recording) -> None:
@@ -172,16 +161,3 @@ def _trajectory(page: Page, recording: Recording) -> None:
     line(figure, path, "sensor", COLORS["good"], 2.4)
     line(figure, path[:1], "start", INK, mode="markers", marker={"color": INK, "size": 9})
     page.plot(figure, height=520)
-
-
-def _contents(page: Page, found: dict) -> None:
-    page.section("What is in it")
-    page.table(
-        ("data set", "shape", "type", "unit", "about"),
-        [
-            (f"/{name}", " x ".join(map(str, item["shape"])), item["dtype"], item["unit"], item["about"])
-            for name, item in found["data_sets"].items()
-        ],
-    )
-    config = {name: value for name, value in found["config"].items() if name != "channel_calibration"}
-    page.columns({"configuration (SI units)": config, "derived": found["derived"], "attributes": found["attributes"]})

@@ -43,9 +43,10 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     if errors:
         _result(page, metrics)
     if blind:
-        page.text(words.blindness(blind))
-        if blind.spans:
-            page.table(*words.blind_spans(blind), sortable=True)
+        sentence, spans = words.blindness(blind)
+        page.text(sentence)
+        if spans.rows:
+            page.table(*spans, sortable=True)
     if errors and others:
         page.section("Beside other methods", "The same recording; odometry and SLAM against the truth.")
         rows = [(methods(folder), metrics), *((methods(other), evaluate(other)) for other in others)]

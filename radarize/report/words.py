@@ -100,6 +100,18 @@ def parts(metrics: Mapping[str, object]) -> Iterator[Table]:
             yield Table((name, "value"), [(figure.words, figure.text(metrics[name])) for figure in figures])
 
 
+def everything(metrics: Mapping[str, object]) -> Iterator[Table | str]:
+    """Tables and sentences of all that `radarize.evaluation.evaluate` returned, without what figures mean."""
+    head, rows, numbers = trajectories(metrics)
+    yield Table(head[:-1], [row[:-1] for row in rows], numbers)
+    yield from parts(metrics)
+    if "blind" in metrics:
+        sentence, spans = blindness(BlindSpans.model_validate(metrics["blind"]))
+        yield sentence
+        if spans.rows:
+            yield spans
+
+
 def beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> Table:
     """Runs of one recording beside each other, by what they were made with."""
     head = ("method", *(f"{figure.words}, {figure.unit}" for figure in _BESIDE))
@@ -107,17 +119,9 @@ def beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> Table:
     return Table(head, rows, range(1, len(head)))
 
 
-def blindness(found: BlindSpans) -> str:
-    """A sentence on how much of the way odometry was blind."""
-    if not found.spans:
-        return "Odometry was blind nowhere."
-    return (
-        f"Odometry was blind (no match believed, no velocity) over {found.way_m:.1f} m, "
-        f"{100 * found.share_of_way:.0f} % of the way."
-    )
-
-
-def blind_spans(found: BlindSpans) -> Table:
-    """Where odometry was blind."""
+def blindness(found: BlindSpans) -> tuple[str, Table]:
+    """A sentence on how much of the way odometry was blind, and where it was."""
     rows = [(f"{s.start_s:.1f}", f"{s.stop_s:.1f}", f"{s.way_m:.2f}", s.why) for s in found.spans]
-    return Table(("blind from, s", "to, s", "way, m", "why"), rows, (0, 1, 2))
+    over = f"(no match believed, no velocity) over {found.way_m:.1f} m, {100 * found.share_of_way:.0f} % of the way"
+    table = Table(("blind from, s", "to, s", "way, m", "why"), rows, (0, 1, 2))
+    return f"Odometry was blind {over if rows else 'nowhere'}.", table

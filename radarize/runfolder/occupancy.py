@@ -5,6 +5,7 @@ counts as occupied, below ``free_thresh`` as free, between them as unknown. Row 
 the lower left corner.
 """
 
+import re
 import reprlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,12 +17,15 @@ from jaxtyping import Bool, Float, UInt8
 from pydantic import BaseModel, Field, ValidationError
 
 from radarize.errors import InputError
+from radarize.pose import transform
 from radarize.replacing import replacing
 from radarize.yamlfile import read_yaml
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 #: Bytes of a description, and of a picture's header, comments included.
 _DESCRIPTION, _HEADER = 16 << 10, 4 << 10
+#: Of an 8-bit PGM: width and height, with comments between the words, and one space before the pixels.
+_PGM = re.compile(rb"P5~(\d{1,9})~(\d{1,9})~255\s".replace(b"~", rb"(?:\s|#[^\n]*\n)+"))
 
 
 class MapFile(BaseModel):
@@ -105,8 +109,7 @@ class OccupancyMap:
         """Middles of the chosen cells in the map's frame, m."""
         row, column = np.nonzero(cells)
         inside = np.column_stack([column + 0.5, len(self.pixels) - row - 0.5]) * self.resolution
-        c, s = np.cos(self.origin[2]), np.sin(self.origin[2])
-        return inside @ np.array([[c, s], [-s, c]]) + self.origin[:2]
+        return transform(np.array(self.origin), inside)
 
     def save(self, description: Path) -> Path:
         """Write it as ``NAME.yaml`` and ``NAME.pgm``.
@@ -135,23 +138,11 @@ def read_pgm(path: Path) -> UInt8[np.ndarray, "row column"]:
         content = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    head, words, at = content[:_HEADER], [], 0
-    while len(words) < 4 and at < len(head):
-        if head[at : at + 1] == b"#":
-            at = (head.find(b"\n", at) + 1) or len(head)
-        elif head[at : at + 1].isspace():
-            at += 1
-        else:
-            end = at
-            while end < len(head) and not head[end : end + 1].isspace():
-                end += 1
-            words.append(head[at:end])
-            at = end
-    numbers = [int(word) for word in words[1:] if word.isdigit() and len(word) < 10]
-    if len(numbers) != 3 or words[0] != b"P5" or numbers[2] != 255:
-        raise InputError(f"{path}: starts with {head[:20]!r}, expected an 8-bit binary PGM (P5)")
-    width, height, _ = numbers
-    found = len(content) - at - 1
+    head = _PGM.match(content, 0, _HEADER)
+    if not head:
+        raise InputError(f"{path}: starts with {content[:20]!r}, expected an 8-bit binary PGM (P5)")
+    width, height = map(int, head.groups())
+    found = len(content) - head.end()
     if found < width * height:
         raise InputError(f"{path}: holds {found} pixels, expected {width} x {height}")
-    return np.frombuffer(content, np.uint8, width * height, at + 1).reshape(height, width)
+    return np.frombuffer(content, np.uint8, width * height, head.end()).reshape(height, width)

@@ -119,13 +119,10 @@ class RunWriter:
         def unit(name: str) -> str:
             return str(recording.describe(f"truth/{name}")["unit"])
 
-        known = {name for name in _TRUTH if recording.has(f"truth/{name}")}
-        if known >= {"pose", "time"}:
-            poses = recording.read("truth/pose")
-            seen = np.isfinite(poses).all(axis=1)  # a tracking camera may have been blind for a while
-            self.write_poses("reference", (recording.read("truth/time")[seen], poses[seen]))
+        if poses := recording.true_poses():
+            self.write_poses("reference", poses)
         used = self._scans["frames"]
-        for name in (name for name in _TRUTH if name in known):
+        for name in (name for name in _TRUTH if recording.has(f"truth/{name}")):
             if name not in ("velocity", "scan"):
                 self.put(f"truth/{name}", recording.read(f"truth/{name}"), unit(name))
                 continue

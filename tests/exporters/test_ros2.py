@@ -222,7 +222,7 @@ def test_refusals(recording, run, tmp_path):
         writer.append(np.zeros((2, *CONFIG.frame_shape), np.int16), np.arange(2.0))
     with pytest.raises(InputError, match="has 25 scans .* expected the run of .*other.h5 with 2 frames"):
         export(tmp_path / "other.h5", "ros2", tmp_path / "x", run=run)
-    with pytest.raises(InputError, match="scans.h5"):
+    with pytest.raises(InputError, match="trajectory.tum"):
         export(tmp_path / "there", "ros2", tmp_path / "x")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["other.h5", "there"]
 

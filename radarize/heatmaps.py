@@ -241,10 +241,6 @@ class Heatmaps:
         # For one echo 1 / (a^H R^-1 a) = A^2 + load / antennas.
         return (scale / power.clamp_min(1e-12) - load[..., None] / antennas).clamp_min(0)
 
-    def range_doppler_azimuth(self, adc, valid=None) -> Float32[torch.Tensor, "frame range doppler azimuth"]:
-        """Bartlett power over range, speed and azimuth (large: a frame at default settings has 1.5 MB)."""
-        return self.beamformed(self.spectrum(adc, valid), self.row, self._steering)
-
     def beamformed(
         self, spectrum: torch.Tensor, antennas: np.ndarray, steering: torch.Tensor
     ) -> Float32[torch.Tensor, "frame range doppler direction"]:

@@ -2,10 +2,14 @@
 
 import math
 from pathlib import Path
+from typing import TypeVar
 
 import yaml
+from pydantic import BaseModel, ValidationError
 
 from radarize.errors import InputError
+
+Settings = TypeVar("Settings", bound=BaseModel)
 
 
 def read_yaml(path: str | Path, most: float = math.inf) -> object:
@@ -24,3 +28,26 @@ def read_yaml(path: str | Path, most: float = math.inf) -> object:
         raise InputError(f"{path}: cannot be read ({error}), expected text in UTF-8") from error
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # a date like 2026-99-99 is a ValueError
         raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+
+
+def read_settings(path: str | Path, defaults: Settings) -> Settings:
+    """Settings with what a YAML file says otherwise: sections and fields named as there.
+
+    Raises:
+        InputError: no such file, or a field that does not exist or has an impossible value.
+    """
+    changes = read_yaml(path) or {}
+    if not isinstance(changes, dict):
+        raise InputError(f"{path}: holds a {type(changes).__name__}, expected sections as `radarize config` prints")
+    try:
+        return type(defaults).model_validate(_merged(defaults.model_dump(), changes))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"]))
+        raise InputError(f"{path}: {where} is {first['input']!r}, expected: {first['msg']}") from error
+
+
+def _merged(settings: dict, changes: dict) -> dict:
+    """Settings with some of them changed, however deep."""
+    both = {name for name in changes if isinstance(changes[name], dict) and isinstance(settings.get(name), dict)}
+    return settings | changes | {name: _merged(settings[name], changes[name]) for name in both}

@@ -13,12 +13,12 @@ flash would drown the ridge on which the whole static world lies. Decibels are o
 quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of its size.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float, Float16, Int16
+from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
 from torch import Tensor
 
 from radarize.errors import InputError
@@ -58,7 +58,7 @@ class Axes:
     azimuths: Float[np.ndarray, "azimuth"]
 
 
-class Maker(Protocol):
+class Maker(ABC):
     """Makes the maps that a method's networks see, of one radar configuration.
 
     Attributes:
@@ -69,50 +69,50 @@ class Maker(Protocol):
 
     maps: dict[str, str]
     names: tuple[str, ...]
-    history: int
+    history = 0
 
     @staticmethod
     def stride(config: RadarConfig) -> int:
-        """Frames from one that networks see to the next."""
-        ...
+        """Frames from one that networks see to the next: they see every frame, unless told otherwise."""
+        return 1
 
     @staticmethod
+    @abstractmethod
     def axes(config: RadarConfig, name: str) -> Axes:
         """Rows and columns of a map."""
-        ...
 
+    @abstractmethod
     def __call__(
         self,
         adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
         names: tuple[str, ...] | None = None,
-        frames: slice = slice(None),
+        frames: slice | Int[np.ndarray, "map"] = slice(None),
     ) -> dict[str, Float16[np.ndarray, "map row azimuth"]]:
-        """Maps of those of consecutive frames that `frames` picks."""
-        ...
+        """Maps of some of consecutive frames.
+
+        Args:
+            adc, valid: see `Heatmaps.spectrum`.
+            names: of `self.names`; all if None.
+            frames: whose maps are wanted.
+
+        Raises:
+            InputError: samples that do not fit the configuration.
+        """
 
 
-class MapMaker:
-    """Makes the maps of one radar configuration.
+class MapMaker(Maker):
+    """Makes the maps of one radar configuration, dB; without antennas of two heights, only those of the row.
 
     Args:
         config: radar configuration.
-
-    Attributes:
-        names: maps that the array can make; without antennas of two heights, only those of the row.
     """
 
     maps = MAPS
-    history = 0
 
     def __init__(self, config: RadarConfig):
         self.heatmaps = Heatmaps(config, AZIMUTHS)
         self.names = tuple(n for n in MAPS if self.heatmaps.pairs is not None or "elevation" not in n)
-
-    @staticmethod
-    def stride(config: RadarConfig) -> int:
-        """Networks see every frame."""
-        return 1
 
     @staticmethod
     def axes(config: RadarConfig, name: str) -> Axes:
@@ -126,23 +126,7 @@ class MapMaker:
         axes = self.axes(self.heatmaps.config, name)
         return axes.rows, len(axes.azimuths)
 
-    def __call__(
-        self,
-        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
-        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
-        names: tuple[str, ...] | None = None,
-        frames: slice = slice(None),
-    ) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
-        """Maps of frames, dB.
-
-        Args:
-            adc, valid: see `Heatmaps.spectrum`.
-            names: of `self.names`; all if None.
-            frames: whose maps are wanted.
-
-        Raises:
-            InputError: samples that do not fit the configuration.
-        """
+    def __call__(self, adc, valid=None, names=None, frames=slice(None)):
         return self.of(self.heatmaps.spectrum(adc[frames], None if valid is None else valid[frames]), names)
 
     def of(

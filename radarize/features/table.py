@@ -1,7 +1,7 @@
 """Recordings' maps, other readings and truth in memory, ready to be indexed: an hour of two range maps takes 1.7 GB."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 
@@ -26,12 +26,16 @@ class Reading:
     Attributes:
         name: of it.
         where: data set of the recording that it is made of.
-        of: makes it of some of a recording's frames, a row a frame.
+        of: makes it of some of a recording's frames, a row a frame; None: it is those rows of the data set.
     """
 
     name: str
     where: str
-    of: Callable[[Recording, slice], np.ndarray]
+    of: Callable[[Recording, slice], np.ndarray] | None = None
+
+    def rows(self, recording: Recording, frames: slice) -> np.ndarray:
+        """A row for each of some frames."""
+        return self.of(recording, frames) if self.of else recording.read(self.where)[frames]
 
 
 def _velocity(recording: Recording, frames: slice) -> np.ndarray:
@@ -42,22 +46,15 @@ def _yaw(recording: Recording, frames: slice) -> np.ndarray:
     return planar(recording.read("truth/pose")[frames])[:, 2:].astype(np.float32)
 
 
-def _pose(recording: Recording, frames: slice) -> np.ndarray:
-    return recording.read("truth/pose")[frames]
-
-
-def _occupancy(recording: Recording, frames: slice) -> np.ndarray:
-    return recording.read("truth/occupancy")[frames]
-
-
 #: Truth that several methods learn from: m/s (forward, left); rad; m and quaternion; cells of `radarize.nets.losses`.
 VELOCITY = Reading("velocity", "truth/velocity", _velocity)
 YAW = Reading("yaw", "truth/pose", _yaw)
-POSE = Reading("pose", "truth/pose", _pose)
-OCCUPANCY = Reading("occupancy", "truth/occupancy", _occupancy)
+POSE = Reading("pose", "truth/pose")
+OCCUPANCY = Reading("occupancy", "truth/occupancy")
 _BATCH = 32
 
 
+@dataclass(frozen=True, eq=False)
 class Table:
     """Frames of recordings, one after the other.
 
@@ -70,17 +67,12 @@ class Table:
         sensed: what else networks see by name, (frame, ...).
     """
 
-    def __init__(
-        self,
-        maps: dict[str, Tensor],
-        truth: dict[str, Tensor],
-        lengths: Sequence[int],
-        grid: Grid | None,
-        frame_period: float,
-        sensed: dict[str, Tensor] | None = None,
-    ):
-        self.maps, self.truth, self.lengths, self.grid = maps, truth, list(lengths), grid
-        self.frame_period, self.sensed = frame_period, sensed or {}
+    maps: dict[str, Tensor]
+    truth: dict[str, Tensor]
+    lengths: Sequence[int]
+    grid: Grid | None
+    frame_period: float
+    sensed: dict[str, Tensor] = field(default_factory=dict)
 
     @classmethod
     def read(
@@ -144,7 +136,7 @@ class Table:
         return cls(
             {name: torch.from_numpy(values) for name, values in joined.items()},
             {reading.name: rows[reading.name] for reading in truth},
-            lengths,
+            list(lengths),
             grids[0],
             periods[0],
             {reading.name: rows[reading.name] for reading in sensed},
@@ -164,17 +156,13 @@ class Table:
     def divide(self, count: int) -> tuple["Table", "Table"]:
         """The first `count` recordings, and the others."""
         frame = sum(self.lengths[:count])
-        parts = (slice(frame), self.lengths[:count]), (slice(frame, None), self.lengths[count:])
 
-        def some(columns: dict[str, Tensor], part: slice) -> dict[str, Tensor]:
-            return {name: values[part] for name, values in columns.items()}
+        def part(frames: slice, lengths: Sequence[int]) -> Table:
+            columns = ("maps", "truth", "sensed")
+            some = {what: {name: rows[frames] for name, rows in getattr(self, what).items()} for what in columns}
+            return replace(self, lengths=lengths, **some)
 
-        return tuple(
-            Table(
-                some(self.maps, part), some(self.truth, part), lengths, self.grid, self.frame_period,
-                some(self.sensed, part),
-            ) for part, lengths in parts
-        )  # fmt: skip
+        return part(slice(frame), self.lengths[:count]), part(slice(frame, None), self.lengths[count:])
 
     def window(self, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item frame map row azimuth"]:
         """Maps of windows of frames."""
@@ -207,7 +195,7 @@ def _read(
         parts = [maps_of(recording, start, min(start + size, count), maps, maker, stride) for start in starts]
         found, frames = {}, slice(0, count, stride)
         for reading in readings:
-            rows = found[reading.name] = reading.of(recording, frames)
+            rows = found[reading.name] = reading.rows(recording, frames)
             # Some may be unknown: a tracking camera is blind now and then.
             if len(rows) < -(-count // stride) or not np.isfinite(rows).any():
                 raise InputError(f"{path}: /{reading.where} lacks values or holds no numbers, expected {count} frames")

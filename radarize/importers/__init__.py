@@ -17,11 +17,11 @@ from radarize.importers import pcap as pcap_format
 from radarize.importers import studio as studio_format
 from radarize.importers.capture import Batch, Capture
 from radarize.importers.parameters import Given
-from radarize.importers.poses import pose_products
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import range_balance
 from radarize.radar.presets import load_config
-from radarize.recording import RecordingWriter
+from radarize.recording import Product, RecordingWriter
+from radarize.tum import read_tum
 
 __all__ = ["Given", "import_recording"]
 
@@ -66,7 +66,7 @@ def import_recording(
     start_time = float(given.start_time or 0.0)
     if source.resolve() == output.resolve():
         raise InputError(f"{output}: is the source itself, expected another output file")
-    products = pose_products(given.poses) if given.poses else {}
+    products = _poses(given.poses) if given.poses else {}
 
     capture = _open(source, output, given)
     batches = iter(capture.batches)
@@ -101,6 +101,15 @@ def import_recording(
         capture.warnings += writer.losses.warnings()
         writer.annotate(warnings="; ".join(capture.warnings), assumed=", ".join(capture.assumed))
     return output
+
+
+def _poses(path: Path) -> dict[str, Product]:
+    """True poses of a TUM file as data sets of a recording, at their own times."""
+    times, poses = read_tum(path)
+    return {
+        "truth/time": Product(times, "s", f"stamps of the poses of {path.name}"),
+        "truth/pose": Product(poses, "m; x y z qx qy qz qw", "sensor in the world"),
+    }
 
 
 def _apart(times: np.ndarray, start: float, end: float, poses: Path) -> list[str]:

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from textwrap import wrap
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
-from radarize.errors import InputError
 from radarize.heatmaps import HeatmapConfig
 from radarize.mapping.scans import ScanConfig
 from radarize.odometry.doppler import DopplerConfig
@@ -16,7 +15,7 @@ from radarize.odometry.integration import VelocityConfig
 from radarize.odometry.rotation import RotationConfig
 from radarize.odometry.settings import FusionConfig, TurnConfig
 from radarize.slam.config import SlamConfig
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import read_settings
 
 
 class Configuration(BaseModel):
@@ -43,25 +42,11 @@ class Configuration(BaseModel):
         Raises:
             InputError: no such file, or a field that does not exist or has an impossible value.
         """
-        changes = read_yaml(path) or {}
-        if not isinstance(changes, dict):
-            raise InputError(f"{path}: holds a {type(changes).__name__}, expected sections as `radarize config` prints")
-        try:
-            return cls.model_validate(_merged(cls().model_dump(), changes))
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"]))
-            raise InputError(f"{path}: {where} is {first['input']!r}, expected: {first['msg']}") from error
+        return read_settings(path, cls())
 
     def text(self) -> str:
         """As YAML, with what each field means beside it."""
         return "\n".join(_lines(self, "")) + "\n"
-
-
-def _merged(settings: dict, changes: dict) -> dict:
-    """Settings with some of them changed, however deep."""
-    both = {name for name in changes if isinstance(changes[name], dict) and isinstance(settings.get(name), dict)}
-    return settings | changes | {name: _merged(settings[name], changes[name]) for name in both}
 
 
 def _lines(section: BaseModel, indent: str) -> Iterator[str]:

@@ -43,10 +43,6 @@ class Gaussian:
     def covariance(self) -> Float[Tensor, "item dimension dimension"]:
         return self.factor @ self.factor.mT
 
-    @property
-    def log_variance(self) -> Float[Tensor, "item dimension"]:
-        return self.factor.square().sum(dim=2).log()
-
     def errors_squared(self, truth: Float[Tensor, "item dimension"]) -> Float[Tensor, "item"]:
         """Squared Mahalanobis distances; of honest distributions their mean is the number of dimensions."""
         residual = (truth - self.mean)[..., None]

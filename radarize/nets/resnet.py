@@ -7,23 +7,32 @@ from torch.nn.functional import relu
 
 
 class Block(nn.Module):
-    """Two 3 x 3 convolutions beside a shortcut."""
+    """Two convolutions beside a shortcut, over as many axes as told: 3 x 3 over images, 3 over time."""
 
-    def __init__(self, inputs: int, outputs: int, stride: int):
+    def __init__(self, inputs: int, outputs: int, stride: int, axes: int):
         super().__init__()
+        convolution, norm = (nn.Conv1d, nn.BatchNorm1d) if axes == 1 else (nn.Conv2d, nn.BatchNorm2d)
         self.body = nn.Sequential(
-            nn.Conv2d(inputs, outputs, 3, stride, 1, bias=False),
-            nn.BatchNorm2d(outputs),
-            nn.ReLU(),
-            nn.Conv2d(outputs, outputs, 3, 1, 1, bias=False),
-            nn.BatchNorm2d(outputs),
-        )
+            convolution(inputs, outputs, 3, stride, 1, bias=False), norm(outputs), nn.ReLU(),
+            convolution(outputs, outputs, 3, 1, 1, bias=False), norm(outputs),
+        )  # fmt: skip
         self.shortcut = nn.Identity()
         if stride != 1 or inputs != outputs:
-            self.shortcut = nn.Sequential(nn.Conv2d(inputs, outputs, 1, stride, bias=False), nn.BatchNorm2d(outputs))
+            self.shortcut = nn.Sequential(convolution(inputs, outputs, 1, stride, bias=False), norm(outputs))
 
     def forward(self, x: Tensor) -> Tensor:
         return relu(self.body(x) + self.shortcut(x))
+
+
+def stages(width: int, axes: int = 2) -> nn.Sequential:
+    """Four stages of two blocks: each but the first halves the size and doubles the channels, `width` at first."""
+    widths = [width, width, 2 * width, 4 * width, 8 * width]
+    return nn.Sequential(
+        *(
+            nn.Sequential(Block(before, after, 1 if before == after else 2, axes), Block(after, after, 1, axes))
+            for before, after in zip(widths[:-1], widths[1:], strict=True)
+        )
+    )
 
 
 class ResNet18(nn.Module):
@@ -46,13 +55,7 @@ class ResNet18(nn.Module):
         self.stem = nn.Sequential(nn.Conv2d(inputs, width, 7, stride, 3, bias=False), nn.BatchNorm2d(width), nn.ReLU())
         if pool:
             self.stem.append(nn.MaxPool2d(3, 2, 1))
-        widths = [width, width, 2 * width, 4 * width, 8 * width]
-        self.stages = nn.Sequential(
-            *(
-                nn.Sequential(Block(before, after, 1 if before == after else 2), Block(after, after, 1))
-                for before, after in zip(widths[:-1], widths[1:], strict=True)
-            )
-        )
+        self.stages = stages(width)
         self.head = nn.Linear(8 * width, outputs)
         self.coarse = False
         for module in self.modules():

@@ -1,5 +1,7 @@
 """U-Net (Ronneberger et al., "U-Net: convolutional networks for biomedical image segmentation", 2015) of any width."""
 
+from collections.abc import Iterable
+
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -16,17 +18,32 @@ def double_convolution(inputs: int, outputs: int, between: int | None = None) ->
 
 
 class Up(nn.Module):
-    """Twice the size by a transposed convolution, then the encoder's image of that size beside it."""
+    """Twice the size, then the encoder's image of that size beside it.
 
-    def __init__(self, inputs: int, outputs: int):
+    Args:
+        grow: makes the size twice as large.
+        mix: makes one image of both.
+    """
+
+    def __init__(self, grow: nn.Module, mix: nn.Module):
         super().__init__()
-        self.grow = nn.ConvTranspose2d(inputs, outputs, 2, 2)
-        self.mix = double_convolution(2 * outputs, outputs)
+        self.grow, self.mix = grow, mix
 
     def forward(self, x: Tensor, beside: Tensor) -> Tensor:
         x = self.grow(x)
         rows, columns = (beside.shape[axis] - x.shape[axis] for axis in (2, 3))  # 1 where an odd size was halved
         return self.mix(torch.cat([beside, pad(x, (0, columns, 0, rows))], dim=1))
+
+
+def through(x: Tensor, down: Iterable[nn.Module], up: Iterable[Up]) -> Tensor:
+    """An image down the levels, each of half the size, and up again."""
+    levels: list[Tensor] = []
+    for convolution in down:
+        levels.append(convolution(max_pool2d(levels[-1], 2) if levels else x))
+    x = levels.pop()
+    for each in up:
+        x = each(x, levels.pop())
+    return x
 
 
 class UNet(nn.Module):
@@ -44,16 +61,14 @@ class UNet(nn.Module):
         super().__init__()
         widths = [width * 2**level for level in range(5)]
         self.down = nn.ModuleList(double_convolution(a, b) for a, b in zip([inputs, *widths[:-1]], widths, strict=True))
-        self.up = nn.ModuleList(Up(b, a) for a, b in zip(widths[-2::-1], widths[:0:-1], strict=True))
+        self.up = nn.ModuleList(
+            Up(nn.ConvTranspose2d(b, a, 2, 2), double_convolution(2 * a, a))
+            for a, b in zip(widths[-2::-1], widths[:0:-1], strict=True)
+        )
         self.head = nn.Conv2d(width, outputs, 1)
         self.coarse = False
 
     def forward(self, x: Float[Tensor, "item input row column"]) -> Float[Tensor, "item output row column"]:
         with torch.autocast(x.device.type, torch.bfloat16, enabled=self.coarse and self.training):
-            levels = [self.down[0](x)]
-            for convolution in self.down[1:]:
-                levels.append(convolution(max_pool2d(levels[-1], 2)))
-            x = levels.pop()
-            for up in self.up:
-                x = up(x, levels.pop())
+            x = through(x, self.down, self.up)
         return self.head(x.float())

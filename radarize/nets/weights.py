@@ -2,8 +2,9 @@
 
 import json
 import warnings
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import torch
 from jaxtyping import Float
@@ -74,9 +75,13 @@ class Header(BaseModel):
 _HEADER = 1 << 20
 
 
-class Network(Protocol):
-    """What a class of networks says of itself; made from frames of a window, names of its inputs and width, and `step`
-    if it is `scaled`.
+class Network(nn.Module):
+    """What networks have in common; `scaled` ones take the `step` from row to row of their maps as well.
+
+    Args:
+        frames: of a window, oldest first.
+        maps: names of what it reads of a frame.
+        width: channels of the first stage.
 
     Attributes:
         kind: name of its task; setting: see `Header`.
@@ -91,6 +96,10 @@ class Network(Protocol):
     scaled: bool = False
     inputs: tuple[str, ...] = ("maps",)
     outputs: tuple[str, ...] = ("estimate", "covariance")
+
+    def __init__(self, frames: int, maps: Sequence[str], width: int):
+        super().__init__()
+        self.frames, self.maps, self.width = frames, tuple(maps), width
 
 
 def build(network: type[Network], header: Header) -> nn.Module:

@@ -76,9 +76,8 @@ def rx_positions(config: RadarConfig) -> Float[np.ndarray, "rx 3"]:
 
 
 def _positions(config: RadarConfig, layout: tuple, enabled: tuple[int, ...]) -> Float[np.ndarray, "antenna 3"]:
-    half = SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
     positions = np.zeros((len(enabled), 3))
-    positions[:, 1:] = half * np.asarray(layout, float)[list(enabled)]
+    positions[:, 1:] = _half(config) * np.asarray(layout, float)[list(enabled)]
     return positions
 
 
@@ -90,14 +89,22 @@ def virtual_positions(config: RadarConfig) -> Float[np.ndarray, "tx rx 3"]:
     return tx_positions(config)[:, None] + rx_positions(config)[None]
 
 
+def _half(config: RadarConfig) -> float:
+    """Half a wavelength at the board's design frequency, m."""
+    return SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
+
+
+def _lattice(config: RadarConfig) -> Int[np.ndarray, "antenna 2"]:
+    """Left and up of the virtual antennas, flat (tx, rx), in half wavelengths."""
+    return np.rint(virtual_positions(config).reshape(-1, 3)[:, 1:] / _half(config)).astype(int)
+
+
 def rows(config: RadarConfig) -> dict[float, Int[np.ndarray, "antenna"]]:
     """Virtual antennas of equal height, as flat (tx, rx) indices by ascending y; where two coincide, the first stays.
 
     Returns a dictionary from height (half wavelengths, ascending) to indices.
     """
-    half = SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
-    grid = np.rint(virtual_positions(config).reshape(-1, 3)[:, 1:] / half).astype(int)
-    result = {}
+    grid, result = _lattice(config), {}
     for height in np.unique(grid[:, 1]):
         members = np.flatnonzero(grid[:, 1] == height)
         _, first = np.unique(grid[members, 0], return_index=True)
@@ -116,10 +123,7 @@ def elevation_pairs(config: RadarConfig) -> Int[np.ndarray, "pair 2"] | None:
     Averaging a pair steers to 0 deg elevation and nulls the zenith: the paper's elevation-aware beamforming (section
     4).
     """
-    half = SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
-    grid = np.rint(virtual_positions(config).reshape(-1, 3)[:, 1:] / half).astype(int)
-    by_height = rows(config)
-    pairs = []
+    grid, by_height, pairs = _lattice(config), rows(config), []
     for height, lower in by_height.items():
         upper = by_height.get(height + 1.0, ())
         left_of_upper = {grid[u, 0]: u for u in upper}

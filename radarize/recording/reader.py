@@ -1,6 +1,5 @@
 """Reading a recording, finished, growing, or left behind by a crash."""
 
-import json
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
@@ -204,7 +203,3 @@ class Recording:
             InputError: there is no data set of that name.
         """
         return tuple(map(str, self._dataset(name).attrs.get("labels", ())))
-
-    def config_json(self) -> dict[str, object]:
-        """The radar configuration as plain data."""
-        return json.loads(self.config.model_dump_json())

@@ -8,7 +8,8 @@ flushed so far. No clock of the writing machine goes into the file or its layout
 import errno
 import os
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import h5py
@@ -114,7 +115,7 @@ class RecordingWriter:
         rows = dict(rows or {})
         if self.raw:
             rows["radar/adc"] = adc
-        try:
+        with self._telling("write"):
             self._require_space(sum(np.asarray(data).nbytes for data in rows.values()))
             for name, data in rows.items():
                 self._extend(name, data)
@@ -124,16 +125,12 @@ class RecordingWriter:
             self._unflushed += len(time)
             if self._unflushed >= self.config.frame_rate:
                 self.flush()
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"cannot write {self.part}: {reason(error)}; {self._survivors()}") from error
 
     def extend(self, name: str, data: np.ndarray) -> None:
         """Append rows to a stream that runs at its own rate (an IMU)."""
-        try:
+        with self._telling("write"):
             self._require_space(data.nbytes)
             self._extend(name, data)
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"cannot write {self.part}: {reason(error)}; {self._survivors()}") from error
 
     def _require_space(self, size: int) -> None:
         free = shutil.disk_usage(self.path.parent).free
@@ -166,20 +163,24 @@ class RecordingWriter:
             raise OSError(errno.ENOSPC, "no space left on the device")
         self._unflushed = 0
 
-    def _survivors(self) -> str:
-        return f"{self.frames} whole frames are kept there"
+    @contextmanager
+    def _telling(self, what: str) -> Iterator[None]:
+        """Say what could not be done, and what is left."""
+        try:
+            yield
+        except (OSError, RuntimeError) as error:
+            kept = f"{self.frames} whole frames are kept there"
+            raise InputError(f"cannot {what} {self.part}: {reason(error)}; {kept}") from error
 
     def close(self, keep_part: bool = False) -> None:
         """Flush, close and give the file its final name, unless `keep_part`."""
         if self._file:
-            try:
+            with self._telling("finish"):
                 self.flush()
                 self._file.close()
                 if self._notes:  # HDF5 takes no new attributes while readers may follow
                     with h5py.File(self.part, "r+", libver="latest") as file:
                         file.attrs.update(_storable(self._notes))
-            except (OSError, RuntimeError) as error:
-                raise InputError(f"cannot finish {self.part}: {reason(error)}; {self._survivors()}") from error
             if not keep_part:
                 os.replace(self.part, self.path)
 
@@ -191,10 +192,8 @@ class RecordingWriter:
         if kind is None or issubclass(kind, KeyboardInterrupt):
             self.close()
         else:
-            try:
+            with suppress(InputError):  # the first error is the one to report
                 self.close(keep_part=True)
-            except InputError:
-                pass  # the first error is the one to report
 
 
 def grow(file: h5py.File, name: str, stream: Stream) -> h5py.Dataset:

@@ -109,7 +109,7 @@ class RunWriter:
             "duration_s": float(times[-1] - times[0] + period),
             "blind": self.blindness.summary(),
             "warnings": [self.blindness.warning] if self.blindness.warning else [],
-            "radar": recording.config_json(),
+            "radar": recording.config.model_dump(mode="json"),
         }
         self.put("azimuths", BEARINGS, "rad")
         self._copy_truth(recording)

@@ -6,10 +6,10 @@ Defaults are the preset ``lidar``; values without a source are ours.
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from radarize.errors import InputError
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import read_settings
 
 
 class _Section(BaseModel):
@@ -154,18 +154,7 @@ class SlamConfig(_Section):
         Raises:
             InputError: no such preset or file, or a field that does not exist or has an impossible value.
         """
-        settings = cls.preset(preset).model_dump()
-        try:
-            changes = read_yaml(path) or {}
-            for section, fields in changes.items():
-                settings[section] = {**settings.get(section, {}), **fields}
-            return cls.model_validate(settings)
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join(map(str, first["loc"]))
-            raise InputError(f"{path}: {where} is {first['input']!r}, expected: {first['msg']}") from error
-        except (AttributeError, TypeError) as error:
-            raise InputError(f"{path}: holds no sections with fields, expected e.g. 'grid: {{nodes: 10}}'") from error
+        return read_settings(path, cls.preset(preset))
 
 
 PRESETS: dict[str, SlamConfig] = {

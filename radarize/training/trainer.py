@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from jaxtyping import Float
 from torch import Generator, Tensor
 from torch.optim.lr_scheduler import ReduceLROnPlateau
 
@@ -148,11 +149,7 @@ class Trainer:
     def validate(self) -> dict[str, float]:
         """Metrics on the validation data, by the network's present weights."""
         self.net.eval()
-        sums = [
-            self.task.judge(self.net, *batch).double().sum(dim=0)
-            for batch in self._validation(self.team.rank, self.team.size)
-        ]
-        return self.task.metrics(self.team.sum(torch.stack(sums).sum(dim=0)) / len(self._validated))
+        return self.task.metrics(self.team.sum(self._judged(self.team.rank, self.team.size)) / len(self._validated))
 
     @torch.no_grad()
     def finish(self) -> dict[str, float]:
@@ -160,8 +157,11 @@ class Trainer:
         self.net.load_state_dict(self.best[1])
         self.net.eval()
         self.task.calibrate(self.net, self._validation(0, 1))
-        sums = sum(self.task.judge(self.net, *batch).double().sum(dim=0) for batch in self._validation(0, 1))
-        return self.task.metrics(sums.cpu() / len(self._validated))
+        return self.task.metrics(self._judged(0, 1).cpu() / len(self._validated))
+
+    def _judged(self, rank: int, size: int) -> Float[Tensor, "number"]:
+        """Sums of what the task says of validation items, of which each process takes some."""
+        return sum(self.task.judge(self.net, *batch).double().sum(dim=0) for batch in self._validation(rank, size))
 
     def save(self, path: Path, about: dict) -> None:
         """Write a checkpoint.

@@ -256,7 +256,7 @@ def test_memory_does_not_grow_with_the_bag(tmp_path, monkeypatch):
                 if k % 5 == 0:
                     bag.frame(0.01 * k, frames[k // 5 % 20], SMALL)
                 bag.imu(0.01 * k, np.zeros(3), np.zeros(3))
-        capture = open_bag(path, Given(SMALL))
+        capture = open_bag(path, Given(config=SMALL))
         tracemalloc.start()
         count = sum(len(batch.times) for batch in capture.batches)
         peaks.append(tracemalloc.get_traced_memory()[1])

@@ -78,7 +78,7 @@ def test_truth_told_is_truth_followed(name, recording, weights, monkeypatch):
         turned = np.column_stack([cos * moved[:, 0] - sin * moved[:, 1], sin * moved[:, 0] + cos * moved[:, 1]])
         net = Truth(turned, 1e-4 * np.eye(2))
     header = Header(kind=name, frames=3, maps=(), width=4, grid=None)
-    monkeypatch.setattr(f"radarize.methods.{name}.odometry.load", lambda path, network: (net, header))
+    monkeypatch.setattr("radarize.methods.inertial.load", lambda path, network: (net, header))
     track, truth = follow(name, recording, weights, [16] * 5 + [10]), true_track()
     # The first displacement comes when there is a frame to tell it from: until then nothing is known but rest.
     late = slice(45, None)

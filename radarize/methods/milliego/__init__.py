@@ -3,5 +3,5 @@
 from radarize.methods.method import Method
 
 _PLACE = "radarize.methods.milliego"
-ODOMETRY = {"milliego": Method("milliEgo", f"{_PLACE}.odometry:odometry", ("milliego",))}
+ODOMETRY = {"milliego": Method("milliEgo", f"{_PLACE}.odometry:MilliEgoOdometry", ("milliego",))}
 TASKS = {"milliego": f"{_PLACE}.training:MilliEgo"}

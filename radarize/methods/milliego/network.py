@@ -9,7 +9,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from radarize.features.maps import MapMaker
+from radarize.nets.weights import Network
 
 #: s, from one panorama to the next.
 PAIR = 0.2
@@ -42,7 +42,7 @@ class Heads(nn.Module):
         return torch.cat([self.translation(x), _TURN * self.rotation(x)], dim=-1)
 
 
-class MilliEgoNet(nn.Module):
+class MilliEgoNet(Network):
     """Pairs of panoramas and the IMU's samples between them to the motion from each to the next.
 
     Gates are of channels: a squeeze-and-excitation gate on the radar's (Hu et al., "Squeeze-and-excitation networks",
@@ -54,12 +54,10 @@ class MilliEgoNet(nn.Module):
         width: channels of the first convolution; 64 in the original, with 33.98 M parameters.
     """
 
-    kind, setting, maker, scaled = "milliego", "corrected", MapMaker, False
-    inputs, outputs = ("panorama", "imu"), ("estimate", "covariance")
+    kind, inputs = "milliego", ("panorama", "imu")
 
     def __init__(self, frames: int, maps: Sequence[str] = ("panorama", "imu"), width: int = 64):
-        super().__init__()
-        self.frames, self.maps, self.width = frames, tuple(maps), width
+        super().__init__(frames, maps, width)
         self.shapes = ((frames, ROWS, COLUMNS), (frames, SAMPLES, 6))  # of an item's inputs
         channels, layers, (rows, columns) = 6, [], (ROWS, COLUMNS)
         for scale, kernel, stride in _ENCODER:

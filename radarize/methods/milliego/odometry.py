@@ -1,66 +1,52 @@
 """milliEgo as odometry of a stream of frames: motions over 0.2 s, told anew at every frame."""
 
-from pathlib import Path
-
 import numpy as np
 import torch
 
 from radarize.batch import Batch
 from radarize.features.windows import spaced
+from radarize.methods.inertial import InertialOdometry
 from radarize.methods.method import Inputs
 from radarize.methods.milliego.network import PAIR, SAMPLES, MilliEgoNet
 from radarize.methods.milliego.panorama import panoramas
-from radarize.nets.weights import load
-from radarize.odometry.displacements import Displacements, joined
-from radarize.odometry.inertial import Imu
+from radarize.odometry.displacements import joined
 from radarize.odometry.integration import Track, intervals
 from radarize.odometry.ties import Ties
 from radarize.pose import compose
-from radarize.radar.config import RadarConfig
-from radarize.recording import Recording
 from radarize.stopwatch import stage
 
 #: rad/s^1.5 and rad/s: by how much a walker's turning wanders in a second, and of a rate not known at all.
 _TWIST, _FASTEST_TURN = np.radians(33.0), np.radians(60.0)
 
 
-class MilliEgoOdometry:
-    """Odometry by `MilliEgoNet`: from sparse points and an IMU.
+class MilliEgoOdometry(InertialOdometry):
+    """Odometry by `MilliEgoNet`: from sparse points and an IMU."""
 
-    Args:
-        radar: configuration.
-        recording: with the IMU.
-        weights: file.
+    network, lasts = MilliEgoNet, PAIR
 
-    Raises:
-        InputError: no IMU, or no such weights.
-    """
-
-    def __init__(self, radar: RadarConfig, recording: Recording, weights: Path):
-        self._imu = Imu.of(recording)
-        self.net, header = load(weights, MilliEgoNet)
-        self._period, self._frames = radar.frame_period, header.frames
-        self._path = Displacements(PAIR, self._period)
-        self._yaw = Ties(self._path.reach + 1, _TWIST, _FASTEST_TURN)
+    def __init__(self, inputs: Inputs):
+        super().__init__(inputs)
+        self._period, self._frames = inputs.radar.frame_period, self.header.frames
+        self._yaw = Ties(self.path.reach + 1, _TWIST, _FASTEST_TURN)
         self._past: tuple[np.ndarray, np.ndarray] | None = None  # stamps and panoramas
 
     @torch.inference_mode()
     def follow(self, batch: Batch) -> Track:
         """Poses of the next frames."""
         centers = batch.centers
-        steps = intervals(centers, self._path.time)
+        steps = intervals(centers, self.path.time)
         shown = panoramas(*batch.points, len(batch))
         with stage("translation"):
             stamps = centers
             if self._past is not None:
                 stamps, shown = (np.concatenate(each) for each in zip(self._past, (centers, shown), strict=True))
-            kept = max(len(stamps) - self._path.reach * (self._frames - 1), 0)
+            kept = max(len(stamps) - self.path.reach * (self._frames - 1), 0)
             self._past = stamps[kept:], shown[kept:]
-            apart = self._path.reach * self._period
+            apart = self.path.reach * self._period
             # What is older than the newest pair is memory only: where it is missing, the rest tells the displacement.
             rows, _ = spaced(stamps, len(centers), self._frames, apart, self._period)
             ago = centers[:, None] - apart * np.arange(self._frames - 1, -1, -1)
-            imu = self._imu.latest(ago.ravel(), SAMPLES).reshape(*ago.shape, SAMPLES, 6)
+            imu = self.imu.latest(ago.ravel(), SAMPLES).reshape(*ago.shape, SAMPLES, 6)
             found = [
                 self.net.estimate(torch.from_numpy(shown[window][None]).float(), torch.from_numpy(turns[None]).float())
                 for window, turns in zip(rows, imu, strict=True)
@@ -72,13 +58,8 @@ class MilliEgoOdometry:
         return joined(centers, track)
 
     def _next(self, time: float, dt: float, motion: np.ndarray, covariance: np.ndarray) -> tuple[np.ndarray, ...]:
-        back = self._path.arrive(time)
+        back = self.path.arrive(time)
         self._yaw.predict(dt)
-        self._yaw.tie(back, motion[2], self._path.reach * covariance[2, 2])
+        self._yaw.tie(back, motion[2], self.path.reach * covariance[2, 2])
         older = compose(np.array([0, 0, self._yaw.values[-1 - back]]), np.array([*motion[:2], 0]))
-        return self._path.next(dt, back, older[:2], covariance, self._yaw.values[-1], self._yaw.variance(1))
-
-
-def odometry(inputs: Inputs) -> MilliEgoOdometry:
-    """With the recording's IMU."""
-    return MilliEgoOdometry(inputs.radar, inputs.imu("milliego"), inputs.weights.of("milliego"))
+        return self.path.next(dt, back, older[:2], covariance, self._yaw.values[-1], self._yaw.variance(1))

@@ -15,11 +15,11 @@ and the elevation-aware array is averaged from channels of one loop (zeros would
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
+from jaxtyping import Complex64, Float, Float16, Int, Int16
 
 from radarize.batch import Batch
 from radarize.errors import InputError
-from radarize.features.maps import Axes
+from radarize.features.maps import Axes, Maker
 from radarize.radar.config import RadarConfig
 from radarize.stopwatch import stage
 
@@ -36,29 +36,25 @@ RATE = 15.0
 
 #: Channels (in firing order: TX1, TX3, TX2 x RX) of the row, and of the pairs that differ in height.
 ROW, LOWER, UPPER = slice(0, 8), slice(2, 6), slice(8, 12)
-_DOPPLER = {
+DOPPLER = {
     "published_doppler_azimuth": "log power over closing speed and azimuth, all channels as one line",
     "published_doppler_elevation_aware": "log power over closing speed and azimuth near the horizon",
 }
-_RANGE = {f"published_range_azimuth_{n}": f"log power over range and azimuth, {n} frames" for n in BUFFERS}
-_LEVEL = {f"published_elevation_aware_{n}": f"log power near the horizon, {n} frames" for n in BUFFERS}
+RANGE = {f"published_range_azimuth_{n}": f"log power over range and azimuth, {n} frames" for n in BUFFERS}
+LEVEL = {f"published_elevation_aware_{n}": f"log power near the horizon, {n} frames" for n in BUFFERS}
 
 
-class PublishedMaps:
+class PublishedMaps(Maker):
     """Makes the artefact's maps of one radar configuration, 0...1.
 
     Args:
         config: radar configuration.
 
-    Attributes:
-        names: of all maps.
-        history: frames before its own that a map needs.
-
     Raises:
         InputError: the radar has not twelve virtual channels.
     """
 
-    maps = _DOPPLER | _RANGE | _LEVEL
+    maps = DOPPLER | RANGE | LEVEL
     unit = "natural logarithm, 0...1"
     history = max(*BUFFERS, BURSTS) - 1
 
@@ -80,50 +76,25 @@ class PublishedMaps:
     @staticmethod
     def axes(config: RadarConfig, name: str) -> Axes:
         """Rows and columns of a map."""
-        if name in _DOPPLER:
+        if name in DOPPLER:
             rows, columns = DOPPLER_SIZE
             places = (np.arange(columns) + 0.5) * len(BEAMS) / columns - 0.5
             azimuths = -np.interp(places, np.arange(len(BEAMS)), BEAMS)[::-1]
             return Axes(rows, 2 * config.max_velocity / rows, azimuths)
         return Axes(config.samples, config.range_resolution, BEARINGS)
 
-    def __call__(
-        self,
-        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
-        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
-        names: tuple[str, ...] | None = None,
-        frames: slice = slice(None),
-    ) -> dict[str, Float16[np.ndarray, "map row azimuth"]]:
-        """Maps of some of consecutive frames, which for these maps are the buffer.
-
-        Args:
-            adc: raw samples; before the first frame there was nothing.
-            valid: is not used: what was lost counts as silence.
-            names: of `self.names`; all if None.
-            frames: whose maps are wanted.
-
-        Raises:
-            InputError: samples that do not fit the configuration.
-        """
-        return self.of_frames(adc, np.arange(len(adc))[frames], names)
-
-    def of_frames(
-        self,
-        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
-        wanted: Int[np.ndarray, "map"],
-        names: tuple[str, ...] | None = None,
-    ) -> dict[str, Float16[np.ndarray, "map row azimuth"]]:
-        """The same, for frames by number."""
+    def __call__(self, adc, valid=None, names=None, frames=slice(None)):
+        """See `Maker`: before the first frame there was nothing, and what was lost counts as silence."""
         if tuple(adc.shape[1:]) != self.config.frame_shape:
             raise InputError(f"frames have shape {tuple(adc.shape[1:])}, expected {self.config.frame_shape}")
-        names, channels = names or self.names, self.channels(adc)
-        doppler, made = [n for n in names if n in _DOPPLER], {}
+        names, channels, wanted = names or self.names, self.channels(adc), np.arange(len(adc))[frames]
+        doppler, made = [n for n in names if n in DOPPLER], {}
         if doppler:
             silence = channels.new_zeros(BURSTS - 1, *channels.shape[1:])
             bursts = torch.cat([silence, channels]).unfold(0, BURSTS, 1)[wanted]  # (frame, loop, channel, sample, 3)
             slow = bursts.permute(0, 4, 1, 2, 3).flatten(1, 2)
             found = [self._doppler_azimuth(one) for one in slow]
-            made = {name: torch.stack([pair[k] for pair in found]) for k, name in enumerate(_DOPPLER) if name in names}
+            made = {name: torch.stack([pair[k] for pair in found]) for k, name in enumerate(DOPPLER) if name in names}
         if len(doppler) < len(names):
             made |= self._range_azimuth(channels, wanted)
         return {name: made[name].half().numpy() for name in names}
@@ -164,8 +135,8 @@ class PublishedMaps:
         steering = self._steering(8, BEARINGS).to(torch.complex128)
         made = {}
         for names, covariance, beams in (
-            (_RANGE, apart, steering.reshape(2, 4, -1)),
-            (_LEVEL, whole, steering[:4].reshape(1, 4, -1)),
+            (RANGE, apart, steering.reshape(2, 4, -1)),
+            (LEVEL, whole, steering[:4].reshape(1, 4, -1)),
         ):
             silence = covariance.new_zeros(self.history, *covariance.shape[1:])
             buffer = torch.cat([silence, covariance])
@@ -215,7 +186,7 @@ class PublishedStream:
         self._buffer = frames[-self._maker.history :].copy()
         used = np.flatnonzero(batch.numbers % self._stride == 0)
         with stage("maps"):
-            return used, self._maker.of_frames(frames, before + used) if len(used) else {}
+            return used, self._maker(frames, frames=before + used) if len(used) else {}
 
 
 def levels(power: torch.Tensor, span: tuple[float, float]) -> torch.Tensor:

@@ -14,6 +14,7 @@ from radarize.features.maps import Maps
 from radarize.methods.published.maps import PublishedMaps
 from radarize.nets.resnet import Block, ResNet18
 from radarize.nets.unet import UNet
+from radarize.nets.weights import Network
 
 
 class Attention(nn.Module):
@@ -32,28 +33,20 @@ class Attention(nn.Module):
         return x * torch.sigmoid(self.mix(mean) + self.mix(most))
 
 
-class PublishedMotionNet(nn.Module):
+class PublishedMotionNet(Network):
     """What the two have in common.
-
-    Args:
-        frames: of a window.
-        maps: names of a frame's maps.
-        width: of the ResNet.
 
     Attributes:
         kind, dimensions, pool: set by the subclass; the last as of `ResNet18`.
         error: mean squared error on validation data.
     """
 
-    setting, maker, scaled = "published", PublishedMaps, False
-    inputs, outputs = ("maps",), ("estimate", "covariance")
-    kind: str
+    setting, maker = "published", PublishedMaps
     dimensions: int
     pool: bool
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
-        super().__init__()
-        self.frames, self.maps, self.width = frames, tuple(maps), width
+        super().__init__(frames, maps, width)
         self.resnet = ResNet18(frames * len(self.maps), self.dimensions, width, pool=self.pool)
         self.register_buffer("error", torch.ones(self.dimensions))
 
@@ -91,15 +84,13 @@ class PublishedRotationNet(PublishedMotionNet):
         return turn, torch.diag(self.error).expand(maps.shape[0], -1, -1)
 
 
-class PublishedSegmentationNet(nn.Module):
+class PublishedSegmentationNet(Network):
     """Range-azimuth maps of one, three and five frames of both arrays to occupancy, of two classes."""
 
-    kind, setting, maker, scaled = "segmentation", "published", PublishedMaps, False
-    inputs, outputs = ("maps",), ("probability",)
+    kind, setting, maker, outputs = "segmentation", "published", PublishedMaps, ("probability",)
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
-        super().__init__()
-        self.frames, self.maps, self.width = frames, tuple(maps), width
+        super().__init__(frames, maps, width)
         self.unet = UNet(frames * len(self.maps), 2, width)
 
     def forward(self, maps: Maps) -> Float[Tensor, "item class range bearing"]:

@@ -12,19 +12,14 @@ from radarize.features import augment
 from radarize.features.maps import Maps
 from radarize.features.table import YAW, Reading, Table
 from radarize.methods.published import labels
-from radarize.methods.published.maps import PublishedMaps
+from radarize.methods.published.maps import DOPPLER, LEVEL, RANGE
 from radarize.methods.published.networks import (
     PublishedRotationNet,
     PublishedSegmentationNet,
     PublishedTranslationNet,
 )
 from radarize.methods.radarize.training import Rotation, Segmentation, Translation
-from radarize.methods.task import Motion, Settings, first_cell, turns
-
-_DOPPLER, _RANGE, _LEVEL = (
-    tuple(name for name in PublishedMaps.maps if name.startswith(f"published_{kind}"))
-    for kind in ("doppler", "range", "elevation")
-)
+from radarize.methods.task import Motion, Settings, turns
 
 
 class Plain(Motion):
@@ -42,7 +37,7 @@ class PublishedTranslation(Plain):
     """Velocity since the frame before, m/s."""
 
     network, error, size = PublishedTranslationNet, Translation.error, Translation.size
-    maps, truth = _DOPPLER, (Reading("published_velocity", "truth/pose", labels.velocity),)
+    maps, truth = tuple(DOPPLER), (Reading("published_velocity", "truth/pose", labels.velocity),)
     defaults = Settings(width=64, frames=1, patience=30)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
@@ -68,7 +63,7 @@ class PublishedRotation(Plain):
     """Turn over one to four frames of 15 Hz, rad."""
 
     network, error, size, reach = PublishedRotationNet, Rotation.error, Rotation.size, Rotation.reach
-    maps, truth = _RANGE, (YAW,)
+    maps, truth = tuple(RANGE), (YAW,)
     optimiser = torch.optim.AdamW
     defaults = Settings(width=64, patience=30)
 
@@ -95,7 +90,7 @@ class PublishedSegmentation(Segmentation):
     """Occupancy of the depth picture's slab."""
 
     network, steepest = PublishedSegmentationNet, math.inf
-    maps, truth = _RANGE + _LEVEL, (Reading("published_occupancy", "truth/depth", labels.occupancy),)
+    maps, truth = (*RANGE, *LEVEL), (Reading("published_occupancy", "truth/depth", labels.occupancy),)
     defaults = Settings(width=64, frames=1, epochs=5, batch=48, rate=1e-4, betas=(0.8, 0.9))
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
@@ -109,10 +104,7 @@ class PublishedSegmentation(Segmentation):
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         logits = net(maps)
         loss = torch.stack([pooled_dice(one[None], truth[None]) for one, truth in zip(logits, label, strict=True)])
-        found, truth = first_cell(logits.argmax(dim=1) == 1), first_cell(label == 1)
-        there = truth < label.shape[1]
-        near = ((found - truth).abs() <= self.near) & there
-        return torch.stack([loss, near.sum(dim=1), there.sum(dim=1)], dim=1)
+        return self._judged(loss, logits.argmax(dim=1) == 1, label == 1)
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Its probabilities are taken as they are."""

@@ -3,20 +3,23 @@
 Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023.
 """
 
+from collections import OrderedDict
 from collections.abc import Sequence
 
 import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
-from torch.nn.functional import interpolate, max_pool2d, pad
+from torch.nn.functional import pad
 
-from radarize.features.maps import AZIMUTHS, MapMaker, Maps
+from radarize.features.maps import AZIMUTHS, Maps
 from radarize.mapping.scans import BEARINGS
-from radarize.nets.unet import double_convolution
+from radarize.nets.unet import Up, double_convolution, through
+from radarize.nets.weights import Network
 
 #: Columns that the network sees, and those of its picture, over the field of the scans.
 SEEN, DRAWN = 64, 512
+_DOUBLINGS = (DRAWN // SEEN).bit_length() - 1
 #: Edges of the picture, rad: those of the scans' outer bearings.
 _HALF = (BEARINGS[1] - BEARINGS[0]) / 2
 FIELD = (float(BEARINGS[0] - _HALF), float(BEARINGS[-1] + _HALF))
@@ -32,31 +35,11 @@ def columns(count: int) -> Float[np.ndarray, "count"]:
     return (edges[1:] + edges[:-1]) / 2
 
 
-class Up(nn.Module):
-    """Twice the size by interpolation, the encoder's image of that size beside it, and fewer channels."""
-
-    def __init__(self, inputs: int, outputs: int):
-        super().__init__()
-        self.mix = double_convolution(inputs, outputs, inputs // 2)
-
-    def forward(self, x: Tensor, beside: Tensor) -> Tensor:
-        x = interpolate(x, scale_factor=2.0, mode="bilinear", align_corners=True)
-        rows, columns = (beside.shape[axis] - x.shape[axis] for axis in (2, 3))  # 1 where an odd size was halved
-        return self.mix(torch.cat([beside, pad(x, (0, columns, 0, rows))], dim=1))
+def _larger(*scale: float) -> nn.Upsample:
+    return nn.Upsample(scale_factor=scale, mode="bilinear", align_corners=True)
 
 
-class Sharper(nn.Module):
-    """Twice the columns."""
-
-    def __init__(self, width: int):
-        super().__init__()
-        self.mix = double_convolution(width, width)
-
-    def forward(self, x: Tensor) -> Tensor:
-        return self.mix(interpolate(x, scale_factor=(1.0, 2.0), mode="bilinear", align_corners=True))
-
-
-class RadarHdNet(nn.Module):
+class RadarHdNet(Network):
     """Range-azimuth maps to a picture of the first surfaces, of eight times as many columns.
 
     The original sees 256 ranges, 64 directions of half a circle and a Bartlett beamformer's magnitudes; this one sees
@@ -68,18 +51,19 @@ class RadarHdNet(nn.Module):
         width: channels of the first level; 64 in the original, with 17.51 M parameters.
     """
 
-    kind, setting, maker, scaled = "radarhd", "corrected", MapMaker, False
-    inputs, outputs = ("maps",), ("probability",)
+    kind, outputs = "radarhd", ("probability",)
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
-        super().__init__()
-        self.frames, self.maps, self.width = frames, tuple(maps), width
+        super().__init__(frames, maps, width)
         widths = [width * scale for scale in (1, 2, 4, 8, 8)]
         inputs = [frames * len(self.maps), *widths[:-1]]
         self.down = nn.ModuleList(double_convolution(a, b) for a, b in zip(inputs, widths, strict=True))
         sizes = [width * scale for scale in (8, 4, 2, 1, 1)]
-        self.up = nn.ModuleList(Up(2 * a, b) for a, b in zip(sizes[:-1], sizes[1:], strict=True))
-        self.sharpen = nn.Sequential(*(Sharper(width) for _ in range((DRAWN // SEEN).bit_length() - 1)))
+        self.up = nn.ModuleList(
+            Up(_larger(2.0, 2.0), double_convolution(2 * a, b, a)) for a, b in zip(sizes[:-1], sizes[1:], strict=True)
+        )
+        sharper = (OrderedDict(grow=_larger(1.0, 2.0), mix=double_convolution(width, width)) for _ in range(_DOUBLINGS))
+        self.sharpen = nn.Sequential(*map(nn.Sequential, sharper))
         self.head = nn.Conv2d(width, 1, 1)
         self.coarse = False  # whether training rounds convolutions to bfloat16, see `ResNet18`
         resampling = np.stack([np.interp(columns(SEEN), AZIMUTHS, row) for row in np.eye(len(AZIMUTHS))])
@@ -97,13 +81,7 @@ class RadarHdNet(nn.Module):
         """Logits of a surface in a cell of range and `columns(DRAWN)`."""
         x = self.seen(maps)
         with torch.autocast(x.device.type, torch.bfloat16, enabled=self.coarse and self.training):
-            levels = [self.down[0](x)]
-            for convolution in self.down[1:]:
-                levels.append(convolution(max_pool2d(levels[-1], 2)))
-            x = levels.pop()
-            for up in self.up:
-                x = up(x, levels.pop())
-            x = self.sharpen(x)
+            x = self.sharpen(through(x, self.down, self.up))
         return self.head(x.float())[:, 0]
 
     def estimate(self, maps: Maps) -> Float[Tensor, "item range direction"]:

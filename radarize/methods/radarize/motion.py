@@ -10,37 +10,35 @@ from collections.abc import Sequence
 
 import torch
 from jaxtyping import Float
-from torch import Tensor, nn
+from torch import Tensor
 
-from radarize.features.maps import AZIMUTHS, MapMaker, Maps
+from radarize.features.maps import AZIMUTHS, Maps
 from radarize.nets.correlation import Correlation
 from radarize.nets.gaussian import Gaussian
 from radarize.nets.maps import coordinates, level
 from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
+from radarize.nets.weights import Network
 
 
-class MotionNet(nn.Module):
+class MotionNet(Network):
     """What the two have in common.
 
     Args:
+        frames, maps, width: see `Network`; the width is that of the ResNet.
         channels: of the image.
-        width: of the ResNet.
 
     Attributes:
         kind, dimensions, stride: set by the subclass; the stride is that of the ResNet's first convolution.
-        setting, maker, scaled, inputs, outputs: see `radarize.nets.weights.Network`.
         spread: logarithm of what standard deviations are multiplied with.
     """
 
-    setting, maker, scaled = "corrected", MapMaker, True
-    inputs, outputs = ("maps",), ("estimate", "covariance")
-    kind: str
+    scaled = True
     dimensions: int
     stride: tuple[int, int]
 
-    def __init__(self, channels: int, width: int):
-        super().__init__()
+    def __init__(self, frames: int, maps: Sequence[str], width: int, channels: int):
+        super().__init__(frames, maps, width)
         self.resnet = ResNet18(channels + 2, Gaussian.numbers(self.dimensions), width, self.stride, pool=False)
         self.register_buffer("spread", torch.zeros(()))
 
@@ -66,8 +64,8 @@ class TranslationNet(MotionNet):
     near = 6
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 16, step: float = 0.1146):
-        super().__init__(frames * len(maps), width)
-        self.frames, self.maps, self.width, self.step = frames, tuple(maps), width, step
+        super().__init__(frames, maps, width, frames * len(maps))
+        self.step = step
         self.second = ResNet18(frames * len(maps) + 2, Gaussian.numbers(2), width, self.stride, pool=False)
         self.register_buffer("directions", torch.tensor(_directions(), dtype=torch.float32), persistent=False)
 
@@ -123,8 +121,7 @@ class RotationNet(MotionNet):
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 16, step: float = 0.0446):
         correlation = Correlation(len(maps), len(AZIMUTHS))
-        super().__init__((frames - 1) * correlation.channels + 2, width)
-        self.frames, self.maps, self.width = frames, tuple(maps), width
+        super().__init__(frames, maps, width, (frames - 1) * correlation.channels + 2)
         self.moved, self.correlation = Moved(step), correlation
 
     def forward(self, maps: Maps, travel: Float[Tensor, "item 2"]) -> Gaussian:

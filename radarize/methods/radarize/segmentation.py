@@ -5,12 +5,13 @@ from collections.abc import Sequence
 import numpy as np
 import torch
 from jaxtyping import Float
-from torch import Tensor, nn
+from torch import Tensor
 
-from radarize.features.maps import AZIMUTHS, MapMaker, Maps
+from radarize.features.maps import AZIMUTHS, Maps
 from radarize.mapping.scans import BEARINGS
 from radarize.nets.maps import coordinates, level
 from radarize.nets.unet import UNet
+from radarize.nets.weights import Network
 
 
 def _resampling() -> Tensor:
@@ -19,7 +20,7 @@ def _resampling() -> Tensor:
     return torch.tensor(weights, dtype=torch.float32)
 
 
-class SegmentationNet(nn.Module):
+class SegmentationNet(Network):
     """U-Net on range-azimuth maps, azimuth and elevation-aware, whose answers lie on the grid of the occupancy labels.
 
     Args:
@@ -28,12 +29,10 @@ class SegmentationNet(nn.Module):
         width: of the U-Net.
     """
 
-    kind, setting, maker, scaled = "segmentation", "corrected", MapMaker, False
-    inputs, outputs = ("maps",), ("probability",)
+    kind, outputs = "segmentation", ("probability",)
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 16):
-        super().__init__()
-        self.frames, self.maps, self.width = frames, tuple(maps), width
+        super().__init__(frames, maps, width)
         self.unet = UNet(frames * len(self.maps) + 2, 1, width)
         self.register_buffer("resampling", _resampling(), persistent=False)
         # Balanced classes make surfaces seem likelier than they are; training fits these on validation data.

@@ -92,10 +92,14 @@ class Segmentation(Task):
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         logits = net(maps)
-        found, truth = first_cell(logits > 0), first_cell(label == losses.SURFACE)
-        there = truth < label.shape[1]
+        return self._judged(losses.surfaces(logits, label), logits > 0, label == losses.SURFACE)
+
+    def _judged(self, loss: Tensor, occupied: Tensor, surface: Tensor) -> Float[Tensor, "item 3"]:
+        """Loss, first surfaces that are found nearly where they are, and first surfaces."""
+        found, truth = first_cell(occupied), first_cell(surface)
+        there = truth < surface.shape[1]
         near = ((found - truth).abs() <= self.near) & there
-        return torch.stack([losses.surfaces(logits, label), near.sum(dim=1), there.sum(dim=1)], dim=1)
+        return torch.stack([loss, near.sum(dim=1), there.sum(dim=1)], dim=1)
 
     def metrics(self, means: Tensor) -> dict[str, float]:
         loss, near, there = means.tolist()

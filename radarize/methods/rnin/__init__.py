@@ -3,5 +3,5 @@
 from radarize.methods.method import Method
 
 _PLACE = "radarize.methods.rnin"
-ODOMETRY = {"rnin": Method("RNIN", f"{_PLACE}.odometry:odometry", ("rnin",))}
+ODOMETRY = {"rnin": Method("RNIN", f"{_PLACE}.odometry:RninOdometry", ("rnin",))}
 TASKS = {"rnin": f"{_PLACE}.training:Rnin"}

@@ -9,32 +9,15 @@ from collections.abc import Sequence
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
-from torch.nn.functional import relu
 
-from radarize.features.maps import MapMaker
+from radarize.nets.resnet import stages
+from radarize.nets.weights import Network
 
 #: s, of a window, and its samples.
 LASTS, SAMPLES = 1.0, 100
 
 
-class Block1d(nn.Module):
-    """Two convolutions over time and a shortcut around them."""
-
-    def __init__(self, inputs: int, outputs: int, stride: int):
-        super().__init__()
-        self.body = nn.Sequential(
-            nn.Conv1d(inputs, outputs, 3, stride, 1, bias=False), nn.BatchNorm1d(outputs), nn.ReLU(),
-            nn.Conv1d(outputs, outputs, 3, 1, 1, bias=False), nn.BatchNorm1d(outputs),
-        )  # fmt: skip
-        self.shortcut = nn.Identity()
-        if stride != 1 or inputs != outputs:
-            self.shortcut = nn.Sequential(nn.Conv1d(inputs, outputs, 1, stride, bias=False), nn.BatchNorm1d(outputs))
-
-    def forward(self, x: Tensor) -> Tensor:
-        return relu(self.body(x) + self.shortcut(x))
-
-
-class RninNet(nn.Module):
+class RninNet(Network):
     """Consecutive windows of IMU samples, levelled, to the displacement in each.
 
     Args:
@@ -43,21 +26,13 @@ class RninNet(nn.Module):
         width: channels of the first stage; 64 in the original, with 5.36 M parameters.
     """
 
-    kind, setting, maker, scaled = "rnin", "corrected", MapMaker, False
-    inputs, outputs = ("windows",), ("estimate", "covariance")
+    kind, inputs = "rnin", ("windows",)
 
     def __init__(self, frames: int, maps: Sequence[str] = ("levelled",), width: int = 64):
-        super().__init__()
-        self.frames, self.maps, self.width = frames, tuple(maps), width
+        super().__init__(frames, maps, width)
         self.shapes = ((frames, SAMPLES, 6),)  # of an item's inputs
-        widths = [width, width, 2 * width, 4 * width, 8 * width]
         self.stem = nn.Sequential(nn.Conv1d(6, width, 7, 2, 3, bias=False), nn.BatchNorm1d(width), nn.ReLU())
-        self.stages = nn.Sequential(
-            *(
-                nn.Sequential(Block1d(a, b, 1 if a == b else 2), Block1d(b, b, 1))
-                for a, b in zip(widths[:-1], widths[1:], strict=True)
-            )
-        )
+        self.stages = stages(width, axes=1)
         steps = -(-SAMPLES // 16)
         self.narrow = nn.Sequential(
             nn.Conv1d(8 * width, 2 * width, 1, bias=False), nn.BatchNorm1d(2 * width), nn.ReLU(), nn.Flatten()

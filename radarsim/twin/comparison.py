@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-import torch
 from jaxtyping import Float, Int
 
+from radarize.batch import Batch, Signal
 from radarize.errors import InputError
-from radarize.features.maps import MapMaker
+from radarize.features.maps import MAPS
 from radarize.mapping.scans import ScanConfig, make_scans
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.config import RadarConfig
@@ -29,8 +29,8 @@ FIGURES = {
     "profile_rms": ("dB", "RMS difference of the range profiles, gain taken out"),
     "gain": ("dB", "twin over recording: median over the range profile, where it is well above its floor"),
     "noise": ("dB", "noise floor, twin over recording"),
-    **{f"correlation_{name}": ("", f"correlation: {about}") for name, about in MapMaker.maps.items()},
-    **{f"similarity_{name}": ("", f"MS-SSIM: {about}") for name, about in MapMaker.maps.items()},
+    **{f"correlation_{name}": ("", f"correlation: {about}") for name, about in MAPS.items()},
+    **{f"similarity_{name}": ("", f"MS-SSIM: {about}") for name, about in MAPS.items()},
     "velocity": ("m/s", "length of the difference of the velocities"),
     "velocity_error_recording": ("m/s", "recording's velocity against that of the poses"),
     "velocity_error_twin": ("m/s", "twin's velocity against that of the poses"),
@@ -208,7 +208,8 @@ class _Analysis:
     """What is compared of frames: range profile, noise, and, of more than one antenna, maps, velocity and scan."""
 
     def __init__(self, config: RadarConfig):
-        self.config, self.maker = config, MapMaker(config)
+        self.config, self._signal = config, Signal(config)
+        self.maker = self._signal.maker
         self.ranges, self.azimuths = self.maker.heatmaps.ranges, self.maker.heatmaps.azimuths
         self.maps = self.maker.names if len(self.maker.heatmaps.row) > 1 else ()
         self._far = self.ranges >= ScanConfig().min_range  # nearer is leakage, the same anywhere
@@ -217,15 +218,16 @@ class _Analysis:
     def __call__(self, source: Recording, frames: Int[np.ndarray, "frame"]) -> dict[str, np.ndarray]:
         adc = np.concatenate([source.adc(k, k + 1) for k in frames])
         valid = np.concatenate([source.valid(k, k + 1) for k in frames])
-        spectrum = self.maker.heatmaps.spectrum(adc, valid)
+        batch = Batch(self._signal, adc, source.times[frames], valid)
+        spectrum = batch.spectrum
         power = spectrum.abs().square().sum(dim=2).mean(dim=-1).numpy()
         found = {"profile": power, "noise": self._noise(adc, valid), "far": np.broadcast_to(self._far, power.shape)}
         if not self.maps:
             return found
-        for name, made in self.maker.of(spectrum, self.maps).items():
+        for name, made in batch.maps(self.maps).items():
             rows = self._far if not name.startswith("doppler") else slice(None)
             found[name] = foreground(made.astype(np.float32)[:, rows]).astype(np.float16)
-        found["velocity"] = self._velocities(spectrum)
+        found["velocity"] = self._velocities(batch)
         sharp = self.maker.heatmaps.range_azimuth_of(spectrum, "capon").numpy()
         found["scan"] = make_scans(sharp, self.ranges, self.azimuths, method="first-echo")
         return found
@@ -238,10 +240,10 @@ class _Analysis:
             [noise_floor(noise_profile(s[None])) if w else np.nan for s, w in zip(signal, whole, strict=True)]
         )
 
-    def _velocities(self, spectrum: torch.Tensor) -> Float[np.ndarray, "frame 2"]:
+    def _velocities(self, batch: Batch) -> Float[np.ndarray, "frame 2"]:
         if self.config.loops < _LOOPS:
-            return np.full((len(spectrum), 2), np.nan)
-        found = self._velocity.estimate(spectrum)
+            return np.full((len(batch), 2), np.nan)
+        found = self._velocity.estimate(batch)
         return np.where(found.inliers[:, None] > 0, found.velocity, np.nan)
 
 
@@ -259,7 +261,7 @@ def _figures(real: dict[str, np.ndarray], twin: dict[str, np.ndarray]) -> dict[s
         "gain": gain,
         "noise": 10 * np.log10(twin["noise"] / real["noise"]),
     }
-    for name in (n for n in real if n in MapMaker.maps):
+    for name in (n for n in real if n in MAPS):
         found[f"correlation_{name}"] = correlation(real[name], twin[name])
         found[f"similarity_{name}"] = similarity(real[name], twin[name])
     if "scan" in real:

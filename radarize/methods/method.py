@@ -27,8 +27,10 @@ class Weights:
         self.folder = folder
 
     def of(self, kind: str) -> Path:
-        """File of a network."""
-        return (self.folder or Path(__file__).parents[1] / "weights") / f"{kind}.safetensors"
+        """File of a network; in a folder of the user's ``published-KIND`` may be called ``KIND``, as it once was."""
+        path = (self.folder or Path(__file__).parents[1] / "weights") / f"{kind}.safetensors"
+        former = path.with_name(path.name.removeprefix("published-"))
+        return former if self.folder and not path.is_file() and former.is_file() else path
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,5 @@
 """The methods, put together."""
 
-from pathlib import Path
-
 import numpy as np
 from jaxtyping import Float
 from torch import nn
@@ -32,22 +30,12 @@ def scans(inputs: Inputs) -> PublishedScans:
 
 
 def _load(inputs: Inputs, network: type[Network]) -> nn.Module:
-    return load(file(inputs.weights.folder, network.kind), network, inputs.radar)[0]
-
-
-def file(folder: Path | None, kind: str) -> Path:
-    """Of one of the artefact's networks: ``published-KIND.safetensors``, or as it once was, ``KIND.safetensors``.
-
-    Raises:
-        InputError: no folder is named.
-    """
-    if folder is None:
+    if inputs.weights.folder is None:
         raise InputError(
             "published odometry and scans come without weights: train them (`radarize train published-translation` and "
             "so on) and name their folder with --weights"
         )
-    path = folder / f"published-{kind}.safetensors"
-    return path if path.is_file() else folder / f"{kind}.safetensors"
+    return load(inputs.weights.of(f"published-{network.kind}"), network, inputs.radar)[0]
 
 
 def _headings(inputs: Inputs) -> Float[np.ndarray, "4"] | None:

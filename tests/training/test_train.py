@@ -270,7 +270,7 @@ def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
     table = Table.read(paths, ("doppler_azimuth",), (VELOCITY, YAW))
     assert table.starts(1).tolist() == [0, 1, 2, 4, 5, 6, *range(8, 16)]
     assert table.starts(3).tolist() == [0, 4, *range(8, 14)]
-    table.sensed = {"imu": torch.zeros(16, 15, 6)}
+    table = replace(table, sensed={"imu": torch.zeros(16, 15, 6)})
     table.sensed["imu"][9, 3, 0] = torch.nan
     assert table.starts(1).tolist() == [0, 1, 2, 4, 5, 6, 8, *range(10, 16)]
     walk_with_gap = data_set(tmp_path / "data", "velocity", frames=60)

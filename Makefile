@@ -1,7 +1,8 @@
 # make demo: sets this machine up and runs the main job end to end      make test: sets up and passes the tests
+# make documents: types every command of README and docs where nothing is compiled yet, in some ten minutes
 RUN := runs/demo
 
-.PHONY: setup demo test lint clean
+.PHONY: setup demo test documents lint clean
 
 setup:
 	@./setup.sh
@@ -16,6 +17,9 @@ demo: setup
 
 test: setup
 	@.venv/bin/python -m pytest $(TESTS)
+
+documents: setup
+	@DOCUMENTS=1 .venv/bin/python -m pytest tests/documents
 
 lint: setup
 	@.venv/bin/ruff check .

@@ -74,13 +74,15 @@ def test_a_replay_gives_what_the_file_gives(walk, tmp_path):
     inputs = Inputs(PRESETS["radarize"])
     offline, intake = Workshop(inputs).pipeline(**CLASSICAL), Intake(inputs.signal)
     with Recording(walk) as one, Recording(tmp_path / "again.h5") as other:
-        result = offline.push(intake.take(one.adc(0, FRAMES), one.times, one.valid(0, FRAMES)))
+        # In the live view's own batches: on some processors sums are ordered otherwise in batches of another size.
+        ends = [each.frames[-1] + 1 for each in live.results]
+        spans = zip([0, *ends[:-1]], ends, strict=True)
+        results = [offline.push(intake.take(one.adc(a, b), one.times[a:b], one.valid(a, b))) for a, b in spans]
         assert np.array_equal(one.adc(0, FRAMES), other.adc(0, FRAMES))
         assert np.array_equal(one.valid(0, FRAMES), other.valid(0, FRAMES)) and np.array_equal(one.times, other.times)
-    # On some processors sums are ordered otherwise in batches of another size.
-    assert poses(live.results) == pytest.approx(result.track.pose, abs=1e-4)
-    assert np.array_equal(np.concatenate([each.frames for each in live.results]), result.frames)
-    assert len(result.frames) == FRAMES - 1 and live.intake.lost == intake.lost == 1
+    assert poses(live.results) == pytest.approx(poses(results), abs=1e-6)
+    frames = [np.concatenate([each.frames for each in every]) for every in (live.results, results)]
+    assert np.array_equal(*frames) and len(frames[0]) == FRAMES - 1 and live.intake.lost == intake.lost == 1
     assert live.losses.lost_frames == 1 and live.intake.taken == FRAMES and stream.counts.dropped == 0
 
 

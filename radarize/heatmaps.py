@@ -13,10 +13,11 @@ from typing import Literal
 import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float32, Int16
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from scipy.signal import windows
 
 from radarize.errors import InputError
+from radarize.plain import Frozen
 from radarize.radar.array import azimuth_row, elevation_pairs, virtual_positions
 from radarize.radar.config import RadarConfig
 
@@ -24,10 +25,8 @@ from radarize.radar.config import RadarConfig
 AZIMUTHS = np.radians(np.arange(-60.0, 61.0))
 
 
-class HeatmapConfig(BaseModel):
+class HeatmapConfig(Frozen):
     """Settings of the heat maps."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     loading: float = Field(
         0.01, gt=0, description="diagonal loading of Capon's covariance, as a share of its mean eigenvalue"

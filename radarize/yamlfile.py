@@ -8,6 +8,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from radarize.errors import InputError
+from radarize.plain import complaint
 
 Settings = TypeVar("Settings", bound=BaseModel)
 
@@ -30,21 +31,24 @@ def read_yaml(path: str | Path, most: float = math.inf) -> object:
         raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
 
 
-def read_settings(path: str | Path, defaults: Settings) -> Settings:
+def read_settings(path: str | Path, defaults: Settings, expected: str) -> Settings:
     """Settings with what a YAML file says otherwise: sections and fields named as there.
+
+    Args:
+        path: of the file.
+        defaults: of all sections.
+        expected: what such a file holds, in words.
 
     Raises:
         InputError: no such file, or a field that does not exist or has an impossible value.
     """
     changes = read_yaml(path) or {}
     if not isinstance(changes, dict):
-        raise InputError(f"{path}: holds a {type(changes).__name__}, expected sections as `radarize config` prints")
+        raise InputError(f"{path}: holds a {type(changes).__name__}, expected {expected}")
     try:
         return type(defaults).model_validate(_merged(defaults.model_dump(), changes))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise InputError(f"{path}: {where} is {first['input']!r}, expected: {first['msg']}") from error
+        raise InputError(f"{path}: {complaint(error)}") from error
 
 
 def _merged(settings: dict, changes: dict) -> dict:

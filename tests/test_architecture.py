@@ -10,7 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 #: Packages and modules of `radarize`, lowest first: each imports only what stands before it, or beside it.
 LAYERS = (
-    "errors replacing yamlfile jsonfile npyfile pose tum console stopwatch jobs",
+    "errors plain replacing yamlfile jsonfile npyfile pose tum console stopwatch jobs",
     "radar",
     "recording",
     "heatmaps points contents",

@@ -5,6 +5,7 @@ from typing import Annotated
 from pydantic import BaseModel, Field, ValidationError
 
 from radarize.errors import InputError
+from radarize.plain import complaint
 from radarize.runfolder import RunFolder
 
 Amount = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -38,9 +39,7 @@ class BlindSpans(BaseModel):
         try:
             found = cls.model_validate(run.facts["blind"])
         except ValidationError as error:
-            problem = error.errors()[0]
-            field, value = ".".join(map(str, ("blind", *problem["loc"]))), str(problem["input"])[:60]
-            raise InputError(f"{run.path / 'run.json'}: {field} is {value!r}: {problem['msg'].lower()}") from error
+            raise InputError(f"{run.path / 'run.json'}: blind.{complaint(error)}") from error
         start = float(run.trajectory[0][0])
         for span in found.spans:
             span.start_s, span.stop_s = span.start_s - start, span.stop_s - start

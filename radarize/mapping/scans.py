@@ -9,12 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from radarize.batch import Batch
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.mapping import echoes
+from radarize.plain import Frozen
 from radarize.points import Cfar, level_around
 from radarize.stopwatch import stage
 
@@ -22,10 +23,8 @@ from radarize.stopwatch import stage
 BEARINGS = np.radians(np.arange(-44.0, 44.0))
 
 
-class ScanConfig(BaseModel):
+class ScanConfig(Frozen):
     """Detection of echoes in range-azimuth maps."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     min_range: float = Field(0.3, ge=0, description="m, nearer cells hold transmitter leakage")
     above_noise_db: float = Field(15.0, gt=0, description="dB, an echo stands so far above the noise")

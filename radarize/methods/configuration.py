@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from textwrap import wrap
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field
 
 from radarize.heatmaps import HeatmapConfig
 from radarize.mapping.scans import ScanConfig
@@ -14,14 +14,13 @@ from radarize.odometry.doppler import DopplerConfig
 from radarize.odometry.integration import VelocityConfig
 from radarize.odometry.rotation import RotationConfig
 from radarize.odometry.settings import FusionConfig, TurnConfig
+from radarize.plain import Frozen
 from radarize.slam.config import SlamConfig
 from radarize.yamlfile import read_settings
 
 
-class Configuration(BaseModel):
+class Configuration(Frozen):
     """The pipeline's settings; each section belongs to one step, and is described where that step stands."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     heatmaps: HeatmapConfig = Field(HeatmapConfig(), description="spectra and beamformers of the classical methods")
     scans: ScanConfig = Field(ScanConfig(), description="echoes in range-azimuth maps, of scans without networks")
@@ -42,7 +41,7 @@ class Configuration(BaseModel):
         Raises:
             InputError: no such file, or a field that does not exist or has an impossible value.
         """
-        return read_settings(path, cls())
+        return read_settings(path, cls(), "sections as `radarize config` prints")
 
     def text(self) -> str:
         """As YAML, with what each field means beside it."""

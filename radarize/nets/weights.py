@@ -8,7 +8,7 @@ from typing import Any
 
 import torch
 from jaxtyping import Float
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save as serialise
 from torch import Tensor, nn
@@ -18,11 +18,12 @@ from radarize.errors import InputError
 from radarize.features.grid import TOLERANCE, Grid
 from radarize.features.maps import Maker, MapMaker
 from radarize.features.windows import Windows
+from radarize.plain import Frozen
 from radarize.radar.config import RadarConfig
 from radarize.replacing import replacing
 
 
-class Header(BaseModel):
+class Header(Frozen):
     """What the file says of itself.
 
     Attributes:
@@ -36,8 +37,6 @@ class Header(BaseModel):
         metrics: on its validation data.
         version: of this package.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: str
     setting: str = "corrected"

@@ -22,10 +22,11 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float, Int
 from numba import njit
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
+from radarize.plain import Frozen
 from radarize.radar.array import virtual_positions
 
 
@@ -46,10 +47,8 @@ class Velocities:
     seen: Bool[np.ndarray, "frame"]
 
 
-class DopplerConfig(BaseModel):
+class DopplerConfig(Frozen):
     """Velocity from the Doppler shifts of single echoes (`DopplerVelocity`)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     beams: int = Field(48, ge=8, description="azimuth beams of the cube, uniform in u_y")
     echoes: int = Field(160, ge=4, description="strongest peaks kept per frame")

@@ -5,12 +5,13 @@ from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from radarize.batch import Batch
 from radarize.errors import InputError
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
+from radarize.plain import Frozen
 from radarize.pose import compose, exponential
 from radarize.radar.config import RadarConfig
 from radarize.stopwatch import stage
@@ -70,10 +71,8 @@ class Track:
     turn_seen: Bool[np.ndarray, "frame"]
 
 
-class VelocityConfig(BaseModel):
+class VelocityConfig(Frozen):
     """Filter of velocities (`VelocityFilter`)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     wander: float = Field(
         0.73, gt=0, description="m/s^1.5, by how much the velocity of a handheld radar wanders in a second"

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float, Float32
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from torch.nn.functional import avg_pool1d
 
 from radarize.batch import Batch
@@ -28,6 +28,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.ties import wandered
+from radarize.plain import Frozen
 
 #: Half widths of the high-pass over range bins and azimuth columns.
 _TEXTURE = (12, 12)
@@ -55,10 +56,8 @@ class Rotations:
     seen: Bool[np.ndarray, "frame"]
 
 
-class RotationConfig(BaseModel):
+class RotationConfig(Frozen):
     """Matching of frames with a local map (`MapRotation`)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     field: float = Field(0.85, gt=0, lt=1, description="largest |sin azimuth| used")
     columns: int = Field(69, ge=8, description="azimuth columns, uniform in sin azimuth")

@@ -1,13 +1,13 @@
 """What may be set where networks tell motion, beside the classical estimators or alone."""
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
+
+from radarize.plain import Frozen
 
 
-class FusionConfig(BaseModel):
+class FusionConfig(Frozen):
     """Two estimates of the same samples (`radarize.methods.radarize.fused`)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     correlation: float = Field(
         0.06,
@@ -21,10 +21,8 @@ class FusionConfig(BaseModel):
     )
 
 
-class TurnConfig(BaseModel):
+class TurnConfig(Frozen):
     """Turns by the network over several spacings (`radarize.methods.radarize.learned`)."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     spacings: tuple[int, ...] = Field(
         (1, 2, 4),

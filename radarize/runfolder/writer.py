@@ -22,6 +22,7 @@ from radarize.odometry.blindness import Blindness
 from radarize.pipeline import Result
 from radarize.recording import Recording
 from radarize.replacing import Replacement
+from radarize.runfolder.occupancy import OccupancyMap
 from radarize.runfolder.reader import FILES, Poses, Scans
 from radarize.slam.backend import Slam
 from radarize.tum import planar_poses, write_poses
@@ -164,7 +165,7 @@ class RunWriter:
             "python": machine.python_version(),
             "machine": f"{machine.system()} {machine.machine()}",
         }
-        slam.map().save(self._files.part / "map")
+        OccupancyMap.of(slam.map()).save(self._files.part / "map.yaml")
         with self._writing():
             (self._files.part / "run.json").write_text(json.dumps({**self._facts, **facts, **made}, indent=2))
             self._scans.close()

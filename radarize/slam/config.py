@@ -6,17 +6,14 @@ Defaults are the preset ``lidar``; values without a source are ours.
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from radarize.errors import InputError
+from radarize.plain import Frozen
 from radarize.yamlfile import read_settings
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class OdometryConfig(_Section):
+class OdometryConfig(Frozen):
     """Uncertainty of odometry that comes without covariances, as standard deviations of one step."""
 
     translation: float = Field(0.02, gt=0, description="floor of a step, m")
@@ -34,7 +31,7 @@ class OdometryConfig(_Section):
     missing_rotation: float = Field(0.2, gt=0, description="of a step without any odometry, rad")
 
 
-class NodeConfig(_Section):
+class NodeConfig(Frozen):
     """How scans are gathered into the nodes of the graph.
 
     Scans join the open node until the sensor has moved by `distance` or `angle`, or `duration` has passed since its
@@ -48,11 +45,11 @@ class NodeConfig(_Section):
     min_points: int = Field(20, gt=0, description="nodes with fewer are neither matched nor searched for loops")
 
 
-class GridConfig(_Section):
+class GridConfig(Frozen):
     """Probability grids of submaps and of the final map."""
 
     resolution: float = Field(0.05, gt=0, description="cell size of submaps, m")
-    map_resolution: float = Field(0.05, gt=0, description="cell size of the final map, m")
+    map_resolution: float = Field(0.05, gt=0, le=1, description="cell size of the final map, m")
     hit: float = Field(0.7, gt=0.5, lt=1, description="probability that a cell is occupied given one echo from it")
     miss: float = Field(0.45, gt=0, lt=0.5, description="the same given one ray through it")
     lowest: float = Field(0.12, gt=0, lt=0.5, description="least probability, so that a map can change its mind")
@@ -63,7 +60,7 @@ class GridConfig(_Section):
     nodes: int = Field(10, ge=2, description="nodes of a submap; the next one starts when half of them are in")
 
 
-class MatcherConfig(_Section):
+class MatcherConfig(Frozen):
     """Scan-to-submap matching."""
 
     enabled: bool = Field(True, description="else nodes follow odometry, and submaps serve the loop search only")
@@ -85,7 +82,7 @@ class MatcherConfig(_Section):
     spacing: float = Field(0.05, gt=0, description="points are thinned to one per square of this size, m")
 
 
-class LoopConfig(_Section):
+class LoopConfig(Frozen):
     """Loop closure."""
 
     enabled: bool = Field(True, description="search for loops at all")
@@ -123,7 +120,7 @@ class LoopConfig(_Section):
     )
 
 
-class SlamConfig(_Section):
+class SlamConfig(Frozen):
     """All parameters of `radarize.slam.backend.Slam`."""
 
     odometry: OdometryConfig = OdometryConfig()
@@ -154,7 +151,7 @@ class SlamConfig(_Section):
         Raises:
             InputError: no such preset or file, or a field that does not exist or has an impossible value.
         """
-        return read_settings(path, cls.preset(preset))
+        return read_settings(path, cls.preset(preset), "sections with fields, such as grid: {nodes: 10}")
 
 
 PRESETS: dict[str, SlamConfig] = {

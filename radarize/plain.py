@@ -1,0 +1,17 @@
+"""Plain data that is checked when it is made, and what is wrong with it as a sentence."""
+
+from reprlib import repr as shortened
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+
+class Frozen(BaseModel):
+    """Fields that nobody changes, and none that nobody knows."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+def complaint(error: ValidationError) -> str:
+    """The first thing that is wrong: field, value, and what is expected."""
+    first = error.errors()[0]
+    return f"{'.'.join(map(str, first['loc'])) or 'file'} is {shortened(first['input'])}, expected: {first['msg']}"

@@ -174,7 +174,7 @@ def live(
         warnings = stream.troubles() + live.losses.warnings()
         if writer:
             writer.annotate(warnings="; ".join(warnings))
-    for words in (*warnings, *filter(None, [live.blindness.warning])):
+    for words in (*warnings, *live.blindness.warnings()):
         typer.echo(f"warning: {words}", err=True)
     print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
 

@@ -1,5 +1,7 @@
 """The one exception that users meet."""
 
+#: Environment variable of processes that show tracebacks.
+DEBUG = "RADARIZE_DEBUG"
 #: Characters of a sentence that somebody reads.
 _LONGEST = 1000
 
@@ -16,6 +18,11 @@ class InputError(Exception):
         text = super().__str__()
         text = text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
         return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def of_system(error: OSError) -> str:
+    """What the system says, and of which file."""
+    return f"{error.filename}: {reason(error)}" if error.filename else reason(error)
 
 
 def first_line(error: BaseException) -> str:

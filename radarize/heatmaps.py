@@ -186,17 +186,17 @@ class Heatmaps:
 
     def elevation_aware_of(self, spectrum: torch.Tensor) -> torch.Tensor:
         """`elevation_aware` of a spectrum at hand."""
-        if self.pairs is None:
-            raise self._no_pairs()
-        pairs = spectrum[..., torch.as_tensor(self.pairs)].mean(dim=-1)
-        covariance = self.covariance(pairs, np.arange(len(self.pairs)))
+        covariance = self.covariance(self._paired(spectrum).mean(dim=-1), np.arange(len(self.pairs)))
         return self._bartlett(covariance, self._pair_steering)
 
-    def _no_pairs(self) -> InputError:
-        return InputError(
-            f"tx {self.config.tx} and rx {self.config.rx} of {self.config.board} hold no antenna pairs of different "
-            "height, expected all three transmitters for elevation"
-        )
+    def _paired(self, spectrum: torch.Tensor) -> torch.Tensor:
+        """Spectra of the elevation pairs, lower and upper along a last axis."""
+        if self.pairs is None:
+            raise InputError(
+                f"tx {self.config.tx} and rx {self.config.rx} of {self.config.board} hold no antenna pairs of "
+                "different height, expected all three transmitters for elevation"
+            )
+        return spectrum[..., torch.as_tensor(self.pairs)]
 
     def elevation_of(
         self, spectrum: torch.Tensor
@@ -209,10 +209,7 @@ class Heatmaps:
         Raises:
             InputError: the array has no such pairs.
         """
-        if self.pairs is None:
-            raise self._no_pairs()
-        pairs = torch.as_tensor(self.pairs)
-        lower, upper = spectrum[..., pairs[:, 0]], spectrum[..., pairs[:, 1]]
+        lower, upper = self._paired(spectrum).unbind(dim=-1)
 
         def beam(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
             steering = self._pair_steering
@@ -268,10 +265,7 @@ class Heatmaps:
             InputError: `elevation_aware` without elevation pairs.
         """
         if elevation_aware:
-            if self.pairs is None:
-                raise self._no_pairs()
-            x = spectrum[..., torch.as_tensor(self.pairs)].mean(dim=-1)
-            steering = self._pair_steering
+            x, steering = self._paired(spectrum).mean(dim=-1), self._pair_steering
         else:
             x, steering = spectrum[..., torch.as_tensor(self.row)], self._steering
         x = x.transpose(1, 2)  # (frame, doppler, range, antenna)

@@ -6,9 +6,11 @@ entries in `radarize.methods`.
 
 from functools import partial
 
-from radarize.benchmark import mapping, odometry, runtime, slam, uncertainty, varied
-from radarize.benchmark.drawings import draw_maps, draw_odometry, draw_slam
+from radarize.benchmark import mapping, odometry, runtime, slam, varied
+from radarize.benchmark.drawings import draw
 from radarize.benchmark.study import Benchmark
+
+_PATHS = partial(draw, which="odometry", parts="trajectories errors", name=lambda pair: pair.odometry)
 
 BENCHMARKS: dict[str, Benchmark] = {
     "odometry": Benchmark(
@@ -17,7 +19,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         odometry.pairs,
         odometry.tables,
         "random",
-        draw=draw_odometry,
+        draw=_PATHS,
     ),
     "odometry-platforms": Benchmark(
         "Odometry on unseen platforms",
@@ -25,7 +27,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         odometry.pairs,
         partial(odometry.tables, paper=odometry.PAPER_PLATFORMS),
         "platform",
-        draw=draw_odometry,
+        draw=_PATHS,
     ),
     "slam": Benchmark(
         "SLAM",
@@ -33,7 +35,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         slam.pairs,
         slam.tables,
         "random",
-        draw=draw_slam,
+        draw=draw,
     ),
     "buildings": Benchmark(
         "SLAM in unseen buildings",
@@ -41,13 +43,13 @@ BENCHMARKS: dict[str, Benchmark] = {
         slam.building_pairs,
         slam.building_tables,
         "building",
-        draw=draw_slam,
+        draw=draw,
     ),
     "uncertainty": Benchmark(
         "Claimed uncertainty",
         "Squared errors of velocities and turns over the variances that odometry claims; 1 if it knows itself.",
         odometry.pairs,
-        uncertainty.tables,
+        odometry.claims_tables,
         "random",
     ),
     "runtime": Benchmark(
@@ -63,7 +65,7 @@ BENCHMARKS: dict[str, Benchmark] = {
         mapping.pairs,
         mapping.tables,
         "random",
-        draw=draw_maps,
+        draw=partial(draw, parts="maps errors", name=lambda pair: pair.scans),
     ),
     "multipath": Benchmark(
         "Multipath",

@@ -40,7 +40,7 @@ def pairs(chosen: Chosen) -> list[Pair]:
 
 
 def stages(found: dict) -> dict[str, float]:
-    """The paper's stages, and what ours are beside them, of `radarize.benchmark.runs.measure`."""
+    """The paper's stages, and what ours are beside them, of `radarize.benchmark.runs.Timing`."""
     spent = dict(found["stages"])
     took = {name: sum(spent.pop(part, 0.0) for part in parts) for name, parts in STAGES.items()}
     slowest = max(took["translation"], took["rotation"], took["map"], *spent.values())

@@ -83,7 +83,11 @@ class Live:
                 progress(int(came["number"][-1]) + 1, frames or 0)
         self.pipeline.finish()
         self.page.send("map", self.view.map())
-        self.page.send("end", {"troubles": stream.troubles()})
+        self.page.send("end", {"troubles": self._troubles(stream)})
+
+    def _troubles(self, stream: Stream) -> list[str]:
+        """What is wrong so far, and where the odometry was blind."""
+        return [*stream.troubles(), *self.blindness.warnings()]
 
     def _show(self, stream: Stream, adc: np.ndarray, valid: np.ndarray, stamp: float) -> None:
         now = time.monotonic()
@@ -98,7 +102,7 @@ class Live:
             "lost_share": self.losses.lost_chirps / max(self.losses.chirps, 1),
             "waiting": max(counts.frames - counts.dropped - self.losses.frames, 0),
             "slots": stream.ring.slots,
-            "troubles": stream.troubles(),
+            "troubles": self._troubles(stream),
         }
         self.page.send("frame", self.view.frame(adc, valid, stamp) | figures)
         drawn = time.monotonic()

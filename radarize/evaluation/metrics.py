@@ -173,13 +173,6 @@ def _relative_errors(
     return np.linalg.norm(errors[:, :3, 3], axis=1), Rotation.from_matrix(errors[:, :3, :3]).magnitude()
 
 
-def at(found: object, *path: str) -> float | None:
-    """A figure by its place in nested ones; None where it is missing."""
-    for key in path:
-        found = found.get(key) if isinstance(found, dict) else None
-    return found  # type: ignore[return-value]
-
-
 def without_nan(content: object) -> object:
     """Plain data with None for numbers that are not finite, which JSON has no word for."""
     if isinstance(content, dict):

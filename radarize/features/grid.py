@@ -1,6 +1,5 @@
 """On which cells a map lies, and whether two radars' maps lie on the same."""
 
-
 from radarize.features.maps import Maker, MapMaker
 from radarize.plain import Frozen
 from radarize.radar.config import RadarConfig

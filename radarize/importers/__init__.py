@@ -132,10 +132,7 @@ def _open(source: Path, output: Path, given: Given) -> Capture:
     if given.latency is not None and kind != "bag":
         raise InputError(f"{source}: is no ROS bag, but latency is {given.latency:g} s, expected none")
     if kind == "studio":
-        studio = studio_format.find(source)
-        given = given.or_else(studio.config, studio.text)
-        config, _ = given.configure(str(studio.settings))
-        return bin_format.open_bin(studio.files, config, given.cfg_text, warnings=studio.warnings)
+        return studio_format.open_studio(source, given)
     beside = bin_format.whole_name(source).with_suffix(".cfg")
     if given.config is None and beside.is_file():
         given = given.or_else(*load_config(beside))

@@ -309,17 +309,13 @@ def cloud_columns(message: object) -> Float[np.ndarray, "point column"]:
     data = np.asarray(message.data, np.uint8)
     if data.size < count * step:
         raise InputError(f"point cloud of {count} points has {data.size} bytes, expected {count * step}")
-    table = data[: count * step].reshape(count, step)
-    sources = {"x": "x", "y": "y", "z": "z", "velocity": "velocity", "snr": "intensity", "noise": "noise"}
-    columns = []
-    for name in COLUMNS:
-        field = fields.get(sources[name])
-        if field is None or field.datatype != 7 or field.offset + 4 > step:  # 7: float32
-            if name in "xyz":
-                raise InputError(f"point cloud has fields {', '.join(fields) or '(none)'}, expected float32 x, y, z")
-            columns.append(np.full(count, np.nan))
-            continue
-        kind = ">f4" if message.is_bigendian else "<f4"
-        column = np.ascontiguousarray(table[:, field.offset : field.offset + 4]).view(kind)[:, 0].astype(float)
-        columns.append(-column if name == "velocity" else column)
-    return np.column_stack(columns)
+    usable = {name: f.offset for name, f in fields.items() if f.datatype == 7 and f.offset + 4 <= step}  # 7: float32
+    if not {*"xyz"} <= usable.keys():
+        raise InputError(f"point cloud has fields {', '.join(fields) or '(none)'}, expected float32 x, y, z")
+    formats = [">f4" if message.is_bigendian else "<f4"] * len(usable)
+    kind = np.dtype({"names": [*usable], "formats": formats, "offsets": [*usable.values()], "itemsize": step})
+    table = np.frombuffer(data.tobytes(), kind, count)
+    columns = {name: table[name].astype(float) for name in usable}
+    columns["snr"] = columns.get("intensity", unknown := np.full(count, np.nan))
+    columns["velocity"] = -columns.get("velocity", unknown)
+    return np.column_stack([columns.get(name, unknown) for name in COLUMNS])

@@ -102,7 +102,7 @@ class DopplerVelocity:
         lever: m, see `VelocityEstimator`.
     """
 
-    def __init__(self, heatmaps: Heatmaps, settings: DopplerConfig | None = None, seed: int = 0):
+    def __init__(self, heatmaps: Heatmaps, settings: DopplerConfig | None = None):
         self.settings = settings or DopplerConfig()
         self.config = heatmaps.config
         self.row, self.pairs = heatmaps.row, heatmaps.pairs
@@ -115,20 +115,14 @@ class DopplerVelocity:
         self.lever = float(virtual_positions(self.config).reshape(-1, 3)[self.row, 1].mean()) / 2
         self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
         # One table of random numbers for all frames: the same frame gives the same answer in any batch.
-        self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 2))
+        self._draws = np.random.default_rng(0).random((self.settings.hypotheses, 2))
 
     def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames."""
         spectrum = batch.spectrum
         power = self._heatmaps.beamformed(spectrum, self.row, self._steering).numpy()
-        cells = spectrum.numpy()
-        frames = len(cells)
-        velocity, covariance = np.zeros((frames, 2)), np.zeros((frames, 2, 2))
-        inliers = np.zeros(frames, int)
-        for frame in range(frames):
-            echoes = self._echoes(cells[frame], power[frame])
-            solution = self._solve(echoes)
-            velocity[frame], covariance[frame], inliers[frame] = solution
+        found = [self._solve(self._echoes(*frame)) for frame in zip(spectrum.numpy(), power, strict=True)]
+        velocity, covariance, inliers = map(np.array, zip(*found, strict=True))
         seen = (np.linalg.eigvalsh(covariance)[:, -1] < _DETERMINED**2) & (inliers >= _ECHOES)
         covariance[seen] = self.settings.independent * covariance[seen] + self._shared(velocity[seen])
         return Velocities(velocity, covariance, inliers, seen)

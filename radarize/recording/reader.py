@@ -95,13 +95,13 @@ class Recording:
         """
         if self._adc is None:
             raise InputError(f"{self.path}: has no raw samples, only heat maps, expected a recording with /radar/adc")
-        return self._read(self._adc, start, stop)
+        return self._frames(self._adc, start, stop)
 
     def valid(self, start: int, stop: int) -> Bool[np.ndarray, "frame loop tx"]:
         """Per chirp: False where samples were lost."""
-        return self._read(self._valid, start, stop)
+        return self._frames(self._valid, start, stop)
 
-    def _read(self, data: h5py.Dataset, start: int, stop: int) -> np.ndarray:
+    def _frames(self, data: h5py.Dataset, start: int, stop: int) -> np.ndarray:
         with reading(f"{self.path}: frames {start}...{stop - 1} of {data.name} are damaged"):
             return data[start : min(stop, len(self))]
 

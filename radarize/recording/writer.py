@@ -1,4 +1,4 @@
-"""Writing a recording frame by frame.
+"""Writing a recording frame by frame, and adding to a finished one.
 
 A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once a second of
 recorded time in HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame
@@ -21,6 +21,7 @@ from radarize.errors import InputError, reason
 from radarize.radar.config import RadarConfig
 from radarize.recording.losses import Losses
 from radarize.recording.streams import FORMAT, Product, Stream
+from radarize.replacing import replacing
 
 #: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
 #: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.
@@ -86,8 +87,7 @@ class RecordingWriter:
         grow(file, "radar/valid", Stream((loops, tx), "?", "", "False where samples of the chirp were lost"))
         grow(file, "radar/time", Stream((), "f8", "s", "start of the frame's first chirp"))
         for name, product in products.items():
-            data = file.create_dataset(name, data=product.data)
-            data.attrs.update({"unit": product.unit, "about": product.about})
+            fix(file, name, product)
         for name, stream in streams.items():
             grow(file, name, stream)
         file.swmr_mode = True
@@ -194,6 +194,49 @@ class RecordingWriter:
         else:
             with suppress(InputError):  # the first error is the one to report
                 self.close(keep_part=True)
+
+
+def add(
+    path: Path,
+    streams: Mapping[str, Stream],
+    rows: Mapping[str, np.ndarray],
+    products: Mapping[str, Product] | None = None,
+    attributes: Mapping[str, object] | None = None,
+) -> Path:
+    """Add streams to a recording, which is replaced as a whole.
+
+    Args:
+        path: recording, which nobody writes.
+        streams: by path.
+        rows: of each stream, all.
+        products: data sets written once, by path.
+        attributes: of the file, to replace or add.
+
+    Raises:
+        InputError: it is there already, or the file cannot be written.
+    """
+    with replacing(path) as part:
+        shutil.copyfile(path, part)
+        try:
+            with h5py.File(part, "r+", libver="latest") as file:
+                for name in (*streams, *(products or {})):
+                    if name in file:
+                        raise InputError(f"{path}: has /{name} already, expected a recording without")
+                for name, stream in streams.items():
+                    data = grow(file, name, stream)
+                    data.resize(len(rows[name]), axis=0)
+                    data[:] = rows[name]
+                for name, product in (products or {}).items():
+                    fix(file, name, product)
+                file.attrs.update(attributes or {})
+        except (OSError, RuntimeError) as error:
+            raise InputError(f"{path}: cannot be added to ({reason(error)})") from error
+    return path
+
+
+def fix(file: h5py.File, name: str, product: Product) -> None:
+    """A data set that is written once."""
+    file.create_dataset(name, data=product.data).attrs.update({"unit": product.unit, "about": product.about})
 
 
 def grow(file: h5py.File, name: str, stream: Stream) -> h5py.Dataset:

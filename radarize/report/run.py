@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError
-from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.evaluate import evaluate, trajectories, trajectory_errors
 from radarize.evaluation.metrics import TrajectoryErrors
 from radarize.report import words
@@ -37,7 +36,7 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     folder, others = RunFolder(run), [RunFolder(other) for other in beside]
     errors = trajectory_errors(folder) if folder.has("reference.tum") else {}
     metrics = evaluate(folder, errors=errors) if errors else {}
-    blind = BlindSpans.of(folder)
+    blind = folder.blind
 
     page = Page(f"Run {folder.path.resolve().name}", _about(folder, errors))
     if errors:

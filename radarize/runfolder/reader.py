@@ -10,9 +10,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 from jaxtyping import Float
+from pydantic import ValidationError
 
 from radarize.errors import InputError
 from radarize.jsonfile import read_json
+from radarize.odometry.blindness import BlindSpans
+from radarize.plain import complaint
 from radarize.recording.damage import dataset, reading
 from radarize.replacing import write_whole
 from radarize.runfolder.occupancy import OccupancyMap
@@ -96,6 +99,24 @@ class RunFolder:
         if not isinstance(found, dict):
             raise InputError(f"{self.path / 'run.json'}: methods is {str(found)[:60]!r}, expected an object")
         return {name: str(value) for name, value in found.items()}
+
+    @property
+    def blind(self) -> BlindSpans | None:
+        """Where odometry was blind, in s since the first pose; None where ``run.json`` does not say, as of old.
+
+        Raises:
+            InputError: it says something else.
+        """
+        if "blind" not in self.facts:
+            return None
+        try:
+            found = BlindSpans.model_validate(self.facts["blind"])
+        except ValidationError as error:
+            raise InputError(f"{self.path / 'run.json'}: blind.{complaint(error)}") from error
+        start = float(self.trajectory[0][0])
+        for span in found.spans:
+            span.start_s, span.stop_s = span.start_s - start, span.stop_s - start
+        return found
 
     @cached_property
     def trajectory(self) -> Poses:

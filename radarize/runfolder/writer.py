@@ -108,8 +108,8 @@ class RunWriter:
             "recording_attributes": attributes,
             "frames": len(recording),
             "duration_s": float(times[-1] - times[0] + period),
-            "blind": self.blindness.summary(),
-            "warnings": [self.blindness.warning] if self.blindness.warning else [],
+            "blind": self.blindness.found.model_dump(),
+            "warnings": self.blindness.warnings(),
             "radar": recording.config.model_dump(mode="json"),
         }
         self.put("azimuths", BEARINGS, "rad")

@@ -24,12 +24,7 @@ Made = TypeVar("Made")
 
 
 class Signal:
-    """What turns samples of one radar into spectra, maps and points; all batches of a stream share it.
-
-    Args:
-        radar: configuration.
-        settings: of the heat maps.
-    """
+    """What turns samples of one radar into spectra, maps and points; all batches of a stream share it."""
 
     def __init__(self, radar: RadarConfig, settings: HeatmapConfig | None = None):
         self.radar = radar
@@ -123,9 +118,6 @@ class Batch:
 
 class Intake:
     """Makes batches of what a radar delivers.
-
-    Args:
-        signal: that the batches share.
 
     Attributes:
         taken: frames so far.

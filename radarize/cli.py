@@ -235,14 +235,11 @@ def run_(
                 raise InputError(f"{option} is {value!r}, expected none with --settings published, which has its own")
         odometry = scans = "published"
     configuration = Configuration() if config is None else Configuration.load(config)
-    try:
-        with progress("run") as report:
-            written = run(
-                recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,
-                progress=report,
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        raise InputError(f"stopped; {output} is as it was before, and so is the recording") from None
+    with progress("run", f"{output} is as it was before, and so is the recording") as report:
+        written = run(
+            recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,
+            progress=report,
+        )  # fmt: skip
     for words in RunFolder(written).facts["warnings"]:
         typer.echo(f"warning: {words}", err=True)
     print(written)
@@ -295,14 +292,11 @@ def train(
     given = {name: value for name, value in choices.items() if value is not None}
     task = f"published-{task}" if settings == "published" and not task.startswith("published-") else task
     hyper = replace(find_task(task).defaults, **given)
-    try:
-        with progress("train") as report:
-            written = train(
-                task, data, output, hyper, Options(split, device, workers, resume, onnx),
-                progress=report, say=lambda line: typer.echo(line, err=True),
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        raise InputError("stopped; with --resume the same command goes on after the last whole epoch") from None
+    with progress("train", "with --resume the same command goes on after the last whole epoch") as report:
+        written = train(
+            task, data, output, hyper, Options(split, device, workers, resume, onnx),
+            progress=report, say=lambda line: typer.echo(line, err=True),
+        )  # fmt: skip
     print(written)
 
 
@@ -424,11 +418,8 @@ def benchmark(
 
     chosen = [method for word in methods or () for method in word.split(",")]
     options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
-    try:
-        with progress("benchmark") as report:
-            published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
-    except KeyboardInterrupt:
-        raise InputError(f"stopped; what has ended is kept in {out}, and the same command goes on after it") from None
+    with progress("benchmark", f"what has ended is kept in {out}, and the same command goes on after it") as report:
+        published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
     for each in published:
         print(out / f"{each}.html")
     print(out / "index.html")

@@ -70,10 +70,11 @@ def _sentence(error: BaseException) -> str:
 
 
 @contextmanager
-def progress(label: str) -> Iterator[Callable[..., None]]:
+def progress(label: str, stopped: str = "") -> Iterator[Callable[..., None]]:
     """Progress bars on stderr, moved by calling what this yields with (done, in all) or (stage, done, in all).
 
-    Until the first call, while things are being prepared, a spinner turns; so an error then comes without a bar.
+    Until the first call, while things are being prepared, a spinner turns; so an error then comes without a bar. Ctrl-C
+    becomes an InputError of what `stopped` says.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -98,6 +99,8 @@ def progress(label: str) -> Iterator[Callable[..., None]]:
     spinner.start()
     try:
         yield move
+    except KeyboardInterrupt:
+        raise InputError(f"stopped; {stopped}") if stopped else KeyboardInterrupt from None
     finally:
         spinner.stop()
         bars.stop()

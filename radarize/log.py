@@ -73,7 +73,7 @@ class Log:
             covariances = None  # the odometry is another one
         return cls(times, azimuths, ranges, stamps, planar(poses), covariances)
 
-    def feed(self, slam: Slam, progress: Callable[[int, int], None] | None = None) -> None:
+    def feed(self, slam: Slam, progress: Callable[[int, int], None] = lambda done, total: None) -> None:
         """Give everything to a session, in order of time, and finish it.
 
         Args:
@@ -86,8 +86,7 @@ class Log:
             while odometry and odometry[0][0] <= self.times[i]:
                 slam.add_odometry(*odometry.popleft())
             slam.add_scan(self.times[i], self.azimuths, self.ranges[i])
-            if progress:
-                progress(done, len(self.times))
+            progress(done, len(self.times))
         for entry in odometry:
             slam.add_odometry(*entry)
         slam.finish()
@@ -100,7 +99,7 @@ def run(
     *,
     config: SlamConfig,
     reference: Path | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """SLAM on plain files.
 
@@ -112,9 +111,6 @@ def run(
         config: of the back end.
         reference: TUM file of true poses; of a run's folder its ``reference.tum`` by default.
         progress: called with (scans done, scans in all).
-
-    Returns:
-        the folder.
 
     Raises:
         InputError: unusable input, or the folder cannot be written.

@@ -75,10 +75,6 @@ DENSE = PointCloudConfig(
 class PointClouds:
     """Makes point clouds for one radar configuration.
 
-    Args:
-        config: radar configuration.
-        settings: of the chain.
-
     Raises:
         InputError: the configuration has too few loops or samples for the CFAR windows.
     """

@@ -35,9 +35,6 @@ def run(
         configuration: of the pipeline.
         progress: called with (frames done, frames in all).
 
-    Returns:
-        the folder.
-
     Raises:
         InputError: unusable recording or unknown method.
     """

@@ -3,8 +3,7 @@
 import pandas as pd
 
 from radarize.benchmark.protocol import figures_of
-from radarize.benchmark.runs import Pair
-from radarize.benchmark.study import Chosen, Study
+from radarize.benchmark.study import Study
 from radarize.benchmark.table import Table
 from radarize.evaluation.stress import FIGURES, SOURCES
 
@@ -32,11 +31,6 @@ NOTES = (
     "IoU of free space with what they passed through.",
     "To reach: 85 % within 10 cm, less than 1 % through a wall, less than 3 % ghosts left.",
 )
-
-
-def pairs(chosen: Chosen) -> list[Pair]:
-    """Every scan; odometry is the same."""
-    return [Pair(chosen.partner.odometry, scans) for scans in chosen.scans]
 
 
 def tables(study: Study) -> list[Table]:

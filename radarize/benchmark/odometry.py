@@ -8,8 +8,7 @@ import pandas as pd
 
 from radarize.benchmark.followed import Followed, joined, turn_nees, turned
 from radarize.benchmark.protocol import figures_of
-from radarize.benchmark.runs import Pair
-from radarize.benchmark.study import Chosen, Study
+from radarize.benchmark.study import Study
 from radarize.benchmark.table import Table
 from radarize.benchmark.trajectories import trajectory_tables
 from radarize.evaluation.metrics import Statistics
@@ -53,11 +52,6 @@ CLAIMS = (
     "many matches alike, so claims that fit minutes are too large for single steps.",
     "To reach: 0.9 to 1.1 for velocities, mean and median, on every platform.",
 )
-
-
-def pairs(chosen: Chosen) -> list[Pair]:
-    """Every odometry; the scans are the same."""
-    return [Pair(odometry, chosen.partner.scans) for odometry in chosen.odometry]
 
 
 def tables(study: Study, paper: dict[str, tuple[float, ...]] = PAPER) -> list[Table]:

@@ -8,7 +8,7 @@ from functools import partial
 
 from radarize.benchmark import mapping, odometry, runtime, slam, varied
 from radarize.benchmark.drawings import draw
-from radarize.benchmark.study import Benchmark
+from radarize.benchmark.study import Benchmark, Chosen
 
 _PATHS = partial(draw, which="odometry", parts="trajectories errors", name=lambda pair: pair.odometry)
 
@@ -16,7 +16,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "odometry": Benchmark(
         "Odometry",
         "Trajectories by odometry alone, tested on random splits (the paper's table 2).",
-        odometry.pairs,
+        Chosen.by_odometry,
         odometry.tables,
         "random",
         draw=_PATHS,
@@ -24,7 +24,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "odometry-platforms": Benchmark(
         "Odometry on unseen platforms",
         "Tested on platforms that, with --train, no training saw (the paper's table 3).",
-        odometry.pairs,
+        Chosen.by_odometry,
         partial(odometry.tables, paper=odometry.PAPER_PLATFORMS),
         "platform",
         draw=_PATHS,
@@ -40,7 +40,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "buildings": Benchmark(
         "SLAM in unseen buildings",
         "Tested in buildings that, with --train, no training saw (the paper's table 5).",
-        slam.building_pairs,
+        Chosen.by_odometry,
         slam.building_tables,
         "building",
         draw=draw,
@@ -48,7 +48,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "uncertainty": Benchmark(
         "Claimed uncertainty",
         "Squared errors of velocities and turns over the variances that odometry claims; 1 if it knows itself.",
-        odometry.pairs,
+        Chosen.by_odometry,
         odometry.claims_tables,
         "random",
     ),
@@ -62,7 +62,7 @@ BENCHMARKS: dict[str, Benchmark] = {
     "mapping": Benchmark(
         "Scans and maps",
         "Scans against true surfaces, what wrong ones come from, and maps against the floor plan.",
-        mapping.pairs,
+        Chosen.by_scans,
         mapping.tables,
         "random",
         draw=partial(draw, parts="maps errors", name=lambda pair: pair.scans),

@@ -73,6 +73,14 @@ class Chosen:
     scans: tuple[str, ...]
     partner: Pair
 
+    def by_odometry(self) -> list[Pair]:
+        """Every odometry; the scans are the same."""
+        return [Pair(odometry, self.partner.scans) for odometry in self.odometry]
+
+    def by_scans(self) -> list[Pair]:
+        """Every scan; odometry is the same."""
+        return [Pair(self.partner.odometry, scans) for scans in self.scans]
+
     @classmethod
     def of(cls, options: Options, data: DataSet) -> "Chosen":
         """Methods of choice are those without networks where the shipped ones do not fit the radar."""

@@ -113,10 +113,8 @@ def ablation_tables(study: Study) -> list[Table]:
 
 def stress_pairs(chosen: Chosen) -> list[Pair]:
     """Every scan with the odometry of choice, and with odometry that is made of nothing else."""
-    return [
-        *(Pair(chosen.partner.odometry, scans) for scans in chosen.scans),
-        *(Pair(MATCHING, scans) for scans in chosen.scans if MATCHING in chosen.odometry),
-    ]
+    matching = [Pair(MATCHING, scans) for scans in chosen.scans if MATCHING in chosen.odometry]
+    return [*chosen.by_scans(), *matching]
 
 
 def stress_tables(study: Study) -> list[Table]:

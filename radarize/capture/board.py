@@ -75,9 +75,6 @@ class Network:
 class Board:
     """A DCA1000; use as a context manager.
 
-    Args:
-        network: addresses and ports.
-
     Raises:
         InputError: the command port cannot be bound.
     """

@@ -50,7 +50,7 @@ class Live:
         *,
         frames: int | None = None,
         writer: RecordingWriter | None = None,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
         """Follow the stream until the user stops it, there are enough frames, or it ends; then finish the map.
 
@@ -79,8 +79,7 @@ class Live:
             with stage("page"):
                 self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
             self.busy += time.monotonic() - start
-            if progress:
-                progress(int(came["number"][-1]) + 1, frames or 0)
+            progress(int(came["number"][-1]) + 1, frames or 0)
         self.pipeline.finish()
         self.page.send("map", self.view.map())
         self.page.send("end", {"troubles": self._troubles(stream)})

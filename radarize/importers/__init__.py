@@ -39,7 +39,10 @@ _POSES = ("truth/time", "truth/pose", "truth/velocity")
 
 
 def import_recording(
-    source: Path, output: Path, given: Given | None = None, progress: Callable[[int, int], None] | None = None
+    source: Path,
+    output: Path,
+    given: Given | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """Write a recording (.h5) from a capture.
 
@@ -54,9 +57,6 @@ def import_recording(
         output: recording to write.
         given: what the user says of it.
         progress: called with frames done and (estimated) frames in all.
-
-    Returns:
-        `output`.
 
     Raises:
         InputError: unknown format, nothing usable in the source, or a configuration that does not fit it.
@@ -93,8 +93,7 @@ def import_recording(
             writer.append(frames, stamps, batch.valid, rows={name: batch.rows[name] for name in streams})
             start_time = stamps[0] if not done else start_time
             done, last = done + len(batch.valid), stamps[-1]
-            if progress:
-                progress(done, max(done, capture.expected_frames))
+            progress(done, max(done, capture.expected_frames))
         if products:
             end = last + radar.frame_period
             capture.warnings += _apart(products["truth/time"].data, start_time, end, given.poses)

@@ -40,11 +40,7 @@ class Stamps:
 
 
 class Frames:
-    """Raw frames that wait for what comes along with them, and what was wrong with others.
-
-    Args:
-        config: radar configuration.
-    """
+    """Raw frames that wait for what comes along with them, and what was wrong with others."""
 
     def __init__(self, config: RadarConfig):
         self.config, self.words = config, config.frame_bytes // 2

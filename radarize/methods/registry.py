@@ -33,9 +33,6 @@ CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
 class Workshop:
     """Makes methods, and pipelines of them. Pipelines of one workshop share what they have in common: pushed the same
     batches, spectra, maps, scans and odometry are made once.
-
-    Args:
-        inputs: what all are made from.
     """
 
     def __init__(self, inputs: Inputs):

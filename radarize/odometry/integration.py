@@ -86,11 +86,7 @@ class VelocityConfig(Frozen):
 
 
 class VelocityFilter:
-    """Causal Kalman filter of the planar velocity as a random walk; measurements far off their prediction count less.
-
-    Args:
-        settings: of the filter.
-    """
+    """Causal Kalman filter of the planar velocity as a random walk; what is far off its prediction counts less."""
 
     def __init__(self, settings: VelocityConfig | None = None):
         self.settings = settings or VelocityConfig()
@@ -119,13 +115,7 @@ class VelocityFilter:
 
 
 class Odometry:
-    """Radar odometry in a stream. Memory does not grow.
-
-    Args:
-        radar: configuration.
-        velocity, rotation: estimators.
-        settings: of the filter of velocities.
-    """
+    """Radar odometry in a stream. Memory does not grow."""
 
     def __init__(
         self,

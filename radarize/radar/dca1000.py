@@ -185,9 +185,6 @@ class FrameAssembler:
         config: radar configuration.
         window: how far behind the newest byte a late packet is still accepted.
         max_jump: a byte count further than this past the newest one is taken for a damaged header.
-
-    Attributes:
-        counts: packets so far.
     """
 
     def __init__(self, config: RadarConfig, window: int = 1 << 20, max_jump: int = 1 << 28):

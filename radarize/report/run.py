@@ -27,9 +27,6 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
         output: file to write; by default ``report.html`` in the folder.
         beside: other runs of the same recording, to compare with.
 
-    Returns:
-        The page's path.
-
     Raises:
         InputError: not a run, or a damaged one.
     """

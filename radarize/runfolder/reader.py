@@ -64,12 +64,6 @@ _PACKED, _AHEAD = 20, 1 << 20
 class RunFolder:
     """A run folder for reading; every file is read when it is asked for, and once.
 
-    Args:
-        path: the folder.
-
-    Attributes:
-        path: the folder.
-
     Raises:
         InputError: it is no run folder, or not a whole one.
     """

@@ -46,9 +46,6 @@ class RunWriter:
             writer.describe(recording, heatmaps)
             writer.finish(pipeline.slam, facts)
 
-    Args:
-        folder: to write.
-
     Attributes:
         blindness: of the odometry so far.
 

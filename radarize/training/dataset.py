@@ -98,7 +98,7 @@ class Frames(Dataset):
         item = {}
         names = tuple(field for field in self.fields if field in MAPS)
         if names:
-            item |= self._maps(recording, frames, names, maker)
+            item |= maps_of(recording, first, frames.stop, names, maker, self.spacing)
         for field in self.fields:
             if field in TRUTH:
                 path, columns = TRUTH[field]
@@ -111,10 +111,6 @@ class Frames(Dataset):
                 poses = recording.rows("truth/pose", first, frames.stop)[:: self.spacing]
                 item[field] = wrap(np.diff(planar(poses)[:, 2]))
         return {name: _tensor(item[name]) for name in self.fields}
-
-    def _maps(self, recording: Recording, frames: slice, names: tuple[str, ...], maker: MapMaker) -> dict:
-        parts = [maps_of(recording, k, k + 1, names, maker) for k in range(frames.start, frames.stop, frames.step)]
-        return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
     def _recording(self, number: int) -> tuple[Recording, MapMaker]:
         """Opened at first use, by every process for itself: HDF5 files do not survive a fork."""

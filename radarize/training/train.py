@@ -64,9 +64,6 @@ def train(
         progress: called with (stage, done, in all).
         say: takes a line for every epoch.
 
-    Returns:
-        the weights' path.
-
     Raises:
         InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
             is no number.

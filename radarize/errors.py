@@ -1,5 +1,8 @@
 """The one exception that users meet."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 #: Environment variable of processes that show tracebacks.
 DEBUG = "RADARIZE_DEBUG"
 #: Characters of a sentence that somebody reads.
@@ -39,3 +42,16 @@ def reason(error: Exception) -> str:
         return error.strerror
     line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     return line[:120] or type(error).__name__
+
+
+@contextmanager
+def explained(message: str, *kinds: type[Exception]) -> Iterator[None]:
+    """Turn errors, of any kind if none is named, into an InputError of `message` and the reason: of damaged files,
+    libraries raise whatever their parsers meet."""
+    expected = kinds or (Exception,)
+    try:
+        yield
+    except InputError:
+        raise
+    except expected as error:
+        raise InputError(f"{message} ({reason(error)})") from error

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.npyfile import npy_header
-from radarize.recording.damage import reading
 from radarize.runfolder import RunFolder, RunWriter
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
@@ -144,7 +143,7 @@ def _npz_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     found: dict[str, np.ndarray] = {}
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected scans (.npz) or the folder of a run")
-    with reading(f"{path}: is no .npz of numbers, expected ranges, angle_min, angle_increment and range_max"):
+    with explained(f"{path}: is no .npz of numbers, expected ranges, angle_min, angle_increment and range_max"):
         with zipfile.ZipFile(path) as archive:
             _check_size(archive, path)
         with np.load(path, allow_pickle=False) as file:

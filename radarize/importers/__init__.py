@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.importers import bin as bin_format
 from radarize.importers import cube as cube_format
 from radarize.importers import pcap as pcap_format
@@ -155,11 +155,8 @@ def _kind(source: Path) -> str:
         return "bag"
     if suffix in _ARRAYS:
         return "cube"
-    try:
-        with source.open("rb") as file:
-            magic = file.read(4)
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read ({error.strerror})") from error
+    with explained(f"{source}: cannot be read", OSError), source.open("rb") as file:
+        magic = file.read(4)
     if magic in pcap_format.MAGIC or suffix in (".pcap", ".pcapng"):
         return "pcap"
     if suffix == ".bin":

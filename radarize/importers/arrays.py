@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from radarize.errors import InputError, reason
+from radarize.errors import InputError, explained
 from radarize.npyfile import npy_header
 
 #: Bytes of a compressed member unpacked at a time.
@@ -109,10 +109,8 @@ class MatlabArray(ArrayFile):
         self.dtype = _checked(data.dtype, name)
 
     def _take(self, where: tuple[slice, ...]) -> np.ndarray:
-        try:
+        with explained(f"{self.name}: is damaged"):
             return _joined(self._data[where[::-1]], self.dtype).T
-        except Exception as error:  # as in `open_array`
-            raise InputError(f"{self.name}: is damaged ({reason(error)})") from error
 
 
 def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
@@ -126,7 +124,7 @@ def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
     Raises:
         InputError: not such a file, no such array, or one that does not hold numbers.
     """
-    try:
+    with explained(f"{path}: cannot be read"):
         if path.suffix.lower() == ".npz":
             return _open_npz(path, variable, folder)
         if path.suffix.lower() == ".mat":
@@ -134,10 +132,6 @@ def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
         with path.open("rb") as file:
             header = npy_header(file, str(path))
             return MappedArray(str(path), path, header, file.tell())
-    except InputError:
-        raise
-    except Exception as error:  # zipfile, zlib, HDF5 and scipy raise whatever they meet in a damaged file
-        raise InputError(f"{path}: cannot be read ({reason(error)})") from error
 
 
 def _open_npz(path: Path, variable: str | None, folder: Path) -> ArrayFile:

@@ -140,9 +140,7 @@ class HeatmapScans:
     """Scans of a stream's frames, from heat maps alone.
 
     Args:
-        heatmaps: make the maps.
         method: a key of `METHODS`.
-        config: parameters of detection.
 
     Raises:
         InputError: the array has no elevation-aware maps, and the method needs them.

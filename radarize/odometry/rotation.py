@@ -96,8 +96,6 @@ class MapRotation:
     by that. Yaws are searched as far as the filter is unsure of its own; where it knows nothing, the map starts anew.
 
     Args:
-        heatmaps: of the radar.
-        settings: of the matcher.
         prior: estimator of turns, to start the search from.
     """
 

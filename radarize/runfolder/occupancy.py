@@ -15,7 +15,7 @@ import yaml
 from jaxtyping import Bool, Float, UInt8
 from pydantic import BaseModel, Field, ValidationError
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.plain import complaint
 from radarize.pose import transform
 from radarize.replacing import replacing
@@ -138,10 +138,8 @@ def read_pgm(path: Path) -> UInt8[np.ndarray, "row column"]:
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected a map's picture (.pgm)")
-    try:
+    with explained(f"{path}: cannot be read", OSError):
         content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     head = _PGM.match(content, 0, _HEADER)
     if not head:
         raise InputError(f"{path}: starts with {content[:20]!r}, expected an 8-bit binary PGM (P5)")

@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Float
 from pydantic import ValidationError
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.jsonfile import read_json
 from radarize.odometry.blindness import BlindSpans
 from radarize.plain import complaint
-from radarize.recording.damage import dataset, reading
+from radarize.recording.damage import dataset
 from radarize.replacing import write_whole
 from radarize.runfolder.occupancy import OccupancyMap
 from radarize.tum import read_tum
@@ -211,7 +211,7 @@ class Scans(Mapping[str, np.ndarray]):
 
     @contextmanager
     def _open(self) -> Iterator[h5py.File]:
-        with reading(f"{self.path}: is no readable HDF5 file"), h5py.File(self.path, "r") as file:
+        with explained(f"{self.path}: is no readable HDF5 file"), h5py.File(self.path, "r") as file:
             yield file
 
     def _check(self, name: str, data: h5py.Dataset) -> None:

@@ -32,12 +32,6 @@ _DROP, _LASTS = 0.75, 25
 class Trainer:
     """Trains one network.
 
-    Args:
-        task: what for.
-        settings: hyper-parameters.
-        training, validation: frames.
-        team: processes that train together.
-
     Attributes:
         net: the network.
         history: of each epoch so far, what the log says.

@@ -51,9 +51,7 @@ class TranslationNet(MotionNet):
     reads what is missing; it sees the same picture whatever the speed, and needs the fewer examples.
 
     Args:
-        frames: of a window.
-        maps: names of a frame's maps, see `radarize.features.maps.MAPS`.
-        width: of the ResNets.
+        frames, maps, width: see `MotionNet`.
         step: m/s from row to row.
     """
 

@@ -23,8 +23,6 @@ class Segmentation:
     """Scans of a stream's frames.
 
     Args:
-        radar: configuration.
-        weights: file.
         first: take the first surface; False: the likeliest occupied cell of each bearing, wherever it is, for
             comparison.
 

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
-from radarize.errors import InputError, reason
+from radarize.errors import InputError, explained, reason
 from radarize.radar.config import RadarConfig
 from radarize.recording.losses import Losses
 from radarize.recording.streams import FORMAT, Product, Stream
@@ -217,20 +217,20 @@ def add(
     """
     with replacing(path) as part:
         shutil.copyfile(path, part)
-        try:
-            with h5py.File(part, "r+", libver="latest") as file:
-                for name in (*streams, *(products or {})):
-                    if name in file:
-                        raise InputError(f"{path}: has /{name} already, expected a recording without")
-                for name, stream in streams.items():
-                    data = grow(file, name, stream)
-                    data.resize(len(rows[name]), axis=0)
-                    data[:] = rows[name]
-                for name, product in (products or {}).items():
-                    fix(file, name, product)
-                file.attrs.update(attributes or {})
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"{path}: cannot be added to ({reason(error)})") from error
+        with (
+            explained(f"{path}: cannot be added to", OSError, RuntimeError),
+            h5py.File(part, "r+", libver="latest") as file,
+        ):
+            for name in (*streams, *(products or {})):
+                if name in file:
+                    raise InputError(f"{path}: has /{name} already, expected a recording without")
+            for name, stream in streams.items():
+                data = grow(file, name, stream)
+                data.resize(len(rows[name]), axis=0)
+                data[:] = rows[name]
+            for name, product in (products or {}).items():
+                fix(file, name, product)
+            file.attrs.update(attributes or {})
     return path
 
 

@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Shaped
 
 from radarize import __version__
-from radarize.errors import InputError, reason
+from radarize.errors import InputError, explained
 from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS
 from radarize.odometry.blindness import Blindness
@@ -200,9 +200,7 @@ class RunWriter:
     @contextmanager
     def _writing(self, size: int = 0) -> Iterator[None]:
         """Turn what comes of writing into an InputError; refuses where the disk has no room for so many bytes."""
-        try:
+        with explained(f"{self.folder}: cannot be written", OSError, RuntimeError):
             if shutil.disk_usage(self._files.part).free < size + _RESERVE:
                 raise OSError(errno.ENOSPC, "no space left on the device")
             yield
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"{self.folder}: cannot be written ({reason(error)})") from error

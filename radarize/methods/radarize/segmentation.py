@@ -21,8 +21,8 @@ def _resampling() -> Tensor:
 
 
 class SegmentationNet(Network):
-    """U-Net on range-azimuth maps, azimuth and elevation-aware, whose answers for the newest frame lie on the grid of the
-    occupancy labels."""
+    """U-Net on range-azimuth maps, azimuth and elevation-aware, whose answers for the newest frame lie on the grid of
+    the occupancy labels."""
 
     kind, outputs = "segmentation", ("probability",)
 

@@ -135,13 +135,7 @@ class Intake:
         stamps: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
     ) -> Batch:
-        """The next frames, without those that are left out.
-
-        Args:
-            samples: raw I/Q.
-            stamps: starts of the frames' first chirps, s.
-            valid: False where a chirp was lost.
-        """
+        """The next frames, without those that are left out; arguments are those of `Batch`."""
         used = samples.reshape(len(samples), -1).any(axis=1)
         if valid is not None:
             used &= valid.mean(axis=(1, 2)) >= LEAST_SHARE

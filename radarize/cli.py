@@ -1,5 +1,6 @@
 """`radarize`: the pipeline's command line. Heavy modules load inside the commands, so that --help is instant."""
 
+import json
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -203,7 +204,7 @@ def info(recording: RecordingFile, as_json: AsJson = False):
     from radarize.contents import contents, show
 
     found = contents(recording)
-    _print_json(found) if as_json else show(found)
+    print(json.dumps(found, indent=2)) if as_json else show(found)
 
 
 @app.command("run")
@@ -343,7 +344,7 @@ def evaluate(
         compared = [(methods(other), evaluate(other, reference)) for other in others]
         folder.write_metrics(metrics)
     if as_json:
-        _print_json(metrics)
+        print(json.dumps(metrics, indent=2))
         return
     for part in words.everything(metrics):
         print(part) if isinstance(part, str) else print_table(*part)
@@ -438,12 +439,6 @@ def view(
         written = view(source, run, save, progress=report)
     if written:
         print(written)
-
-
-def _print_json(content: dict) -> None:
-    import json
-
-    print(json.dumps(content, indent=2))
 
 
 def main() -> None:

@@ -33,8 +33,7 @@ def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None
     """Run a command line and exit: 0, or 2 with one sentence on stderr.
 
     Args:
-        app: its commands.
-        name: as the user typed it.
+        app: its commands; name: as the user typed it.
         arguments: the process's own if None.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)

@@ -13,11 +13,10 @@ from typing import Literal
 import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float32, Int16
-from pydantic import Field
 from scipy.signal import windows
 
 from radarize.errors import InputError
-from radarize.plain import Frozen
+from radarize.plain import Frozen, setting
 from radarize.radar.array import azimuth_row, elevation_pairs, virtual_positions
 from radarize.radar.config import RadarConfig
 
@@ -28,9 +27,7 @@ AZIMUTHS = np.radians(np.arange(-60.0, 61.0))
 class HeatmapConfig(Frozen):
     """Settings of the heat maps."""
 
-    loading: float = Field(
-        0.01, gt=0, description="diagonal loading of Capon's covariance, as a share of its mean eigenvalue"
-    )
+    loading: float = setting(0.01, "diagonal loading of Capon's covariance, as a share of its mean eigenvalue", gt=0)
 
 
 class Heatmaps:

@@ -31,9 +31,7 @@ def parse_json(text: str, name: str, number: Callable[[str], object] = float) ->
     Raises:
         InputError: it is not JSON, or no object.
     """
-    with explained(
-        f"{name}: is not JSON", ValueError, RecursionError
-    ):  # no JSON, a number of thousands of digits, too deep
+    with explained(f"{name}: is not JSON", ValueError, RecursionError):  # thousands of digits, too deep
         content = json.loads(text, parse_float=number)
     if not isinstance(content, dict):
         raise InputError(f"{name}: holds a {type(content).__name__}, expected an object")

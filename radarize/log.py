@@ -73,12 +73,7 @@ class Log:
         return cls(times, azimuths, ranges, stamps, planar(poses), covariances)
 
     def feed(self, slam: Slam, progress: Callable[[int, int], None] = lambda done, total: None) -> None:
-        """Give everything to a session, in order of time, and finish it.
-
-        Args:
-            slam: a new session.
-            progress: called with (scans done, scans in all).
-        """
+        """Give everything to a new session, in order of time, and finish it; `progress` takes scans done and in all."""
         spreads = self.covariances if self.covariances is not None else [None] * len(self.odometry_times)
         odometry = deque(zip(self.odometry_times, self.odometry, spreads, strict=True))
         for done, i in enumerate(np.argsort(self.times, kind="stable"), 1):

@@ -53,10 +53,9 @@ def view(
     """
     try:
         import rerun
-    except ImportError as error:
-        raise InputError("viewing needs rerun-sdk, which is not installed; type: pip install 'radarize[viewer]'") from (
-            error
-        )
+    except ImportError:
+        words = "viewing needs rerun-sdk, which is not installed; type: pip install 'radarize[viewer]'"
+        raise InputError(words) from None
     source, run = Path(source), None if run is None else Path(run)
     if source.is_dir():
         if run is not None:

@@ -19,7 +19,7 @@ from pydantic import TypeAdapter
 from radarize import __version__
 from radarize.benchmark.choices import Walk, helped
 from radarize.benchmark.table import Table
-from radarize.errors import InputError
+from radarize.errors import explained
 from radarize.nets.weights import read
 from radarize.recording import Recording
 from radarize.replacing import write_whole
@@ -203,10 +203,8 @@ class Results:
         Raises:
             InputError: unreadable, or of another layout.
         """
-        try:
+        with explained(f"{path}: is no page of results as this version writes them", OSError, ValueError):
             return TypeAdapter(cls).validate_json(path.read_bytes())
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: is no page of results as this version writes them ({error})") from error
 
     def write(self, folder: Path, name: str) -> Path:
         """Write NAME.json and NAME.md, and return the latter's path.

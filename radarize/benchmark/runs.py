@@ -106,11 +106,7 @@ class Run(_Step):
 
 
 def figures(run: Path, recording: Path) -> dict[str, object]:
-    """All figures of a run; None for numbers that do not exist.
-
-    Args:
-        run: folder of the run.
-        recording: that it was made of.
+    """All figures of a run of a recording; None for numbers that do not exist.
 
     Returns:
         What `evaluate` returns, and ``nearest``: `TrajectoryErrors.summary` of ``odometry``, ``slam`` and ``open``

@@ -123,8 +123,6 @@ class Board:
         """Send a command; returns the status of its reply.
 
         Args:
-            command: what to do.
-            body: its settings.
             answer: the status is no success or failure but what was asked for.
 
         Raises:

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from pydantic import Field
 
 from radarize.batch import Batch
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.mapping import echoes
-from radarize.plain import Frozen
+from radarize.plain import Frozen, setting
 from radarize.points import Cfar, level_around
 from radarize.stopwatch import stage
 
@@ -26,37 +25,27 @@ BEARINGS = np.radians(np.arange(-44.0, 44.0))
 class ScanConfig(Frozen):
     """Detection of echoes in range-azimuth maps."""
 
-    min_range: float = Field(0.3, ge=0, description="m, nearer cells hold transmitter leakage")
-    above_noise_db: float = Field(15.0, gt=0, description="dB, an echo stands so far above the noise")
-    below_ring_db: float = Field(
-        15.0,
-        gt=0,
-        description="dB, an echo lies at most so far below the strongest of all bearings at its range; what is weaker "
-        "is taken for that echo's sidelobe",
+    min_range: float = setting(0.3, "m, nearer cells hold transmitter leakage", ge=0)
+    above_noise_db: float = setting(15.0, "dB, an echo stands so far above the noise", gt=0)
+    below_ring_db: float = setting(
+        15.0, "dB, an echo lies at most so far below the strongest of all bearings at its range; what is weaker is "
+        "taken for that echo's sidelobe", gt=0
+    )  # fmt: skip
+    below_bearing_db: float = setting(
+        6.0, "dB, the same below the strongest of all ranges on its bearing; what is weaker and nearer is clutter "
+        "above or below the plane, or the skirt of a neighbour: in simulated offices 6 dB halves the echoes that come "
+        "too early and costs one in ten of the others", gt=0
+    )  # fmt: skip
+    noise_quantile: float = setting(
+        0.25, "the noise is this quantile of a frame's cells: most of a room's cells are behind its walls", gt=0, lt=1
     )
-    below_bearing_db: float = Field(
-        6.0,
-        gt=0,
-        description="dB, the same below the strongest of all ranges on its bearing; what is weaker and nearer is "
-        "clutter above or below the plane, or the skirt of a neighbour: in simulated offices 6 dB halves the echoes "
-        "that come too early and costs one in ten of the others",
+    cfar: Cfar = setting(
+        Cfar(window=8, guard=4, threshold=10.0), "what an echo stands above in range and in bearing, for scans by cfar"
     )
-    noise_quantile: float = Field(
-        0.25,
-        gt=0,
-        lt=1,
-        description="the noise is this quantile of a frame's cells: most of a room's cells are behind its walls",
-    )
-    cfar: Cfar = Field(
-        Cfar(window=8, guard=4, threshold=10.0),
-        description="what an echo stands above in range and in bearing, for scans by cfar",
-    )
-    elevation_power: float = Field(
-        2.0,
-        gt=0,
-        description="how strongly echoes from above and below are weighed down, for scans by elevation-aware: a cell's "
-        "power is multiplied with (elevation-aware / reference power)^this, at most 1",
-    )
+    elevation_power: float = setting(
+        2.0, "how strongly echoes from above and below are weighed down, for scans by elevation-aware: a cell's power "
+        "is multiplied with (elevation-aware / reference power)^this, at most 1", gt=0
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from textwrap import wrap
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel
 
 from radarize.heatmaps import HeatmapConfig
 from radarize.mapping.scans import ScanConfig
@@ -14,7 +14,7 @@ from radarize.odometry.doppler import DopplerConfig
 from radarize.odometry.integration import VelocityConfig
 from radarize.odometry.rotation import RotationConfig
 from radarize.odometry.settings import FusionConfig, TurnConfig
-from radarize.plain import Frozen
+from radarize.plain import Frozen, setting
 from radarize.slam.config import SlamConfig
 from radarize.yamlfile import read_settings
 
@@ -22,17 +22,14 @@ from radarize.yamlfile import read_settings
 class Configuration(Frozen):
     """The pipeline's settings; each section belongs to one step, and is described where that step stands."""
 
-    heatmaps: HeatmapConfig = Field(HeatmapConfig(), description="spectra and beamformers of the classical methods")
-    scans: ScanConfig = Field(ScanConfig(), description="echoes in range-azimuth maps, of scans without networks")
-    doppler: DopplerConfig = Field(DopplerConfig(), description="velocity from single echoes")
-    rotation: RotationConfig = Field(RotationConfig(), description="turns by matching frames with a local map")
-    velocity: VelocityConfig = Field(VelocityConfig(), description="filter of velocities, whoever tells them")
-    fusion: FusionConfig = Field(FusionConfig(), description="velocities by network and Doppler together")
-    turns: TurnConfig = Field(TurnConfig(), description="turns by the network")
-    slam: SlamConfig = Field(
-        default_factory=lambda: SlamConfig.preset("radar"),
-        description="the back end",
-    )
+    heatmaps: HeatmapConfig = setting(HeatmapConfig(), "spectra and beamformers of the classical methods")
+    scans: ScanConfig = setting(ScanConfig(), "echoes in range-azimuth maps, of scans without networks")
+    doppler: DopplerConfig = setting(DopplerConfig(), "velocity from single echoes")
+    rotation: RotationConfig = setting(RotationConfig(), "turns by matching frames with a local map")
+    velocity: VelocityConfig = setting(VelocityConfig(), "filter of velocities, whoever tells them")
+    fusion: FusionConfig = setting(FusionConfig(), "velocities by network and Doppler together")
+    turns: TurnConfig = setting(TurnConfig(), "turns by the network")
+    slam: SlamConfig = setting(SlamConfig.preset("radar"), "the back end")
 
     @classmethod
     def load(cls, path: str | Path) -> "Configuration":

@@ -52,11 +52,7 @@ class Workshop:
         return self._scanners[name]
 
     def odometry(self, name: str, scans: str) -> Follower:
-        """Odometry by a key of `ODOMETRY`.
-
-        Args:
-            name: of it.
-            scans: what it is made from, if it is made from scans.
+        """Odometry by a key of `ODOMETRY`, made from `scans` if it is made from scans.
 
         Raises:
             InputError: unknown name, or see `Method`.

@@ -233,7 +233,7 @@ class PointClouds:
 
 
 def level_around(level: np.ndarray, cfar: Cfar, axis: int, cyclic: bool) -> np.ndarray:
-    """Mean level (dB) of the cells around each along an axis; at the ends of one that is no circle, of one side only."""
+    """Mean level (dB) of the cells around each along an axis; at the ends of one that is no circle, of one side."""
     reach = cfar.window + cfar.guard
     level = np.moveaxis(level, axis, -1)
     padded = np.pad(level, [(0, 0)] * (level.ndim - 1) + [(reach, reach)], mode="wrap")

@@ -312,7 +312,7 @@ def cloud_columns(message: object) -> Float[np.ndarray, "point column"]:
         raise InputError(f"point cloud has fields {', '.join(fields) or '(none)'}, expected float32 x, y, z")
     formats = [">f4" if message.is_bigendian else "<f4"] * len(usable)
     kind = np.dtype({"names": [*usable], "formats": formats, "offsets": [*usable.values()], "itemsize": step})
-    table = np.frombuffer(data.tobytes(), kind, count)
+    table = np.ascontiguousarray(data[: count * step]).view(kind)
     columns = {name: table[name].astype(float) for name in usable}
     columns["snr"] = columns.get("intensity", unknown := np.full(count, np.nan))
     columns["velocity"] = -columns.get("velocity", unknown)

@@ -17,7 +17,6 @@ without a clock were written once.
 from radarize.recording.interrupted import keeping
 from radarize.recording.losses import Losses
 from radarize.recording.reader import Recording
-from radarize.recording.streams import Product, Stream
-from radarize.recording.writer import RecordingWriter, add
+from radarize.recording.writer import Product, RecordingWriter, Stream, add
 
 __all__ = ["Losses", "Product", "Recording", "RecordingWriter", "Stream", "add", "keeping"]

@@ -10,6 +10,7 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
@@ -20,12 +21,44 @@ from radarize import __version__
 from radarize.errors import InputError, explained, reason
 from radarize.radar.config import RadarConfig
 from radarize.recording.losses import Losses
-from radarize.recording.streams import FORMAT, Product, Stream
 from radarize.replacing import replacing
 
 #: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
 #: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.
 _RESERVE = 512 << 10
+#: Of the layout.
+_FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A data set that grows with the recording, one row per appended item.
+
+    Attributes:
+        shape: shape of one row.
+        dtype: numpy type.
+        unit: SI unit, or what the columns are.
+        about: one sentence for the reader.
+        clock: data set that says which instant (float, s) or frame (integer) each row belongs to; ``radar/time``: the
+            rows are the frames.
+        labels: what the values 0, 1, ... stand for, where they stand for something.
+    """
+
+    shape: tuple[int, ...]
+    dtype: str
+    unit: str
+    about: str
+    clock: str = "radar/time"
+    labels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Product:
+    """A data set written once when the recording is opened (a floor plan, a label axis)."""
+
+    data: np.ndarray
+    unit: str
+    about: str
 
 
 class RecordingWriter:
@@ -77,7 +110,7 @@ class RecordingWriter:
 
     def _create(self, cfg_text, attributes, streams, products) -> None:
         file = self._file
-        file.attrs.update({"format": FORMAT, "radarize_version": __version__, **_storable(attributes)})
+        file.attrs.update({"format": _FORMAT, "radarize_version": __version__, **_storable(attributes)})
         radar = file.create_group("radar")
         radar.attrs["config"] = self.config.model_dump_json()
         radar.attrs["cfg"] = cfg_text

@@ -48,7 +48,7 @@ def curves(
         top = max(axis.dataLim.y1 for axis in axis_row)
         for axis in axis_row:
             axis.set_ylim(0, 1.06 * top if np.isfinite(top) and top > 0 else 1)
-        axis_row[0].set_ylabel(figure_of.title.replace(", ", ",\n"))
+        axis_row[0].set_ylabel(f"{figure_of.words},\n{figure_of.unit}")
     for axis in axes[-1]:
         axis.set_xlabel(over)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(lines), frameon=False)

@@ -126,7 +126,7 @@ class OccupancyMap:
             part.write_bytes(b"P5\n%d %d\n255\n" % self.pixels.shape[::-1] + self.pixels.tobytes())
         with replacing(description) as part:
             fields = self.about.model_dump() | {"image": image.name, "origin": list(self.origin)}
-            part.write_text(yaml.safe_dump(fields, sort_keys=False))
+            part.write_text(yaml.safe_dump(fields, sort_keys=False, default_flow_style=None))
         return description
 
 

@@ -13,10 +13,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from radarize.features.maps import AZIMUTHS, Maps
-from radarize.nets.correlation import Correlation
+from radarize.nets.correlation import Correlation, Moved
 from radarize.nets.gaussian import Gaussian
 from radarize.nets.maps import coordinates, level
-from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
 from radarize.nets.weights import Network
 

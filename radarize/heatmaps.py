@@ -39,7 +39,6 @@ class Heatmaps:
     widens the 12.8 deg beam of 8 elements to 15 deg.
 
     Args:
-        config: radar configuration.
         azimuths: (azimuth,) columns of all maps, rad, ascending.
         settings: of the beamformers.
 

@@ -26,10 +26,8 @@ class Live:
     Args:
         inputs: what its methods are made from; see `prepare`.
         methods: odometry and scans by name.
-        page: to show it on.
 
     Attributes:
-        pipeline: the pipeline.
         losses: of the frames that came.
         blindness: of the odometry.
         busy: s spent on the frames so far, showing them included.

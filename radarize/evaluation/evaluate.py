@@ -21,7 +21,6 @@ def trajectory_errors(
     """Errors of the run's trajectories, by ``odometry`` and ``slam``.
 
     Args:
-        run: folder of a run.
         reference: TUM file of the truth; by default the run's ``reference.tum``.
         association: see `radarize.evaluation.trajectory.matched`.
 
@@ -62,7 +61,6 @@ def evaluate(
     """Compare a run with the truth. Nothing is written, see `RunFolder.write_metrics`.
 
     Args:
-        run: a run, or its folder.
         reference: TUM file of the truth; by default the run's ``reference.tum``.
         errors: of its trajectories (`trajectory_errors`), where they are at hand.
 

@@ -40,7 +40,6 @@ class Companion(ABC):
     """A topic beside the radar's, taken message by message and given out frame batch by frame batch.
 
     Args:
-        config: radar configuration.
         first: the topic's first message.
 
     Attributes:

@@ -16,7 +16,6 @@ class Stamps:
     """When frames begin: from their headers, or from their receipt.
 
     Args:
-        config: radar configuration.
         first: the first frame.
         received: when that was, s.
         latency: given by the user, s.

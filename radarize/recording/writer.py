@@ -66,7 +66,6 @@ class RecordingWriter:
 
     Args:
         path: file to write; its ``.part`` neighbour holds the frames until the writer is closed.
-        config: radar configuration.
         cfg_text: original configuration text, kept as it is.
         attributes: scene, seed, command and the like, stored as attributes of the file.
         streams: growing data sets by path, e.g. ``"truth/pose"``.

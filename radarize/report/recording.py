@@ -27,7 +27,6 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
     """Draw a recording.
 
     Args:
-        path: ``.h5`` file.
         output: page to write; by default beside the recording, ``.html`` in place of ``.h5``.
 
     Raises:

@@ -23,7 +23,6 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     """Draw a run, with its errors where it knows the truth. Nothing but the page is written.
 
     Args:
-        run: folder of a run.
         output: file to write; by default ``report.html`` in the folder.
         beside: other runs of the same recording, to compare with.
 

@@ -204,8 +204,8 @@ def main() -> None:
             noise = noisier(log, truth, rng), truth
             keep = np.sort(rng.permutation(len(truth))[: 2 * len(truth) // 3])
             fewer = replace(log, times=log.times[keep], ranges=log.ranges[keep]), truth[keep]
-            for errors, case in zip(disturbed.values(), (noise, fewer), strict=True):
-                errors.append(f"{row('', *case, lidar_preset)['ATE m']:.3f}")
+            for found, case in zip(disturbed.values(), (noise, fewer), strict=True):
+                found.append(f"{row('', *case, lidar_preset)['ATE m']:.3f}")
         notes += [f"{name}, {what}, {options.seeds} seeds: ATE {', '.join(disturbed[what])} m." for what in disturbed]
     rows += graph_rows(options.seed)
     log, truth = to_and_fro(*lidar("intel"), legs=3)

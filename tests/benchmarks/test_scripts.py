@@ -1,0 +1,39 @@
+"""The scripts write pages that say what they are of; each runs with as little as it takes."""
+
+import importlib
+from pathlib import Path
+
+import pytest
+
+from benchmarks import results
+from radarize.benchmark.results import Results
+from radarsim.simulate import simulate
+
+
+@pytest.fixture(scope="module")
+def walk(tmp_path_factory) -> Path:
+    """A second of the office with what labels need."""
+    path = tmp_path_factory.mktemp("data") / "office.h5"
+    return simulate("office", path, duration=1.0, seed=4, sensors=["occupancy"])
+
+
+@pytest.mark.parametrize(
+    ("script", "words"),
+    [
+        ("claims", ["--data", "{folder}"]),
+        ("live_speed", ["{walk}"]),
+        ("motion_statistics", ["--buildings", "1"]),
+        ("twin", ["--duration", "0.5"]),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_a_script_writes_its_page(script, words, walk, tmp_path, monkeypatch, capsys):
+    module = importlib.import_module(f"benchmarks.{script}")
+    words = [word.format(folder=walk.parent, walk=walk) for word in words]
+    monkeypatch.setattr("sys.argv", [script, *words])
+    monkeypatch.setattr(results, "FOLDER", tmp_path)
+    module.main()
+    page = Results.read(tmp_path / f"{script}.json")
+    assert page.tables[0].rows and page.data.walks
+    assert page.command.startswith(f"python -m benchmarks.{script} ")
+    assert page.markdown() in capsys.readouterr().out

@@ -102,7 +102,7 @@ PARSER = command_line(
     __doc__,
     seconds=(300.0, "length of the capture"),
     config=("radarize", "preset or .cfg"),
-    bad_seconds=(60.0, "length of another one over a bad network"),
+    bad_seconds=(60.0, "length of another one over a bad network; 0: none"),
     seed=(0, "of noise and network"),
 )
 
@@ -120,6 +120,8 @@ def main() -> None:
     ]
     bad = {"loss": 0.01, "duplicate": 0.01, "reorder": 0.01}
     for seconds, shares in ((arguments.seconds, {}), (arguments.bad_seconds, bad)):
+        if not seconds:
+            continue
         with tempfile.TemporaryDirectory() as folder:
             row, warnings = run(config, arguments.config, seconds, Path(folder), arguments.seed, shares)
         rows.append(row)

@@ -21,9 +21,8 @@ def walk(tmp_path_factory) -> Path:
     ("script", "words"),
     [
         ("claims", ["--data", "{folder}"]),
-        ("live_speed", ["{walk}"]),
+        ("corrections", ["{walk}", "--steps", "1", "--duration", "1"]),
         ("motion_statistics", ["--buildings", "1"]),
-        ("twin", ["--duration", "0.5"]),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

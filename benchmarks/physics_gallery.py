@@ -263,11 +263,11 @@ def phase_noise(axis) -> str:
     """4 L(f) sin^2(pi f tau): the skirt of an echo vanishes with its delay."""
     bins, step, worst = np.arange(CONFIG.samples), CONFIG.sample_rate / CONFIG.samples, 0.0
     for cell, color in ((10, "tab:blue"), (40, "tab:orange"), (90, "tab:green")):
-        theory, found = law(cell, bins - cell) / step, skirt(cell) / step
-        beside, far = bins != cell, np.abs(bins - cell) > 4
-        axis.plot(bins[beside], db(theory[beside]), color="black", lw=1)
+        off = np.where(bins == cell, np.nan, bins - cell)  # the echo itself is none of its skirt
+        theory, found, far = law(cell, off) / step, skirt(cell) / step + 0 * off, np.abs(bins - cell) > 4
+        axis.plot(bins, db(theory), color="black", lw=1)
         label = f"echo at {CONFIG.ranges[cell]:.2f} m"
-        axis.plot(bins[beside], db(found[beside]), ".", ms=4, color=color, label=label)
+        axis.plot(bins, db(found), ".", ms=4, color=color, label=label)
         worst = max(worst, abs(db(found[far].mean() / theory[far].mean())))
     axis.set(ylim=(-150, -98))
     return f"Mean level of each skirt: {worst:.2f} dB off at worst."

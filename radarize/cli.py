@@ -43,8 +43,8 @@ def import_(
         Path,
         typer.Argument(
             metavar="SOURCE",
-            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), or "
-            "an array of samples (.npy, .npz, .mat).",
+            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), "
+            "an array of samples (.npy, .npz, .mat), or RadarHD's dataset_5.",
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
@@ -60,6 +60,7 @@ def import_(
             help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
         ),
     ] = None,
+    walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -88,7 +89,7 @@ def import_(
     from radarize.recording import keeping
 
     radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency)
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk)
     with keeping(output), progress("import") as report:
         _tell(import_recording(source, output, given, progress=report))
 

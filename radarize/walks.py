@@ -52,7 +52,9 @@ class Walk:
             names = {int(path.stem.split("_")[2]) for path in folder.glob(f"radar/R_{number}_*.png")}
             if names:
                 if missing := sorted(set(range(max(names) + 1)) - names):
-                    raise InputError(f"{folder / 'radar' / f'R_{number}_{missing[0]}.png'}: is missing, expected a picture")
+                    raise InputError(
+                        f"{folder / 'radar' / f'R_{number}_{missing[0]}.png'}: is missing, expected a picture"
+                    )
                 return cls(folder, number, len(names))
         raise InputError(f"{data}: has no walk {number}, expected train|test/radar/R_{number}_0.png and so on")
 
@@ -65,7 +67,9 @@ class Walk:
         """
         numbers = {path.stem.split("_")[1] for path in Path(data).glob("test/radar/R_*_*.png")}
         if not numbers:
-            raise InputError(f"{data}: holds no test/radar/R_WALK_FRAME.png, expected the data set of RadarHD's repository")
+            raise InputError(
+                f"{data}: holds no test/radar/R_WALK_FRAME.png, expected the data set of RadarHD's repository"
+            )
         return [cls.find(data, int(number)) for number in sorted(numbers, key=int)]
 
     def radar(self, frame: int) -> UInt8[np.ndarray, "range azimuth"]:
@@ -110,7 +114,7 @@ class Predictions:
 
     Attributes:
         folder: of ``WALK.npz`` or ``WALK.npz.xz`` (``prediction``, packed bits of frames on the grid of
-            `radarize.polar.GRID`, and ``frame``, their numbers), or of polar pictures ``...WALK_FRAME.png`` as the lidar's.
+            `radarize.polar.GRID`, and ``frame``, their numbers), or of pictures ``...WALK_FRAME.png`` as the lidar's.
     """
 
     folder: Path
@@ -124,7 +128,9 @@ class Predictions:
         for path in (self.folder / f"{walk.number}.npz", self.folder / f"{walk.number}.npz.xz"):
             if path.is_file():
                 frames, bits = _packed(path)
-                return {int(frame): _on_grid(np.unpackbits(each, axis=-1)) for frame, each in zip(frames, bits, strict=True)}
+                return {
+                    int(frame): _on_grid(np.unpackbits(each, axis=-1)) for frame, each in zip(frames, bits, strict=True)
+                }
         pictures = {}
         for path in self.folder.glob(f"*{walk.number}_*.png"):
             words = path.stem.removesuffix("_pred").split("_")
@@ -145,7 +151,9 @@ def _packed(path: Path) -> tuple[Int[np.ndarray, "frame"], UInt8[np.ndarray, "fr
         if bits.dtype != np.uint8 or bits.shape != (len(frames), polar.GRID[0], polar.GRID[1] // 8):
             raise ValueError(f"prediction is {bits.dtype} of shape {bits.shape}")
     except (OSError, ValueError, KeyError, EOFError, lzma.LZMAError) as error:
-        raise InputError(f"{path}: is damaged ({error}), expected packed bits `prediction` and numbers `frame`") from error
+        raise InputError(
+            f"{path}: is damaged ({error}), expected packed bits `prediction` and numbers `frame`"
+        ) from error
     return frames, bits
 
 

@@ -13,7 +13,6 @@ from radarize.benchmark.results import Data, Network, Results, command, machine
 from radarize.benchmark.results import Walk as Facts
 from radarize.benchmark.table import Table
 from radarize.clouds import Apart
-from radarize.errors import InputError
 from radarize.features.windows import Windows
 from radarize.methods.method import Weights
 from radarize.methods.pictures.network import PictureNet
@@ -26,8 +25,8 @@ from radarize.walks import FIRST, PERIOD, Predictions, Walk
 #: What stands in every picture, by name: all cells; the first one of each azimuth that stands out; all that do.
 _CFAR = Cfar(window=8, guard=4, threshold=64.0)
 NOTES = (
-    "Medians over all frames from the 40th on, points through the authors' grid; `+-` is the standard error of the "
-    "median, with as many independent frames as the errors' autocorrelation leaves.",
+    "Medians over all frames from the 40th on, points through the authors' grid; `+-` is a median's standard error, "
+    "with as many independent frames as the errors' autocorrelation leaves.",
     "`network` has seen simulated walks alone; nothing of it was chosen on test walks. On the data set's training walks "
     "it was found how far the radar reads beyond the lidar (0.17 to 0.34 m) and what share of a picture's cells is lit "
     "(6 to 14 %), which the roughening of its training spans.",
@@ -85,7 +84,7 @@ def real(
             if frame < FIRST or frame % options.every:
                 continue
             true = polar.cartesian(walk.lidar(frame))
-            by_method |= {name: lambda one=known.get(frame): one for name, known in others.items() if frame in known}
+            by_method |= {name: lambda one=known[frame]: one for name, known in others.items() if frame in known}
             for name, make in by_method.items():
                 found.setdefault(name, []).append(Apart.of(make(), true))
         for name, apart in found.items():
@@ -163,7 +162,15 @@ def _paired(errors: dict[tuple[int, str], list[Apart]]) -> list[dict]:
                 pairs = zip(a[-common:], b[-common:], strict=True)
                 apart.append(np.nanmean([one.chamfer - two.chamfer for one, two in pairs]))
             spread = float(np.std(apart, ddof=1) / np.sqrt(len(apart))) if len(apart) > 1 else np.nan
-            rows.append({"method": name, "against": other, "walks": len(walks), "chamfer apart_m": float(np.mean(apart)), "+-": spread})
+            rows.append(
+                {
+                    "method": name,
+                    "against": other,
+                    "walks": len(walks),
+                    "chamfer apart_m": float(np.mean(apart)),
+                    "+-": spread,
+                }
+            )
     return rows
 
 

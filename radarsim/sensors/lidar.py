@@ -30,7 +30,11 @@ class Lidar(Sensor):
         motion, times = self._rig.motion, frames.times + self._rig.config.burst_center
         forward = motion.rotation(times).apply([1.0, 0.0, 0.0])
         yaw = np.arctan2(forward[:, 1], forward[:, 0])
-        return {"truth/lidar": np.stack([self._picture(*each) for each in zip(times, motion.position(times), yaw, strict=True)])}
+        return {
+            "truth/lidar": np.stack(
+                [self._picture(*each) for each in zip(times, motion.position(times), yaw, strict=True)]
+            )
+        }
 
     def _picture(self, time: float, position: Float[np.ndarray, "3"], yaw: float) -> np.ndarray:
         cos, sin = np.cos(yaw), np.sin(yaw)

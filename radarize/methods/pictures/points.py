@@ -5,9 +5,7 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 
 
-def points(
-    probability: Float[Tensor, "item 257 column"], least: float | Tensor
-) -> Bool[Tensor, "item range column"]:
+def points(probability: Float[Tensor, "item 257 column"], least: float | Tensor) -> Bool[Tensor, "item range column"]:
     """Pictures with one point in every column that is likely to have any: at the median of its ranges, from which the
     true one is least far on average."""
     ranges, nothing = probability[:, :-1], probability[:, -1]

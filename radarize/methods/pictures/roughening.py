@@ -1,7 +1,7 @@
 """What real pictures have and simulated ones lack: drawn at random, so that a network relies on neither.
 
-Simulated walls are flatter and rooms emptier than real ones, so a few flashes hide everything else below the threshold
-of 26 dB. Here flashes lose what they have above a random level, echoes that nobody explains are added, levels wander, and cells
+Simulated walls are flatter and rooms emptier than real ones, so a few flashes hide everything that is
+weaker by the threshold's 26 dB. Here flashes lose what they have above a random level, echoes that nobody explains are added, levels wander, and cells
 go missing, before a picture is made that keeps a random share of its cells.
 """
 
@@ -80,9 +80,7 @@ def picture(
     return torch.where(kept, (255 * (1 - level / least.clamp_max(-1e-3))).floor(), torch.zeros_like(level))
 
 
-def shifted(
-    found: Float[Tensor, "item frame row column"], rows: Tensor
-) -> Float[Tensor, "item frame row column"]:
+def shifted(found: Float[Tensor, "item frame row column"], rows: Tensor) -> Float[Tensor, "item frame row column"]:
     """Pictures that read so many rows too far."""
     place = torch.arange(polar.ROWS)[None] - rows[:, None]
     moved = found.gather(2, place.clamp_min(0)[:, None, :, None].expand_as(found))

@@ -1,7 +1,7 @@
 """Polar pictures as RadarHD's data set has them: what an array of eight antennas hears, and what a lidar sees.
 
-Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023, and the program that made its
-data set. A picture has 256 rows of range up to 10.8 m, and columns of azimuth from -90 to 90 deg, positive to the left: 64 of the
+Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023, and the program that made its data set.
+A picture has 256 rows of range up to 10.8 m, and columns of azimuth from -90 to 90 deg, positive to the left: 64 of the
 radar's, 512 of the lidar's. Measures of their paper are taken on a Cartesian grid (`cartesian`).
 """
 

@@ -1,8 +1,8 @@
 """What real pictures have and simulated ones lack: drawn at random, so that a network relies on neither.
 
-Simulated walls are flatter and rooms emptier than real ones, so a few flashes hide everything that is
-weaker by the threshold's 26 dB. Here flashes lose what they have above a random level, echoes that nobody explains are added, levels wander, and cells
-go missing, before a picture is made that keeps a random share of its cells.
+Simulated walls are flatter and rooms emptier than real ones, so a few flashes hide everything that lies below the
+threshold of 26 dB. Here flashes lose what they have above a random level, echoes that nobody explains are added, levels
+wander, and cells go missing, before a picture is made that keeps a random share of its cells.
 """
 
 import math

@@ -450,7 +450,7 @@ def _benchmark_real(data: Path, out: Path, weights: Path | None, walks: str | No
         raise InputError(f"--walks names {wrong[0]!r}, expected numbers as in 227,230")
     named = dict(each.partition("=")[::2] for each in predictions)
     for name, folder in named.items():
-        if not name or not Path(folder).is_dir():
+        if not (name and folder and Path(folder).is_dir()):
             raise InputError(f"--predictions is {name}={folder}, expected NAME=FOLDER of a folder that is there")
     options = Options([int(number) for number in numbers], {name: Path(each) for name, each in named.items()}, weights)
     with progress("real") as report:

@@ -44,8 +44,8 @@ def import_(
         Path,
         typer.Argument(
             metavar="SOURCE",
-            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), or "
-            "an array of samples (.npy, .npz, .mat).",
+            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), "
+            "an array of samples (.npy, .npz, .mat), or RadarHD's dataset_5.",
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
@@ -61,6 +61,7 @@ def import_(
             help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
         ),
     ] = None,
+    walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -89,7 +90,7 @@ def import_(
     from radarize.recording import keeping
 
     radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency)
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk)
     with keeping(output), progress("import") as report:
         _tell(import_recording(source, output, given, progress=report))
 
@@ -400,6 +401,10 @@ def benchmark(
     protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; by default one per core.")] = None,
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
+    walks: Annotated[str | None, typer.Option(help="real: walks to judge, 227,230; by default all that test.")] = None,
+    predictions: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=FOLDER", help="real: what another program says of the walks.")
+    ] = None,
 ):
     """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
     import os
@@ -410,10 +415,13 @@ def benchmark(
         width = max(map(len, BENCHMARKS))
         for each, about in BENCHMARKS.items():
             print(f"{each:<{width}}  {about.about}")
+        print(f"{'real':<{width}}  Points of real walks against a lidar (RadarHD's repository).")
         return
     for option, value in (("--data", data), ("--out", out)):
         if value is None:
             raise InputError(f"{option} is missing, expected a folder")
+    if name == "real":
+        return _benchmark_real(data, out, weights, walks, predictions or [])
     from radarize.benchmark.run import benchmark as compare
     from radarize.benchmark.study import Options
 
@@ -424,6 +432,23 @@ def benchmark(
     for each in published:
         print(out / f"{each}.html")
     print(out / "index.html")
+
+
+def _benchmark_real(data: Path, out: Path, weights: Path | None, walks: str | None, predictions: list[str]) -> None:
+    from radarize.benchmark.real import Options, real
+
+    numbers = [number.strip() for number in walks.split(",")] if walks else []
+    if wrong := [number for number in numbers if not number.isdecimal()]:
+        raise InputError(f"--walks names {wrong[0]!r}, expected numbers as in 227,230")
+    named = dict(each.partition("=")[::2] for each in predictions)
+    for name, folder in named.items():
+        if not (name and folder and Path(folder).is_dir()):
+            raise InputError(f"--predictions is {name}={folder}, expected NAME=FOLDER of a folder that is there")
+    options = Options([int(number) for number in numbers], {name: Path(each) for name, each in named.items()}, weights)
+    with progress("real") as report:
+        results = real(data, out, options, progress=report)
+    print(results.tables[0].markdown())
+    print(out / "real.md")
 
 
 @app.command()

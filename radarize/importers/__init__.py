@@ -14,6 +14,7 @@ from radarize.errors import InputError, explained
 from radarize.importers import bin as bin_format
 from radarize.importers import cube as cube_format
 from radarize.importers import pcap as pcap_format
+from radarize.importers import pictures as picture_format
 from radarize.importers import studio as studio_format
 from radarize.importers.capture import Batch, Capture
 from radarize.importers.parameters import Given
@@ -32,7 +33,7 @@ _ASKED = 8
 _BAGS, _ARRAYS = (".bag", ".mcap", ".db3"), (".npy", ".npz", ".mat")
 _EXPECTED = (
     "a DCA1000 .bin, a .pcap, a folder of mmWave Studio files, a ROS bag (.bag, .mcap, .db3 or a folder), "
-    "or an array (.npy, .npz, .mat)"
+    "an array (.npy, .npz, .mat), or RadarHD's dataset_5"
 )
 #: What poses given by hand stand in for.
 _POSES = ("truth/time", "truth/pose", "truth/velocity")
@@ -52,8 +53,8 @@ def import_recording(
 
     Args:
         source: a DCA1000 ``.bin``, whole or in parts (its ``.cfg`` of the same name, or mmWave Studio's JSON files, may
-            lie beside it), a ``.pcap`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, or an array of
-            samples (``.npy``, ``.npz``, ``.mat``).
+            lie beside it), a ``.pcap`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an array of
+            samples (``.npy``, ``.npz``, ``.mat``), or RadarHD's data set of pictures, of which ``given.walk`` is taken.
         output: recording to write.
         given: what the user says of it.
         progress: called with frames done and (estimated) frames in all.
@@ -67,6 +68,8 @@ def import_recording(
     if source.resolve() == output.resolve():
         raise InputError(f"{output}: is the source itself, expected another output file")
     products = _poses(given.poses) if given.poses else {}
+    if picture_format.asked(source, given.walk):
+        return picture_format.import_walk(source, given.walk, output, products, progress or (lambda done, total: None))
 
     capture = _open(source, output, given)
     batches = iter(capture.batches)

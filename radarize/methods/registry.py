@@ -5,7 +5,7 @@ the trainings of their networks. A method is a folder beside this file, loaded w
 from collections.abc import Callable
 
 from radarize.errors import InputError
-from radarize.methods import doppler, milliego, published, radarhd, radarize, ransac, rnin, scan_matching
+from radarize.methods import doppler, milliego, pictures, published, radarhd, radarize, ransac, rnin, scan_matching
 from radarize.methods.configuration import Configuration
 from radarize.methods.method import Inputs, Method, Weights, load
 from radarize.methods.task import Task
@@ -13,7 +13,7 @@ from radarize.nets.weights import check
 from radarize.pipeline import Follower, Pipeline, Scanner
 from radarize.radar.config import RadarConfig
 
-_FOLDERS = (radarize, doppler, ransac, scan_matching, milliego, rnin, radarhd, published)
+_FOLDERS = (radarize, doppler, ransac, scan_matching, milliego, rnin, radarhd, pictures, published)
 
 
 def _all(what: str) -> dict:

@@ -27,7 +27,7 @@ _CFAR = Cfar(window=8, guard=4, threshold=64.0)
 NOTES = (
     "Medians over all frames from the 40th on, points through the authors' grid; +-: standard error, with as many "
     "independent frames as the errors' autocorrelation leaves.",
-    "`network` has seen simulated walks alone, and nothing of it was chosen on test walks. The data set's training walks "
+    "`network` has seen simulated walks alone, and nothing of it was chosen on test walks. Training walks of the set "
     "told how far the radar reads beyond the lidar (0.17 to 0.34 m) and which share of a picture's cells is lit (6 to "
     "14 %), which the roughening of its training spans.",
 )

@@ -12,7 +12,9 @@ from radarize.radar.dca1000_commands import Command, Reply, Status
 from radarize.recording import Recording
 from radarsim.emulator.commandline import PROMPT
 from radarsim.emulator.disturbance import Disturbance
-from radarsim.emulator.source import Playback, Walk
+from radarsim.emulator.simulation import Simulation
+from radarsim.emulator.source import Playback
+from radarsim.walk import Walk
 from tests.emulator.client import SMALL, attached
 from tests.packets import packets
 from tests.virtual import CONFIG, record
@@ -158,7 +160,7 @@ def test_a_scene_is_simulated_as_simulate_does_it(tmp_path):
     simulate("office", tmp_path / "office.h5", duration=0.2, seed=3, radar=str(tmp_path / "small.cfg"))
     with Recording(tmp_path / "office.h5") as recording:
         expected = encode(recording.adc(0, len(recording)), SMALL).tobytes()
-    walk = Walk("office", duration=0.2, seed=3, radar=str(tmp_path / "small.cfg"))
+    walk = Simulation("office", Walk(duration=0.2), seed=3, radar=str(tmp_path / "small.cfg"))
     with attached(walk) as (emulator, client, said):
         client.record()
         assert client.configure(SMALL)[-1].endswith("Done\n\r" + PROMPT)

@@ -40,7 +40,9 @@ class AdcByCause(Sensor):
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The parts."""
-        parts = np.stack([self._split(*each) for each in zip(frames.lengths, frames.received, frames.echoes, strict=True)])
+        parts = np.stack(
+            [self._split(*each) for each in zip(frames.lengths, frames.received, frames.echoes, strict=True)]
+        )
         return {"truth/adc_by_cause": np.stack([parts.real, parts.imag], axis=-1).astype(np.float16)}
 
     @one_blas_thread

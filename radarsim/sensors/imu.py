@@ -100,7 +100,9 @@ class Triad:
         self.bias = errors.offset * start[1] + errors._wander * wander + errors.walk * walk
         self._noise = errors.noise * np.sqrt(RATE) * drive[:, 2]
 
-    def measure(self, truth: Float[np.ndarray, "tick 3"], ticks: Int[np.ndarray, "tick"]) -> Float[np.ndarray, "tick 3"]:
+    def measure(
+        self, truth: Float[np.ndarray, "tick 3"], ticks: Int[np.ndarray, "tick"]
+    ) -> Float[np.ndarray, "tick 3"]:
         """What the sensors report as their samples number `ticks`."""
         errors = self._errors
         value = np.rint((truth + self.bias[ticks] + self._noise[ticks]) / errors.step) * errors.step

@@ -49,7 +49,9 @@ class PlanarScan(Sensor):
         self.products = {
             "truth/scan_azimuths": Product(AZIMUTHS, "rad", "bearings of /truth/scan, positive to the left"),
             "truth/floor_plan": Product(
-                scenario.scene.floor_plan(height), "m", "x0 y0 x1 y1 of everything cut by the plane of the sensor at start"
+                scenario.scene.floor_plan(height),
+                "m",
+                "x0 y0 x1 y1 of everything cut by the plane of the sensor at start",
             ),
         }
 

@@ -40,14 +40,18 @@ def read_settings(path: str | Path, defaults: Settings) -> Settings:
     if not isinstance(changes, dict):
         raise InputError(f"{path}: holds a {type(changes).__name__}, expected sections as `radarize config` prints")
     try:
-        return type(defaults).model_validate(_merged(defaults.model_dump(), changes))
+        return type(defaults).model_validate(changed(defaults, changes))
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(map(str, first["loc"]))
         raise InputError(f"{path}: {where} is {first['input']!r}, expected: {first['msg']}") from error
 
 
-def _merged(settings: dict, changes: dict) -> dict:
-    """Settings with some of them changed, however deep."""
-    both = {name for name in changes if isinstance(changes[name], dict) and isinstance(settings.get(name), dict)}
-    return settings | changes | {name: _merged(settings[name], changes[name]) for name in both}
+def changed(settings: BaseModel, changes: dict[str, object]) -> dict[str, object]:
+    """The fields of settings, with some of them changed: those of settings within settings, too, however deep."""
+    within = {
+        name: changed(part, changes[name])
+        for name in changes
+        if isinstance(part := getattr(settings, name, None), BaseModel) and isinstance(changes[name], dict)
+    }
+    return settings.model_dump() | changes | within

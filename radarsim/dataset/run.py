@@ -123,10 +123,11 @@ def _alone(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror})") from error
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(f"{folder}: another run is making a data set here, expected to be alone") from None
         yield
-    except BlockingIOError:
-        raise InputError(f"{folder}: another run is making a data set here, expected to be alone") from None
     finally:
         os.close(handle)
 

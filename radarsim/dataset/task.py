@@ -13,7 +13,7 @@ from radarize.errors import InputError
 from radarize.radar.presets import load_config
 from radarize.recording import Recording
 from radarsim.dataset.variant import Attributes, Variant
-from radarsim.scene.description import split_level
+from radarsim.scene.description import meshes, split_level
 
 #: Attribute of a recording that holds its task's parameters.
 ATTRIBUTE = "task"
@@ -73,8 +73,10 @@ class Task:
         found["attributes"] = self.attributes or None  # older recordings know no such fields
         found["variant"] = self.variant.model_dump(mode="json", exclude_defaults=True) or None
         if isinstance(self.scene, str):
-            file, _ = split_level(self.scene)
-            found["scene"] = {"file": Path(self.scene).name, "sha256": _digest(Path(file))}
+            file = Path(split_level(self.scene)[0])
+            found["scene"] = {"file": Path(self.scene).name, "sha256": _digest(file)}
+            if parts := meshes(file):
+                found["scene"]["meshes"] = {part.name: _digest(part) for part in parts}
         return found
 
     @property

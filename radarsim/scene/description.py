@@ -207,6 +207,18 @@ def shipped() -> Path:
     return packaged if packaged.is_dir() else here.parents[2] / "scenes"
 
 
+def meshes(path: Path) -> list[Path]:
+    """The mesh files that a scene file names, at any of its levels.
+
+    Raises:
+        InputError: unreadable, malformed YAML, unknown key or value.
+    """
+    data, found = read_yaml(path), set()
+    for level in range(len(described(data, str(path)).levels) + 1):
+        found |= {item.file for item in described(data, str(path), level).objects if isinstance(item, Mesh)}
+    return [path.parent / name for name in sorted(found)]
+
+
 def read(path: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover]]:
     """Name, objects and movers of a scene file at one of its levels.
 

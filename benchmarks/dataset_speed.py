@@ -18,41 +18,39 @@ from radarize.recording import RecordingWriter
 from radarsim.dataset.run import making
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task
-from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.sensors.sensor import Rig
-from radarsim.sensors.sight import Sight
-from radarsim.sensors.suite import Suite
-from radarsim.simulate import Simulator
+from radarsim.sensors.suite import Suite, chosen
+from radarsim.simulate import TOGETHER
+from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"]
-BATCH = 8
 BIG = "radarize146"
 
 
 def steps(frames: int, seed: int, folder: Path) -> dict[str, float]:
     """Seconds per frame of simulation, truth and writing, in one loop; medians over batches."""
     scene = Scene.of({"building": {"kind": "A", "seed": 1}}, "A")
-    route, physics = np.random.default_rng(seed).spawn(2)
-    motion = plan_motion(scene, "handheld", frames * CONFIG.frame_period + 1, route)
-    simulator = Simulator(scene, motion, CONFIG, physics)
-    rig = Rig(scene, motion, CONFIG, simulator.front_end, Sight(scene))
-    suites = {"truth always there": Suite(rig, (), seed), "all truth sensors": Suite(rig, ("all",), seed)}
+    motion = Walk("handheld", frames * CONFIG.frame_period + 1).through(scene, seed)
+    scenario = Scenario(scene, motion, CONFIG, seed=seed)
+    suites = {"truth always there": Suite(scenario)}
+    suites["all truth sensors"] = Suite(scenario, (*suites["truth always there"].sensors, *chosen(["all"])))
     spent: dict[str, list[float]] = {"simulation": [], **{name: [] for name in suites}, "writing all": []}
     full = suites["all truth sensors"]
     with RecordingWriter(folder / "steps.h5", CONFIG, streams=full.streams, products=full.products) as writer:
-        for first in range(0, frames, BATCH):
+        for first in range(0, frames, TOGETHER):
             start = time.perf_counter()
-            batch = simulator.observe(np.arange(first, first + BATCH) * CONFIG.frame_period)
+            batch = scenario.frames(np.arange(first, first + TOGETHER) * CONFIG.frame_period)
+            assert batch.samples.any()
             spent["simulation"].append(time.perf_counter() - start)
             for name, suite in suites.items():
                 start = time.perf_counter()
-                rows = suite.observe(batch)
+                rows = suite.observe(batch, first)
                 spent[name].append(time.perf_counter() - start)
             start = time.perf_counter()
             writer.append(batch.samples, batch.times, rows=rows)
             spent["writing all"].append(time.perf_counter() - start)
-    return {name: float(np.median(seconds[1:])) / BATCH for name, seconds in spent.items()}
+    return {name: float(np.median(seconds[1:])) / TOGETHER for name, seconds in spent.items()}
 
 
 @dataclass

@@ -34,7 +34,7 @@ def walks(count: int, seed: int) -> tuple[dict[str, list[Statistics]], list[Walk
             start = time.process_time()
             motion = plan_motion(scene, platform, DURATION, np.random.default_rng(building["seed"]))
             times.append(time.process_time() - start)
-            statistics.append(motion.statistics(scene))
+            statistics.append(Statistics.of(motion, scene))
             made.append(Walk(scene.name, building["seed"], statistics[-1].distance, simulated=True))
     return found, made, times
 

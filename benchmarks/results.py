@@ -10,6 +10,7 @@ from pathlib import Path
 from radarize.benchmark.results import Data, Network, Results, Walk, command, machine
 from radarize.benchmark.table import Beside, Table
 from radarsim.motion import Motion
+from radarsim.statistics import Statistics
 
 FOLDER = Path(__file__).parent / "results"
 #: Captures and logs that others made, beside the checkout.
@@ -59,7 +60,7 @@ def publish(
 
 def walked(scene: str, seed: int, motion: Motion) -> Walk:
     """A simulated walk of which no recording was made."""
-    return Walk(scene, seed, motion.statistics().distance, simulated=True)
+    return Walk(scene, seed, Statistics.of(motion).distance, simulated=True)
 
 
 def peak_memory_mb() -> float:

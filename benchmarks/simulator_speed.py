@@ -15,12 +15,12 @@ from radarize.radar.presets import PRESETS
 from radarsim.physics.pathsolver import DEPTH, RAYS
 from radarsim.physics.surface import DENSITY, Surface
 from radarsim.physics.synthesis import BurstClock
-from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.simulate import Simulator
+from radarsim.simulate import TOGETHER
+from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"]
-BATCH = 8
 
 
 def naive(lengths: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
@@ -41,11 +41,10 @@ def naive(lengths: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
     return out
 
 
-def walk(scene: Scene, frames: int, seed: int) -> tuple[Simulator, np.ndarray]:
-    """A simulator on a handheld walk, and the frames' stamps."""
-    route, physics = np.random.default_rng(seed).spawn(2)
-    motion = plan_motion(scene, "handheld", frames * CONFIG.frame_period + 1, route)
-    return Simulator(scene, motion, CONFIG, physics), np.arange(frames) * CONFIG.frame_period
+def walk(scene: Scene, frames: int, seed: int) -> tuple[Scenario, np.ndarray]:
+    """A handheld walk, and the frames' stamps."""
+    motion = Walk("handheld", frames * CONFIG.frame_period + 1).through(scene, seed)
+    return Scenario(scene, motion, CONFIG, seed=seed), np.arange(frames) * CONFIG.frame_period
 
 
 @dataclass
@@ -66,37 +65,35 @@ class Pace:
     memory: float
 
 
-def pace(name: str, frames: int, seed: int) -> tuple[Pace, Simulator, np.ndarray]:
+def pace(name: str, frames: int, seed: int) -> tuple[Pace, Scenario, np.ndarray]:
     """Speed on one scene."""
     start = time.perf_counter()
-    simulator, times = walk(Scene.load(name), frames, seed)
-    simulator.frames(times[:BATCH])
+    scenario, times = walk(Scene.load(name), frames, seed)
+    assert scenario.frames(times[:TOGETHER]).samples.any()
     first = time.perf_counter() - start
     spent, finding, counts = [], [], []
-    for k in range(0, frames, BATCH):
-        start = time.perf_counter()
-        _, echoes = simulator.frames(times[k : k + BATCH])
-        spent.append((time.perf_counter() - start) / len(echoes))
-        counts += [len(e) for e in echoes]
-        start = time.perf_counter()
-        simulator.echoes(times[k : k + BATCH])
-        finding.append((time.perf_counter() - start) / len(echoes))
+    for k in range(0, frames, TOGETHER):
+        some, start = scenario.frames(times[k : k + TOGETHER]), time.perf_counter()
+        counts += [len(e) for e in some.echoes]
+        finding.append((time.perf_counter() - start) / len(some))
+        spent.append((time.perf_counter() - start) / len(some.samples))
     found = Pace(float(np.median(spent)), float(np.median(finding)), np.mean(counts), first, peak_memory_mb())
-    return found, simulator, times
+    return found, scenario, times
 
 
-def memory_growth(simulator: Simulator, frames: int) -> str:
+def memory_growth(scenario: Scenario, frames: int) -> str:
     """Resident memory early and late in a long run, MB."""
     levels = []
-    for k in range(0, frames, BATCH):
-        simulator.frames((np.arange(k, k + BATCH) * CONFIG.frame_period) % (simulator.motion.duration - 1))
+    for k in range(0, frames, TOGETHER):
+        times = np.arange(k, k + TOGETHER) * CONFIG.frame_period % (scenario.motion.duration - 1)
+        assert scenario.frames(times).samples.any()
         levels.append(memory_mb())
     tenth = max(len(levels) // 10, 1)
     early, late = np.mean(levels[tenth : 2 * tenth]), np.mean(levels[-tenth:])
     return f"{early:.0f} MB early, {late:.0f} MB late, over {frames} frames"
 
 
-def cell_powers(simulator: Simulator, times: np.ndarray) -> np.ndarray:
+def cell_powers(scenario: Scenario, times: np.ndarray) -> np.ndarray:
     """Diffuse power by cell, a range bin by a sixth of sin(azimuth) = -0.9...0.9, mean over frames.
 
     The sum of the echoes' powers: that of their field, but for what the scatterers' random phases add or take away. So
@@ -104,9 +101,9 @@ def cell_powers(simulator: Simulator, times: np.ndarray) -> np.ndarray:
     """
     edges = np.arange(0.5, CONFIG.max_range, CONFIG.range_resolution), np.linspace(-0.9, 0.9, 7)
     power = 0.0
-    middle = times + CONFIG.burst_center
-    poses = simulator.motion.position(middle), simulator.motion.rotation(middle).as_matrix()
-    for present, position, rotation in zip(simulator.echoes(times), *poses, strict=True):
+    frames = scenario.frames(times)
+    poses = scenario.motion.position(frames.middles), scenario.motion.rotation(frames.middles).as_matrix()
+    for present, position, rotation in zip(frames.echoes, *poses, strict=True):
         way = present.points - position
         distance = np.linalg.norm(way, axis=2)
         side = (way[:, 1] @ rotation[:, 1]) / distance[:, 1]
@@ -118,16 +115,16 @@ def cell_powers(simulator: Simulator, times: np.ndarray) -> np.ndarray:
 def density_error(name: str, draws: int, seed: int, frames: int = 8, factor: int = 10) -> str:
     """Mean power per cell against that of ten times the scatterers, over independent draws of both worlds."""
     scene = Scene.load(name)
-    simulator, times = walk(scene, 60 * frames, seed)
+    scenario, times = walk(scene, 60 * frames, seed)
     powers = []
     for density in (DENSITY, factor * DENSITY):
         worlds = np.random.default_rng([seed, int(density)]).spawn(draws)
         found = []
         for world in worlds:
-            simulator.finder.surface = Surface(scene, world, density)
-            found.append(np.concatenate([cell_powers(simulator, times[k : k + 1]) for k in range(0, len(times), 60)]))
+            scenario.finder.surface = Surface(scene, world, density)
+            found.append(np.concatenate([cell_powers(scenario, times[k : k + 1]) for k in range(0, len(times), 60)]))
         powers.append(np.array(found).reshape(draws, frames, -1).mean(axis=1))
-        simulator.finder.weakest /= np.sqrt(factor)  # each of the more scatterers is weaker
+        scenario.finder.weakest /= np.sqrt(factor)  # each of the more scatterers is weaker
     # cells that hold a hundredth of the mean or more
     powers = np.array(powers)[:, :, (np.mean(powers, axis=(0, 1)) > 0.01 * np.mean(powers))]
     decibel = 10 / np.log(10)
@@ -174,18 +171,18 @@ def main() -> None:
         found, *rest = pace(name, options.frames, options.seed)
         walks.append(walked(name, options.seed, rest[0].motion))
         if not rows:
-            main_pace, simulator, times = found, *rest
+            main_pace, scenario, times = found, *rest
         rows.append(row(f"{name}: radarsim", found.frame, found.echoes, "int16 I/Q with noise"))
         rows.append(row(f"{name}: of it, finding echoes", found.finding, found.echoes, "echoes"))
         notes.append(
-            f"{name}: first {BATCH} frames after {found.first:.1f} s; peak memory {found.memory:.0f} MB so far."
+            f"{name}: first {TOGETHER} frames after {found.first:.1f} s; peak memory {found.memory:.0f} MB so far."
         )
 
     naive_seconds, error = [], []
     for t in times[:: max(options.frames // options.naive_frames, 1)][: options.naive_frames]:
-        present = simulator.echoes([t])[0]
-        lengths = present.lengths(CONFIG, simulator.motion, t)
-        fast = simulator.synthesize(lengths, present.amplitude)
+        present = scenario.frames([t]).echoes[0]
+        lengths = present.lengths(CONFIG, scenario.motion, t)
+        fast = scenario.synthesize(lengths, present.amplitude)
         start = time.perf_counter()
         truth = naive(lengths, present.amplitude)
         naive_seconds.append(time.perf_counter() - start)
@@ -194,15 +191,15 @@ def main() -> None:
     seconds = np.median(naive_seconds)
     rows.append(row(f"{first}: naive float64 numpy", seconds, main_pace.echoes, "the same echoes, samples"))
 
-    _, physics = np.random.default_rng(options.seed).spawn(2)
-    other = Simulator(Scene.load(first), simulator.motion, CONFIG, physics, engine="sionna")
+    other = Scenario(Scene.load(first), scenario.motion, CONFIG, seed=options.seed, engine="sionna")
     seconds, counts = [], []
     for k, t in enumerate(np.linspace(0, times[-1], options.sionna_frames + 2)):
         start = time.perf_counter()
-        _, paths = other.frames(np.array([t]))
+        frames = other.frames([t])
+        assert frames.samples.any()
         if k >= 2:  # the first calls compile kernels
             seconds.append(time.perf_counter() - start)
-            counts.append(len(paths[0]))
+            counts.append(len(frames.echoes[0]))
     rows.append(row(f"{first}: --engine sionna", np.median(seconds), np.mean(counts), "int16 I/Q with noise"))
     for each in rows:
         each["times slower"] = each["ms per frame"] / rows[0]["ms per frame"]
@@ -216,7 +213,7 @@ def main() -> None:
         "turned into samples by the same synthesis.",
     ]
     if options.memory_frames:
-        notes.append(f"{first}: memory {memory_growth(simulator, options.memory_frames)}.")
+        notes.append(f"{first}: memory {memory_growth(scenario, options.memory_frames)}.")
     if options.draws:
         off = density_error(first, options.draws, options.seed)
         notes.append(f"{first}: diffuse power per cell against ten times the scatterers {off}.")

@@ -25,8 +25,8 @@ from radarize.training.dataset import recordings
 from radarsim.calibrate import calibrate
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.simulate import Simulator
 from radarsim.twin.likeness import frechet_distance, patch_statistics
 
 SCENES = ("office", "visitors", "buildings/b")
@@ -92,9 +92,9 @@ def simulated(
     """Maps of a frame at every place, (frame, row, azimuth), by name; the same worlds whatever the board."""
     maker, parts = MapMaker(config), []
     for number, (scene, standing) in enumerate(scenes.values()):
-        simulator = Simulator(scene, standing, config, np.random.default_rng([seed, number]), front_end=board)
+        scenario = Scenario(scene, standing, config, board or FrontEndConfig(), seed=seed + number)
         for k in range(len(standing.places)):
-            parts.append(maker(simulator.frames(np.array([(k + 0.25) * STAY]))[0]))
+            parts.append(maker(scenario.frames([(k + 0.25) * STAY]).samples))
     return {name: np.concatenate([part[name] for part in parts]) for name in maker.names}
 
 

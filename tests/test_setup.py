@@ -37,7 +37,10 @@ def python(code: str, **environment: str) -> subprocess.CompletedProcess:
 def test_what_is_imported_is_declared():
     """Every package that a file imports, wherever in it, is a requirement or an extra's."""
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = [*declared["dependencies"], *(line for extra in declared["optional-dependencies"].values() for line in extra)]
+    wanted = [
+        *declared["dependencies"],
+        *(line for extra in declared["optional-dependencies"].values() for line in extra),
+    ]
     names = {canonicalize_name(Requirement(line).name) for line in wanted}
     found = {
         name.split(".")[0]

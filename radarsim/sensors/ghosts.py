@@ -18,9 +18,9 @@ from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.recording import Product, Stream
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.synthesis import BurstClock, _sincos_cycles
+from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import CAUSES
 from radarsim.sensors.scan import AZIMUTHS
-from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 
 _INSTANTS = 3

@@ -10,35 +10,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, walked
-from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.physics.pathsolver import DEPTH, RAYS
 from radarsim.physics.surface import DENSITY, Surface
-from radarsim.physics.synthesis import BurstClock
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
 from radarsim.simulate import TOGETHER
 from radarsim.walk import Walk
+from tests.physics.brute_force import direct_sum
 
 CONFIG = PRESETS["radarize"]
-
-
-def naive(lengths: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
-    """The beat signal as everybody writes it first: float64, one matrix of phases per trace."""
-    loops, tx, rx, samples, _ = CONFIG.frame_shape
-    clock = BurstClock.of(CONFIG)
-    n = (np.arange(samples) - (samples - 1) / 2) / CONFIG.sample_rate
-    out = np.empty((loops, tx, rx, samples), complex)
-    for loop in range(loops):
-        for k in range(tx):
-            s = (CONFIG.chirp_times[loop, k] - clock.middle) / clock.half
-            for r in range(rx):
-                c0, c1, c2 = lengths[:, k * rx + r].T
-                length, rate = c0 + s * (c1 + s * c2), (c1 + 2 * s * c2) / clock.half
-                beat = (CONFIG.slope * length + CONFIG.center_frequency * rate) / SPEED_OF_LIGHT
-                cycles = CONFIG.center_frequency / SPEED_OF_LIGHT * length[:, None] + beat[:, None] * n
-                out[loop, k, r] = amplitudes @ np.exp(2j * np.pi * cycles)
-    return out
 
 
 def walk(scene: Scene, frames: int, seed: int) -> tuple[Scenario, np.ndarray]:
@@ -184,7 +165,7 @@ def main() -> None:
         lengths = present.lengths(CONFIG, scenario.motion, t)
         fast = scenario.synthesize(lengths, present.amplitude)
         start = time.perf_counter()
-        truth = naive(lengths, present.amplitude)
+        truth = direct_sum(CONFIG, lengths, present.amplitude)
         naive_seconds.append(time.perf_counter() - start)
         error.append(10 * np.log10(np.sum(np.abs(fast - truth) ** 2) / np.sum(np.abs(truth) ** 2)))
     first = options.scenes[0]

@@ -1,6 +1,6 @@
 """Recordings of scenarios: frame after frame to a file, and on from where a killed run stopped."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -112,7 +112,8 @@ def record(
             output, scenario.config, cfg_text=cfg_text, attributes=about, products=suite.products, streams=suite.streams
         ) as writer,
     ):
-        begun = found if found is not None and _fits(found, scenario, about, times + start, made) else None
+        alike = found is not None and found.config == scenario.config
+        begun = found if alike and _fits(found, suite.streams, about, times + start, made) else None
         for first in range(0, len(times), TOGETHER):
             last = min(first + TOGETHER, len(times))
             if begun is not None and last <= len(begun):
@@ -165,13 +166,12 @@ def _length(path: Path) -> int:
         return 0
 
 
-def _fits(begun: Recording, scenario: Scenario, about: Mapping, stamps: np.ndarray, made: Callable) -> bool:
+def _fits(begun: Recording, streams: Iterable[str], about: Mapping, stamps: np.ndarray, made: Callable) -> bool:
     """Whether the frames of a recording are the first of one that is to be made; two of them are made to see."""
     count = len(begun)
-    alike = (
-        begun.config == scenario.config
-        and about.items() <= begun.attributes.items()
+    return (
+        about.items() <= begun.attributes.items()
         and np.array_equal(begun.times, stamps[:count])
-        and all(map(begun.has, Suite(scenario).streams))
+        and all(map(begun.has, streams))
+        and all(np.array_equal(begun.adc(k, k + 1), made(k, k + 1)[0]) for k in (0, count - 1))
     )
-    return alike and all(np.array_equal(begun.adc(k, k + 1), made(k, k + 1)[0]) for k in (0, count - 1))

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import psutil
 
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import Data, command_line, publish, timed
 from radarize.jobs import perform
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
@@ -20,7 +21,7 @@ from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.sensors.suite import Suite, chosen
+from radarsim.sensors.suite import ALWAYS, Suite, chosen
 from radarsim.simulate import TOGETHER
 from radarsim.walk import Walk
 
@@ -33,24 +34,20 @@ def steps(frames: int, seed: int, folder: Path) -> dict[str, float]:
     scene = Scene.of({"building": {"kind": "A", "seed": 1}}, "A")
     motion = Walk("handheld", frames * CONFIG.frame_period + 1).through(scene, seed)
     scenario = Scenario(scene, motion, CONFIG, seed=seed)
-    suites = {"truth always there": Suite(scenario)}
-    suites["all truth sensors"] = Suite(scenario, (*suites["truth always there"].sensors, *chosen(["all"])))
-    spent: dict[str, list[float]] = {"simulation": [], **{name: [] for name in suites}, "writing all": []}
-    full = suites["all truth sensors"]
+    suites = {"truth always there": Suite(scenario, ALWAYS)}
+    suites["all truth sensors"] = Suite(scenario, (*ALWAYS, *chosen(["all"])))
+    full, spent = suites["all truth sensors"], []
     with RecordingWriter(folder / "steps.h5", CONFIG, streams=full.streams, products=full.products) as writer:
         for first in range(0, frames, TOGETHER):
-            start = time.perf_counter()
             batch = scenario.frames(np.arange(first, first + TOGETHER) * CONFIG.frame_period)
-            assert batch.samples.any()
-            spent["simulation"].append(time.perf_counter() - start)
+            _, simulation = timed(getattr, batch, "samples")
+            took = {"simulation": simulation}
             for name, suite in suites.items():
-                start = time.perf_counter()
-                rows = suite.observe(batch, first)
-                spent[name].append(time.perf_counter() - start)
+                rows, took[name] = timed(suite.observe, batch, first)
             start = time.perf_counter()
             writer.append(batch.samples, batch.times, rows=rows)
-            spent["writing all"].append(time.perf_counter() - start)
-    return {name: float(np.median(seconds[1:])) / TOGETHER for name, seconds in spent.items()}
+            spent.append(took | {"writing all": time.perf_counter() - start})
+    return dict(pd.DataFrame(spent[1:]).median() / TOGETHER)
 
 
 @dataclass

@@ -19,11 +19,11 @@ from radarize.nets.losses import SURFACE, surfaces
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
-from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.sensors.scan import AZIMUTHS, level_rays
 from radarsim.sensors.sight import Sight
 from radarsim.simulate import simulate
+from radarsim.walk import Walk
 from tests.echoes import record
 
 CONFIG = PRESETS["radarize"]
@@ -235,7 +235,7 @@ def grids(source: Recording) -> list[dict]:
 
 def levelled(scene: Scene, duration: float, seed: int) -> dict:
     """First surfaces in the sensor's own plane against those in the horizontal one."""
-    motion = plan_motion(scene, PLATFORM, duration, np.random.default_rng(seed).spawn(2)[0])
+    motion = Walk(PLATFORM, duration).through(scene, seed)
     times = np.arange(0, min(duration, motion.duration) - 0.1, 0.1)
     sight, own = Sight(scene), np.stack([np.cos(AZIMUTHS), np.sin(AZIMUTHS), 0 * AZIMUTHS], axis=1)
     level = sight.distance(*level_rays(motion, times, AZIMUTHS), times)

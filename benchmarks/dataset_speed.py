@@ -19,37 +19,35 @@ from radarize.recording import RecordingWriter
 from radarsim.dataset.run import making
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task
-from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.sensors.sensor import Rig
-from radarsim.sensors.sight import Sight
-from radarsim.sensors.suite import Suite
-from radarsim.simulate import Simulator
+from radarsim.sensors.suite import ALWAYS, Suite, chosen
+from radarsim.simulate import TOGETHER
+from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"]
-BATCH = 8
 BIG = "radarize146"
 
 
 def steps(frames: int, seed: int, folder: Path) -> dict[str, float]:
     """Seconds per frame of simulation, truth and writing, in one loop; medians over batches."""
     scene = Scene.of({"building": {"kind": "A", "seed": 1}}, "A")
-    route, physics = np.random.default_rng(seed).spawn(2)
-    motion = plan_motion(scene, "handheld", frames * CONFIG.frame_period + 1, route)
-    simulator = Simulator(scene, motion, CONFIG, physics)
-    rig = Rig(scene, motion, CONFIG, simulator.front_end, Sight(scene))
-    suites = {"truth always there": Suite(rig, (), seed), "all truth sensors": Suite(rig, ("all",), seed)}
+    motion = Walk("handheld", frames * CONFIG.frame_period + 1).through(scene, seed)
+    scenario = Scenario(scene, motion, CONFIG, seed=seed)
+    suites = {"truth always there": Suite(scenario, ALWAYS)}
+    suites["all truth sensors"] = Suite(scenario, (*ALWAYS, *chosen(["all"])))
     full, spent = suites["all truth sensors"], []
     with RecordingWriter(folder / "steps.h5", CONFIG, streams=full.streams, products=full.products) as writer:
-        for first in range(0, frames, BATCH):
-            batch, simulation = timed(simulator.observe, np.arange(first, first + BATCH) * CONFIG.frame_period)
+        for first in range(0, frames, TOGETHER):
+            batch = scenario.frames(np.arange(first, first + TOGETHER) * CONFIG.frame_period)
+            _, simulation = timed(getattr, batch, "samples")
             took = {"simulation": simulation}
             for name, suite in suites.items():
-                rows, took[name] = timed(suite.observe, batch)
+                rows, took[name] = timed(suite.observe, batch, first)
             start = time.perf_counter()
             writer.append(batch.samples, batch.times, rows=rows)
             spent.append(took | {"writing all": time.perf_counter() - start})
-    return dict(pd.DataFrame(spent[1:]).median() / BATCH)
+    return dict(pd.DataFrame(spent[1:]).median() / TOGETHER)
 
 
 @dataclass

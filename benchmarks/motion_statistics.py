@@ -11,6 +11,7 @@ from radarize.benchmark.table import PAPER
 from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
 from radarsim.scene.scene import Scene
+from radarsim.statistics import Statistics
 
 DURATION = 60.0
 #: What the paper says of its platforms and data set; the gaps it leaves are "-".
@@ -32,7 +33,7 @@ def walks(count: int, seed: int) -> pd.DataFrame:
             motion = plan_motion(scene, platform, DURATION, np.random.default_rng(building["seed"]))
             took = time.process_time() - start
             about = {"platform": platform, "took": took, "walk": walked(scene.name, building["seed"], motion)}
-            found.append(about | vars(motion.statistics(scene)))
+            found.append(about | vars(Statistics.of(motion, scene)))
     return pd.DataFrame(found)
 
 

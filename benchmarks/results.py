@@ -12,6 +12,7 @@ from typing import TypeVar
 from radarize.benchmark.results import Data, Network, Results, Walk, command, machine
 from radarize.benchmark.table import Beside, Table
 from radarsim.motion import Motion
+from radarsim.statistics import Statistics
 
 FOLDER = Path(__file__).parent / "results"
 #: Captures and logs that others made, beside the checkout.
@@ -62,7 +63,7 @@ def publish(
 
 def walked(scene: str, seed: int, motion: Motion) -> Walk:
     """A simulated walk of which no recording was made."""
-    return Walk(scene, seed, motion.statistics().distance, simulated=True)
+    return Walk(scene, seed, Statistics.of(motion).distance, simulated=True)
 
 
 def timed(work: Callable[..., T], *arguments: object) -> tuple[T, float]:

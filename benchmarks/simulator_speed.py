@@ -8,54 +8,56 @@ import numpy as np
 
 from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, timed, walked
 from radarize.radar.presets import PRESETS
-from radarsim.physics.direct import DirectSum
 from radarsim.physics.pathsolver import DEPTH, RAYS
-from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.simulate import BATCH, Simulator
+from radarsim.simulate import TOGETHER
+from radarsim.walk import Walk
+from tests.physics.brute_force import direct_sum
 
 CONFIG = PRESETS["radarize"]
 
 
-def walk(name: str, times: np.ndarray, seed: int, **options: object) -> Simulator:
-    """A simulator on a handheld walk, its first batch of frames made."""
-    route, physics = np.random.default_rng(seed).spawn(2)
+def walk(name: str, times: np.ndarray, seed: int, **options: object) -> Scenario:
+    """A handheld walk, its first frames made."""
     scene = Scene.load(name)
-    motion = plan_motion(scene, "handheld", len(times) * CONFIG.frame_period + 1, route)
-    simulator = Simulator(scene, motion, CONFIG, physics, **options)
-    simulator.frames(times[:BATCH])
-    return simulator
+    motion = Walk("handheld", len(times) * CONFIG.frame_period + 1).through(scene, seed)
+    scenario = Scenario(scene, motion, CONFIG, seed=seed, **options)
+    assert scenario.frames(times[:TOGETHER]).samples.any()
+    return scenario
 
 
-def pace(simulator: Simulator, times: np.ndarray) -> tuple[float, float, float]:
+def pace(scenario: Scenario, times: np.ndarray) -> tuple[float, float, float]:
     """Medians over a walk: s per frame, s per frame for its echoes; and the mean number of echoes."""
     spent, counts = [], []
-    for batch in np.split(times, range(BATCH, len(times), BATCH)):
-        (_, echoes), whole = timed(simulator.frames, batch)
-        _, finding = timed(simulator.echoes, batch)
-        spent.append((whole / len(batch), finding / len(batch)))
+    for batch in np.split(times, range(TOGETHER, len(times), TOGETHER)):
+        frames = scenario.frames(batch)
+        echoes, finding = timed(getattr, frames, "echoes")
+        _, rest = timed(getattr, frames, "samples")
+        spent.append(((finding + rest) / len(batch), finding / len(batch)))
         counts += map(len, echoes)
     return *np.median(spent, axis=0), np.mean(counts)
 
 
-def summed(simulator: Simulator, times: np.ndarray) -> tuple[float, float]:
+def summed(scenario: Scenario, times: np.ndarray) -> tuple[float, float]:
     """The direct sum of the same echoes: median s per frame, and the fast synthesis' worst error power, dB."""
-    direct, seconds, errors = DirectSum(CONFIG), [], []
+    seconds, errors = [], []
     for t in times:
-        (present,) = simulator.echoes([t])
-        beat = present.lengths(CONFIG, simulator.motion, t), present.amplitude
-        truth, spent = timed(direct, *beat)
+        (present,) = scenario.frames([t]).echoes
+        beat = present.lengths(CONFIG, scenario.motion, t), present.amplitude
+        truth, spent = timed(direct_sum, CONFIG, *beat)
         seconds.append(spent)
-        off = simulator.synthesize(*beat) - truth
+        off = scenario.synthesize(*beat) - truth
         errors.append(10 * np.log10(np.sum(np.abs(off) ** 2) / np.sum(np.abs(truth) ** 2)))
     return float(np.median(seconds)), max(errors)
 
 
-def memory_growth(simulator: Simulator, frames: int) -> str:
+def memory_growth(scenario: Scenario, frames: int) -> str:
     """Resident memory early and late in a long run, MB."""
     levels = []
-    for k in range(0, frames, BATCH):
-        simulator.frames((np.arange(k, k + BATCH) * CONFIG.frame_period) % (simulator.motion.duration - 1))
+    for k in range(0, frames, TOGETHER):
+        times = np.arange(k, k + TOGETHER) * CONFIG.frame_period % (scenario.motion.duration - 1)
+        assert scenario.frames(times).samples.any()
         levels.append(memory_mb())
     tenth = max(len(levels) // 10, 1)
     early, late = np.mean(levels[tenth : 2 * tenth]), np.mean(levels[-tenth:])
@@ -76,24 +78,26 @@ PARSER.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor
 def main() -> None:
     options = PARSER.parse_args()
     times, first = np.arange(options.frames) * CONFIG.frame_period, options.scenes[0]
-    ways, notes, simulators = [], [], {}  # ways: words, s per frame, echoes or paths, and what they give
+    ways, notes, scenarios = [], [], {}  # ways: words, s per frame, echoes or paths, and what they give
     for name in options.scenes:
-        simulators[name], begun = timed(walk, name, times, options.seed)
-        frame, finding, echoes = pace(simulators[name], times)
+        scenarios[name], begun = timed(walk, name, times, options.seed)
+        frame, finding, echoes = pace(scenarios[name], times)
         ways.append((f"{name}: radarsim", frame, echoes, "int16 I/Q with noise"))
         ways.append((f"{name}: of it, finding echoes", finding, echoes, "echoes"))
-        notes.append(f"{name}: first {BATCH} frames after {begun:.1f} s; peak memory {peak_memory_mb():.0f} MB so far.")
+        memory = f"{peak_memory_mb():.0f} MB"
+        notes.append(f"{name}: first {TOGETHER} frames after {begun:.1f} s; peak memory {memory} so far.")
     _, fastest, echoes, _ = ways[0]
 
     few = np.linspace(0, len(times) - 1, options.direct_frames).astype(int)
-    seconds, error = summed(simulators[first], times[few])
+    seconds, error = summed(scenarios[first], times[few])
     ways.append((f"{first}: direct sum, float64", seconds, echoes, "the same echoes, samples"))
 
     other, counts, spent = walk(first, times, options.seed, engine="sionna"), [], []  # its kernels are compiled now
     for t in np.linspace(0, times[-1], options.sionna_frames):
-        (_, (paths,)), took = timed(other.frames, np.array([t]))
+        frames = other.frames([t])
+        _, took = timed(getattr, frames, "samples")
         spent.append(took)
-        counts.append(len(paths))
+        counts.append(len(frames.echoes[0]))
     ways.append((f"{first}: --engine sionna", np.median(spent), np.mean(counts), "int16 I/Q with noise"))
 
     notes += [
@@ -105,7 +109,7 @@ def main() -> None:
         "turned into samples by the same synthesis.",
     ]
     if options.memory_frames:
-        notes.append(f"{first}: memory {memory_growth(simulators[first], options.memory_frames)}.")
+        notes.append(f"{first}: memory {memory_growth(scenarios[first], options.memory_frames)}.")
     publish(
         "simulator_speed",
         "Simulator speed, preset radarize",
@@ -116,7 +120,7 @@ def main() -> None:
         ],
         data=Data(
             "handheld walks",
-            tuple(walked(name, options.seed, simulator.motion) for name, simulator in simulators.items()),
+            tuple(walked(name, options.seed, scenario.motion) for name, scenario in scenarios.items()),
             options.seed,
         ),
         networks=(),

@@ -23,8 +23,8 @@ from radarsim.calibrate import calibrate
 from radarsim.motion import Motion
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.simulate import Simulator
 from radarsim.twin.likeness import frechet_distance, patch_statistics
 from tests.importers.public import captures
 
@@ -45,9 +45,9 @@ def simulated(
     """Maps of a frame at every place, (frame, row, azimuth), by name; the same worlds whatever the board."""
     maker, parts = MapMaker(config), []
     for number, (scene, stays) in enumerate(scenes.values()):
-        simulator = Simulator(scene, stays[0], config, np.random.default_rng([seed, number]), front_end=board)
-        for second, simulator.motion in enumerate(stays):  # people move on meanwhile
-            parts.append(maker(simulator.frames(np.array([second + 0.25]))[0]))
+        for second, motion in enumerate(stays):  # people move on meanwhile
+            scenario = Scenario(scene, motion, config, board or FrontEndConfig(), seed + number)
+            parts.append(maker(scenario.frames([second + 0.25]).samples))
     return {name: np.concatenate([part[name] for part in parts]) for name in maker.names}
 
 

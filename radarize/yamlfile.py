@@ -42,12 +42,16 @@ def read_settings(path: str | Path, defaults: Settings, expected: str) -> Settin
     if not isinstance(changes, dict):
         raise InputError(f"{path}: holds a {type(changes).__name__}, expected {expected}")
     try:
-        return type(defaults).model_validate(_merged(defaults.model_dump(), changes))
+        return type(defaults).model_validate(changed(defaults, changes))
     except ValidationError as error:
         raise InputError(f"{path}: {complaint(error)}") from error
 
 
-def _merged(settings: dict, changes: dict) -> dict:
-    """Settings with some of them changed, however deep."""
-    both = {name for name in changes if isinstance(changes[name], dict) and isinstance(settings.get(name), dict)}
-    return settings | changes | {name: _merged(settings[name], changes[name]) for name in both}
+def changed(settings: BaseModel, changes: dict[str, object]) -> dict[str, object]:
+    """The fields of settings, with some of them changed: those of settings within settings, too, however deep."""
+    within = {
+        name: changed(part, changes[name])
+        for name in changes
+        if isinstance(part := getattr(settings, name, None), BaseModel) and isinstance(changes[name], dict)
+    }
+    return settings.model_dump() | changes | within

@@ -34,13 +34,9 @@ def simulate(
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
-    device: Annotated[Literal["cpu", "cuda"], typer.Option(help="Where echoes are summed; cuda is untried.")] = "cpu",
     frontend: Annotated[
         Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else an IWR1843BOOST.")
     ] = None,
-    provenance: Annotated[
-        bool, typer.Option("--provenance", help="Also write I/Q split by cause, before noise (a much larger file).")
-    ] = False,
     engine: Annotated[
         Literal["radarsim", "sionna"],
         typer.Option(
@@ -49,10 +45,14 @@ def simulate(
         ),
     ] = "radarsim",
     sensors: Annotated[
-        str, typer.Option(help="Also record, comma-separated: depth, occupancy, tracking, imu, points, ghosts; or all.")
+        str,
+        typer.Option(
+            help="Also record, comma-separated: depth, occupancy, tracking, imu, points, ghosts, or all; and "
+            "adc-by-cause, I/Q split by cause, before noise (a much larger file)."
+        ),
     ] = "",
 ):
-    """Simulate a walk through SCENE and write it as a recording with its truth."""
+    """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
     from radarize.recording import Recording, keeping
     from radarsim.motion import Mounting
     from radarsim.simulate import simulate
@@ -60,22 +60,10 @@ def simulate(
 
     with keeping(output), progress(f"simulate {Path(scene).stem}") as report:
         written = simulate(
-            scene,
-            output,
-            platform=platform,
-            trajectory=trajectory,
-            waypoints=waypoints,
-            mounting=Mounting.parse(mounting) if mounting else None,
-            duration=duration,
-            seed=seed,
-            radar=radar,
-            device=device,
-            frontend=frontend,
-            provenance=provenance,
-            engine=engine,
-            sensors=[name.strip() for name in sensors.split(",") if name.strip()],
-            progress=report,
-        )
+            scene, output, platform=platform, trajectory=trajectory, waypoints=waypoints, duration=duration, seed=seed,
+            mounting=Mounting.parse(mounting) if mounting else None, radar=radar, frontend=frontend, engine=engine,
+            sensors=[name.strip() for name in sensors.split(",") if name.strip()], progress=report,
+        )  # fmt: skip
     with Recording(written) as recording:
         print(Statistics.from_json(recording.attributes["motion"]))
         if recording.attributes["warnings"]:
@@ -297,10 +285,16 @@ def emulate(
 
     from radarsim.emulator.disturbance import Disturbance
     from radarsim.emulator.emulator import Emulator
-    from radarsim.emulator.source import Playback, Walk
 
-    recorded = Path(source).suffix == ".h5"
-    given = Playback(Path(source), loop) if recorded else Walk(source, platform, duration, seed, radar, loop)
+    if Path(source).suffix == ".h5":
+        from radarsim.emulator.source import Playback
+
+        given = Playback(Path(source), loop)
+    else:
+        from radarsim.emulator.simulation import Simulation
+        from radarsim.walk import Walk
+
+        given = Simulation(source, Walk(platform, duration), seed, radar, loop)
     disturbance = Disturbance(loss, duplicate, reorder, delay, np.random.default_rng(seed))
     console = Console(stderr=True)
     with Emulator(

@@ -138,12 +138,12 @@ def first_frame() -> float:
     import numpy as np
 
     from radarize.radar.presets import PRESETS
-    from radarsim.planner import plan_motion
+    from radarsim.scenario import Scenario
     from radarsim.scene.scene import Scene
-    from radarsim.simulate import Simulator
+    from radarsim.walk import Walk
 
-    scene, rng = Scene.load("visitors"), np.random.default_rng(0)
-    Simulator(scene, plan_motion(scene, "handheld", 1.0, rng), PRESETS["radarize"], rng).frames(np.zeros(1))
+    scene = Scene.load("visitors")
+    assert len(Scenario(scene, Walk(duration=1.0).through(scene, 0), PRESETS["radarize"]).frames(np.zeros(1)).samples)
     return time.perf_counter() - start
 
 

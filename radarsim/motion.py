@@ -7,7 +7,6 @@ velocity holds the lever arm's share, and Doppler follows from the same function
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from jaxtyping import Float
@@ -16,10 +15,6 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from radarize.errors import InputError
 from radarize.tum import read_tum
-
-if TYPE_CHECKING:
-    from radarsim.scene.scene import Scene
-    from radarsim.statistics import Statistics
 
 _FASTEST = 20.0  # m/s between two poses of a file: beyond it, they are no positions in m or no times in s
 _SHARPEST = np.deg2rad(120)  # between two poses: beyond it, nobody knows which way round
@@ -82,7 +77,7 @@ class Motion:
     def position(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
         """Sensor in the world, m."""
         inside = self._inside(t)
-        return self.path(inside) + self.attitude(inside).apply(self.lever_arm)
+        return self.path(inside) + turned(self.attitude(inside), self.lever_arm)
 
     def rotation(self, t: Float[np.ndarray, "n"]) -> Rotation:
         """Sensor-to-world rotation."""
@@ -92,28 +87,22 @@ class Motion:
         """Velocity of the sensor in the world frame, m/s: v + R (omega x lever arm)."""
         inside = self._inside(t)
         swing = np.cross(self.attitude(inside, 1), self.lever_arm)
-        return (self.path(inside, 1) + self.attitude(inside).apply(swing)) * self._moving(t)
+        return (self.path(inside, 1) + turned(self.attitude(inside), swing)) * self._moving(t)
 
     def angular_velocity(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
         """Angular velocity in the sensor frame, rad/s."""
-        return self.mount.inv().apply(self.attitude(self._inside(t), 1)) * self._moving(t)
+        return turned(self.mount.inv(), self.attitude(self._inside(t), 1)) * self._moving(t)
 
     def until(self, duration: float) -> "Motion":
         """The same motion, ended after `duration` (s) at the latest."""
         return replace(self, duration=min(self.duration, duration))
-
-    def statistics(self, scene: "Scene | None" = None) -> "Statistics":
-        """Distance, speeds, turn rates and shares of directions; with a scene, the least clearance too."""
-        from radarsim.statistics import Statistics
-
-        return Statistics.of(self, scene)
 
     def acceleration(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:
         """Acceleration of the sensor in the world frame, m/s^2: a + R (alpha x l + omega x (omega x l))."""
         inside = self._inside(t)
         omega = self.attitude(inside, 1)
         swing = np.cross(self.attitude(inside, 2), self.lever_arm) + np.cross(omega, np.cross(omega, self.lever_arm))
-        return (self.path(inside, 2) + self.attitude(inside).apply(swing)) * self._moving(t)
+        return (self.path(inside, 2) + turned(self.attitude(inside), swing)) * self._moving(t)
 
     def mounted(self, offset: tuple[float, float, float]) -> "Motion":
         """Motion of something fixed beside the sensor, its axes parallel: `offset` in the sensor frame, m."""
@@ -160,6 +149,11 @@ class Motion:
         path = np.asarray(position, float) + times[:, None] * np.asarray(velocity, float)
         turn = Rotation.from_euler("z", (yaw + yaw_rate * times)[:, None])
         return cls(duration, CubicSpline(times, path), RotationSpline(times, turn), lever_arm)
+
+
+def turned(rotation: Rotation, vectors: Float[np.ndarray, "*n 3"] | tuple) -> Float[np.ndarray, "n 3"]:
+    """Vectors turned, each as it would be alone: `Rotation.apply` adds up in another order where there is only one."""
+    return (rotation.as_matrix() @ np.asarray(vectors, float)[..., None])[..., 0]
 
 
 def motion_from_tum(path: str | Path, mounting: Mounting | None = None) -> Motion:

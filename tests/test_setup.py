@@ -1,5 +1,6 @@
 """Set-up: the lock file, the script that applies it, LLVM, and the doctor."""
 
+import ast
 import importlib.metadata
 import os
 import re
@@ -31,6 +32,27 @@ def python(code: str, **environment: str) -> subprocess.CompletedProcess:
     return subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, env=inherited | environment, cwd=ROOT
     )
+
+
+def test_what_is_imported_is_declared():
+    """Every package that a file imports, wherever in it, is a requirement or an extra's."""
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    wanted = [
+        *declared["dependencies"],
+        *(line for extra in declared["optional-dependencies"].values() for line in extra),
+    ]
+    names = {canonicalize_name(Requirement(line).name) for line in wanted}
+    found = {
+        name.split(".")[0]
+        for package in ("radarize", "radarsim")
+        for path in (ROOT / package).rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text()))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for name in ([node.module] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names])
+    }
+    source = importlib.metadata.packages_distributions()
+    others = found - sys.stdlib_module_names - {"radarize", "radarsim"}
+    assert not {name for name in others if not names & set(map(canonicalize_name, source.get(name, [name])))}
 
 
 def test_the_lock_pins_everything_and_names_nothing_else():

@@ -141,4 +141,4 @@ def test_the_recording_tells_its_motion(tmp_path):
     (tmp_path / "wall.tum").write_text("".join(f"{t} 0 {1 + 15 * t} 1 0 0 0 1\n" for t in (0.0, 0.05, 0.1, 0.15)))
     path = simulate("physics/room", tmp_path / "b.h5", trajectory=tmp_path / "wall.tum", duration=0.1)
     with Recording(path) as recording:
-        assert "wall.tum: the sensor passes through 'north'" in recording.attributes["warnings"]
+        assert "the sensor passes through 'north'" in recording.attributes["warnings"]

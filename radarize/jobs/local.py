@@ -7,6 +7,7 @@ import sys
 import threading
 from collections import deque
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from multiprocessing.connection import Connection, wait
 
 from radarize.jobs.job import Job, News, attempt
@@ -28,7 +29,8 @@ class _Worker:
 
     def give(self, name: str, job: Job) -> None:
         self.busy = name
-        self.connection.send((name, job))
+        with suppress(OSError):  # it has died at rest, which is heard of as any death
+            self.connection.send((name, job))
 
     def hear(self) -> News | None:
         """News; None if it is dead."""

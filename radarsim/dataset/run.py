@@ -51,8 +51,9 @@ def make(
 ) -> Outcome:
     """Make every recording of a data set that is not there yet.
 
-    A recording that is there is opened and compared with its task: whole and of the same parameters, it is kept. So a
-    run that was stopped, or killed, goes on by being started again, and ends in the same bytes.
+    A recording that is there is opened and compared with its task: whole and of the same parameters, it is kept; one
+    that was begun goes on with its next frame. So a run that was stopped, or killed, goes on by being started again,
+    and ends in the same bytes.
 
     Args:
         specification: what to make.
@@ -73,32 +74,29 @@ def make(
         finished = _examine(tasks, folder, replace)
         _write_index(specification, folder)
         outcome = Outcome(kept=[task.name for task in finished])
-        todo = [task for task in tasks if task not in finished]
+        todo = {task.name: task for task in tasks if task not in finished}
         total = sum(task.frames for task in tasks)
         done = {task.name: task.frames for task in finished}
         progress(sum(done.values()), total)
-        frames = {task.name: task.frames for task in todo}
         try:
-            for news in perform(making(todo, folder), workers or default_workers(), ray):
+            for news in perform(making(todo.values(), folder), workers or default_workers(), ray):
                 name = news.name
                 if news.error is not None:
                     outcome.failed[name] = news.error
                     done.pop(name, None)
+                    todo[name].clear(folder)
                     if "no space left" in news.error:
                         raise InputError(f"no space left on the device; {_finished(outcome, tasks, folder)}")
                     say(f"failed: {news.error}")
                 elif news.ended:
                     outcome.made.append(name)
-                    done[name] = frames[name]
+                    done[name] = todo[name].frames
                     say(f"{name}: {news.result}")
                 else:
                     done[name] = int(news.done)
                 progress(sum(done.values()), total)
         except KeyboardInterrupt:
             raise InputError(f"stopped; {_finished(outcome, tasks, folder)}") from None
-        finally:
-            for task in todo:
-                task.clear(folder)
     return outcome
 
 
@@ -125,10 +123,11 @@ def _alone(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror})") from error
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise InputError(f"{folder}: another run is making a data set here, expected to be alone") from None
         yield
-    except BlockingIOError:
-        raise InputError(f"{folder}: another run is making a data set here, expected to be alone") from None
     finally:
         os.close(handle)
 

@@ -27,7 +27,6 @@ of the data set, of recordings or of a variant, become attributes of the files.
 """
 
 import hashlib
-import json
 from collections import Counter
 from collections.abc import Iterator
 from functools import cached_property
@@ -42,6 +41,7 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
 from radarize.yamlfile import read_yaml
+from radarsim.complaint import complaint
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task
 from radarsim.dataset.variant import Attributes, Strict, Variant
@@ -134,7 +134,7 @@ class Specification(Strict):
             for late in ("tasks", "members"):  # so that their errors come now, with the file's name
                 getattr(found, late)
         except ValidationError as error:
-            raise InputError(f"{path}: {_first(error)}") from error
+            raise InputError(f"{path}: {complaint(error, data)}") from error
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
         return found
@@ -228,8 +228,9 @@ class Specification(Strict):
         try:
             Description.model_validate(description)
         except ValidationError as error:
-            reason = _first(error).removeprefix(f"building.{given.get('kind')}.")
-            raise InputError(f"buildings.{building}: {reason}") from error
+            raise InputError(
+                f"buildings.{building}: {complaint(error, description).removeprefix('building.')}"
+            ) from error
         return description
 
     def _beside(self, name: str) -> str:
@@ -247,25 +248,3 @@ def _find(path: str | Path) -> Path:
         return named
     known = ", ".join(sorted(str(file.relative_to(folder).with_suffix("")) for file in folder.glob("**/*.yaml")))
     raise InputError(f"no specification {str(path)!r}, expected a .yaml file or one of: {known or 'none found'}")
-
-
-def _first(error: ValidationError) -> str:
-    """The first complaint as one sentence, with the field's place in the file."""
-    problem = error.errors()[0]
-    place = [part for part in problem["loc"] if not (isinstance(part, str) and ("[" in part or part in _TAGS))]
-    if place[:1] == ["splits"]:
-        del place[2:3]  # the kind, by which pydantic chose
-    field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).lstrip(".")
-    message = problem["msg"].removeprefix("Value error, ")
-    if problem["type"] == "extra_forbidden":
-        return f"{field}: unknown key"
-    if problem["type"] == "missing":
-        return f"has no {field}"
-    if not field:
-        return message
-    value = "" if isinstance(problem["input"], dict) else f" is {json.dumps(problem['input'], default=str)}"
-    return f"{field}{value}: {message[0].lower()}{message[1:]}"
-
-
-#: Names that pydantic puts into an error's path for the branches of a union.
-_TAGS = {"str", "dict", "dict[any,any]"}

@@ -10,14 +10,15 @@ import numpy as np
 
 from radarize import __version__
 from radarize.errors import InputError
+from radarize.radar.presets import load_config
 from radarize.recording import Recording
 from radarsim.dataset.variant import Attributes, Variant
-from radarsim.scene.description import split_level
+from radarsim.scene.description import meshes, split_level
 
 #: Attribute of a recording that holds its task's parameters.
 ATTRIBUTE = "task"
-#: What a killed run may leave beside a recording: samples of it, or those that its heat maps are made from.
-_LEFTOVERS = (".part", ".raw.part", ".raw.part.part")
+#: What lies beside a recording until it is whole: samples of it, or those that its heat maps are made from.
+_LEFTOVERS = (".part", ".begun", ".raw.part", ".raw.part.part", ".raw.part.begun")
 
 
 class Stale(InputError):
@@ -72,8 +73,10 @@ class Task:
         found["attributes"] = self.attributes or None  # older recordings know no such fields
         found["variant"] = self.variant.model_dump(mode="json", exclude_defaults=True) or None
         if isinstance(self.scene, str):
-            file, _ = split_level(self.scene)
-            found["scene"] = {"file": Path(self.scene).name, "sha256": _digest(Path(file))}
+            file = Path(split_level(self.scene)[0])
+            found["scene"] = {"file": Path(self.scene).name, "sha256": _digest(file)}
+            if parts := meshes(file):
+                found["scene"]["meshes"] = {part.name: _digest(part) for part in parts}
         return found
 
     @property
@@ -103,7 +106,7 @@ class Task:
             raise Stale(f"{self.name} does not come from a data set")
         made, complete = json.loads(str(made)), True
         for key, wanted in json.loads(self.identity).items():
-            if key == "sensors" and self._replanned and _can_follow(made.get(key), wanted):
+            if key == "sensors" and set(made.get(key)) < set(wanted):
                 complete = False
             elif made.get(key) != wanted:
                 raise Stale(f"{self.name} has {key} {_short(made.get(key))}, now {_short(wanted)}")
@@ -125,56 +128,48 @@ class Task:
         """
         from radarize.features.keeping import keep_maps
         from radarsim.accompany import accompany
-        from radarsim.scene.scene import Scene
-        from radarsim.simulate import simulate
+        from radarsim.simulate import record
         from radarsim.statistics import Statistics
         from radarsim.threads import share_with_drjit
 
         share_with_drjit()
-        final = self.path(folder)
-        late = self._late(folder)
-        path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
+        final, late = self.path(folder), self._late(folder)
+        about = {"platform": self.platform, **self.attributes, ATTRIBUTE: self.identity}
         try:
-            scene = Scene.load(self.scene) if isinstance(self.scene, str) else Scene.of(self.scene, self._place)
-            walk = {"platform": self.platform, "duration": self.duration, "seed": self.seed, "progress": progress}
-            walk["attributes"] = {**self.attributes, ATTRIBUTE: self.identity}
+            scenario, cfg_text = self._scenario()
             if late:
-                accompany(final, scene, sensors=late, **walk)
+                accompany(final, scenario, late, about, progress)
             else:
-                mild = Scene.load(split_level(self.scene)[0]) if self.variant.level else scene
-                simulate(
-                    scene,
-                    path,
-                    waypoints=None if self.waypoints is None else np.array(self.waypoints),
-                    planned_in=mild,
-                    mounting=self.variant.mounted,
-                    radar=self.variant.radar_of(self.radar),
-                    frontend=self.variant.frontend_of(self.frontend),
-                    sensors=self.sensors,
-                    **walk,
-                )
-                with Recording(path) as recording:
-                    frames = len(recording)
+                path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
+                frames = len(scenario.times)
                 if frames < self.frames:
-                    path.unlink()
                     raise InputError(
                         f"the way-points are passed after {frames} of {self.frames} frames, expected more way"
                     )
+                record(scenario, path, cfg_text=cfg_text, attributes=about, progress=progress)
                 if path != final:
                     keep_maps(path, final)
+            self.clear(folder)
             with Recording(final) as recording:
                 moved = Statistics.from_json(str(recording.attributes["motion"]))
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from error
-        finally:
-            if path != final:
-                path.unlink(missing_ok=True)
         return str(moved)
 
-    @property
-    def _replanned(self) -> bool:
-        """Whether its walk can be planned anew: a tour of the platform's own."""
-        return self.waypoints is None and self.variant == Variant()
+    def _scenario(self):
+        """The `Scenario` to record, and the radar's original configuration text."""
+        from radarsim.scenario import Scenario
+        from radarsim.scene.scene import Scene
+        from radarsim.walk import Walk
+
+        scene = Scene.load(self.scene) if isinstance(self.scene, str) else Scene.of(self.scene, self._place)
+        mild = Scene.load(split_level(self.scene)[0]) if self.variant.level else scene
+        places = None if self.waypoints is None else np.array(self.waypoints)
+        walk = Walk(self.platform, self.duration, waypoints=places, mounting=self.variant.mounted)
+        config, cfg_text = load_config(self.variant.radar_of(self.radar))
+        front_end = self.variant.frontend_of(self.frontend)
+        motion = walk.through(mild, self.seed)
+        return Scenario(scene, motion, config, front_end, self.seed, self.sensors), cfg_text
 
     def _late(self, folder: Path) -> list[str]:
         """Sensors that a recording of this task, otherwise finished, has yet to get."""
@@ -188,21 +183,14 @@ class Task:
             return []
 
     def clear(self, folder: Path) -> None:
-        """Remove what a killed run left half-written."""
+        """Remove what is left of making the recording, by this run or by one that was killed."""
+        path = self.path(folder)
         for suffix in _LEFTOVERS:
-            path = self.path(folder)
             path.with_name(path.name + suffix).unlink(missing_ok=True)
 
     @property
     def _place(self) -> str:
         return self.building if self.floor is None else f"{self.building}_{self.floor}"
-
-
-def _can_follow(made: list[str], wanted: list[str]) -> bool:
-    """Whether a recording with some sensors can be given the others without the radar."""
-    from radarsim.sensors.suite import SENSORS
-
-    return set(made) < set(wanted) and not any(SENSORS[name].of_radar for name in set(wanted) - set(made))
 
 
 def _digest(path: Path) -> str:

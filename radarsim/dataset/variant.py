@@ -6,6 +6,7 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config
+from radarize.yamlfile import changed
 from radarsim.motion import Mounting
 from radarsim.physics.frontend_config import FrontEndConfig
 
@@ -24,7 +25,7 @@ class Variant(Strict):
     Attributes:
         level: of a scene that has levels (`radarsim.scene.description`); the walk is planned in its level 0.
         radar: fields of `RadarConfig` to change.
-        frontend: fields of `FrontEndConfig` to change.
+        frontend: fields of `FrontEndConfig` to change; of its parts, those given.
         mounting: of the sensor on the platform: x y z in m, roll pitch yaw in degrees.
         attributes: of the recordings.
     """
@@ -50,7 +51,7 @@ class Variant(Strict):
         """
         if not self.radar:
             return name
-        return RadarConfig.build("radar", **load_config(name)[0].model_dump() | self.radar)
+        return RadarConfig.build("radar", **changed(load_config(name)[0], self.radar))
 
     def frontend_of(self, file: str | None) -> FrontEndConfig:
         """The front end of that file, by default an IWR1843BOOST's, with the changes.
@@ -59,7 +60,7 @@ class Variant(Strict):
             InputError: unreadable file, or an unknown or impossible value.
         """
         settings = FrontEndConfig.load(file) if file else FrontEndConfig()
-        return FrontEndConfig.build("frontend", settings.model_dump() | self.frontend)
+        return FrontEndConfig.build("frontend", changed(settings, self.frontend))
 
     @property
     def mounted(self) -> Mounting | None:

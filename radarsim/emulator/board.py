@@ -101,12 +101,14 @@ class BoardSockets:
     Args:
         board, command_port: where requests are taken.
         computer, data_port: where packets go; replies go to its `command_port`.
+        say: tells the user what happened.
 
     Raises:
         InputError: the address is in use, or not one of this machine.
     """
 
-    def __init__(self, board: str, computer: str, command_port: int, data_port: int):
+    def __init__(self, board: str, computer: str, command_port: int, data_port: int, say: Callable[[str], None]):
+        self._say, self._unheard = say, False
         self._replies_to, self._data_to = (computer, command_port), (computer, data_port)
         self._commands = _bound(board, command_port)
         try:
@@ -117,18 +119,18 @@ class BoardSockets:
         self._closed = threading.Event()
         self._thread: threading.Thread | None = None
 
-    def serve(self, execute: Callable[[Request], int], say: Callable[[str], None]) -> None:
+    def serve(self, execute: Callable[[Request], int]) -> None:
         """Answer requests in a thread until closed."""
-        self._thread = threading.Thread(target=self._serve, args=(execute, say), name="commands", daemon=True)
+        self._thread = threading.Thread(target=self._serve, args=(execute,), name="commands", daemon=True)
         self._thread.start()
 
     def data(self, packet: bytes) -> None:
         """Send a data packet."""
-        self._out.sendto(packet, self._data_to)
+        self._send(packet, self._data_to)
 
     def report(self, status: Status) -> None:
         """Send a status that nobody asked for."""
-        self._out.sendto(Reply(Command.STATUS, status).encode(), self._replies_to)
+        self._send(Reply(Command.STATUS, status).encode(), self._replies_to)
 
     def close(self) -> None:
         self._closed.set()
@@ -137,7 +139,17 @@ class BoardSockets:
         self._commands.close()
         self._out.close()
 
-    def _serve(self, execute: Callable[[Request], int], say: Callable[[str], None]) -> None:
+    def _send(self, packet: bytes, where: tuple[str, int]) -> None:
+        """Send what gets through: to a board without a network packets are lost, and it goes on."""
+        try:
+            self._out.sendto(packet, where)
+            self._unheard = False
+        except OSError as error:
+            if not self._unheard:
+                self._say(f"board: packets to {where[0]}:{where[1]} are lost ({error.strerror or error})")
+            self._unheard = True
+
+    def _serve(self, execute: Callable[[Request], int]) -> None:
         self._commands.settimeout(0.05)
         while not self._closed.is_set():
             try:
@@ -146,9 +158,13 @@ class BoardSockets:
             except TimeoutError:
                 continue
             except InputError as error:
-                say(f"board: {error}; no reply")
+                self._say(f"board: {error}; no reply")
                 continue
-            self._out.sendto(Reply(request.command, execute(request)).encode(), self._replies_to)
+            except OSError as error:
+                self._say(f"board: a request is lost ({error.strerror or error})")
+                self._closed.wait(0.1)
+                continue
+            self._send(Reply(request.command, execute(request)).encode(), self._replies_to)
 
 
 def _bound(address: str, port: int) -> socket.socket:

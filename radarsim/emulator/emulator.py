@@ -70,9 +70,10 @@ class Emulator:
         self.lateness = 0.0
         self._running = threading.Event()  # from sensorStart to the end of the last frame
         self._stopping, self._closed = threading.Event(), threading.Event()
-        self._left = 0
+        self._left = self._resets = 0
+        self._lock = threading.Lock()  # resets and starts come from different threads
         expected = source.expected()
-        self._sockets = BoardSockets(board, computer, command_port, data_port)
+        self._sockets = BoardSockets(board, computer, command_port, data_port, say)
         self.link = Link(self._sockets.data, self._sockets.report, disturbance)
         try:
             self._uart = Uart(lambda: CommandLine(self).execute, port_link)
@@ -81,7 +82,7 @@ class Emulator:
             raise
         self.port = self._uart.path
         self._feed = self._feeding(expected)
-        self._sockets.serve(Board(self.link, self._reset, say).execute, say)
+        self._sockets.serve(Board(self.link, self._reset, say).execute)
         self._thread = threading.Thread(target=self._live, name="radar", daemon=True)
         self._thread.start()
 
@@ -112,17 +113,21 @@ class Emulator:
         """Begin to send, the first frame included: `frames` frames, or without end if 0.
 
         Raises:
-            InputError: the source cannot give this configuration.
+            InputError: the source cannot give this configuration, or the radar is reset meanwhile.
         """
+        resets = self._resets
         try:
             self.source.check(config)
             self._prepare(config)
         except InputError as error:
             self._say(f"radar: sensorStart refused: {error}")
             raise
-        self._left = frames or -1
-        self._stopping.clear()
-        self._running.set()
+        with self._lock:
+            if self._resets != resets:
+                raise InputError("the radar was reset while it started")
+            self._left = frames or -1
+            self._stopping.clear()
+            self._running.set()
         self._say(f"radar: started, {config.frame_rate:.2f} frames/s of {config.frame_bytes} bytes")
 
     def stop(self) -> None:
@@ -137,7 +142,9 @@ class Emulator:
         return f"{self.frames} frames sent{late}; {self.link.packets} packets"
 
     def _reset(self) -> None:
-        self._stopping.set()
+        with self._lock:
+            self._resets += 1
+            self._stopping.set()
         self._uart.reset()
 
     def _feeding(self, config: RadarConfig) -> Feed:
@@ -163,7 +170,8 @@ class Emulator:
                     self._send(self._feed)
                 except InputError as error:
                     self._say(f"radar: {error}")
-                self._running.clear()
+                finally:
+                    self._running.clear()
             self.link.advance(time.monotonic() + _IDLE)
 
     def _send(self, feed: Feed) -> None:

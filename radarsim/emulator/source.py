@@ -1,4 +1,4 @@
-"""Where the virtual radar's samples come from: a recording, or a walk through a scene simulated as it goes."""
+"""Where the virtual radar's samples come from: a recording, or whatever else gives frames (`simulation`)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,7 +13,6 @@ from jaxtyping import Int16
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
-from radarize.radar.presets import load_config
 from radarize.recording import Recording
 
 #: What does not change the samples that the radar sends: corrections for whoever reads them.
@@ -71,7 +70,7 @@ class Playback:
         with Recording(self.path) as recording:
             numbers, kept = range(len(recording)), len(recording) * config.frame_bytes <= _KEPT
             frames = (
-                _packed(recording.adc(number, number + 1), config)
+                packed(recording.adc(number, number + 1), config)
                 for number in (cycle(numbers) if self.loop and not kept else numbers)
             )
             if self.loop and kept:
@@ -79,59 +78,8 @@ class Playback:
             yield from frames
 
 
-@dataclass(frozen=True)
-class Walk:
-    """A walk through a scene, at whatever configuration the radar gets; as `radarsim simulate` makes it.
-
-    Attributes:
-        scene, platform, duration, seed: as for `simulate`.
-        radar: preset or configuration file expected over the UART.
-        loop: walk again, from the start, at the end.
-    """
-
-    scene: str
-    platform: str = "handheld"
-    duration: float = 40.0
-    seed: int = 0
-    radar: str = "radarize"
-    loop: bool = False
-
-    def expected(self) -> RadarConfig:
-        """The preset's, or the file's; refuses a scene that is not there."""
-        from radarsim.scene.description import find
-
-        find(self.scene)
-        return load_config(self.radar)[0]
-
-    def check(self, config: RadarConfig) -> None:
-        """Takes all that the chip can do, if the walk is long enough for a frame.
-
-        Raises:
-            InputError: it is not.
-        """
-        if config.frames_within(self.duration) < 1:
-            raise InputError(f"duration is {self.duration:g} s, expected at least one frame of {config.frame_period} s")
-
-    def frames(self, config: RadarConfig) -> Iterator[bytes]:
-        """Simulated in batches, as `simulate` does."""
-        from radarsim.planner import plan_motion
-        from radarsim.scene.scene import Scene
-        from radarsim.simulate import BATCH, Simulator
-
-        world = Scene.load(self.scene)
-        while True:
-            route, physics = np.random.default_rng(self.seed).spawn(2)
-            motion = plan_motion(world, self.platform, self.duration, route).until(self.duration)
-            simulator = Simulator(world, motion, config, physics)
-            times = np.arange(config.frames_within(motion.duration)) * config.frame_period
-            for first in range(0, len(times), BATCH):
-                for frame in simulator.frames(times[first : first + BATCH])[0]:
-                    yield _packed(frame[None], config)
-            if not self.loop:
-                return
-
-
-def _packed(frame: Int16[np.ndarray, "1 loop tx rx sample 2"], config: RadarConfig) -> bytes:
+def packed(frame: Int16[np.ndarray, "1 loop tx rx sample 2"], config: RadarConfig) -> bytes:
+    """A frame's LVDS bytes."""
     return encode(frame, config).astype("<i2", copy=False).tobytes()
 
 

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from radarize.errors import InputError
 from radarize.replacing import replacing
 from radarize.yamlfile import read_yaml
+from radarsim.complaint import complaint
 from radarsim.physics.antenna import ISOTROPIC, Antenna
 
 
@@ -194,15 +195,7 @@ class FrontEndConfig(_Strict):
         try:
             return cls.model_validate(fields)
         except ValidationError as error:
-            first = error.errors()[0]
-            field = ".".join(str(part) for part in first["loc"])
-            if first["type"] == "extra_forbidden":
-                raise InputError(
-                    f"{source}: {field}: unknown key, expected one of {', '.join(cls.model_fields)}"
-                ) from error
-            value = "" if isinstance(first["input"], dict) else f" is {first['input']!r}"
-            message = first["msg"].removeprefix("Value error, ")
-            raise InputError(f"{source}: {field}{value}: {message[0].lower()}{message[1:]}") from error
+            raise InputError(f"{source}: {complaint(error, fields)}") from error
 
     def save(self, path: Path, remarks: list[str] = ()) -> None:
         """Write as a front-end file, with remarks as comments on top."""

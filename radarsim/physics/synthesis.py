@@ -116,12 +116,6 @@ class Synthesizer:
         )  # fmt: skip
         return self._samples(moments, np.pi * width)
 
-    def batch(
-        self, lengths: list[Float[np.ndarray, "echo virtual 3"]], amplitudes: list[Complex[np.ndarray, "echo"]]
-    ) -> list[Complex[np.ndarray, "loop tx rx sample"]]:
-        """Beat signals of several bursts."""
-        return [self(c, a) for c, a in zip(lengths, amplitudes, strict=True)]
-
     def _orders(self, x: float) -> int:
         """Terms after which the rest of the Jacobi-Anger series is below `accuracy`."""
         orders = np.arange(1, 200)

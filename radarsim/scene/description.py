@@ -34,6 +34,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from radarize.errors import InputError
 from radarize.yamlfile import read_yaml
+from radarsim.complaint import complaint
 from radarsim.scene import shapes
 from radarsim.scene.buildings import Building
 from radarsim.scene.materials import Material, constant, decibel, material
@@ -207,6 +208,18 @@ def shipped() -> Path:
     return packaged if packaged.is_dir() else here.parents[2] / "scenes"
 
 
+def meshes(path: Path) -> list[Path]:
+    """The mesh files that a scene file names, at any of its levels.
+
+    Raises:
+        InputError: unreadable, malformed YAML, unknown key or value.
+    """
+    data, found = read_yaml(path), set()
+    for level in range(len(described(data, str(path)).levels) + 1):
+        found |= {item.file for item in described(data, str(path), level).objects if isinstance(item, Mesh)}
+    return [path.parent / name for name in sorted(found)]
+
+
 def read(path: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover]]:
     """Name, objects and movers of a scene file at one of its levels.
 
@@ -258,7 +271,7 @@ def described(data: object, source: str, level: int = 0) -> Description:
             data = _laid_upon(data, changes)
         return Description.model_validate(data)
     except ValidationError as error:
-        raise InputError(f"{source}: {_first(error, data)}") from error
+        raise InputError(f"{source}: {complaint(error, data)}") from error
 
 
 def _laid_upon(data: dict, changes: Level) -> dict:
@@ -282,23 +295,3 @@ def _material(item: _Item) -> Material:
         return material(item.material)
     except InputError as error:
         raise InputError(f"object {item.name!r}: {error}") from error
-
-
-def _first(error: ValidationError, data: dict) -> str:
-    """The first complaint as one sentence with the field's place in the file."""
-    problem = error.errors()[0]
-    # Tags of unions are in pydantic's path but not in the file.
-    tags = {"box", "rectangle", "cylinder", "sphere", "mesh", "str", "CustomMaterial", "person", "door", "fan"}
-    tags |= {"office", "A", "B", "C", "D"}
-    place = [part for part in problem["loc"] if part not in tags]
-    field = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in place).lstrip(".")
-    if len(place) > 1 and place[0] in ("objects", "moving"):
-        item = data[place[0]][place[1]]
-        field += f" (object {item['name']!r})" if isinstance(item, dict) and "name" in item else ""
-    if problem["type"] == "extra_forbidden":
-        return f"{field}: unknown key"
-    if problem["type"] == "union_tag_invalid":
-        tag, expected = problem["ctx"]["tag"], problem["ctx"]["expected_tags"].replace("'", "")
-        return f"{field}.{problem['ctx']['discriminator'].strip(chr(39))} is {tag!r}, expected one of: {expected}"
-    value = "" if isinstance(problem["input"], dict) else f" is {problem['input']!r}"
-    return f"{field or 'file'}{value}: {problem['msg'][0].lower()}{problem['msg'][1:]}"

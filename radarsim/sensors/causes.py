@@ -1,10 +1,13 @@
 """How many echoes there are and how strong, by cause, and the I/Q split by cause."""
 
 import numpy as np
+from jaxtyping import Complex, Float
 
 from radarize.recording import Stream
-from radarsim.physics.echoes import Provenance
-from radarsim.sensors.sensor import Frames, Rig, Sensor
+from radarsim.physics.echoes import Echoes, Provenance
+from radarsim.scenario import Frames, Scenario
+from radarsim.sensors.sensor import Sensor
+from radarsim.threads import one_blas_thread
 
 _NAMES = ", ".join(p.name.lower() for p in Provenance)
 #: Parts of /truth/adc_by_cause, in this order.
@@ -14,15 +17,10 @@ CAUSES = (*(p.name.lower() for p in Provenance), "leakage")
 class CauseCounts(Sensor):
     """Number and total power of the echoes of each cause."""
 
-    of_radar = True
-
     streams = {
         "truth/echoes": Stream((len(Provenance),), "i4", "", f"echoes per cause: {_NAMES}"),
         "truth/echo_power": Stream((len(Provenance),), "f4", "1", f"received over transmitted power: {_NAMES}"),
     }
-
-    def __init__(self, rig: Rig, rng: np.random.Generator):
-        pass
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Counts and powers."""
@@ -34,14 +32,24 @@ class CauseCounts(Sensor):
 class AdcByCause(Sensor):
     """I/Q of each cause before noise and converter."""
 
-    of_radar = True
-
-    def __init__(self, rig: Rig, rng: np.random.Generator):
+    def __init__(self, scenario: Scenario):
+        super().__init__(scenario)
         about = "I/Q before noise and converter, by cause, which add up: " + ", ".join(CAUSES)
-        shape = (len(CAUSES), *rig.config.frame_shape)
+        shape = (len(CAUSES), *scenario.config.frame_shape)
         self.streams = {"truth/adc_by_cause": Stream(shape, "f2", "ADC counts", about)}
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The parts."""
-        parts = frames.by_cause
+        parts = np.stack(
+            [self._split(*each) for each in zip(frames.lengths, frames.received, frames.echoes, strict=True)]
+        )
         return {"truth/adc_by_cause": np.stack([parts.real, parts.imag], axis=-1).astype(np.float16)}
+
+    @one_blas_thread
+    def _split(
+        self, lengths: Float[np.ndarray, "echo virtual 3"], amplitudes: Complex[np.ndarray, "echo"], echoes: Echoes
+    ) -> Complex[np.ndarray, "cause loop tx rx sample"]:
+        """Counts of each cause in a frame."""
+        masks = [echoes.provenance == cause for cause in Provenance]
+        signals = [self.scenario.synthesize(lengths[mask], amplitudes[mask]) for mask in masks]
+        return np.stack(self.scenario.board.by_cause(signals))

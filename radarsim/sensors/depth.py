@@ -20,7 +20,8 @@ import numpy as np
 from jaxtyping import Float, UInt16
 
 from radarize.recording import Product, Stream
-from radarsim.sensors.sensor import Frames, Rig, Sensor
+from radarsim.scenario import Frames, Scenario
+from radarsim.sensors.sensor import Sensor
 
 #: Camera in the radar's frame, m: six centimetres above it; both look the same way.
 MOUNT = (0.0, 0.0, 0.06)
@@ -83,8 +84,8 @@ class Stereo:
     dropout: float = 0.01
 
     def measure(
-        self, depth: Float[np.ndarray, "frame height width"], camera: Intrinsics, rng: np.random.Generator
-    ) -> UInt16[np.ndarray, "frame height width"]:
+        self, depth: Float[np.ndarray, "*frame height width"], camera: Intrinsics, rng: np.random.Generator
+    ) -> UInt16[np.ndarray, "*frame height width"]:
         """Depth as the camera reports it, mm, 0 where it has no value; `depth` is the truth, m, inf for nothing."""
         scale = np.float32(self.focal_length * self.baseline)
         disparity = scale / np.asarray(depth, np.float32)
@@ -106,17 +107,14 @@ class DepthCamera(Sensor):
     """Depth pictures, one a frame.
 
     Args:
-        rig: what it is mounted on.
-        rng: for the noise.
+        scenario: that it is part of.
         camera: what is seen.
         stereo: how well; None: the exact depth.
     """
 
-    def __init__(
-        self, rig: Rig, rng: np.random.Generator, camera: Intrinsics = QUARTER, stereo: Stereo | None = Stereo()
-    ):
-        self._rig, self._rng, self._camera, self._stereo = rig, rng, camera, stereo
-        self._motion = rig.motion.mounted(MOUNT)
+    def __init__(self, scenario: Scenario, camera: Intrinsics = QUARTER, stereo: Stereo | None = Stereo()):
+        super().__init__(scenario)
+        self._camera, self._stereo, self._motion = camera, stereo, scenario.motion.mounted(MOUNT)
         rays = camera.rays.reshape(-1, 3)
         self._stretch = np.linalg.norm(rays, axis=1)
         self._rays = rays / self._stretch[:, None]
@@ -135,19 +133,23 @@ class DepthCamera(Sensor):
         """Exact depth at given times, m, inf where there is nothing."""
         rotation = self._motion.rotation(times).as_matrix()
         directions = self._rays @ rotation.transpose(0, 2, 1)
-        distance = self._rig.sight.distance(self._motion.position(times), directions, times, through_glass=True)
+        distance = self.scenario.sight.distance(self._motion.position(times), directions, times, through_glass=True)
         return (distance / self._stretch).reshape(len(times), self._camera.height, self._camera.width)
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The pictures."""
-        depth = self.depth(frames.times + self._rig.config.burst_center)
+        depth = self.depth(frames.middles)
         if self._stereo is None:
             return {"truth/depth": np.where(depth < 65.5, np.rint(1000 * depth), 0).astype(np.uint16)}
-        return {"truth/depth": self._stereo.measure(depth, self._camera, self._rng)}
+        measured = [
+            self._stereo.measure(picture, self._camera, self.scenario.draws("depth", time))
+            for picture, time in zip(depth, frames.times, strict=True)
+        ]
+        return {"truth/depth": np.stack(measured)}
 
 
 class DepthStrip(DepthCamera):
     """The depth camera as the Radarize data set has it: 848 x 100 pixels."""
 
-    def __init__(self, rig: Rig, rng: np.random.Generator):
-        super().__init__(rig, rng, STRIP)
+    def __init__(self, scenario: Scenario):
+        super().__init__(scenario, STRIP)

@@ -18,9 +18,10 @@ from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.recording import Product, Stream
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.synthesis import BurstClock, _sincos_cycles
+from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import CAUSES
 from radarsim.sensors.scan import AZIMUTHS
-from radarsim.sensors.sensor import Frames, Rig, Sensor
+from radarsim.sensors.sensor import Sensor
 
 _INSTANTS = 3
 #: Half width of the window's transform, bins, and its table's entries per bin.
@@ -34,11 +35,10 @@ NOISE = 255
 class Ghosts(Sensor):
     """Power by cause on the radar's range bins and the scan's bearings, and the strongest cause of every cell."""
 
-    of_radar = True
-
-    def __init__(self, rig: Rig, rng: np.random.Generator):
-        config, front_end = rig.config, rig.front_end
-        self._front_end, self._maps = front_end, CauseMaps(config)
+    def __init__(self, scenario: Scenario):
+        super().__init__(scenario)
+        config, front_end = scenario.config, scenario.board
+        self._maps = CauseMaps(config)
         window = windows.hann(config.samples)
         window /= window.sum()
         taper = self._maps.taper
@@ -67,7 +67,7 @@ class Ghosts(Sensor):
         """Maps and labels."""
         power, cause = [], []
         for lengths, amplitudes, echoes in zip(frames.lengths, frames.received, frames.echoes, strict=True):
-            maps = self._maps(lengths, self._front_end.scale * amplitudes, echoes.provenance)
+            maps = self._maps(lengths, self.scenario.board.scale * amplitudes, echoes.provenance)
             power.append(maps)
             cause.append(self.label(maps))
         level = 10 * np.log10(np.maximum(np.stack(power), 10 ** ((self._floor - DEPTH) / 10)))

@@ -12,12 +12,14 @@ motion's splines at the sensor's own place, plus
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.signal import lfilter
 
 from radarize.recording import Product, Stream
+from radarsim.motion import turned
+from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.depth import MOUNT
-from radarsim.sensors.sensor import Frames, Rig, Sensor, Ticker
+from radarsim.sensors.sensor import Sensor
 
 RATE = 200.0
 STANDARD_GRAVITY = 9.80665  # m/s^2
@@ -75,46 +77,47 @@ GYROSCOPE = Errors(
 
 
 class Triad:
-    """Three sensors at right angles with errors that go on from one call to the next."""
+    """Three sensors at right angles, with errors laid down for all their samples at once.
 
-    def __init__(self, errors: Errors, rng: np.random.Generator):
-        self._errors, self._rng = errors, rng
-        self._offset = errors.offset * rng.standard_normal(3)
-        self._wander = errors._wander * rng.standard_normal(3)
-        self._walk = np.zeros(3)
+    Args:
+        errors: of each.
+        rng: draws them; fewer samples have the errors of the first of more.
+        count: of samples, at `RATE`.
+
+    Attributes:
+        bias: constant, wandering and walking, of every sample.
+    """
+
+    bias: Float[np.ndarray, "tick 3"]
+
+    def __init__(self, errors: Errors, rng: np.random.Generator, count: int):
+        self._errors = errors
+        start, drive = rng.standard_normal((2, 3)), rng.standard_normal((count, 3, 3))
+        keep = np.exp(-1 / (RATE * errors.correlation_time))
+        force = np.sqrt(1 - keep**2) * drive[:, 0]
+        wander, _ = lfilter([1.0], [1.0, -keep], force, axis=0, zi=keep * start[:1])
+        walk = np.cumsum(drive[:, 1], axis=0) / np.sqrt(RATE)
+        self.bias = errors.offset * start[1] + errors._wander * wander + errors.walk * walk
+        self._noise = errors.noise * np.sqrt(RATE) * drive[:, 2]
 
     def measure(
-        self, truth: Float[np.ndarray, "tick 3"]
-    ) -> tuple[Float[np.ndarray, "tick 3"], Float[np.ndarray, "tick 3"]]:
-        """What the sensors report for samples at `RATE`, and the bias in it."""
-        errors, drive = self._errors, self._rng.standard_normal((3, *truth.shape))
-        if not len(truth):
-            return truth, truth
-        keep = np.exp(-1 / (RATE * errors.correlation_time))
-        force = errors._wander * np.sqrt(1 - keep**2) * drive[0]
-        wander, _ = lfilter([1.0], [1.0, -keep], force, axis=0, zi=keep * self._wander[None])
-        walk = self._walk + np.cumsum(errors.walk / np.sqrt(RATE) * drive[1], axis=0)
-        self._wander, self._walk = wander[-1], walk[-1]
-        bias = self._offset + wander + walk
-        value = truth + bias + errors.noise * np.sqrt(RATE) * drive[2]
-        value = np.clip(np.rint(value / errors.step) * errors.step, -errors.limit, errors.limit)
-        return value, bias
+        self, truth: Float[np.ndarray, "tick 3"], ticks: Int[np.ndarray, "tick"]
+    ) -> Float[np.ndarray, "tick 3"]:
+        """What the sensors report as their samples number `ticks`."""
+        errors = self._errors
+        value = np.rint((truth + self.bias[ticks] + self._noise[ticks]) / errors.step) * errors.step
+        return np.clip(value, -errors.limit, errors.limit)
 
 
 class Imu(Sensor):
-    """Accelerometers and gyroscopes in the depth camera's housing, axes parallel to the radar's.
+    """Accelerometers and gyroscopes in the depth camera's housing, axes parallel to the radar's."""
 
-    Args:
-        rig: what it is mounted on.
-        rng: for its errors.
-    """
-
-    def __init__(self, rig: Rig, rng: np.random.Generator):
-        self._motion = rig.motion.mounted(MOUNT)
-        self._ticker = Ticker(rig.config, RATE)
-        self._accelerometer, self._gyroscope = (
-            Triad(errors, generator) for errors, generator in zip((ACCELEROMETER, GYROSCOPE), rng.spawn(2), strict=True)
-        )
+    def __init__(self, scenario: Scenario):
+        super().__init__(scenario)
+        self._motion = scenario.motion.mounted(MOUNT)
+        count = len(scenario.ticks(RATE))
+        self._accelerometer = Triad(ACCELEROMETER, scenario.draws("accelerometer"), count)
+        self._gyroscope = Triad(GYROSCOPE, scenario.draws("gyroscope"), count)
         clock = "imu/time"
         self.streams = {
             clock: Stream((), "f8", "s", "instants of the IMU's samples", clock),
@@ -137,17 +140,16 @@ class Imu(Sensor):
     ) -> tuple[Float[np.ndarray, "tick 3"], Float[np.ndarray, "tick 3"]]:
         """Exact specific force and angular velocity."""
         acceleration = self._motion.acceleration(times) + [0.0, 0.0, STANDARD_GRAVITY]
-        return self._motion.rotation(times).inv().apply(acceleration), self._motion.angular_velocity(times)
+        return turned(self._motion.rotation(times).inv(), acceleration), self._motion.angular_velocity(times)
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Samples until the next frame."""
-        times = self._ticker(frames)
+        ticks = frames.ticks(RATE)
+        times = ticks / RATE
         force, turn = self.truth(times)
-        force, force_bias = self._accelerometer.measure(force)
-        turn, turn_bias = self._gyroscope.measure(turn)
         return {
             "imu/time": times,
-            "imu/accelerometer": force,
-            "imu/gyroscope": turn,
-            "imu/bias": np.hstack([force_bias, turn_bias]),
+            "imu/accelerometer": self._accelerometer.measure(force, ticks),
+            "imu/gyroscope": self._gyroscope.measure(turn, ticks),
+            "imu/bias": np.hstack([self._accelerometer.bias[ticks], self._gyroscope.bias[ticks]]),
         }

@@ -4,17 +4,16 @@ import numpy as np
 
 from radarize.points import COLUMNS, PointClouds
 from radarize.recording import Stream
-from radarsim.sensors.sensor import Frames, Rig, Sensor
+from radarsim.scenario import Frames, Scenario
+from radarsim.sensors.sensor import Sensor
 
 
 class ChipPoints(Sensor):
     """TI's point cloud of every frame, from the simulated samples."""
 
-    of_radar = True
-
-    def __init__(self, rig: Rig, rng: np.random.Generator):
-        self._clouds = PointClouds(rig.config)
-        self._frames = 0
+    def __init__(self, scenario: Scenario):
+        super().__init__(scenario)
+        self._clouds = PointClouds(scenario.config)
         about = f"{' '.join(COLUMNS)} of TI's point cloud in the sensor frame, closing velocity positive"
         self.streams = {
             "points/frame": Stream((), "i4", "", "number of the frame that a point belongs to", "points/frame"),
@@ -24,6 +23,4 @@ class ChipPoints(Sensor):
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Points of all frames, one after another."""
         points, frame = self._clouds(frames.samples)
-        frame = frame + self._frames
-        self._frames += len(frames)
         return {"points/frame": frame, "points/cloud": points}

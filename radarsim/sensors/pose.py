@@ -3,7 +3,9 @@
 import numpy as np
 
 from radarize.recording import Stream
-from radarsim.sensors.sensor import Frames, Rig, Sensor
+from radarsim.motion import turned
+from radarsim.scenario import Frames
+from radarsim.sensors.sensor import Sensor
 
 
 class TruePose(Sensor):
@@ -15,16 +17,13 @@ class TruePose(Sensor):
         "truth/velocity": Stream((6,), "f8", "m/s, rad/s", "linear, then angular velocity of the sensor, sensor frame"),
     }
 
-    def __init__(self, rig: Rig, rng: np.random.Generator):
-        self._motion, self._center = rig.motion, rig.config.burst_center
-
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Pose and velocity."""
-        times = frames.times + self._center
-        rotation = self._motion.rotation(times)
-        linear = rotation.inv().apply(self._motion.velocity(times))
+        motion, times = self.scenario.motion, frames.middles
+        rotation = motion.rotation(times)
+        linear = turned(rotation.inv(), motion.velocity(times))
         return {
             "truth/time": times,
-            "truth/pose": np.hstack([self._motion.position(times), rotation.as_quat()]),
-            "truth/velocity": np.hstack([linear, self._motion.angular_velocity(times)]),
+            "truth/pose": np.hstack([motion.position(times), rotation.as_quat()]),
+            "truth/velocity": np.hstack([linear, motion.angular_velocity(times)]),
         }

@@ -11,8 +11,9 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from radarize.recording import Product, Stream
-from radarsim.motion import Motion
-from radarsim.sensors.sensor import Frames, Rig, Sensor
+from radarsim.motion import Motion, turned
+from radarsim.scenario import Frames, Scenario
+from radarsim.sensors.sensor import Sensor
 
 #: Bearings of the scan, rad: the radar's own 88 columns of one degree.
 AZIMUTHS = np.deg2rad(np.arange(-44, 44))
@@ -32,7 +33,7 @@ def level_rays(
     motion: Motion, times: Float[np.ndarray, "frame"], azimuths: Float[np.ndarray, "ray"]
 ) -> tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame ray 3"]]:
     """Origins and horizontal unit directions of rays at bearings against the boresight's on the plan."""
-    forward = motion.rotation(times).apply([1.0, 0.0, 0.0])
+    forward = turned(motion.rotation(times), (1.0, 0.0, 0.0))
     bearing = np.arctan2(forward[:, 1], forward[:, 0])[:, None] + azimuths
     return motion.position(times), np.stack([np.cos(bearing), np.sin(bearing), np.zeros_like(bearing)], axis=-1)
 
@@ -40,38 +41,40 @@ def level_rays(
 class PlanarScan(Sensor):
     """Range of the first surface per bearing."""
 
-    def __init__(self, rig: Rig, rng: np.random.Generator):
-        self._rig = rig
-        height = float(rig.motion.position(np.array([rig.config.burst_center]))[0, 2])
+    def __init__(self, scenario: Scenario):
+        super().__init__(scenario)
+        height = float(scenario.motion.position(np.array([scenario.config.burst_center]))[0, 2])
         about = "range of the first surface in the horizontal plane, inf beyond the radar's range"
         self.streams = {"truth/scan": Stream((len(AZIMUTHS),), "f4", "m", about)}
         self.products = {
             "truth/scan_azimuths": Product(AZIMUTHS, "rad", "bearings of /truth/scan, positive to the left"),
             "truth/floor_plan": Product(
-                rig.scene.floor_plan(height), "m", "x0 y0 x1 y1 of everything cut by the plane of the sensor at start"
+                scenario.scene.floor_plan(height),
+                "m",
+                "x0 y0 x1 y1 of everything cut by the plane of the sensor at start",
             ),
         }
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The scan."""
-        times = frames.times + self._rig.config.burst_center
-        distance = self._rig.sight.distance(*level_rays(self._rig.motion, times, AZIMUTHS), times)
-        return {"truth/scan": np.where(distance <= self._rig.config.max_range, distance, np.inf)}
+        times = frames.middles
+        distance = self.scenario.sight.distance(*level_rays(self.scenario.motion, times, AZIMUTHS), times)
+        return {"truth/scan": np.where(distance <= self.scenario.config.max_range, distance, np.inf)}
 
 
 class Occupancy(Sensor):
     """State of every cell of a polar grid with the radar's own range bins and the scan's bearings."""
 
-    def __init__(self, rig: Rig, rng: np.random.Generator):
-        self._rig = rig
-        cells = (rig.config.samples, len(AZIMUTHS))
+    def __init__(self, scenario: Scenario):
+        super().__init__(scenario)
+        cells = (scenario.config.samples, len(AZIMUTHS))
         about = "state of cells (radar range bin, bearing) in the horizontal plane: " + ", ".join(
             f"{cell} {cell.name.lower()}" for cell in Cell
         )
         self.streams = {
             "truth/occupancy": Stream(cells, "u1", "", about, labels=tuple(cell.name.lower() for cell in Cell))
         }
-        ranges = rig.config.ranges - rig.config.range_bias
+        ranges = scenario.config.ranges - scenario.config.range_bias
         self.products = {
             "truth/occupancy_ranges": Product(ranges, "m", "middles of the range cells of /truth/occupancy"),
             "truth/occupancy_azimuths": Product(AZIMUTHS, "rad", "bearings of /truth/occupancy, positive to the left"),
@@ -79,16 +82,16 @@ class Occupancy(Sensor):
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The label."""
-        times = frames.times + self._rig.config.burst_center
+        times = frames.middles
         column = AZIMUTHS[1] - AZIMUTHS[0]
         offsets = column * ((np.arange(_RAYS) + 0.5) / _RAYS - 0.5)
-        rays = level_rays(self._rig.motion, times, (AZIMUTHS[:, None] + offsets).ravel())
-        distance = self._rig.sight.distance(*rays, times).reshape(len(times), len(AZIMUTHS), _RAYS)
+        rays = level_rays(self.scenario.motion, times, (AZIMUTHS[:, None] + offsets).ravel())
+        distance = self.scenario.sight.distance(*rays, times).reshape(len(times), len(AZIMUTHS), _RAYS)
         return {"truth/occupancy": self.label(distance)}
 
     def label(self, distance: Float[np.ndarray, "frame column ray"]) -> UInt8[np.ndarray, "frame range column"]:
         """States from the ranges of a column's rays: free up to the farthest of its first surfaces, unknown behind."""
-        config = self._rig.config
+        config = self.scenario.config
         index = (np.minimum(distance, 2 * config.max_range) + config.range_bias) / config.range_resolution
         index = np.rint(index).astype(int)
         bins = np.arange(config.samples)

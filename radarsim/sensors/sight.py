@@ -60,7 +60,9 @@ class Sight:
         distance = np.full(len(ways), np.inf) if scene is None else scene.hit(starts, ways, coherent=True)[0]
         distance = distance.reshape(frames, rays)
         if len(self._half):
-            turn, center = self._crowd.poses(np.asarray(times, float))
+            # One instant at a time: sums over many at once are ordered otherwise, and a frame is to hang on no other.
+            poses = [self._crowd.poses(np.array([t])) for t in times]
+            turn, center = (np.concatenate(parts) for parts in zip(*poses, strict=True))
             _meet(np.asarray(origins, float), np.asarray(directions, float), turn, center, self._half, self._capsule,
                   distance)  # fmt: skip
         return distance

@@ -1,11 +1,11 @@
 """Which sensors a recording has."""
 
-import zlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from radarize.errors import InputError
+from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import AdcByCause, CauseCounts
 from radarsim.sensors.depth import DepthCamera, DepthStrip
 from radarsim.sensors.ghosts import Ghosts
@@ -14,7 +14,7 @@ from radarsim.sensors.lidar import Lidar
 from radarsim.sensors.points import ChipPoints
 from radarsim.sensors.pose import TruePose
 from radarsim.sensors.scan import Occupancy, PlanarScan
-from radarsim.sensors.sensor import Frames, Rig, Sensor
+from radarsim.sensors.sensor import Sensor
 from radarsim.sensors.tracking import TrackingCamera
 from radarsim.threads import one_blas_thread
 
@@ -30,13 +30,15 @@ SENSORS = {
     "points": ChipPoints,
     "ghosts": Ghosts,
     "lidar": Lidar,
+    "adc-by-cause": AdcByCause,
 }
-#: What ``all`` stands for: either depth camera writes the same stream.
-_ALL = tuple(name for name in SENSORS if name != "depth-strip")
+#: Not part of ``all``: either depth camera writes the same stream, and the other is several times the recording.
+_APART = {"depth-strip", "adc-by-cause"}
 
 
 def chosen(names: Sequence[str]) -> list[str]:
-    """Names of sensors without repetition, in the order of `SENSORS`; ``all`` stands for all of them.
+    """Names of sensors without repetition, in the order of `SENSORS`; ``all`` stands for all but
+    `_APART`.
 
     Raises:
         InputError: there is no such sensor, or two exclude each other.
@@ -44,39 +46,41 @@ def chosen(names: Sequence[str]) -> list[str]:
     for name in names:
         if name not in SENSORS and name != "all":
             raise InputError(f"sensors: {name!r} is unknown, expected all or some of {', '.join(SENSORS)}")
-    wanted = {*names, *(_ALL if "all" in names else ())}
+    wanted = {*names, *(SENSORS.keys() - _APART if "all" in names else ())}
     if {"depth", "depth-strip"} <= wanted:
         raise InputError("sensors: depth and depth-strip are both asked for, expected one depth camera")
     return [name for name in SENSORS if name in wanted]
 
 
 class Suite:
-    """The sensors of a recording; each has a generator of its own, so that none changes what another measures.
+    """The sensors of a scenario.
 
     Args:
-        rig: where they are mounted.
-        names: of optional sensors, from `SENSORS`.
-        seed: of the recording.
-        by_cause: with I/Q by cause.
+        scenario: that they are part of.
+        names: of the sensors; default: those that are always there, and the scenario's own.
 
     Attributes:
-        clocks: paths of streams that hold stamps, s.
+        streams, products: of all of them, by path.
     """
 
-    def __init__(self, rig: Rig, names: Sequence[str], seed: int, by_cause: bool = False):
-        kinds = ALWAYS | {name: SENSORS[name] for name in chosen(names)}
-        if by_cause:
-            kinds["adc_by_cause"] = AdcByCause
-        self.sensors: dict[str, Sensor] = {
-            name: kind(rig, np.random.default_rng([seed, zlib.crc32(name.encode())])) for name, kind in kinds.items()
-        }
+    def __init__(self, scenario: Scenario, names: Iterable[str] | None = None):
+        names = (*ALWAYS, *chosen(scenario.sensors)) if names is None else names
+        self.sensors: dict[str, Sensor] = {name: (ALWAYS | SENSORS)[name](scenario) for name in names}
         self.streams = {path: s for sensor in self.sensors.values() for path, s in sensor.streams.items()}
         self.products = {path: p for sensor in self.sensors.values() for path, p in sensor.products.items()}
-        # Streams of stamps: those in s that others name as their clock, and the truth's.
-        named = {"truth/time", *(s.clock for s in self.streams.values())}
-        self.clocks = {path for path in named & set(self.streams) if self.streams[path].unit == "s"}
+        # Those that others name as their clock, and the truth's.
+        self._clocks = {"truth/time", *(s.clock for s in self.streams.values())} & set(self.streams)
 
     @one_blas_thread
-    def observe(self, frames: Frames) -> dict[str, np.ndarray]:
-        """Rows of all streams for a batch of frames."""
-        return {path: rows for sensor in self.sensors.values() for path, rows in sensor.observe(frames).items()}
+    def observe(self, frames: Frames, first: int = 0, start: float = 0.0) -> dict[str, np.ndarray]:
+        """Rows of all streams for some frames.
+
+        Args:
+            frames: what is observed.
+            first: number of the first of them in the recording.
+            start: stamp of the motion's zero, s.
+        """
+        rows = {path: rows for sensor in self.sensors.values() for path, rows in sensor.observe(frames).items()}
+        for clock in self._clocks:
+            rows[clock] = rows[clock] + (start if self.streams[clock].unit == "s" else first)
+        return rows

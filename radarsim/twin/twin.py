@@ -13,7 +13,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
-from radarize import __version__
 from radarize.errors import InputError
 from radarize.radar.array import BOARDS
 from radarize.radar.config import RadarConfig
@@ -21,11 +20,10 @@ from radarize.recording import Recording
 from radarsim.calibrate import calibrate
 from radarsim.motion import Motion, Mounting, motion_through
 from radarsim.physics.frontend_config import Channel, FrontEndConfig, Mismatch
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.sensors.sensor import Rig
-from radarsim.sensors.sight import Sight
-from radarsim.sensors.suite import Suite
-from radarsim.simulate import Simulator, record
+from radarsim.sensors.suite import chosen
+from radarsim.simulate import record
 from radarsim.statistics import crossings
 
 #: s between two poses: over a longer gap nobody knows where the radar was, and frames there have no twin.
@@ -83,23 +81,16 @@ def make_twin(
         calibrate(recording, frontend)
     config = walk.config
     settings = FrontEndConfig.load(frontend) if frontend else _calibrated(config)
-    _, physics = np.random.default_rng(seed).spawn(2)  # as `simulate` does, which plans its route with the first
-    simulator = Simulator(world, walk.motion, config, physics, front_end=settings)
+    scenario = Scenario(world, walk.motion, config, settings, seed, tuple(chosen(sensors)))
     crossed = crossings(walk.motion, world)
-    facts = {
+    about = {
         "source": "radarsim twin",
         "twin_of": Path(recording).name,
-        "scene": world.name,
-        "seed": seed,
-        "radarsim_version": __version__,
-        "front_end": settings.model_dump_json(),
-        "motion": walk.motion.statistics(world).json(),
         "warnings": "; ".join(filter(None, [walk.left_out, crossed and f"poses: {crossed}"])),
     }
-    suite = Suite(Rig(world, walk.motion, config, simulator.front_end, Sight(world)), sensors, seed)
     return record(
-        output, simulator, suite, walk.times, start=walk.start, valid=walk.valid, cfg_text=walk.cfg_text,
-        attributes=facts, progress=progress,
+        scenario, output, times=walk.times, start=walk.start, valid=walk.valid, cfg_text=walk.cfg_text,
+        attributes=about, progress=progress,
     )  # fmt: skip
 
 

@@ -95,7 +95,14 @@ def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(run, "perform", interrupted)
     with pytest.raises(InputError, match="stopped; 1 of 2 recordings are finished in .*; the same command goes on"):
         make(FakeSpecification(fake("a"), fake("b")), tmp_path, say=lambda line: None)
-    assert not made(tmp_path)
+    assert list(made(tmp_path)) == ["b.h5.part"]  # to go on from
+
+
+def test_only_a_held_folder_is_anothers(tmp_path):
+    with pytest.raises(BlockingIOError), run._alone(tmp_path):
+        raise BlockingIOError("of something else")
+    with run._alone(tmp_path), pytest.raises(InputError, match="another run"), run._alone(tmp_path):
+        pass
 
 
 ORPHANS = """

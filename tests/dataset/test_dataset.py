@@ -16,8 +16,8 @@ from radarize.features.maps import MAPS
 from radarize.recording import Recording
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
-from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
+from radarsim.walk import Walk
 
 PLAIN = {
     "name": "tiny",
@@ -94,8 +94,8 @@ def test_variants_of_a_recording_share_its_walk(tmp_path):
             )  # fmt: skip
     poses = {name: pose for name, (pose, *_) in seen.items()}
     np.testing.assert_array_equal(poses["severe"], poses["mild"])
-    route, places = np.random.default_rng(task.seed).spawn(2)[0], np.array(group["waypoints"])
-    own = plan_motion(Scene.load(f"{tmp_path / 'hall.yaml'}@1"), "cart", 2.0, route, places)
+    walk = Walk("cart", 2.0, waypoints=np.array(group["waypoints"]))
+    own = walk.through(Scene.load(f"{tmp_path / 'hall.yaml'}@1"), task.seed)
     assert np.abs(own.position(np.array([1.9])) - poses["mild"][-1, :3]).max() > 0.05
     np.testing.assert_allclose(poses["coarse"], poses["mild"][::3][: len(poses["coarse"])], atol=2e-3)
     np.testing.assert_allclose(poses["high"][:, :2], poses["low"][:, :2], atol=0.02)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 
 from radarize.errors import InputError
@@ -12,6 +13,7 @@ from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS, load_config
 from radarsim.dataset.specification import Specification
+from radarsim.physics.frontend_config import Channel, FrontEndConfig, Leakage
 from radarsim.scene.description import shipped
 
 CONFIG = PRESETS["radarize"]
@@ -69,6 +71,34 @@ def test_parameters_tell_recordings_apart(tmp_path):
     scene.rename(tmp_path / "elsewhere" / "mine.yaml")
     moved = load(tmp_path / "elsewhere", buildings=PLAIN["buildings"] | {"office": "mine.yaml"})
     assert moved.tasks[3].identity == seen[1]
+
+
+def test_a_changed_mesh_is_another_recording(tmp_path):
+    """Of any level of the scene; where it lies and what else lies there do not matter."""
+    mine = "objects: [{name: a, shape: mesh, file: a.ply, material: wood}]\n"
+    (tmp_path / "mine.yaml").write_text(
+        mine + "levels: [{objects: [{name: b, shape: mesh, file: b.ply, material: wood}]}]"
+    )
+    seen = []
+    for sides in ((3, 4), (5, 4), (5, 6)):
+        for name, count in zip("ab", sides, strict=True):
+            trimesh.creation.cylinder(1.0, 2.0, sections=count).export(tmp_path / f"{name}.ply")
+        seen.append(load(tmp_path, buildings=PLAIN["buildings"] | {"office": "mine.yaml"}).tasks[3].identity)
+    assert len(set(seen)) == 3
+    (tmp_path / "c.ply").write_text("not named")
+    assert load(tmp_path, buildings=PLAIN["buildings"] | {"office": "mine.yaml"}).tasks[3].identity == seen[-1]
+
+
+def test_variants_change_parts_of_parts(tmp_path):
+    """A calibrated board keeps its channels when another of its leakage's fields changes."""
+    channels = tuple(Channel(gain_db=-40.0 - k, phase_deg=10.0 * k) for k in range(12))
+    FrontEndConfig(leakage=Leakage(channels=channels, delay=0.3e-9)).save(tmp_path / "board.yaml")
+    variants = {"far": {"frontend": {"leakage": {"delay": 0.9e-9}, "noise_figure_db": {30: 20.0}}}, "none": {}}
+    variants["none"]["frontend"] = {"leakage": None}
+    far, none = (task.variant.frontend_of(task.frontend)
+                 for task in load(tmp_path, frontend="board.yaml", variants=variants).tasks[:2])  # fmt: skip
+    assert far.leakage == Leakage(channels=channels, delay=0.9e-9) and none.leakage is None
+    assert far.noise_figure_db == {30.0: 20.0}  # a table is one value
 
 
 def test_the_papers_data_set():
@@ -197,9 +227,9 @@ GROUP = PLAIN["recordings"][0]
     [
         ({"seed": -1}, "seed is -1"),
         ({"bogus": 1}, "bogus: unknown key"),
-        ({"name": "a b"}, 'name is "a b"'),
+        ({"name": "a b"}, "name is 'a b'"),
         ({"sensors": ["deph"]}, "sensors: 'deph' is unknown, expected all or some of depth"),
-        ({"storage": "both"}, "storage is \"both\": input should be 'raw' or 'heatmaps'"),
+        ({"storage": "both"}, "storage is 'both': input should be 'raw' or 'heatmaps'"),
         ({"radar": "x.cfg"}, "x.cfg: no such radar configuration"),
         ({"frontend": "x.yaml"}, "x.yaml: cannot be read"),
         ({"buildings": {"old": {"kind": "Z"}}}, "buildings.old: "),
@@ -207,7 +237,7 @@ GROUP = PLAIN["recordings"][0]
         ({"buildings": {"office": "nowhere.yaml"}}, "buildings.office: scene file nowhere.yaml does not exist"),
         ({"recordings": []}, "recordings is []"),
         ({"recordings": [{"building": "old"}]}, "has no recordings[0].platform"),
-        ({"recordings": [GROUP | {"platform": "drone"}]}, 'recordings[0].platform is "drone"'),
+        ({"recordings": [GROUP | {"platform": "drone"}]}, "recordings[0].platform is 'drone'"),
         ({"recordings": [GROUP | {"count": 0}]}, "recordings[0].count is 0"),
         ({"recordings": [GROUP | {"duration": 0.001}]}, "recordings[0].duration is 0.001 s, expected at least one"),
         ({"recordings": [GROUP | {"building": "x"}]}, "recordings[0].building is 'x', expected one of buildings: old"),
@@ -220,7 +250,7 @@ GROUP = PLAIN["recordings"][0]
         ({"variants": {"a": {"frontend": {"noize": 1}}}}, "variants.a: frontend: noize: unknown key"),
         ({"variants": {"a": {"mounting": [1, 2]}}}, "variants.a.mounting"),
         ({"splits": {"a": {"kind": "random", "train": 0.5}}}, "splits.a: train + validation + test is 0.8, expected 1"),
-        ({"splits": {"a": {"kind": "x"}}}, "splits.a: input tag 'x'"),
+        ({"splits": {"a": {"kind": "x"}}}, "splits.a.kind is 'x', expected one of: random"),
         ({"splits": {"a": {"kind": "random", "folds": 0}}}, "splits.a.folds is 0"),
         ({"splits": {"a": {"kind": "platform", "train": ["x"]}}}, "splits.a: train names 'x', expected some of: cart"),
         (

@@ -1,18 +1,22 @@
 """The virtual radar's samples: each of them, when it is due, as the configuration says."""
 
+import errno
 import select
 import time
 
 import numpy as np
 import pytest
 
+from radarize.errors import InputError
 from radarize.radar.cfg import write_cfg
 from radarize.radar.dca1000 import Packet, decode, encode
-from radarize.radar.dca1000_commands import Command, Reply, Status
+from radarize.radar.dca1000_commands import Command, Reply, Request, Status
 from radarize.recording import Recording
 from radarsim.emulator.commandline import PROMPT
 from radarsim.emulator.disturbance import Disturbance
-from radarsim.emulator.source import Playback, Walk
+from radarsim.emulator.simulation import Simulation
+from radarsim.emulator.source import Playback
+from radarsim.walk import Walk
 from tests.emulator.client import SMALL, attached
 from tests.packets import packets
 from tests.virtual import CONFIG, record
@@ -158,7 +162,7 @@ def test_a_scene_is_simulated_as_simulate_does_it(tmp_path):
     simulate("office", tmp_path / "office.h5", duration=0.2, seed=3, radar=str(tmp_path / "small.cfg"))
     with Recording(tmp_path / "office.h5") as recording:
         expected = encode(recording.adc(0, len(recording)), SMALL).tobytes()
-    walk = Walk("office", duration=0.2, seed=3, radar=str(tmp_path / "small.cfg"))
+    walk = Simulation("office", Walk(duration=0.2), seed=3, radar=str(tmp_path / "small.cfg"))
     with attached(walk) as (emulator, client, said):
         client.record()
         assert client.configure(SMALL)[-1].endswith("Done\n\r" + PROMPT)
@@ -168,3 +172,40 @@ def test_a_scene_is_simulated_as_simulate_does_it(tmp_path):
             assert emulator.ready >= 0  # or the source's own error
         received = b"".join(Packet.decode(data).payload for data in arrived)
     assert received == expected[: len(received)] and len(expected) - len(received) < 1456
+
+
+class Cut:
+    """A socket whose cable is unplugged."""
+
+    def sendto(self, *_: object) -> None:
+        raise OSError(errno.ENETUNREACH, "Network is unreachable")
+
+
+def test_an_unplugged_cable_loses_packets_and_stops_nothing(tmp_path, monkeypatch):
+    record(tmp_path / "r.h5", SMALL, 5)
+    with attached(Playback(tmp_path / "r.h5", loop=True)) as (emulator, client, said):
+        client.record()
+        with monkeypatch.context() as cut:
+            cut.setattr(emulator._sockets, "_out", Cut())
+            assert client.configure(SMALL)[-1].endswith("Done\n\r" + PROMPT)
+            waited = time.monotonic() + 5
+            while emulator.frames < 3:
+                assert time.monotonic() < waited and emulator._thread.is_alive()
+                time.sleep(0.01)
+            client.commands.sendto(Request(Command.ALIVE).encode(), client.board)  # whose reply is lost
+            time.sleep(0.1)
+        assert select.select([client.data], [], [], 5)[0]  # plugged in again
+        assert "Done" in client.say("sensorStop")
+        assert client.ask(Command.ALIVE) == Reply(Command.ALIVE, 0)
+        assert sum("are lost (Network is unreachable)" in line for line in said) == 1
+
+
+def test_a_reset_while_it_starts_is_not_forgotten(tmp_path, monkeypatch):
+    record(tmp_path / "r.h5", SMALL, 5)
+    with attached(Playback(tmp_path / "r.h5", loop=True)) as (emulator, _, said):
+        prepare = emulator._prepare
+        monkeypatch.setattr(emulator, "_prepare", lambda config: (prepare(config), emulator._reset()))
+        with pytest.raises(InputError, match="reset while it started"):
+            emulator.start(SMALL, 0)
+        time.sleep(0.1)
+        assert emulator.frames == 0 and not any("started," in line for line in said)

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 import time
 from pathlib import Path
 
@@ -34,6 +35,19 @@ def test_a_job_is_begun_again_once(tmp_path):
     assert found["once"] == "stands"
     assert found["always"].startswith("always: its process was killed, twice; most often memory is short")
     assert len(list((tmp_path / "always").iterdir())) == 2
+
+
+def test_a_worker_that_dies_at_rest_is_replaced(tmp_path):
+    """Killed between two jobs, as the system does when memory is short."""
+    found = {}
+    for news in perform({name: Sleep(tmp_path / name, 0.0) for name in "ab"}, workers=1):
+        if news.ended:
+            found[news.name] = news
+        if news.ended and news.name == "a":
+            os.kill(found["a"].result, signal.SIGKILL)
+            while Path(f"/proc/{found['a'].result}/stat").read_text().split()[2] != "Z":
+                time.sleep(0.01)
+    assert found["b"].error is None and found["b"].result != found["a"].result
 
 
 def test_an_interrupt_ends_the_workers_and_no_other_child(tmp_path):

@@ -7,6 +7,7 @@ import numpy as np
 
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+from radarsim.physics.synthesis import BurstClock
 
 
 def beat(config: RadarConfig, motion, time: float, points, amplitude) -> np.ndarray:
@@ -51,3 +52,22 @@ def transfer_matrix(layers, cosine, frequency, tm):
     air = 1 / cosine if tm else cosine
     electric, magnetic = total[0] @ [1, air] * air, total[1] @ [1, air]
     return 2 * air / (electric + magnetic), (electric - magnetic) / (electric + magnetic)
+
+
+def direct_sum(config: RadarConfig, lengths: np.ndarray, amplitudes: np.ndarray) -> np.ndarray:
+    """The beat signal (loop, tx, rx, sample) of path-length parabolas as everybody writes it first: float64, one matrix
+    of phases per trace."""
+    loops, tx, rx, samples, _ = config.frame_shape
+    clock = BurstClock.of(config)
+    n = (np.arange(samples) - (samples - 1) / 2) / config.sample_rate
+    out = np.empty((loops, tx, rx, samples), complex)
+    for loop in range(loops):
+        for k in range(tx):
+            s = (config.chirp_times[loop, k] - clock.middle) / clock.half
+            for r in range(rx):
+                c0, c1, c2 = lengths[:, k * rx + r].T
+                length, rate = c0 + s * (c1 + s * c2), (c1 + 2 * s * c2) / clock.half
+                beat = (config.slope * length + config.center_frequency * rate) / SPEED_OF_LIGHT
+                cycles = config.center_frequency / SPEED_OF_LIGHT * length[:, None] + beat[:, None] * n
+                out[loop, k, r] = amplitudes @ np.exp(2j * np.pi * cycles)
+    return out

@@ -2,15 +2,13 @@
 
 import numpy as np
 import pytest
-import torch
 
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
-from radarsim.physics.direct import DirectSum
 from radarsim.physics.echoes import Echoes
 from radarsim.physics.synthesis import BurstClock, Synthesizer
-from tests.physics.brute_force import beat
+from tests.physics.brute_force import beat, direct_sum
 from tests.physics.rigs import Rig
 
 CONFIG = PRESETS["radarize"]
@@ -43,23 +41,14 @@ def test_against_direct_sum():
     """The same path-length parabolas summed directly: what the expansion itself leaves out."""
     echoes = cloud(np.random.default_rng(2), 300)
     lengths = echoes.lengths(CONFIG, FAST, 0.0)
-    assert error_db(Synthesizer(CONFIG)(lengths, echoes.amplitude), DirectSum(CONFIG)(lengths, echoes.amplitude)) < -60
+    assert error_db(Synthesizer(CONFIG)(lengths, echoes.amplitude), direct_sum(CONFIG, lengths, echoes.amplitude)) < -60
 
 
-def test_direct_sum_of_several_frames_in_blocks():
-    """The code that a GPU runs, on a CPU in float64: any number of frames, echoes and blocks gives the same sum."""
-    clouds = [cloud(np.random.default_rng(k), n) for k, n in enumerate((9, 0, 25))]
-    lengths = [c.lengths(CONFIG, FAST, 0.1 * k) for k, c in enumerate(clouds)]
-    amplitudes = [c.amplitude for c in clouds]
-    whole = DirectSum(CONFIG).batch(lengths, amplitudes)
-    for block in (1, 3 << 20, 40 << 20):
-        assert np.allclose(DirectSum(CONFIG, block_bytes=block).batch(lengths, amplitudes), whole, rtol=1e-12)
-    assert not whole[1].any()
-    single = DirectSum(CONFIG)
-    single.real, single.complex = torch.float32, torch.complex64  # as on CUDA
-    assert error_db(single.batch(lengths, amplitudes), whole) < -100
-    truth = beat(CONFIG, FAST, 0.2, clouds[2].points, clouds[2].amplitude)
-    assert error_db(whole[2], truth) < -55  # what parabolas leave out
+def test_the_direct_sum_itself():
+    """What parabolas leave out."""
+    echoes = cloud(np.random.default_rng(2), 25)
+    truth = beat(CONFIG, FAST, 0.2, echoes.points, echoes.amplitude)
+    assert error_db(direct_sum(CONFIG, echoes.lengths(CONFIG, FAST, 0.2), echoes.amplitude), truth) < -55
 
 
 @pytest.mark.parametrize(

@@ -50,7 +50,7 @@ objects:
         (f"objects: [{WALL.replace('facing', 'facking')}]", r"objects\[0\].* \(object 'wall'\)"),
         (f"objects: [{WALL.replace('[4, 3]', '[4, -3]')}]", r"objects\[0\].size\[1\] \(object 'wall'\) is -3"),
         (f"objects: [{WALL.replace('[4, 3]', '[4, .nan]')}]", r"objects\[0\].size\[1\]"),
-        (f"objects: [{WALL.replace('rectangle', 'blob')}]", r"objects\[0\] \(object 'wall'\)"),
+        (f"objects: [{WALL.replace('rectangle', 'blob')}]", r"objects\[0\].shape \(object 'wall'\) is 'blob'"),
         (f"objects: [{WALL}, {WALL}]", "two objects are named 'wall'"),
         (
             "objects: [{name: m, shape: mesh, file: gone.ply, material: wood}]",

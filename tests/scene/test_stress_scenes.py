@@ -8,15 +8,13 @@ import pytest
 from radarize.radar.presets import PRESETS
 from radarsim.dataset.specification import Specification
 from radarsim.physics.echoes import Provenance
-from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
 from radarsim.sensors.causes import CAUSES
 from radarsim.sensors.ghosts import NOISE, Ghosts
 from radarsim.sensors.scan import PlanarScan
-from radarsim.sensors.sensor import Rig
-from radarsim.sensors.sight import Sight
-from radarsim.simulate import Simulator
 from radarsim.statistics import crossings
+from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"]
 TASKS = Specification.load("stress").tasks
@@ -61,16 +59,11 @@ def test_every_level_is_worse_than_the_one_before(place):
         scene = Scene.load(task.scene)
         if motion is None:
             walk = np.array(task.waypoints)
-            motion = plan_motion(scene, task.platform, None, np.random.default_rng(task.seed).spawn(2)[0], walk)
+            motion = Walk(task.platform, waypoints=walk).through(scene, task.seed)
             assert motion.duration >= task.duration
         assert not crossings(motion.until(task.duration), scene)
-        simulator = Simulator(scene, motion, CONFIG, np.random.default_rng(task.seed))
-        rig = Rig(scene, motion, CONFIG, simulator.front_end, Sight(scene))
-        frames = simulator.observe(np.arange(1.0, 14.0, 2.0))
-        rng = np.random.default_rng(0)
-        cause, true = (
-            Ghosts(rig, rng).observe(frames)["truth/cause"],
-            PlanarScan(rig, rng).observe(frames)["truth/scan"],
-        )
-        found.append(measure(cause, true))
+        scenario = Scenario(scene, motion, CONFIG, seed=task.seed)
+        frames = scenario.frames(np.arange(1.0, 14.0, 2.0))
+        cause, true = Ghosts(scenario).observe(frames), PlanarScan(scenario).observe(frames)
+        found.append(measure(cause["truth/cause"], true["truth/scan"]))
     assert len(found) == 4 and np.all(np.diff(found) > 0) and found[3] - found[0] > least, found

@@ -1,4 +1,4 @@
-"""Rigs for tests of sensors, and frames of which only the times matter."""
+"""Radars to put sensors beside, and frames of which only the times matter."""
 
 import numpy as np
 import trimesh
@@ -7,11 +7,10 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from radarize.radar.presets import PRESETS
 from radarsim.motion import Motion
-from radarsim.physics.frontend import FrontEnd
+from radarsim.scenario import Scenario
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
-from radarsim.sensors.sensor import Frames, Rig
-from radarsim.sensors.sight import Sight
+from radarsim.sensors.sensor import Sensor
 
 CONFIG = PRESETS["radarize"]
 
@@ -24,21 +23,20 @@ def box(name: str, low, high, material: str = "concrete") -> SceneObject:
     return SceneObject(name, mesh, MATERIALS[material])
 
 
-def rig(motion: Motion, *objects: SceneObject, movers=(), config=CONFIG) -> Rig:
-    """Something to mount sensors on, far from the one thing that every scene needs."""
+def beside(motion: Motion, *objects: SceneObject, movers=(), config=CONFIG, seed: int = 0) -> Scenario:
+    """A radar to put sensors beside, far from the one thing that every scene needs."""
     scene = Scene("test", [box("far", [900, 900, 900], [901, 901, 901]), *objects], movers)
-    return Rig(scene, motion, config, FrontEnd(config), Sight(scene))
+    return Scenario(scene, motion, config, seed=seed)
 
 
-def frames(start: int, stop: int, config=CONFIG) -> Frames:
-    """Frames start...stop-1 without samples."""
-    return Frames(np.arange(start, stop) * config.frame_period, None, [], [], [])
+def rows(sensor: Sensor, start: int, stop: int) -> dict[str, np.ndarray]:
+    """What a sensor gives for frames start...stop-1."""
+    return sensor.observe(sensor.scenario.frames(np.arange(start, stop) * sensor.scenario.config.frame_period))
 
 
-def stream(sensor, name: str, count: int, batch: int = 8) -> np.ndarray:
+def stream(sensor: Sensor, name: str, count: int, batch: int = 8) -> np.ndarray:
     """All rows of a stream for a recording of `count` frames."""
-    batches = [frames(i, min(i + batch, count)) for i in range(0, count, batch)]
-    return np.concatenate([sensor.observe(each)[name] for each in batches])
+    return np.concatenate([rows(sensor, i, min(i + batch, count))[name] for i in range(0, count, batch)])
 
 
 def tumble(duration: float, rng: np.random.Generator) -> Motion:

@@ -3,16 +3,16 @@
 import numpy as np
 import open3d as o3d
 import pytest
-from mounting import box, rig
+from mounting import beside, box
 from scipy.spatial.transform import Rotation
 
+from radarize.radar.presets import PRESETS
 from radarsim.motion import Motion
 from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.movers import Person
 from radarsim.scene.scene import Scene
 from radarsim.sensors.depth import MOUNT, QUARTER, STRIP, DepthCamera, Intrinsics, Stereo
-from radarsim.sensors.sensor import Rig
-from radarsim.sensors.sight import Sight
 
 NOW = np.array([0.0])
 
@@ -39,10 +39,8 @@ def office() -> Scene:
 @pytest.mark.parametrize("camera", [QUARTER, STRIP])
 def test_depth_is_that_of_open3d(office, camera):
     motion = plan_motion(office, "handheld", 8.0, np.random.default_rng(4))
-    base = rig(motion)
-    where = Rig(office, motion, base.config, base.front_end, Sight(office))
     times = np.array([2.1, 4.7, 7.6])
-    found = DepthCamera(where, np.random.default_rng(0), camera).depth(times)
+    found = DepthCamera(Scenario(office, motion, PRESETS["radarize"]), camera).depth(times)
     for t, depth in zip(times[:, None], found, strict=True):
         rotation = motion.rotation(t)[0]
         expected = raycast(office, camera, motion.position(t)[0] + rotation.apply(MOUNT), rotation)
@@ -55,7 +53,7 @@ def test_depth_is_that_of_open3d(office, camera):
 def test_it_looks_where_the_radar_looks():
     """Left is left and up is up: a block to the left and above is in the upper left of the picture."""
     block = box("block", [2, 0.3, 1.3], [2.2, 0.7, 1.6])
-    depth = DepthCamera(rig(Motion.still((0, 0, 1)), block), np.random.default_rng(0)).depth(NOW)[0]
+    depth = DepthCamera(beside(Motion.still((0, 0, 1)), block)).depth(NOW)[0]
     v, u = np.nonzero(np.isfinite(depth))
     assert np.median(depth[v, u]) == pytest.approx(2.0, abs=1e-4)
     assert u.max() < QUARTER.cx and v.max() < QUARTER.cy
@@ -73,7 +71,7 @@ def test_the_view_is_87_by_58_degrees():
 def test_glass_is_looked_through_and_people_are_seen():
     pane, wall = box("pane", [2, -3, 0], [2.01, 3, 3], "glass"), box("wall", [4, -3, 0], [4.2, 3, 3])
     person = Person(name="someone", path=[(3.0, 0.0)], speed=0.0)
-    camera = DepthCamera(rig(Motion.still((0, 0, 1)), pane, wall, movers=[person]), np.random.default_rng(0))
+    camera = DepthCamera(beside(Motion.still((0, 0, 1)), pane, wall, movers=[person]))
     depth = camera.depth(NOW)[0]
     trunk = depth[50:60, 104:108]
     assert np.all((trunk > 2.7) & (trunk < 3.0))

@@ -7,14 +7,12 @@ from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.frontend_config import FrontEndConfig
-from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.sensors.causes import CAUSES
+from radarsim.sensors.causes import CAUSES, AdcByCause
 from radarsim.sensors.ghosts import NOISE, Ghosts
 from radarsim.sensors.scan import AZIMUTHS
-from radarsim.sensors.sensor import Rig
-from radarsim.sensors.sight import Sight
-from radarsim.simulate import Simulator
+from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"]
 
@@ -23,12 +21,10 @@ CONFIG = PRESETS["radarize"]
 def seen():
     """Three frames of people in an office: (ghost sensor, its rows, map of the I/Q by cause)."""
     scene = Scene.load("visitors")
-    route, physics = np.random.default_rng(1).spawn(2)
-    motion = plan_motion(scene, "handheld", 5.0, route)
-    simulator = Simulator(scene, motion, CONFIG, physics, front_end=FrontEndConfig(mismatch=None))
-    sensor = Ghosts(Rig(scene, motion, CONFIG, simulator.front_end, Sight(scene)), np.random.default_rng(0))
-    frames = simulator.observe(np.array([1.4, 4.1, 4.9]), by_cause=True)
-    iq = np.stack([frames.by_cause.real, frames.by_cause.imag], axis=-1).astype(np.float32)
+    motion = Walk("handheld", 5.0).through(scene, 1)
+    scenario = Scenario(scene, motion, CONFIG, FrontEndConfig(mismatch=None), seed=1)
+    sensor, frames = Ghosts(scenario), scenario.frames(np.array([1.4, 4.1, 4.9]))
+    iq = AdcByCause(scenario).observe(frames)["truth/adc_by_cause"].astype(np.float32)
     maps = Heatmaps(CONFIG, azimuths=AZIMUTHS)
     reference = np.stack([maps.range_azimuth(part).numpy() for part in iq])
     return sensor, sensor.observe(frames), reference
@@ -69,8 +65,8 @@ def test_cells_below_the_noise_are_noise(seen):
     """The level it takes for noise is that of a map of noise alone."""
     sensor, rows, reference = seen
     rng = np.random.default_rng(0)
-    empty = sensor._front_end.receive(np.zeros(CONFIG.frame_shape[:-1], np.complex64), rng)
-    leakage = sensor._front_end.by_cause([])[0]
+    empty = sensor.scenario.board.receive(np.zeros(CONFIG.frame_shape[:-1], np.complex64), rng)
+    leakage = sensor.scenario.board.by_cause([])[0]
     quiet = empty - leakage
     adc = np.stack([quiet.real, quiet.imag], axis=-1).astype(np.float32)[None]
     level = Heatmaps(CONFIG, azimuths=AZIMUTHS).range_azimuth(adc)[0].numpy()[30:70]

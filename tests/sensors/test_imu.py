@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mounting import CONFIG, frames, rig, stream, tumble
+from mounting import CONFIG, beside, rows, stream, tumble
 from scipy.spatial.transform import Rotation
 
 from radarsim.motion import Motion
@@ -11,14 +11,14 @@ from radarsim.sensors.imu import ACCELEROMETER, GYROSCOPE, RATE, STANDARD_GRAVIT
 
 
 def test_samples_come_at_200_hz_without_gaps():
-    imu = Imu(rig(Motion.still((0, 0, 1), duration=5)), np.random.default_rng(0))
-    times = np.concatenate([imu.observe(frames(a, b))["imu/time"] for a, b in ((0, 1), (1, 9), (9, 17), (17, 100))])
+    imu = Imu(beside(Motion.still((0, 0, 1), duration=5)))
+    times = np.concatenate([rows(imu, a, b)["imu/time"] for a, b in ((0, 1), (1, 9), (9, 17), (17, 100))])
     assert np.diff(times) == pytest.approx(np.full(len(times) - 1, 1 / RATE))
     assert times[0] == 0 and 100 * CONFIG.frame_period - 1 / RATE <= times[-1] < 100 * CONFIG.frame_period
 
 
 def test_at_rest_it_feels_gravity_upward():
-    tilted = Imu(rig(Motion.still((0, 0, 1), pitch=np.deg2rad(30))), np.random.default_rng(0))
+    tilted = Imu(beside(Motion.still((0, 0, 1), pitch=np.deg2rad(30))))
     force, turn = tilted.truth(np.array([0.2]))
     # Nose down by 30 degrees: up is half backward.
     assert force[0] == pytest.approx(STANDARD_GRAVITY * np.array([-0.5, 0, np.sqrt(0.75)]), abs=1e-6)
@@ -28,7 +28,7 @@ def test_at_rest_it_feels_gravity_upward():
 def test_centripetal_force_at_the_lever_arm():
     rate, arm = 2.0, 0.3
     motion = Motion.linear((0, 0, 1), (0, 0, 0), yaw_rate=rate, lever_arm=(arm, 0, 0))
-    force, turn = Imu(rig(motion), np.random.default_rng(0)).truth(np.array([0.1, 0.4]))
+    force, turn = Imu(beside(motion)).truth(np.array([0.1, 0.4]))
     assert force == pytest.approx(np.tile([-(rate**2) * (arm + MOUNT[0]), 0, STANDARD_GRAVITY], (2, 1)), abs=2e-3)
     assert turn == pytest.approx(np.tile([0, 0, rate], (2, 1)), abs=1e-6)
 
@@ -56,7 +56,7 @@ def integrate(imu: Imu, here: Motion, dt: float, duration: float) -> tuple[float
 def test_it_integrates_back_to_the_trajectory():
     """Ten seconds of tumbling: centimetres from 200 samples a second, and less with the step's square."""
     motion = tumble(10.0, np.random.default_rng(2))
-    imu = Imu(rig(motion), np.random.default_rng(0))
+    imu = Imu(beside(motion))
     way, turn = integrate(imu, motion.mounted(MOUNT), 1 / RATE, 10.0)
     assert way < 0.015 and turn < 1e-3
     finer, finer_turn = integrate(imu, motion.mounted(MOUNT), 1 / (4 * RATE), 10.0)
@@ -70,7 +70,7 @@ def test_allan_deviation_is_as_specified(errors):
     averages = (1, 4, 20, 200, 2000, 20000)
     variance = np.zeros(len(averages))
     for run in range(runs):
-        value, _ = Triad(errors, np.random.default_rng(run)).measure(np.zeros((size, 3)))
+        value = Triad(errors, np.random.default_rng(run), size).measure(np.zeros((size, 3)), np.arange(size))
         total = np.concatenate([np.zeros((1, 3)), np.cumsum(value, axis=0)])
         for i, m in enumerate(averages):  # overlapping estimate
             step = max(m // 8, 1)
@@ -84,14 +84,20 @@ def test_allan_deviation_is_as_specified(errors):
 
 
 def test_the_bias_is_told():
-    imu = Imu(rig(Motion.still((0, 0, 1), duration=30)), np.random.default_rng(3))
-    rows = imu.observe(frames(0, 900))
-    found = np.hstack([rows["imu/accelerometer"], rows["imu/gyroscope"]]) - [0, 0, STANDARD_GRAVITY, 0, 0, 0]
+    imu = Imu(beside(Motion.still((0, 0, 1), duration=30)))
+    seen = rows(imu, 0, 900)
+    found = np.hstack([seen["imu/accelerometer"], seen["imu/gyroscope"]]) - [0, 0, STANDARD_GRAVITY, 0, 0, 0]
     spread = np.r_[[ACCELEROMETER.noise] * 3, [GYROSCOPE.noise] * 3] / np.sqrt(30)
-    assert np.all(np.abs((found - rows["imu/bias"]).mean(axis=0)) < 4 * spread)
+    assert np.all(np.abs((found - seen["imu/bias"]).mean(axis=0)) < 4 * spread)
 
 
-def test_batches_do_not_matter_to_the_truth():
-    where = rig(tumble(2.0, np.random.default_rng(0)))
-    times = [stream(Imu(where, np.random.default_rng(0)), "imu/time", 50, batch) for batch in (1, 8, 50)]
-    assert np.array_equal(times[0], times[1]) and np.array_equal(times[1], times[2])
+@pytest.mark.parametrize("name", ["imu/time", "imu/bias", "imu/accelerometer"])
+def test_batches_do_not_matter(name):
+    imu = Imu(beside(tumble(2.0, np.random.default_rng(0))))
+    found = [stream(imu, name, 50, batch) for batch in (1, 8, 50)]
+    assert np.array_equal(found[0], found[1]) and np.array_equal(found[1], found[2])
+
+
+def test_a_longer_motion_begins_with_the_same_errors():
+    short, long = (Triad(GYROSCOPE, np.random.default_rng(1), count) for count in (300, 900))
+    assert np.array_equal(short.bias, long.bias[:300]) and np.ptp(long.bias[:, 0]) > 0

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mounting import box, frames, rig
+from mounting import beside, box, rows
 
 from radarize import polar
 from radarsim.motion import Motion
@@ -12,7 +12,7 @@ WALL = box("wall", [2.0, -20, 0], [2.2, 20, 3])
 
 
 def picture(motion: Motion, *objects) -> np.ndarray:
-    found = Lidar(rig(motion, *objects), np.random.default_rng(0)).observe(frames(0, 1))["truth/lidar"][0]
+    found = rows(Lidar(beside(motion, *objects)), 0, 1)["truth/lidar"][0]
     return np.unpackbits(found, axis=1).astype(bool)
 
 

@@ -2,23 +2,20 @@
 
 import numpy as np
 import pytest
-from mounting import CONFIG, box, frames, rig
+from mounting import CONFIG, beside, box, rows
 
 from radarsim.motion import Motion
 from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
 from radarsim.sensors.depth import MOUNT, QUARTER, DepthCamera
 from radarsim.sensors.scan import AZIMUTHS, Cell, Occupancy, PlanarScan
-from radarsim.sensors.sensor import Rig
-from radarsim.sensors.sight import Sight
 
 WALL = box("wall", [2.0, -20, 0], [2.2, 20, 3])
 
 
 def label(motion, *objects, config=CONFIG):
-    return Occupancy(rig(motion, *objects, config=config), np.random.default_rng(0)).observe(frames(0, 1, config))[
-        "truth/occupancy"
-    ][0]
+    return rows(Occupancy(beside(motion, *objects, config=config)), 0, 1)["truth/occupancy"][0]
 
 
 def test_a_wall_is_where_it_is():
@@ -51,14 +48,12 @@ def test_labels_agree_with_the_depth_camera():
     """Points of exact depth pictures within 2 cm of the sensor's plane lie in surface cells, and in no free one."""
     scene = Scene.load("office")
     motion = plan_motion(scene, "handheld", 6.0, np.random.default_rng(4))
-    base = rig(motion)
-    where = Rig(scene, motion, base.config, base.front_end, Sight(scene))
-    some = frames(0, 160)
-    some = type(some)(some.times[30::16], None, [], [], [])
-    states = Occupancy(where, np.random.default_rng(0)).observe(some)["truth/occupancy"]
-    scan = PlanarScan(where, np.random.default_rng(0)).observe(some)["truth/scan"]
-    instants = some.times + CONFIG.burst_center
-    depth = DepthCamera(where, np.random.default_rng(0)).depth(instants).reshape(len(states), -1)
+    where = Scenario(scene, motion, CONFIG)
+    some = where.frames(np.arange(30, 160, 16) * CONFIG.frame_period)
+    states = Occupancy(where).observe(some)["truth/occupancy"]
+    scan = PlanarScan(where).observe(some)["truth/scan"]
+    instants = some.middles
+    depth = DepthCamera(where).depth(instants).reshape(len(states), -1)
     points = QUARTER.rays.reshape(1, -1, 3) * depth[..., None] + MOUNT
     agree, free, close = [], [], []
     for k, rotation in enumerate(motion.rotation(instants)):

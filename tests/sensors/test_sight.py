@@ -4,7 +4,7 @@ import numpy as np
 import open3d as o3d
 import pytest
 import trimesh
-from mounting import rig
+from mounting import beside
 
 from radarsim.motion import Motion
 from radarsim.scene.movers import Door, Person
@@ -18,7 +18,7 @@ from radarsim.scene.movers import Door, Person
     ],
 )
 def test_movers_are_met_where_they_are(mover):
-    sight = rig(Motion.still((0, 0, 1)), movers=[mover]).sight
+    sight = beside(Motion.still((0, 0, 1)), movers=[mover]).sight
     rng = np.random.default_rng(0)
     aim = np.array([3.0, 0.0, 1.0]) + rng.normal(0, [0.3, 0.6, 0.5], (4000, 3)) - [0, 0, 1]
     ways = aim / np.linalg.norm(aim, axis=1, keepdims=True)

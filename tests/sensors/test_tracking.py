@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from mounting import frames, rig, tumble
+from mounting import beside, rows, tumble
 from scipy.spatial.transform import Rotation
 
 from radarsim.motion import Motion
@@ -11,8 +11,8 @@ from radarsim.sensors.tracking import HEADING_WALK, JITTER, SCALE_ERROR, Trackin
 
 def both(motion, count, seed):
     """Tracked poses, true poses and times of a recording."""
-    rows = TrackingCamera(rig(motion), np.random.default_rng(seed)).observe(frames(0, count))
-    return [rows[f"tracking/{name}"] for name in ("pose", "true_pose", "time")]
+    found = rows(TrackingCamera(beside(motion, seed=seed)), 0, count)
+    return [found[f"tracking/{name}"] for name in ("pose", "true_pose", "time")]
 
 
 def test_the_true_pose_is_that_of_the_radar():

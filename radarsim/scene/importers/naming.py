@@ -8,6 +8,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from radarize.errors import InputError
 from radarize.yamlfile import read_yaml
+from radarsim.complaint import complaint
 from radarsim.scene.description import CustomMaterial
 from radarsim.scene.importers.part import Part
 from radarsim.scene.materials import MATERIALS, material
@@ -63,9 +64,7 @@ class MaterialMap:
                 else:
                     TypeAdapter(CustomMaterial).validate_python(choice)
             except ValidationError as error:
-                problem = error.errors()[0]
-                place = ".".join(str(part) for part in problem["loc"])
-                raise InputError(f"{path}: {pattern}: {place or choice}: {problem['msg'].lower()}") from error
+                raise InputError(f"{path}: {pattern}: {complaint(error, choice)}") from error
             except InputError as error:
                 raise InputError(f"{path}: {pattern}: {error}") from error
         return cls({str(pattern): choice for pattern, choice in data.items()}, default)

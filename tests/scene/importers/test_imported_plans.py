@@ -15,10 +15,10 @@ from radarize.radar.presets import PRESETS
 from radarsim.motion import Motion
 from radarsim.physics.facets import Facets
 from radarsim.planner import plan_motion
+from radarsim.scenario import Scenario
 from radarsim.scene.importers import import_scene
 from radarsim.scene.importers.carmen import scans_of
 from radarsim.scene.scene import Scene
-from radarsim.simulate import Simulator
 
 RADISH = Path(__file__).parents[3] / ".." / "shared" / "recordings" / "radish"
 #: Two rooms with a doorway between them: faces at x = 0, 5, 5.2, 9 and y = 0, 4; a door from y = 1 to 2.
@@ -77,9 +77,9 @@ def test_pictures_work_as_well_as_their_yaml(tmp_path):
 def peak(scene: Scene, position, yaw: float) -> tuple[float, float, float]:
     """Range (m), azimuth (deg) and power (dB) of the strongest cell of the range-azimuth map beyond 1 m."""
     config = PRESETS["radarize"]
-    radar = Simulator(scene, Motion.still(position, yaw=yaw), config, np.random.default_rng(0))
+    radar = Scenario(scene, Motion.still(position, yaw=yaw), config)
     maps = Heatmaps(config)
-    power = maps.range_azimuth(radar.frames(np.zeros(1))[0])[0].numpy()
+    power = maps.range_azimuth(radar.frames(np.zeros(1)).samples)[0].numpy()
     power[maps.ranges < 1.0] = 0
     r, a = np.unravel_index(power.argmax(), power.shape)
     return float(maps.ranges[r]), float(np.rad2deg(maps.azimuths[a])), float(10 * np.log10(power[r, a]))

@@ -1,0 +1,180 @@
+"""What is simulated, and the one way from there to frames.
+
+A frame is a function of the scenario and of the instant at which it starts: all random numbers are keyed by the seed,
+what they are for and that instant (`draws`). So frames can be made in any order and number, again, or elsewhere.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Complex, Float, Int, Int16
+
+from radarize.errors import InputError
+from radarize.radar.config import RadarConfig
+from radarsim.draws import draws
+from radarsim.motion import Motion
+from radarsim.physics.crowd import Crowd
+from radarsim.physics.curved import Curved
+from radarsim.physics.echoes import Echoes
+from radarsim.physics.facets import Facets
+from radarsim.physics.finder import EchoFinder
+from radarsim.physics.frontend import FrontEnd
+from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.physics.pathsolver import PathSolverFinder
+from radarsim.physics.surface import Surface
+from radarsim.physics.synthesis import Synthesizer
+from radarsim.scene.scene import Scene
+from radarsim.sensors.sight import Sight
+from radarsim.threads import one_blas_thread
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """A radar that moves through a scene.
+
+    Attributes:
+        scene: the world.
+        motion: of the radar.
+        config: of the radar.
+        front_end: what its board is made of; default: an IWR1843BOOST.
+        seed: of scatterers, noise, sensors' errors, and what differs from board to board.
+        sensors: beside the radar, names from `radarsim.sensors.suite.SENSORS`; none changes the radar's samples.
+        engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver (see `physics.pathsolver`).
+
+    Raises:
+        InputError: no such engine.
+    """
+
+    scene: Scene
+    motion: Motion
+    config: RadarConfig
+    front_end: FrontEndConfig = FrontEndConfig()
+    seed: int = 0
+    sensors: tuple[str, ...] = ()
+    engine: str = "radarsim"
+
+    def __post_init__(self):
+        if self.engine not in ("radarsim", "sionna"):
+            raise InputError(f"engine is {self.engine!r}, expected radarsim or sionna")
+
+    def frames(self, times: Float[np.ndarray, "frame"], end: float | None = None) -> "Frames":
+        """The frames that start at `times`, ascending, s; nothing is computed before it is asked for.
+
+        Args:
+            times: on the clock of the motion.
+            end: when the frame after the last one starts, s; default: a frame period later.
+        """
+        times = np.asarray(times, float)
+        return Frames(self, times, times[-1] + self.config.frame_period if end is None else end)
+
+    @property
+    def times(self) -> Float[np.ndarray, "frame"]:
+        """Starts of the frames for which the motion lasts, one after another, s.
+
+        Raises:
+            InputError: it lasts for none.
+        """
+        count = self.config.frames_within(self.motion.duration)
+        if count < 1:
+            raise InputError(
+                f"duration is {self.motion.duration:g} s, expected at least one frame of {self.config.frame_period} s"
+            )
+        return np.arange(count) * self.config.frame_period
+
+    def ticks(self, rate: float) -> Int[np.ndarray, "tick"]:
+        """Numbers of all ticks that a clock of so many Hz makes while the motion lasts, and a frame's ends with it."""
+        return Frames(self, np.zeros(1), self.motion.duration + self.config.frame_period).ticks(rate)
+
+    def draws(self, purpose: str, time: float | None = None) -> np.random.Generator:
+        """Random numbers for a purpose, at an instant (s) if need be."""
+        return draws(self.seed, purpose, time)
+
+    # --- what frames are made with ------------------------------------------------------------------------------------
+    @cached_property
+    def board(self) -> FrontEnd:
+        """The front end of this very board."""
+        return FrontEnd(self.config, self.front_end, self.draws("board"))
+
+    @cached_property
+    def finder(self) -> EchoFinder | PathSolverFinder:
+        """Finds the echoes of a pose."""
+        weakest, antenna, band = self.board.weakest, self.front_end.pattern, self.front_end.band
+        if self.engine == "sionna":
+            seed = int(self.draws("sionna").integers(2**31))
+            return PathSolverFinder(self.scene, self.config, weakest, antenna, seed)
+        reach = None if band is None else band.high * self.config.max_range  # where the IF filter closes
+        return EchoFinder(
+            self.scene, Surface(self.scene, self.draws("surface")), Facets.of(self.scene, self.config), self.config,
+            weakest, reach, antenna, curved=Curved.of(self.scene, self.config),
+            crowd=Crowd(self.scene.movers, self.draws("movers")),
+        )  # fmt: skip
+
+    @cached_property
+    def synthesize(self) -> Synthesizer:
+        """Sums echoes to the beat signal."""
+        return Synthesizer(self.config)
+
+    @cached_property
+    def sight(self) -> Sight:
+        """What cameras and scanners see: first surfaces, things that move included."""
+        return Sight(self.scene)
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Some frames of a scenario, each step from the echoes to the samples made when it is first asked for.
+
+    Attributes:
+        scenario: that they are of.
+        times: start of each frame's first chirp, ascending, s.
+        end: start of the frame after the last, s.
+    """
+
+    scenario: Scenario
+    times: Float[np.ndarray, "frame"]
+    end: float
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @property
+    def middles(self) -> Float[np.ndarray, "frame"]:
+        """The middle of each burst, s."""
+        return self.times + self.scenario.config.burst_center
+
+    @cached_property
+    @one_blas_thread
+    def echoes(self) -> list[Echoes]:
+        """Echoes of each frame, found at the middle of the burst."""
+        motion, middles = self.scenario.motion, self.middles
+        return self.scenario.finder.batch(motion.position(middles), motion.rotation(middles).as_matrix(), middles)
+
+    @cached_property
+    def lengths(self) -> list[Float[np.ndarray, "echo virtual 3"]]:
+        """Path lengths of each frame's echoes, see `Echoes.lengths`."""
+        config, motion = self.scenario.config, self.scenario.motion
+        found = [e.lengths(config, motion, t) for t, e in zip(self.times, self.echoes, strict=True)]
+        for each in found:
+            each[..., 0] += 2 * config.range_bias  # a board's own delay, which the pipeline takes off again
+        return found
+
+    @cached_property
+    def received(self) -> list[Complex[np.ndarray, "echo"]]:
+        """Amplitudes of each frame's echoes behind the IF filters."""
+        response = self.scenario.board.if_response
+        pairs = zip(self.lengths, self.echoes, strict=True)
+        return [e.amplitude * response(length[:, 0, 0]) for length, e in pairs]
+
+    @cached_property
+    @one_blas_thread
+    def samples(self) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
+        """I/Q as the converter gives it."""
+        board, draws = self.scenario.board, self.scenario.draws
+        signals = map(self.scenario.synthesize, self.lengths, self.received)
+        return np.stack([board.digitize(s, draws("noise", t)) for t, s in zip(self.times, signals, strict=True)])
+
+    def ticks(self, rate: float) -> Int[np.ndarray, "tick"]:
+        """Numbers of the ticks that a clock of so many Hz, which starts at 0, makes from the first frame to the end."""
+        first, last = np.ceil(np.array([self.times[0], self.end]) * rate - 1e-6).astype(int)
+        return np.arange(first, last)

@@ -1,0 +1,191 @@
+"""Frames are functions of their instants: batches, order, processes and interruptions do not matter."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from radarize.radar.presets import PRESETS
+from radarize.recording import Recording
+from radarsim.accompany import accompany
+from radarsim.draws import draws
+from radarsim.motion import Mounting
+from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.scenario import Scenario
+from radarsim.scene.scene import Scene
+from radarsim.sensors.suite import Suite
+from radarsim.simulate import record
+from radarsim.walk import Walk
+
+CONFIG = PRESETS["radarize"].model_copy(update={"loops": 16})
+COUNT = 12
+SCENE = Scene.of(
+    {
+        "objects": [
+            {
+                "name": "floor",
+                "shape": "rectangle",
+                "size": [6, 4],
+                "position": [3, 2, 0],
+                "facing": [0, 0, 1],
+                "material": "concrete",
+            },
+            {
+                "name": "wall",
+                "shape": "rectangle",
+                "size": [4, 2.5],
+                "position": [6, 2, 1.2],
+                "facing": [-1, 0, 0],
+                "material": "concrete",
+            },
+            {
+                "name": "side",
+                "shape": "rectangle",
+                "size": [6, 2.5],
+                "position": [3, 4, 1.2],
+                "facing": [0, -1, 0],
+                "material": "concrete",
+            },
+            {
+                "name": "pipe",
+                "shape": "cylinder",
+                "radius": 0.05,
+                "height": 2,
+                "position": [5, 3, 1],
+                "material": "metal",
+            },
+        ],
+        "moving": [{"kind": "person", "name": "visitor", "path": [[3, 1], [5, 2.5]], "speed": 1.2}],
+    },
+    "room",
+)
+
+
+def room(*sensors: str, seed: int = 4) -> Scenario:
+    """Somebody in a room, and everything that noise, boards and phases are drawn for; the radar swings on an arm."""
+    places, mounting = np.array([[0.8, 1.5], [3.0, 2.5]]), Mounting.of((0.2, 0.05, 0.1), (2, 3, -1))
+    walk = Walk("cart", 1.3, waypoints=places, mounting=mounting)
+    return Scenario(SCENE, walk.through(SCENE, seed), CONFIG, FrontEndConfig(), seed, sensors)
+
+
+@pytest.fixture(scope="module")
+def scenario() -> Scenario:
+    return room("all")
+
+
+@pytest.fixture(scope="module")
+def whole(scenario) -> np.ndarray:
+    """The first frames in one go."""
+    return scenario.frames(scenario.times[:COUNT]).samples
+
+
+@pytest.mark.parametrize("size", [1, 3, 8])
+def test_batches_do_not_matter(scenario, whole, size):
+    parts = [scenario.frames(scenario.times[k : min(k + size, COUNT)]).samples for k in range(0, COUNT, size)]
+    assert np.array_equal(np.concatenate(parts), whole)
+
+
+def test_neither_does_the_order(scenario, whole):
+    backwards = [scenario.frames(scenario.times[k : k + 1]).samples[0] for k in reversed(range(COUNT))]
+    assert np.array_equal(backwards[::-1], whole)
+    assert np.array_equal(scenario.frames(scenario.times[5:7]).samples, whole[5:7])  # and again
+
+
+def test_sensors_see_the_same_in_any_batches(scenario):
+    suite, times = Suite(scenario), scenario.times[:COUNT]
+    once = suite.observe(scenario.frames(times))
+    for size in (1, 3):
+        rows = [suite.observe(scenario.frames(times[k : k + size]), k) for k in reversed(range(0, COUNT, size))][::-1]
+        for name, expected in once.items():
+            assert np.array_equal(np.concatenate([each[name] for each in rows]), expected, equal_nan=True), name
+
+
+def test_draws_differ_by_seed_purpose_and_instant():
+    keys = [(s, p, t) for s in (0, 1) for p in ("noise", "depth") for t in (None, 0.0, 1e-9, 1 / 30, 200.0)]
+    first = {draws(*key).random() for key in keys}
+    assert len(first) == len(keys) and first == {draws(*key).random() for key in keys}
+
+
+HALF = """
+import sys
+from pathlib import Path
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+from test_scenario import COUNT, room
+
+scenario, low, high = room("imu"), *map(int, sys.argv[3:])
+np.save(sys.argv[2], scenario.frames(scenario.times[low:high]).samples)
+"""
+
+
+def test_two_processes_make_the_halves_of_a_recording(whole, tmp_path):
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", HALF, Path(__file__).parent]
+    ranges = [(5, COUNT), (0, 5)]
+    started = [
+        subprocess.Popen([*command, tmp_path / f"{low}.npy", str(low), str(high)], env=environment)
+        for low, high in ranges
+    ]
+    assert [process.wait() for process in started] == [0, 0]
+    assert np.array_equal(np.concatenate([np.load(tmp_path / f"{low}.npy") for low in (0, 5)]), whole)
+
+
+class Killed(Exception):
+    """Stands for the end of the process: the file is left as it lies on the disk then."""
+
+
+def until_killed(scenario: Scenario, path: Path, frames: int) -> Path:
+    """What a run leaves that is killed after so many frames."""
+
+    def progress(done: int, _: int) -> None:
+        if done >= frames:
+            shutil.copy(path.with_name(path.name + ".part"), path.with_name("left"))
+            raise Killed
+
+    with pytest.raises(Killed):
+        record(scenario, path, progress=progress)
+    return path.with_name("left").rename(path.with_name(path.name + ".part"))
+
+
+def test_a_killed_recording_goes_on_where_it_stopped(tmp_path, monkeypatch):
+    """To the same bytes, without making anew what is there but for two frames that are compared."""
+    scenario = room("imu", "points", "tracking", "depth")
+    expected = record(scenario, tmp_path / "whole.h5").read_bytes()
+    part = until_killed(scenario, tmp_path / "a.h5", 33)
+    with Recording(part) as left:
+        kept = len(left)
+    assert 30 <= kept < len(scenario.times)
+    asked: list[np.ndarray] = []
+    monkeypatch.setattr(Scenario, "frames", lambda *args, made=Scenario.frames: asked.append(args[1]) or made(*args))
+    record(scenario, tmp_path / "a.h5")
+    assert (tmp_path / "a.h5").read_bytes() == expected
+    assert sum(map(len, asked)) < len(scenario.times) - kept + 3
+    assert sorted(path.name for path in tmp_path.glob("a.h5*")) == ["a.h5"]
+
+
+def test_what_another_run_has_left_is_not_gone_on_with(tmp_path):
+    """Another seed, and another world of the same name, which only its frames tell."""
+    scenario = room()
+    expected = record(scenario, tmp_path / "whole.h5").read_bytes()
+    emptier = Scene("room", [item for item in SCENE.objects if item.name != "pipe"], SCENE.movers)
+    emptier = Scenario(emptier, scenario.motion, CONFIG, FrontEndConfig(), scenario.seed)
+    for other in (room(seed=5), emptier):
+        until_killed(other, tmp_path / "a.h5", 33)
+        record(scenario, tmp_path / "a.h5")
+        assert (tmp_path / "a.h5").read_bytes() == expected
+
+
+def test_sensors_added_later_are_those_made_at_once(scenario, tmp_path):
+    """Even those that look at the radar's echoes and samples."""
+    names = ("tracking", "imu", "points", "ghosts", "depth")
+    bare = room()
+    later = accompany(record(bare, tmp_path / "later.h5"), bare, names)
+    with Recording(later) as one, Recording(record(room(*names), tmp_path / "once.h5")) as other:
+        assert sorted(one.names()) == sorted(other.names())
+        for name in other.names():
+            assert np.array_equal(one.read(name), other.read(name), equal_nan=True), name
+        assert np.array_equal(one.adc(0, len(one)), other.adc(0, len(other)))

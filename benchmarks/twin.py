@@ -74,7 +74,9 @@ def main() -> None:
     place = Scene.load("office")
 
     def all_of(material: str) -> Scene:
-        return Scene("office", [replace(thing, material=MATERIALS[material]) for thing in place.objects])
+        return Scene(
+            "office", [replace(thing, material=MATERIALS[material]) for thing in place.objects], life=place.life
+        )
 
     rows = []
     with TemporaryDirectory() as temporary, progress("twins") as report:

@@ -13,6 +13,7 @@ from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
 from radarize.recording import RecordingWriter
 from radarsim.motion import Motion, Mounting, motion_from_tum
+from radarsim.physics.clutter import Clutter, Cluttered
 from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
 from radarsim.physics.direct import DirectSum
@@ -24,6 +25,7 @@ from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.physics.pathsolver import PathSolverFinder
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
+from radarsim.physics.unevenness import Heights
 from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.sensors.sensor import Frames, Rig
@@ -69,9 +71,10 @@ class Simulator:
         else:
             band = self.front_end.settings.band
             reach = None if band is None else band.high * config.max_range  # where the IF filter closes
+            surface, clutter, heights = Surface(scene, world), Clutter(scene, world), Heights.of(scene, world)
             self.finder = EchoFinder(
-                scene, Surface(scene, world), Facets.of(scene, config), config, weakest, reach, antenna,
-                curved=Curved.of(scene, config), crowd=Crowd(scene.movers, crowd),
+                scene, Cluttered(surface, clutter), Facets.of(scene, config), config, weakest, reach, antenna,
+                curved=Curved.of(scene, config), crowd=Crowd(scene.movers, crowd), heights=heights,
             )  # fmt: skip
         self.synthesize = Synthesizer(config) if device == "cpu" else DirectSum(config, device)
 

@@ -15,7 +15,7 @@ from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene.scene import Scene
-from tests.physics.corners import corner, cross_section, direction, looking
+from tests.physics.corners import corner, cross_section, direction, looking, seen_by_all, seen_by_both
 from tests.physics.rigs import isotropic_view
 
 CONFIG = PRESETS["radarize"]
@@ -27,7 +27,7 @@ LAMBDA = CONFIG.wavelength
 def test_dihedral(off, a, b):
     """sigma = 8 pi a^2 b^2 / lambda^2 head on; off it, by the width that both plates share, 2 a min(sin, cos)."""
     azimuth = np.deg2rad(45 + off)
-    area = 2 * a * b * min(np.sin(azimuth), np.cos(azimuth))
+    area = seen_by_both(a, b, azimuth)
     found = cross_section(corner(2, a, b), direction(azimuth, 0))
     assert 10 * np.log10(found / (4 * np.pi * area**2 / LAMBDA**2)) == pytest.approx(0, abs=0.2)
     if off == 0:
@@ -48,9 +48,7 @@ def test_trihedral(off):
     a = 0.04
     azimuth, elevation = np.pi / 4 + np.deg2rad(off[0]), np.arcsin(1 / np.sqrt(3)) + np.deg2rad(off[1])
     towards = direction(azimuth, elevation)
-    low, middle, high = np.sort(towards)
-    total = low + middle + high
-    area = a**2 * (total - 2 / total if low + middle >= high else 4 * low * middle / total)
+    area = seen_by_all(a, towards)
     found = cross_section(corner(3, a, a, triangles=True), towards)
     assert 10 * np.log10(found / (4 * np.pi * area**2 / LAMBDA**2)) == pytest.approx(0, abs=0.3)
     if off == (0, 0):
@@ -100,6 +98,31 @@ def test_kirchhoff_integral(seed):
     assert chains.kirchhoff(polygon, 5) == pytest.approx(truth, abs=3e-3)
 
 
+def images_of_a_room(view):
+    """Images of a radar in a box room, by walls and chains of them: isometries, amplitudes, orders."""
+    facets = Facets.of(Scene.load("physics/room"), CONFIG)
+    _, _, single, flash = plates.parts(facets, view)
+    walls = (
+        np.abs(np.linalg.det(single[:, :, :3]) + 1 + np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1)) < 1e-6
+    )
+    chain, isometry, amplitude, _ = chains.images(Mirrors.of(facets, None, 50.0), np.arange(6), view)
+    both = chain[:, 0] != chain[:, 2]
+    order = np.concatenate(
+        [np.ones(walls.sum(), int), *(2 + (chain[some, 1] != chain[some, 2]) for some in (both | True, both))]
+    )
+    isometry = np.concatenate([single[walls], isometry, chains.reverse(isometry[both])])
+    return isometry, np.concatenate([flash[walls], amplitude, amplitude[both]]), order
+
+
+def lattice(p):
+    """The same images by the lattice of rooms: order, by axis whether it is turned, and place."""
+    low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
+    for cell in product(range(-3, 4), repeat=3):
+        order, even = int(np.abs(cell).sum()), np.array(cell) % 2 == 0
+        if 1 <= order <= 3:
+            yield order, ~even, low + cell * (high - low) + np.where(even, p - low, high - p)
+
+
 def test_box_room_has_all_its_images(monkeypatch):
     """6 images of first, 18 of second and 38 of third order and no others, with delay, sign and strength.
 
@@ -110,43 +133,25 @@ def test_box_room_has_all_its_images(monkeypatch):
     for module, kernel in ((chains, "_search"), (plates, "_parts")):
         monkeypatch.setattr(module, "gain_towards", lambda *_: 1.0)
         monkeypatch.setattr(module, kernel, getattr(module, kernel).py_func)
-    scene = Scene.load("physics/room")
-    low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
     p, pose = np.array([0.37, -0.21, 1.23]), Rotation.from_euler("ZYX", [0.3, 0.4, 0.5]).as_matrix()
-    facets, view = Facets.of(scene, CONFIG), isotropic_view(p, LAMBDA, pose)
-    _, _, single, flash = plates.parts(facets, view)
-    walls = (
-        np.abs(np.linalg.det(single[:, :, :3]) + 1 + np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1)) < 1e-6
-    )
-    chain, isometry, amplitude, _ = chains.images(Mirrors.of(facets, scene, 50.0), np.arange(6), view)
-    both = chain[:, 0] != chain[:, 2]
-    order = np.concatenate(
-        [np.ones(walls.sum(), int), *(2 + (chain[some, 1] != chain[some, 2]) for some in (both | True, both))]
-    )
-    isometry = np.concatenate([single[walls], isometry, chains.reverse(isometry[both])])
-    amplitude = np.concatenate([flash[walls], amplitude, amplitude[both]])
+    isometry, amplitude, order = images_of_a_room(isotropic_view(p, LAMBDA, pose))
     found = isometry[:, :, :3] @ p + isometry[:, :, 3]
 
     counted, known = {1: 0, 2: 0, 3: 0}, np.zeros(len(found), bool)
-    for cell in product(range(-3, 4), repeat=3):
-        length = int(np.abs(cell).sum())
-        if length not in counted:
-            continue
-        even = np.array(cell) % 2 == 0
-        image = low + cell * (high - low) + np.where(even, p - low, high - p)
-        turns = np.where(even, 1.0, -1.0)  # the product of reflections in a box is diagonal
+    for length, turned, image in lattice(p):
+        turns = np.where(turned, -1.0, 1.0)  # the product of reflections in a box is diagonal
         path = np.linalg.norm(image - p)
         out = (image - p) / path
         sent = pose[:, 2] - pose[:, 2] @ out * out
         arriving = turns * out
         taken = pose[:, 2] - pose[:, 2] @ arriving * arriving
-        turned = (-1) ** length * turns * sent / np.linalg.norm(sent)
-        expected = LAMBDA / (4 * np.pi * path) * turned @ taken / np.linalg.norm(taken)
+        field = (-1) ** length * turns * sent / np.linalg.norm(sent)
+        expected = LAMBDA / (4 * np.pi * path) * field @ taken / np.linalg.norm(taken)
         here = (np.linalg.norm(found - image, axis=1) < 1e-6) & (order == length)
-        assert here.any(), cell
+        assert here.any(), image
         counted[length] += 1
         known |= here
-        assert np.sum(amplitude[here]) == pytest.approx(expected, abs=0.023 * LAMBDA / (4 * np.pi * path)), cell
+        assert np.sum(amplitude[here]) == pytest.approx(expected, abs=0.023 * LAMBDA / (4 * np.pi * path)), image
     assert counted == {1: 6, 2: 18, 3: 38}
     assert known.all()
 

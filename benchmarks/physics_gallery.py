@@ -353,7 +353,7 @@ def small_things(axis) -> str:
     return (
         f"{len(sigma) / 120:.2f} things a square metre of wall where {ON_WALLS:g} are meant, of {db(sigma.mean()):.1f} "
         f"dBsm on average where {db(CROSS_SECTION):.1f} are; Kolmogorov-Smirnov: p = "
-        f"{stats.kstest(sigma, weibull.cdf).pvalue:.2f}. Their levels were chosen beside RadarHD's training walks, never "
+        f"{stats.kstest(sigma, weibull.cdf).pvalue:.2f}. Levels were chosen beside RadarHD's training walks, never "
         "its test walks (`benchmarks.realism`)."
     )
 

@@ -39,7 +39,9 @@ def main() -> None:
     office, other, rows = Scene.load("office"), options.seed + 6, []
 
     def all_of(material: str) -> Scene:
-        return Scene("office", [replace(thing, material=MATERIALS[material]) for thing in office.objects])
+        return Scene(
+            "office", [replace(thing, material=MATERIALS[material]) for thing in office.objects], life=office.life
+        )
 
     twins: list[tuple[str, Scene, Change | None, int]] = [
         ("the same again", office, None, options.seed),

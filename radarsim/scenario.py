@@ -14,6 +14,7 @@ from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarsim.draws import draws
 from radarsim.motion import Motion
+from radarsim.physics.clutter import Clutter, Cluttered
 from radarsim.physics.crowd import Crowd
 from radarsim.physics.curved import Curved
 from radarsim.physics.echoes import Echoes
@@ -24,6 +25,7 @@ from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.physics.pathsolver import PathSolverFinder
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
+from radarsim.physics.unevenness import Heights
 from radarsim.scene.scene import Scene
 from radarsim.sensors.sight import Sight
 from radarsim.threads import one_blas_thread
@@ -104,10 +106,11 @@ class Scenario:
             seed = int(self.draws("sionna").integers(2**31))
             return PathSolverFinder(self.scene, self.config, weakest, antenna, seed)
         reach = None if band is None else band.high * self.config.max_range  # where the IF filter closes
+        scatterers = Cluttered(Surface(self.scene, self.draws("surface")), Clutter(self.scene, self.draws("clutter")))
         return EchoFinder(
-            self.scene, Surface(self.scene, self.draws("surface")), Facets.of(self.scene, self.config), self.config,
-            weakest, reach, antenna, curved=Curved.of(self.scene, self.config),
-            crowd=Crowd(self.scene.movers, self.draws("movers")),
+            self.scene, scatterers, Facets.of(self.scene, self.config), self.config, weakest, reach, antenna,
+            curved=Curved.of(self.scene, self.config), crowd=Crowd(self.scene.movers, self.draws("movers")),
+            heights=Heights.of(self.scene, self.draws("unevenness")),
         )  # fmt: skip
 
     @cached_property

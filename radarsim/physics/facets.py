@@ -11,6 +11,7 @@ from radarsim.physics.bodies import recognise
 from radarsim.physics.coefficients import TABLE, as_slab, reflection
 from radarsim.physics.grid import Grid
 from radarsim.physics.planes import plates
+from radarsim.physics.unevenness import FINISHES
 from radarsim.scene.materials import Material
 from radarsim.scene.scene import Scene
 
@@ -34,6 +35,7 @@ class Facets:
         horizontal: part of a floor or ceiling.
         reflection: complex reflection coefficient by (facet, polarisation TE / TM, cosine of incidence), roughness
             included, as it appears in the beat signal (conjugate of the field's).
+        finish: how uneven they are over plaster, see `unevenness.FINISHES`; default: flat.
     """
 
     corners: Float[np.ndarray, "facet 4 3"]
@@ -46,6 +48,11 @@ class Facets:
     mirror: np.ndarray
     horizontal: np.ndarray
     reflection: Complex[np.ndarray, "facet 2 cosine"]
+    finish: Float[np.ndarray, "facet"] | None = None
+
+    def __post_init__(self):
+        if self.finish is None:
+            object.__setattr__(self, "finish", np.zeros(len(self)))
 
     def __len__(self) -> int:
         return len(self.center)
@@ -69,11 +76,12 @@ class Facets:
             if slab not in tables:
                 tables[slab] = reflection(slab, config)
             smallest = SMALLEST_METAL_PLATE if item.material.conductor else SMALLEST_PLATE
+            finish = FINISHES.get(item.material.name, 0.0)
             _, is_round = recognise(item.mesh)
             for p in plates(item.mesh, ~is_round, smallest):
                 mirror = 4 * p.half.prod() >= SMALLEST_MIRROR
                 sides = (item.two_sided, mirror, item.is_floor_or_ceiling)
-                rows.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *sides, tables[slab]))
+                rows.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *sides, tables[slab], finish))
         if rows:
             return cls(*(np.array(column) for column in zip(*rows, strict=True)))
         none, empty = np.zeros(0, bool), np.zeros((0, 3))

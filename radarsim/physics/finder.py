@@ -25,6 +25,7 @@ from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.slabs import Slabs
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import NODES, BurstClock
+from radarsim.physics.unevenness import Heights
 from radarsim.physics.view import View
 from radarsim.scene.scene import Scene
 
@@ -45,6 +46,7 @@ class EchoFinder:
         antenna: the elements' pattern; default: the IWR1843BOOST's.
         curved: round bodies.
         crowd: what moves by itself.
+        heights: how uneven walls are; default: flat.
     """
 
     def __init__(
@@ -58,9 +60,10 @@ class EchoFinder:
         antenna: Antenna | None = None,
         curved: Curved | None = None,
         crowd: Crowd | None = None,
+        heights: Heights | None = None,
     ):
         self.scene, self.surface, self.facets, self.config = scene, surface, facets, config
-        self.weakest, self.curved, self.crowd = weakest, curved, crowd
+        self.weakest, self.curved, self.crowd, self.heights = weakest, curved, crowd, heights
         self.reach = 1.05 * config.max_range if reach is None else reach
         self.mirrors = None if facets is None else Mirrors.of(facets, scene, self.reach)
         self.obstacles = Obstacles(scene, None if scene is None else Slabs(scene, config, CLEARANCE), crowd)
@@ -94,7 +97,7 @@ class EchoFinder:
         if self.mirrors is not None:
             limits = self.reach, self.config.wavelength, self.weakest, self._tables
             views = [View(p, r, *limits) for p, r in zip(positions, rotations, strict=True)]
-            images = Images.of(batch, self.facets, self.curved, self.mirrors, near, self.obstacles, views)
+            images = Images.of(batch, self.facets, self.curved, self.mirrors, near, self.obstacles, views, self.heights)
         return self._echoes(batch, candidates, legs, pairs, images)
 
     def _straight(self, batch: Batch, candidates: Candidates) -> Legs:

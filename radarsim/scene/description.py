@@ -21,6 +21,9 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
       - objects: [{name: "*", material: metal}, {name: pillar, shape: cylinder, ...}]    # level 2
 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
+
+``clutter`` and ``unevenness`` say how far the place is from its drawing (see `scene.Life`): 1 as usual, 0 not at all.
+Left out, they are 1 for a building and 0 for objects alone.
 """
 
 import re
@@ -40,10 +43,11 @@ from radarsim.scene.buildings import Building
 from radarsim.scene.materials import Material, constant, decibel, material
 from radarsim.scene.movers import Mover
 from radarsim.scene.office import Office
-from radarsim.scene.scene import SceneObject
+from radarsim.scene.scene import Life, SceneObject
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=10)]
 Vector = tuple[Number, Number, Number]
 
 
@@ -166,6 +170,15 @@ class Description(_Strict):
     building: Annotated[Office | Building, Field(discriminator="kind")] | None = None
     moving: list[Mover] = []
     levels: list[Level] = []
+    clutter: Share | None = None
+    unevenness: Share | None = None
+
+    @property
+    def life(self) -> Life:
+        """What tells the place from its drawing."""
+        usual = float(self.building is not None)
+        clutter, unevenness = (usual if given is None else given for given in (self.clutter, self.unevenness))
+        return Life(clutter, unevenness)
 
 
 def split_level(name: str | Path) -> tuple[str, int]:
@@ -220,19 +233,19 @@ def meshes(path: Path) -> list[Path]:
     return [path.parent / name for name in sorted(found)]
 
 
-def read(path: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover]]:
-    """Name, objects and movers of a scene file at one of its levels.
+def read(path: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover], Life]:
+    """Name, objects, movers and life of a scene file at one of its levels.
 
     Raises:
         InputError: unreadable, malformed YAML, unknown key, value, material, mesh file or level.
     """
-    name, objects, moving = built(read_yaml(path), str(path), path.parent, level)
+    name, *parts = built(read_yaml(path), str(path), path.parent, level)
     name = name or path.stem
-    return (f"{name}@{level}" if level else name), objects, moving
+    return (f"{name}@{level}" if level else name), *parts
 
 
-def built(data: object, source: str, folder: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover]]:
-    """Name ("" where it has none), objects and movers of a description as read from YAML.
+def built(data: object, source: str, folder: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover], Life]:
+    """Name ("" where it has none), objects, movers and life of a description as read from YAML.
 
     Args:
         data: the description.
@@ -252,7 +265,7 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> tuple[str,
         raise InputError(f"{source}: {error}") from error
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
-    return description.name, objects, description.moving
+    return description.name, objects, description.moving, description.life
 
 
 def described(data: object, source: str, level: int = 0) -> Description:

@@ -48,6 +48,19 @@ class SceneObject:
         return bool(np.all(np.abs(self.mesh.face_normals[:, 2]) > 0.999))
 
 
+@dataclass(frozen=True)
+class Life:
+    """What tells a place from its drawing, as shares of what is usual; none: the drawing itself.
+
+    Attributes:
+        clutter: small things on walls, desks and shelves and under ceilings (`radarsim.physics.clutter`).
+        unevenness: how far walls, floors and ceilings are from their planes (`radarsim.physics.unevenness`).
+    """
+
+    clutter: float = 0.0
+    unevenness: float = 0.0
+
+
 class Scene:
     """Objects, their triangles in one list, and ray tests.
 
@@ -55,6 +68,7 @@ class Scene:
         name: for titles and recordings.
         objects: with unique names.
         movers: things that move by themselves (`movers`); ray tests know the objects only.
+        life: how lived-in the place is.
 
     Attributes:
         triangles: (T, 3, 3) corners of all triangles, in the order of the objects, m.
@@ -65,8 +79,8 @@ class Scene:
         InputError: no object, a name twice, a mesh without triangles or too far away.
     """
 
-    def __init__(self, name: str, objects: list[SceneObject], movers: Sequence = ()):
-        self.name, self.objects, self.movers = name, list(objects), list(movers)
+    def __init__(self, name: str, objects: list[SceneObject], movers: Sequence = (), life: Life = Life()):
+        self.name, self.objects, self.movers, self.life = name, list(objects), list(movers), life
         if not self.objects:
             raise InputError(f"scene {name}: has no objects, expected at least one")
         seen: set[str] = set()
@@ -114,8 +128,8 @@ class Scene:
         """
         from radarsim.scene.description import built
 
-        _, objects, moving = built(description, f"scene {name}", Path())
-        return cls(name, objects, moving)
+        _, *parts = built(description, f"scene {name}", Path())
+        return cls(name, *parts)
 
     @property
     def bounds(self) -> Float[np.ndarray, "2 3"]:

@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from radarize.batch import Batch, Signal
 from radarize.errors import InputError
 from radarize.features.maps import MAPS
-from radarize.mapping.scans import ScanConfig, make_scans
+from radarize.mapping.scans import Maps, ScanConfig
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.config import RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
@@ -229,7 +229,7 @@ class _Analysis:
             found[name] = foreground(made.astype(np.float32)[:, rows]).astype(np.float16)
         found["velocity"] = self._velocities(batch)
         sharp = self.maker.heatmaps.range_azimuth_of(spectrum, "capon").numpy()
-        found["scan"] = make_scans(sharp, self.ranges, self.azimuths, method="first-echo")
+        found["scan"] = Maps.of(self.maker.heatmaps, ScanConfig(), [sharp]).scans("first-echo")
         return found
 
     def _noise(self, adc: np.ndarray, valid: np.ndarray) -> Float[np.ndarray, "frame"]:

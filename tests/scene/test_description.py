@@ -5,7 +5,7 @@ import pytest
 
 from radarize.errors import InputError
 from radarsim.scene import shapes
-from radarsim.scene.scene import Scene
+from radarsim.scene.scene import Life, Scene
 
 WALL = "{name: wall, shape: rectangle, size: [4, 3], position: [3, 0, 1], facing: [-1, 0, 0], material: concrete}"
 
@@ -161,3 +161,17 @@ def test_mistakes_in_levels(tmp_path, level, text, complaint):
         load(tmp_path, text)
         Scene.load(f"{tmp_path / 'scene.yaml'}@{level}")
     assert "scene.yaml" in str(caught.value) and "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("text", "life"),
+    [
+        (f"objects: [{WALL}]", Life(0, 0)),
+        ("building: {kind: office}", Life(1, 1)),
+        ("building: {kind: B, seed: 3}\nclutter: 0", Life(0, 1)),
+        (f"objects: [{WALL}]\nclutter: 0.5\nunevenness: 2", Life(0.5, 2)),
+    ],
+)
+def test_how_lived_in_a_place_is(tmp_path, text, life):
+    """As usual for a building, not at all for objects alone, unless the file says so."""
+    assert load(tmp_path, text).life == life

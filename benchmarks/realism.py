@@ -1,0 +1,123 @@
+"""How much of a picture simulated rooms fill beside real ones: RadarHD's walks (Prabhakara et al., ICRA 2023) and walks
+by cart with the same chirps, both through the picture chain of that paper.
+
+A picture (`radarize.polar`) keeps cells of at least 5 % of the frame's largest magnitude. Levels of clutter and unevenness were chosen beside the training walks; the test walks are only reported.
+"""
+
+import io
+import lzma
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool
+
+from benchmarks.results import SHARED, Data, Walk, command_line, publish, walked
+from radarize import polar
+from radarize.console import progress
+from radarize.radar.presets import PRESETS
+from radarize.yamlfile import read_yaml
+from radarsim.motion import Motion
+from radarsim.scenario import Scenario
+from radarsim.scene.description import find
+from radarsim.scene.scene import Scene
+from radarsim.simulate import TOGETHER
+from radarsim.walk import Walk as WayThrough
+
+SCENES = "office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"
+#: Chirps of the real walks, one loop of a frame.
+CONFIG = PRESETS["radarhd"].model_copy(update={"loops": 1})
+
+
+def shares(kept: Bool[np.ndarray, "frame range azimuth"]) -> tuple[float, float, float]:
+    """Cells kept, ranges with any, and azimuths lit at such a range, each as a share."""
+    lit = kept.any(axis=2)
+    return kept.mean(), lit.mean(), kept.sum(axis=2)[lit].mean() / polar.COLUMNS
+
+
+def real(folder: Path, part: str, every: int) -> list[tuple[float, float, float]]:
+    """Shares of each real walk of the ``train`` or ``test`` part, of every few frames."""
+    found = []
+    for path in sorted((folder / "walks").glob("*.npz.xz")):
+        with np.load(io.BytesIO(lzma.open(path).read())) as walk:
+            if str(walk["part"]) == part:
+                found.append(shares(walk["radar"][::every] > 0))
+    return found
+
+
+def simulated(name: str, settings: dict[str, float], every: int, duration: float, seed: int) -> tuple[tuple, Motion]:
+    """Shares of a walk by cart, of every few frames, and the walk.
+
+    Args:
+        name: scene.
+        settings: of the scene, over those in its file.
+        every: of so many frames one is simulated.
+        duration: s.
+        seed: of walk and world.
+    """
+    scene = Scene.of(read_yaml(find(name)) | settings, name)
+    scenario = Scenario(scene, WayThrough("cart", duration).through(scene, seed), CONFIG, seed=seed)
+    times = np.arange(0, duration, every * CONFIG.frame_period)
+    parts = (times[k : k + TOGETHER] for k in range(0, len(times), TOGETHER))
+    kept = [polar.pictures(scenario.frames(part).samples, CONFIG) > 0 for part in parts]
+    return shares(np.concatenate(kept)), scenario.motion
+
+
+def row(about: str, found: list[tuple[float, float, float]]) -> dict[str, object]:
+    """A row of the table: means over walks, and the range of what is kept."""
+    kept, ranges, azimuths = 100 * np.array(found).T
+    return {
+        "what": about, "walks": len(found), "cells kept %": kept.mean(), "least": kept.min(), "most": kept.max(),
+        "ranges with any %": ranges.mean(), "azimuths lit there %": azimuths.mean(),
+    }  # fmt: skip
+
+
+#: What is added to the rooms, step by step.
+STEPS = {
+    "bare rooms": {"clutter": 0.0, "unevenness": 0.0},
+    "uneven walls": {"clutter": 0.0},
+    "clutter": {"unevenness": 0.0},
+    "both": {},
+}
+PARSER = command_line(
+    __doc__,
+    recordings=(SHARED / "radarhd", "folder of the real walks"),
+    every=(10, "of so many frames one is looked at"),
+    duration=(15.0, "of simulated walks, s"),
+    seed=(0, "of walks and worlds"),
+)
+
+
+def main() -> None:
+    options = PARSER.parse_args()
+    rows, walks = [], []
+    with progress("walks") as report:
+        for part in ("train", "test"):
+            found = real(options.recordings, part, options.every)
+            rows.append(row(f"real, {part}", found))
+            walks += [Walk(f"RadarHD, {part}", None, None, simulated=False)] * len(found)
+        for number, (about, settings) in enumerate(STEPS.items()):
+            found = []
+            for k, name in enumerate(SCENES):
+                report(number * len(SCENES) + k, len(STEPS) * len(SCENES))
+                kept, motion = simulated(name, settings, options.every, options.duration, options.seed)
+                found.append(kept)
+                walks.append(walked(name, options.seed, motion))
+            rows.append(row(about, found))
+    publish(
+        "realism",
+        "How much of a radar's picture is filled, in simulated rooms and real ones",
+        rows,
+        data=Data("RadarHD's walks and walks by cart with their chirps", tuple(walks), options.seed),
+        networks=(),
+        notes=[
+            f"Cells of at least {100 * LEAST:g} % of the frame's largest magnitude, in the picture chain of RadarHD "
+            "(one loop, 8 antennas, no windows, 256 ranges by 64 azimuths); means over walks, and the least and the "
+            "most of any walk.",
+            f"Simulated: {', '.join(SCENES)}. Levels of clutter were chosen beside the training walks; the test walks "
+            "are only reported.",
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()

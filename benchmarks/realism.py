@@ -1,7 +1,8 @@
 """How much of a picture simulated rooms fill beside real ones: RadarHD's walks (Prabhakara et al., ICRA 2023) and walks
 by cart with the same chirps, both through the picture chain of that paper.
 
-A picture (`radarize.polar`) keeps cells of at least 5 % of the frame's largest magnitude. Levels of clutter and unevenness were chosen beside the training walks; the test walks are only reported.
+A picture (`radarize.polar`) keeps cells of at least 5 % of the frame's largest magnitude. Levels of clutter and
+unevenness were chosen beside the training walks; the test walks are only reported.
 """
 
 import io

@@ -25,6 +25,7 @@ DATASETS = {
     "evaluation": {"A": ("handheld", "cart")},
     "inertial": {"A101": ("handheld", "cart")},
     "stress": {"corner": ("cart",)},
+    "radarhd": {"A301": ("cart", "handheld")},
     "ablation/loops": {"office": ("handheld",)},
 }
 SECONDS, PLACE = 1.5, "stress/corner"
@@ -46,8 +47,8 @@ def specification(name: str, path: Path) -> None:
     data["variants"] = dict(list(data.get("variants", {}).items())[:2])
     if data["sensors"] == "all":
         data["sensors"] = ["occupancy", "imu"]
-    if "radar" in data:
-        data["radar"] = str(folder / data["radar"])
+    if (radar := folder / data.get("radar", "")).is_file():
+        data["radar"] = str(radar)
     for split in data.get("splits", {}).values():
         split |= {"train": 0.34, "validation": 0.33, "test": 0.33, "folds": 1} if split["kind"] == "random" else {}
         for key in {"building": ("held_out",), "platform": ("test",)}.get(split["kind"], ()):
@@ -128,6 +129,16 @@ def _studio(path: Path) -> None:
         shutil.copyfile(file, path / file.name)
 
 
+def _clone(path: Path) -> None:
+    """A walk of RadarHD's repository, of a wall ahead."""
+    for kind, columns, name in (("radar", 64, "R"), ("lidar", 512, "L")):
+        (path / "test" / kind).mkdir(parents=True)
+        picture = np.zeros((256, columns), np.uint8)
+        picture[75, columns // 4 : 3 * columns // 4] = 255
+        for k in range(44):
+            Image.fromarray(picture).save(path / "test" / kind / f"{name}_227_{k}.png")
+
+
 #: How each comes to be in a folder where `walk.h5` is there, in this order.
 GIVEN: dict[str, Callable[[Path], object]] = {
     "real.h5": lambda path: shutil.copy(path.with_name("walk.h5"), path),
@@ -147,6 +158,7 @@ GIVEN: dict[str, Callable[[Path], object]] = {
     "ODOMETRY.tum": _odometry,
     "intel-corrected.log.gz": _carmen,
     "replica/mesh_semantic.ply": _mesh,
+    "RadarHD/dataset_5": _clone,
     "mine.yaml": lambda path: path.write_text(Configuration().text()),
     "materials.yaml": lambda path: path.write_text('"*": brick\n'),
 }

@@ -1,6 +1,6 @@
 """Frames that are simulated together: where the sensor is in each, and the scatterers that may matter to any."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int, UInt8
@@ -53,8 +53,7 @@ class Batch:
         owner = np.full(still, -1)
         if crowd is not None and len(crowd):
             owner = np.concatenate([owner, np.repeat(np.arange(len(time)), len(crowd))])
-            parts = [found, *(crowd.scatterers(t) for t in time)]
-            found = Scatterers(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Scatterers)))
+            found = Scatterers.joined([found, *(crowd.scatterers(t) for t in time)])
         cause = np.where(found.horizontal, Provenance.FLOOR_CEILING, Provenance.DIRECT).astype(np.uint8)
         cause[still:] = Provenance.MOVING
         weights = np.stack([np.ones(len(found)), found.bounces, found.bounces_twice], axis=1)

@@ -83,8 +83,7 @@ class Cluttered:
 
     def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> Scatterers:
         """Those within `reach` (m) of any of the positions, see `Surface.near`."""
-        parts = [part.near(positions, reach) for part in (self.surface, self.clutter)]
-        return Scatterers(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Scatterers)))
+        return Scatterers.joined([part.near(positions, reach) for part in (self.surface, self.clutter)])
 
 
 def densities(scene: Scene) -> Float[np.ndarray, "triangle"]:

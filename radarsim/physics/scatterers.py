@@ -4,7 +4,8 @@ Each has its place, normal, cross section and random phase in the world. So spec
 coherent while the sensor moves over it, as on a real wall. `Surface` draws those of a scene.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Float
@@ -46,6 +47,11 @@ class Scatterers:
 
     def __len__(self) -> int:
         return len(self.position)
+
+    @classmethod
+    def joined(cls, parts: "Sequence[Scatterers]") -> "Scatterers":
+        """Several, one after the other."""
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 
     @classmethod
     def points(

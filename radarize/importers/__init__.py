@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError, explained
+from radarize.files import regular
 from radarize.importers import bin as bin_format
 from radarize.importers import cube as cube_format
 from radarize.importers import pcap as pcap_format
@@ -126,8 +127,8 @@ def _apart(times: np.ndarray, start: float, end: float, poses: Path) -> list[str
 
 def _open(source: Path, output: Path, given: Given) -> Capture:
     """Choose the format and the configuration."""
-    if not source.exists():
-        raise InputError(f"{source}: no such file or folder, expected {_EXPECTED}")
+    if not source.is_dir():
+        regular(source, _EXPECTED)
     kind = _kind(source)
     if (given.shape or given.variable) and kind != "cube":
         raise InputError(f"{source}: is no array, but shape or variable is given, expected {', '.join(_ARRAYS)}")

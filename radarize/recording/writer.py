@@ -19,6 +19,7 @@ from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
 from radarize.errors import InputError, explained, reason
+from radarize.hdf5 import open_hdf5
 from radarize.radar.config import RadarConfig
 from radarize.recording.losses import Losses
 from radarize.replacing import replacing
@@ -211,7 +212,7 @@ class RecordingWriter:
                 self.flush()
                 self._file.close()
                 if self._notes:  # HDF5 takes no new attributes while readers may follow
-                    with h5py.File(self.part, "r+", libver="latest") as file:
+                    with open_hdf5(self.part, mode="r+") as file:
                         file.attrs.update(_storable(self._notes))
             if not keep_part:
                 os.replace(self.part, self.path)
@@ -251,7 +252,7 @@ def add(
         shutil.copyfile(path, part)
         with (
             explained(f"{path}: cannot be added to", OSError, RuntimeError),
-            h5py.File(part, "r+", libver="latest") as file,
+            open_hdf5(part, mode="r+") as file,
         ):
             for name in (*streams, *(products or {})):
                 if name in file:

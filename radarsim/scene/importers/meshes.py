@@ -5,13 +5,15 @@ file gives its faces (``object_id``, ``category``, ``label``; Replica's `mesh_se
 `info_semantic.json` beside it). STL files and plain PLY files are one part.
 """
 
-import json
 from pathlib import Path
 
 import numpy as np
 import trimesh
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
+from radarize.files import read_text
+from radarize.jsonfile import parse_json
+from radarsim.scene.importers import gltf
 from radarsim.scene.importers.part import Part
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -27,6 +29,8 @@ def parts(path: Path) -> list[Part]:
     """
     if path.suffix.lower() == ".obj":
         _require_materials(path)
+    if path.suffix.lower() in (".glb", ".gltf"):
+        gltf.check(path)
     try:
         scene = trimesh.load_scene(
             path, process=False, maintain_order=True, split_objects=True, split_groups=True, group_material=True
@@ -96,7 +100,7 @@ def _replica_classes(path: Path) -> dict[int, str]:
     """Class names by object number, from Replica's file; empty without it."""
     if not path.is_file():
         return {}
-    try:
-        return {int(item["id"]): str(item["class_name"]) for item in json.loads(path.read_text())["objects"]}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: is no list of Replica's objects ({error}), expected id and class_name") from error
+    with explained(f"{path}: is no list of Replica's objects, expected id and class_name"):
+        return {
+            int(item["id"]): str(item["class_name"]) for item in parse_json(read_text(path, "JSON"), "it")["objects"]
+        }

@@ -166,8 +166,8 @@ def test_files_without_anything_usable(tmp_path, data, message):
 def test_byte_counts_that_leap_are_damage_not_loss(tmp_path):
     """200 MB between two packets of a small file would be 40,000 frames of zeros."""
     sent = list(packets(encode(FRAMES, CONFIG).tobytes()))
-    far = Packet(99, 200_000_000, sent[1].payload)
-    source = pcap(tmp_path / "a.pcap", [udp(packet.encode()) for packet in (*sent, far)])
+    far = [Packet(99 + k, 200_000_000 + len(sent[1].payload) * k, sent[1].payload) for k in range(4)]
+    source = pcap(tmp_path / "a.pcap", [udp(packet.encode()) for packet in (*sent, *far)])
     with pytest.raises(InputError, match="a.pcap: lacks more than .* expected byte counts that grow"):
         imported(source)
     assert not (tmp_path / "a.h5").exists()

@@ -153,9 +153,10 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[object]], numbers: 
 
 @contextmanager
 def until_interrupted() -> Iterator[threading.Event]:
-    """An event that the first Ctrl-C, or a request to terminate, sets; a second one interrupts as usual."""
+    """An event that the first Ctrl-C sets, or a request to terminate, or the terminal's end; a second one interrupts as
+    usual."""
     asked = threading.Event()
-    signals = (signal.SIGINT, signal.SIGTERM)
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def note(number, frame) -> None:
         if asked.is_set():

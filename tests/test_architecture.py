@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 #: Packages and modules of `radarize`, lowest first: each imports only what stands before it, or beside it.
 LAYERS = (
-    "errors plain files replacing hdf5 yamlfile jsonfile npyfile pixels pose tum console stopwatch jobs",
+    "errors plain files locks replacing hdf5 yamlfile jsonfile npyfile pixels pose tum console stopwatch jobs",
     "radar",
     "recording",
     "heatmaps points contents polar clouds walks",

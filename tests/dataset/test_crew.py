@@ -127,7 +127,7 @@ def test_workers_end_with_a_killed_parent_and_runs_exclude_each_other(tmp_path):
         assert time.monotonic() < waited and parent.poll() is None
         time.sleep(0.02)
     tasks = FakeSpecification(fake("a"), fake("b", "slow", 40))
-    with pytest.raises(InputError, match="another run is making a data set here"):
+    with pytest.raises(InputError, match="another program is writing there"):
         make(tasks, folder)
     children = subprocess.run(["ps", "--ppid", str(parent.pid), "-o", "pid="], capture_output=True, text=True)
     parent.kill()

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from radarize.errors import explained
+from radarize.errors import FULL, InputError, explained, reason
 from radarize.locks import hold
 
 
@@ -25,9 +25,11 @@ def replacing(path: str | Path) -> Iterator[Path]:
             path.parent.mkdir(parents=True, exist_ok=True)
             yield part
             os.replace(part, path)
-    except BaseException:
+    except BaseException as error:
         with contextlib.suppress(OSError):
             part.unlink()
+        if isinstance(error, Exception) and not isinstance(error, InputError) and reason(error) == FULL:
+            raise InputError(f"{path}: cannot be written ({FULL})") from error  # libraries have errors of their own
         raise
 
 

@@ -101,7 +101,7 @@ def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
 def test_only_a_held_folder_is_anothers(tmp_path):
     with pytest.raises(BlockingIOError), run._alone(tmp_path):
         raise BlockingIOError("of something else")
-    with run._alone(tmp_path), pytest.raises(InputError, match="another run"), run._alone(tmp_path):
+    with run._alone(tmp_path), pytest.raises(InputError, match="another program"), run._alone(tmp_path):
         pass
 
 

@@ -1,11 +1,14 @@
 """Files from elsewhere: regular ones, and of no more bytes than their reader is made for."""
 
+import os
 from pathlib import Path
 
 from radarize.errors import InputError, explained
 
 #: Bytes of text that people write: a hundred thousand lines.
 TEXT = 8 << 20
+#: Environment variable of processes in which files may name others anywhere.
+OUTSIDE = "RADARIZE_ALLOW_OUTSIDE"
 
 
 def regular(path: str | Path, expected: str) -> Path:
@@ -53,3 +56,22 @@ def read_text(path: str | Path, expected: str, most: int = TEXT) -> str:
     content = read_bytes(path, expected, most)
     with explained(f"{path}: cannot be read", UnicodeDecodeError):
         return content.decode()
+
+
+def within(path: Path, source: str | Path, *folders: Path) -> Path:
+    """A file that another one names, which lies in its folder or below, links followed; unless the user allows others.
+
+    Args:
+        path: as named, from its folder.
+        source: what names it.
+        folders: that it may lie in.
+
+    Raises:
+        InputError: it lies elsewhere.
+    """
+    if os.environ.get(OUTSIDE) or any(path.resolve().is_relative_to(folder.resolve()) for folder in folders):
+        return path
+    raise InputError(
+        f"{source}: names {path}, which lies outside of {folders[0].resolve()}, expected a file within; "
+        "--allow-outside permits it"
+    )

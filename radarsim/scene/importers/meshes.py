@@ -5,13 +5,15 @@ file gives its faces (``object_id``, ``category``, ``label``; Replica's `mesh_se
 `info_semantic.json` beside it). STL files and plain PLY files are one part.
 """
 
+import os
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from trimesh.resolvers import FilePathResolver
 
 from radarize.errors import InputError, explained
-from radarize.files import read_text
+from radarize.files import OUTSIDE, read_text, within
 from radarize.jsonfile import parse_json
 from radarsim.scene.importers import gltf
 from radarsim.scene.importers.part import Part
@@ -31,9 +33,16 @@ def parts(path: Path) -> list[Part]:
         _require_materials(path)
     if path.suffix.lower() in (".glb", ".gltf"):
         gltf.check(path)
+    anywhere = FilePathResolver(str(path), allow_anywhere=bool(os.environ.get(OUTSIDE)))
     try:
         scene = trimesh.load_scene(
-            path, process=False, maintain_order=True, split_objects=True, split_groups=True, group_material=True
+            path,
+            resolver=anywhere,
+            process=False,
+            maintain_order=True,
+            split_objects=True,
+            split_groups=True,
+            group_material=True,
         )
     except Exception as error:  # trimesh's readers raise whatever their parsers do
         raise InputError(f"{path}: is not a readable {path.suffix[1:]} file ({_reason(error)})") from error
@@ -71,7 +80,7 @@ def _require_materials(path: Path) -> None:
     for word in words:
         if word[0] == b"mtllib" and len(word) > 1:
             name = word[1].decode(errors="replace").strip()
-            if not (path.parent / name).is_file():
+            if not within(path.parent / name, path, path.parent).is_file():
                 raise InputError(f"{path}: names the material file {name!r}, which does not lie beside it")
 
 

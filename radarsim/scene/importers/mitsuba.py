@@ -12,7 +12,7 @@ import trimesh
 from jaxtyping import Float
 
 from radarize.errors import InputError
-from radarize.files import read_bytes
+from radarize.files import read_bytes, within
 from radarsim.scene import shapes
 from radarsim.scene.importers import meshes
 from radarsim.scene.importers.naming import Choice, meaning
@@ -75,7 +75,7 @@ def _values(item: ElementTree.Element) -> dict[str, str]:
 def _mesh(shape: ElementTree.Element, folder: Path) -> trimesh.Trimesh:
     kind, values = shape.get("type"), _values(shape)
     if kind in _FILES:
-        file = folder / values.get("filename", "")
+        file = within(folder / values.get("filename", ""), "filename", folder)
         if not file.is_file():
             raise InputError(f"file {file} does not exist")
         mesh = shapes.joined(*(part.mesh for part in meshes.parts(file)))

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError
+from radarize.files import within
 from radarize.pixels import read_picture
 from radarize.runfolder.occupancy import MapFile
 from radarize.yamlfile import read_yaml
@@ -41,7 +42,7 @@ def grid(path: Path) -> OccupancyGrid:
             raise InputError(f"{path}: has no {beside.name} beside it, expected the map's resolution and origin there")
         path = beside
     about = MapFile.read(path)
-    picture = path.parent / about.image
+    picture = within(path.parent / about.image, path, path.parent)
     value, values = read_picture(picture, str(picture), _FORMATS), np.arange(256)
     if max(value.shape) * about.resolution > _FARTHEST:
         raise InputError(

@@ -11,12 +11,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from radarize.capture import live
+from radarize.capture.page import Page
 from radarize.capture.record import record
 from radarize.capture.stream import StreamCounts
 from radarize.capture.uart import Uart
 from radarize.cli import app
 from radarize.console import until_interrupted
 from radarize.errors import InputError
+from radarize.methods.registry import CLASSICAL, Inputs
 from radarize.radar.assembler import PacketCounts
 from radarize.recording import Product, Recording, RecordingWriter, Stream, recover
 from radarize.recording import writer as writer_module
@@ -190,3 +193,16 @@ def test_what_was_simulated_may_be_replaced(tmp_path):
     captured(tmp_path / "a.h5")
     with Recording(tmp_path / "a.h5") as recording:
         assert len(recording) == 20
+
+
+def test_a_live_pipeline_takes_no_more_frames_at_a_time_than_it_was_prepared_for(monkeypatch):
+    """What libraries keep for each number of frames is there before the first one comes."""
+    sizes, take, asked = [], live.Intake.take, []
+    monkeypatch.setattr(
+        live.Intake, "take", lambda self, adc, *more: (sizes.append(len(adc)), take(self, adc, *more))[1]
+    )
+    live.prepare(Inputs(SMALL), CLASSICAL)
+    monkeypatch.setattr(live, "follow", lambda *_, most, **__: asked.append(most) or [])
+    with Page("127.0.0.1:0") as page:
+        live.Live(Inputs(SMALL), CLASSICAL, page).run(Played(), threading.Event())
+    assert sorted(set(sizes)) == list(range(1, asked[0] + 1))

@@ -70,6 +70,9 @@ def import_(
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
     tx: Annotated[str | None, typer.Option(help="How many transmitters (3), or their firing order (1,3,2).")] = None,
     iq_order: Annotated[Literal["iiqq", "qqii"] | None, typer.Option(help="mmWave Studio, or SDK demo.")] = None,
+    encoding: Annotated[
+        Literal["signed", "offset-binary"], typer.Option(help="Of a .bin's words; a warning says where it looks other.")
+    ] = "signed",
     board: Annotated[str | None, typer.Option(help="Antenna layout, e.g. iwr1843boost.")] = None,
     start_frequency: Annotated[float | None, typer.Option(help="Hz.")] = None,
     slope: Annotated[float | None, typer.Option(help="Hz/s (80 MHz/us is 80e12).")] = None,
@@ -93,7 +96,7 @@ def import_(
     from radarize.recording import keeping
 
     radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk)
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk, encoding)
     with keeping(output), progress("import") as report:
         _tell(import_recording(source, output, given, progress=report))
 

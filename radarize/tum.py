@@ -40,8 +40,8 @@ def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndar
             )
         if not np.abs(row).max() <= _LATEST or np.abs(row[1:4]).max() > _FARTHEST:  # also of what is no number
             raise InputError(
-                f"{path}, line {number}: holds {' '.join(words)[:80]}, expected seconds and metres, finite numbers "
-                f"within {_LATEST:g} and {_FARTHEST:g}"
+                f"{path}, line {number}: holds {' '.join(words)[:80]}, expected finite numbers, "
+                f"seconds within {_LATEST:g} and metres within {_FARTHEST:g}"
             )
         if rows and row[0] <= rows[-1][0]:
             raise InputError(

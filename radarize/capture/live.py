@@ -16,8 +16,8 @@ from radarize.odometry.blindness import Blindness
 from radarize.recording import Losses, RecordingWriter
 from radarize.stopwatch import stage
 
-#: Frames at a time, at most. Libraries keep what they have made for every number of frames, the more the larger it is: up
-#: to so many all of it is there after `prepare`, and memory then grows with the map alone.
+#: Frames at a time, at most. Libraries keep what they have made for every number of frames, the more the larger it is:
+#: up to so many all of it is there after `prepare`, and memory then grows with the map alone.
 TOGETHER = 4
 #: s between pictures of a frame, and of the map; redrawing the map takes at most this share of the time.
 _FRAME_INTERVAL, _MAP_INTERVAL, _MAP_SHARE = 0.2, 1.0, 0.05

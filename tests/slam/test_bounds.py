@@ -52,7 +52,7 @@ def test_a_walk_to_the_farthest_that_is_allowed():
 )
 def test_poses_of_a_file(tmp_path, row):
     (tmp_path / "a.tum").write_text(row + "\n")
-    with pytest.raises(InputError, match="line 1: holds .* expected seconds and metres"):
+    with pytest.raises(InputError, match="line 1: holds .* expected finite numbers"):
         read_tum(tmp_path / "a.tum")
 
 

@@ -13,7 +13,7 @@ _SIGN = np.int16(-(1 << 15))
 
 
 def signed(words: Int16[np.ndarray, "word"], encoding: str) -> Int16[np.ndarray, "word"]:
-    """Words of an encoding, ``signed`` or ``offset-binary`` (1 is -32767), as signed ones; 0 stands for what was lost."""
+    """Words of an encoding, ``signed`` or ``offset-binary`` (1 is -32767), as signed ones; 0 is what was lost."""
     return np.where(words == 0, words, words ^ _SIGN) if encoding == "offset-binary" else words
 
 

@@ -95,6 +95,6 @@ def changed(settings: BaseModel, changes: dict[str, object]) -> dict[str, object
     within = {
         name: changed(part, changes[name])
         for name in changes
-        if isinstance(part := getattr(settings, name, None), BaseModel) and isinstance(changes[name], dict)
+        if isinstance(part := getattr(settings, str(name), None), BaseModel) and isinstance(changes[name], dict)
     }
     return settings.model_dump() | changes | within

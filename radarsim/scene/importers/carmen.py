@@ -29,7 +29,7 @@ USABLE = 30.0
 OCCUPIED = 0.3
 #: Free ground is seen at least this often.
 SEEN = 2
-_LARGEST = 60e6  # cells
+_LARGEST = 20e6  # cells, of 8 bytes
 #: Bytes of a log, unpacked.
 _BYTES = 256 << 20
 #: Of scans in an ``.npz``.

@@ -46,6 +46,14 @@ def parts(path: Path) -> list[Part]:
         )
     except Exception as error:  # trimesh's readers raise whatever their parsers do
         raise InputError(f"{path}: is not a readable {path.suffix[1:]} file ({_reason(error)})") from error
+    with explained(f"{path}: is not a readable {path.suffix[1:]} file"):  # of points with two coordinates, say
+        found = _parts(scene, path)
+    if not found:
+        raise InputError(f"{path}: holds no triangles")
+    return sorted(found, key=lambda part: part.name)
+
+
+def _parts(scene: trimesh.Scene, path: Path) -> list[Part]:
     found = []
     for node in scene.graph.nodes_geometry:
         transform, key = scene.graph[node]
@@ -60,9 +68,7 @@ def parts(path: Path) -> list[Part]:
         labels = tuple(dict.fromkeys(str(label) for label in (material, key, node) if label and label != name))
         placed = trimesh.Trimesh(vertices, faces, process=False)
         found += _by_category(path, mesh, placed) or [Part(name, placed, labels=labels)]
-    if not found:
-        raise InputError(f"{path}: holds no triangles")
-    return sorted(found, key=lambda part: part.name)
+    return found
 
 
 def _reason(error: Exception) -> str:

@@ -1,8 +1,9 @@
 # make demo: sets this machine up and runs the main job end to end      make test: sets up and passes the tests
+# make bounds: tests of compiled loops, which then look whether they index within bounds
 # make documents: types every command of docs, too, as `make test` does of README, where nothing is compiled yet
 RUN := runs/demo
 
-.PHONY: setup demo test documents lint clean
+.PHONY: setup demo test bounds documents lint clean
 
 setup:
 	@./setup.sh
@@ -17,6 +18,10 @@ demo: setup
 
 test: setup
 	@.venv/bin/python -m pytest -n 2 --dist loadfile $(TESTS)
+
+bounds: setup
+	@NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/bounds .venv/bin/python -m pytest -n 2 --dist loadfile \
+		$(or $(TESTS),tests/slam tests/odometry tests/physics tests/fuzzing)
 
 documents: setup
 	@DOCUMENTS=1 .venv/bin/python -m pytest tests/documents

@@ -18,7 +18,11 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from rich.progress import track
 
 from benchmarks.results import Data, command_line, publish, surroundings
-from tests.fuzzing.readers import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, READERS, attempt
+from tests.fuzzing.readers import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, attempt
+from tests.fuzzing.readers import READERS as OF_RECORDINGS
+from tests.fuzzing.worlds import WORLDS
+
+READERS = OF_RECORDINGS | WORLDS
 
 #: Inputs of one seed: hypothesis remembers what it has tried.
 _BATCH = 500

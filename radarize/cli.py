@@ -24,6 +24,9 @@ DataPort = Annotated[int, typer.Option(min=1, max=65535, help="UDP port of its s
 Duration = Annotated[float | None, typer.Option(min=0.0, help="End after so many seconds.")]
 FrameCount = Annotated[int | None, typer.Option(min=1, help="End after so many frames.")]
 Reading = Literal["corrected", "published"]
+Overwrite = Annotated[
+    bool, typer.Option("--overwrite", help="Replace a recording that came from a radar, or what was left of one.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 
@@ -67,6 +70,9 @@ def import_(
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
     tx: Annotated[str | None, typer.Option(help="How many transmitters (3), or their firing order (1,3,2).")] = None,
     iq_order: Annotated[Literal["iiqq", "qqii"] | None, typer.Option(help="mmWave Studio, or SDK demo.")] = None,
+    encoding: Annotated[
+        Literal["signed", "offset-binary"], typer.Option(help="Of a .bin's words; a warning says where it looks other.")
+    ] = "signed",
     board: Annotated[str | None, typer.Option(help="Antenna layout, e.g. iwr1843boost.")] = None,
     start_frequency: Annotated[float | None, typer.Option(help="Hz.")] = None,
     slope: Annotated[float | None, typer.Option(help="Hz/s (80 MHz/us is 80e12).")] = None,
@@ -90,7 +96,7 @@ def import_(
     from radarize.recording import keeping
 
     radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk)
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk, encoding)
     with keeping(output), progress("import") as report:
         _tell(import_recording(source, output, given, progress=report))
 
@@ -118,14 +124,18 @@ def capture(
     data_port: DataPort = 4098,
     duration: Duration = None,
     frames: FrameCount = None,
+    overwrite: Overwrite = False,
 ):
-    """Record a real radar: IWR1843BOOST with a DCA1000. Ctrl-C ends it and leaves a whole file."""
+    """Record a real radar: IWR1843BOOST with a DCA1000. Whatever ends it, Ctrl-C too, leaves a whole file."""
     from radarize.capture.record import record
+    from radarize.recording import spare
 
+    if not overwrite:
+        spare(output, anything=True)
     sensor = _sensor(config, port, baud, host, dca, command_port, data_port)
     most = _frames_within(duration, frames, sensor.config.frame_period)
     with until_interrupted() as stopping, progress("capture") as report, sensor:
-        record(sensor, output, stopping, frames=most, progress=report)
+        record(sensor, output, stopping, frames=most, overwrite=overwrite, progress=report)
     _tell(output)
 
 
@@ -145,16 +155,20 @@ def live(
     odometry: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
     scans: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
     address: Annotated[str, typer.Option(help="Where to show the page; port 0 is any.")] = "127.0.0.1:8470",
+    overwrite: Overwrite = False,
 ):
     """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
     from contextlib import ExitStack
 
     from radarize.capture.live import Live, prepare
     from radarize.capture.page import Page
+    from radarize.capture.record import recording
     from radarize.capture.replay import Replay
     from radarize.methods.registry import Inputs, best_methods
-    from radarize.recording import RecordingWriter
+    from radarize.recording import spare
 
+    if output and not overwrite:
+        spare(output, anything=True)
     if replay and (config or port):
         raise InputError(f"--replay {replay} is given with --config or --port, expected one of the two")
     stream = Replay(replay) if replay else _sensor(config, port, baud, host, dca, command_port, data_port)
@@ -169,16 +183,24 @@ def live(
         stack.enter_context(stream)
         print(f"page: {live.page.url}", flush=True)
         if output:
-            writer = RecordingWriter(output, radar, cfg_text=stream.text, attributes=stream.facts)
-            stack.enter_context(writer)
+            writer = stack.enter_context(recording(stream, output, overwrite))
         most = _frames_within(duration, frames, radar.frame_period)
         live.run(stream, stopping, frames=most, writer=writer, progress=report)
         warnings = stream.troubles() + live.losses.warnings()
-        if writer:
-            writer.annotate(warnings="; ".join(warnings))
     for words in (*warnings, *live.blindness.warnings()):
         typer.echo(f"warning: {words}", err=True)
     print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
+
+
+@app.command()
+def recover(
+    part: Annotated[Path, typer.Argument(metavar="REC.h5.part", help="What a program that was killed has left.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Recording to write; else REC.h5.")] = None,
+):
+    """Make a recording of what is left of one: all whole frames, up to a second before its program was killed."""
+    from radarize.recording import recover
+
+    _tell(recover(part, output))
 
 
 def _sensor(config: str | None, port: str | None, baud: int, *network):

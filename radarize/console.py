@@ -11,9 +11,12 @@ from typing import Annotated
 import typer
 
 from radarize.errors import DEBUG, InputError, first_line, of_system
+from radarize.files import OUTSIDE
 
 #: Exit code of everything that ends in an error sentence.
 FAILED = 2
+#: Options that every command takes, and the environment variables that say so to its jobs.
+_EVERYWHERE = {"--debug": DEBUG, "--allow-outside": OUTSIDE}
 #: Letters of a word that a table does not cut.
 _WORD = 32
 
@@ -23,8 +26,13 @@ def new_app(about: str) -> typer.Typer:
     app = typer.Typer(help=about, no_args_is_help=True, add_completion=False, pretty_exceptions_enable=False)
 
     @app.callback()
-    def options(debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False):
-        del debug  # taken from the arguments by `run`, so that it works in any place
+    def options(
+        debug: Annotated[bool, typer.Option("--debug", help="Show the traceback of an error.")] = False,
+        allow_outside: Annotated[
+            bool, typer.Option("--allow-outside", help="Let scenes, maps and data sets name files in other folders.")
+        ] = False,
+    ):
+        del debug, allow_outside  # taken from the arguments by `run`, so that they work in any place
 
     return app
 
@@ -38,9 +46,10 @@ def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in arguments
-    if debug:
-        os.environ[DEBUG] = "1"  # jobs show theirs, too, wherever they are done
-    arguments = [argument for argument in arguments if argument != "--debug"]
+    for option, variable in _EVERYWHERE.items():
+        if option in arguments:
+            os.environ[variable] = "1"  # for jobs, too, wherever they are done
+    arguments = [argument for argument in arguments if argument not in _EVERYWHERE]
     try:
         code = typer.main.get_command(app).main(arguments, prog_name=name, standalone_mode=False)
     except (Exception, KeyboardInterrupt) as error:
@@ -153,9 +162,10 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[object]], numbers: 
 
 @contextmanager
 def until_interrupted() -> Iterator[threading.Event]:
-    """An event that the first Ctrl-C, or a request to terminate, sets; a second one interrupts as usual."""
+    """An event that the first Ctrl-C sets, or a request to terminate, or the terminal's end; a second one interrupts as
+    usual."""
     asked = threading.Event()
-    signals = (signal.SIGINT, signal.SIGTERM)
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def note(number, frame) -> None:
         if asked.is_set():

@@ -5,6 +5,8 @@ from contextlib import contextmanager
 
 #: Environment variable of processes that show tracebacks.
 DEBUG = "RADARIZE_DEBUG"
+#: What `reason` says of a full disk, whoever found it.
+FULL = "no space left on the device"
 #: Characters of a sentence that somebody reads.
 _LONGEST = 1000
 
@@ -36,8 +38,8 @@ def first_line(error: BaseException) -> str:
 def reason(error: Exception) -> str:
     """What a library or the system says went wrong with a file, in a few printable words."""
     text = str(error)
-    if "No space left" in text or "errno = 28" in text:
-        return "no space left on the device"
+    if "no space left" in text.lower() or "errno = 28" in text:
+        return FULL
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     line = " ".join("".join(c if c.isprintable() else " " for c in text).split())

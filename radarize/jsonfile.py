@@ -5,9 +5,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from radarize.errors import InputError, explained
+from radarize.files import read_text
 
-#: Bytes of a file: Python makes some 25 of each.
-_LARGEST = 8 << 20
+#: Digits of a whole number.
+_DIGITS = 40
 
 
 def read_json(path: Path) -> dict:
@@ -16,13 +17,7 @@ def read_json(path: Path) -> dict:
     Raises:
         InputError: it is not JSON, or far larger than any that this package writes.
     """
-    if not path.is_file():
-        return {}
-    if (size := path.stat().st_size) > _LARGEST:
-        raise InputError(f"{path}: has {size} bytes, expected at most {_LARGEST}")
-    with explained(f"{path}: cannot be read", OSError, UnicodeDecodeError):
-        text = path.read_text(encoding="utf-8")
-    return parse_json(text, str(path))
+    return parse_json(read_text(path, "JSON"), str(path)) if path.exists() else {}
 
 
 def parse_json(text: str, name: str, number: Callable[[str], object] = float) -> dict:
@@ -32,7 +27,13 @@ def parse_json(text: str, name: str, number: Callable[[str], object] = float) ->
         InputError: it is not JSON, or no object.
     """
     with explained(f"{name}: is not JSON", ValueError, RecursionError):  # thousands of digits, too deep
-        content = json.loads(text, parse_float=number)
+        content = json.loads(text, parse_float=number, parse_int=_whole)
     if not isinstance(content, dict):
         raise InputError(f"{name}: holds a {type(content).__name__}, expected an object")
     return content
+
+
+def _whole(digits: str) -> int:
+    if len(digits) > _DIGITS:
+        raise ValueError(f"a number of {len(digits)} digits, expected at most {_DIGITS}")
+    return int(digits)

@@ -1,7 +1,5 @@
 """Plain files in and out: scans and odometry of any sensor, and the folder that a session leaves behind."""
 
-import math
-import zipfile
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import InputError, explained
-from radarize.npyfile import npy_header
+from radarize.errors import InputError
+from radarize.files import regular
+from radarize.npyfile import read_npz
 from radarize.runfolder import RunFolder, RunWriter
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
@@ -19,8 +18,6 @@ from radarize.tum import planar, planar_poses, read_tum
 
 #: Of a ``.npz``; times need not be there.
 _FIELDS = ("ranges", "angle_min", "angle_increment", "range_max", "times")
-#: Bytes of numbers that one of a ``.npz`` may unpack to, and bytes that any may.
-_PACKED, _ALWAYS = 100, 16 << 20
 
 
 @dataclass(frozen=True)
@@ -135,14 +132,9 @@ def run(
 
 
 def _npz_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    found: dict[str, np.ndarray] = {}
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, expected scans (.npz) or the folder of a run")
-    with explained(f"{path}: is no .npz of numbers, expected ranges, angle_min, angle_increment and range_max"):
-        with zipfile.ZipFile(path) as archive:
-            _check_size(archive, path)
-        with np.load(path, allow_pickle=False) as file:
-            found = {name: np.asarray(file[name], float) for name in _FIELDS if name in file}
+    regular(path, "scans (.npz) or the folder of a run")
+    arrays = read_npz(path, str(path), _FIELDS, path.stat().st_size)
+    found = {name: np.asarray(array, float) for name, array in arrays.items()}
     for name in _FIELDS[:4]:
         if name not in found:
             raise InputError(f"{path}: has no {name}, expected ranges, angle_min, angle_increment and range_max")
@@ -155,19 +147,6 @@ def _npz_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     times = found.get("times", np.arange(float(len(ranges))))
     if times.shape != ranges.shape[:1] or not np.isfinite(times).all():
         raise InputError(f"{path}: times has shape {times.shape}, expected {ranges.shape[:1]} finite seconds")
-    azimuths = found["angle_min"].item() + found["angle_increment"].item() * np.arange(ranges.shape[1])
+    with np.errstate(over="ignore"):  # refused where they are used
+        azimuths = found["angle_min"].item() + found["angle_increment"].item() * np.arange(ranges.shape[1])
     return times, azimuths, np.where(ranges >= found["range_max"].item(), np.inf, ranges)
-
-
-def _check_size(archive: zipfile.ZipFile, path: Path) -> None:
-    """Whether a log unpacks to no more than scans can."""
-    entries, size = 0, path.stat().st_size
-    for name in _FIELDS:
-        if f"{name}.npy" in archive.namelist():
-            with archive.open(f"{name}.npy") as packed:
-                shape, _, stored = npy_header(packed, f"{path}: {name}")
-            if stored.kind not in "biuf":
-                raise ValueError(f"{name} holds {str(stored)[:40]}")
-            entries += math.prod(shape)
-    if 8 * entries > _PACKED * size + _ALWAYS:
-        raise InputError(f"{path}: declares {entries} numbers, but has {size} bytes")

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from radarize.errors import explained
+from radarize.errors import FULL, InputError, explained, reason
+from radarize.locks import hold
 
 
 @contextmanager
@@ -24,9 +25,11 @@ def replacing(path: str | Path) -> Iterator[Path]:
             path.parent.mkdir(parents=True, exist_ok=True)
             yield part
             os.replace(part, path)
-    except BaseException:
+    except BaseException as error:
         with contextlib.suppress(OSError):
             part.unlink()
+        if isinstance(error, Exception) and not isinstance(error, InputError) and reason(error) == FULL:
+            raise InputError(f"{path}: cannot be written ({FULL})") from error  # libraries have errors of their own
         raise
 
 
@@ -42,16 +45,17 @@ class Replacement:
         part: folder to write them to.
 
     Raises:
-        InputError: nothing can be written there.
+        InputError: nothing can be written there, or another program does.
     """
 
     def __init__(self, folder: Path, names: Sequence[str]):
         self.folder, self.names, self.part = folder, names, folder / ".part"
         self._new = not folder.exists()
         with explained(f"{folder}: cannot be written", OSError):
-            if self.part.exists():
-                shutil.rmtree(self.part)  # of one who died here
-            self.part.mkdir(parents=True)
+            self.part.mkdir(parents=True, exist_ok=True)
+            self._held: int | None = hold(self.part)
+            for left in self.part.iterdir():  # of one who died here
+                left.unlink()
 
     def place(self) -> None:
         """Let the files take their places; those of the folder that are not among them go.
@@ -65,15 +69,20 @@ class Replacement:
             for name in reversed(self.names):
                 if (self.part / name).exists():
                     os.replace(self.part / name, self.folder / name)
-            self.part.rmdir()
+            self._let_go()
 
     def discard(self) -> None:
         """Leave the folder as it was; nothing to do after `place`."""
-        if self.part.exists():
-            shutil.rmtree(self.part, ignore_errors=True)
+        if self._held is not None:
+            self._let_go()
             if self._new:
                 with contextlib.suppress(OSError):
                     self.folder.rmdir()
+
+    def _let_go(self) -> None:
+        shutil.rmtree(self.part, ignore_errors=True)
+        os.close(self._held)
+        self._held = None
 
 
 def write_whole(path: Path, text: str) -> Path:

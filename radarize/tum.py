@@ -6,11 +6,16 @@ from typing import TextIO
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import InputError, explained
+from radarize.errors import InputError
+from radarize.files import read_bytes
 from radarize.replacing import replacing
 
 #: Poses that are written at a time.
 _ROWS = 1024
+#: Bytes of a file: a day at 20 Hz.
+_LARGEST = 256 << 20
+#: s and m, of stamps (also such as count from 1970) and positions.
+_LATEST, _FARTHEST = 1e11, 1e6
 
 
 def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]]:
@@ -19,8 +24,7 @@ def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndar
     Raises:
         InputError: naming the line: not eight finite numbers, times that do not ascend, or no unit quaternion.
     """
-    with explained(f"{path}: cannot be read", OSError):
-        lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
+    lines = read_bytes(path, "poses (TUM)", _LARGEST).decode(errors="replace").splitlines()
     rows = []
     for number, line in enumerate(lines, 1):
         words = line.split("#")[0].replace(",", " ").split()
@@ -34,8 +38,11 @@ def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndar
             raise InputError(
                 f"{path}, line {number}: is {line.strip()[:60]!r}, expected eight numbers: time x y z qx qy qz qw"
             )
-        if not np.isfinite(row).all():
-            raise InputError(f"{path}, line {number}: holds {' '.join(words)[:80]}, expected finite numbers")
+        if not np.abs(row).max() <= _LATEST or np.abs(row[1:4]).max() > _FARTHEST:  # also of what is no number
+            raise InputError(
+                f"{path}, line {number}: holds {' '.join(words)[:80]}, expected finite numbers, "
+                f"seconds within {_LATEST:g} and metres within {_FARTHEST:g}"
+            )
         if rows and row[0] <= rows[-1][0]:
             raise InputError(
                 f"{path}, line {number}: has time {words[0]} after {rows[-1][0]:.6f}, expected ascending times"

@@ -15,16 +15,20 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
-from PIL import Image
 
 from radarize import polar
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
+from radarize.files import read_bytes
+from radarize.npyfile import read_npz
+from radarize.pixels import read_picture
 from radarize.radar.presets import PRESETS
 
 #: s, from frame to frame.
 PERIOD = PRESETS["radarhd"].frame_period
 #: The authors' measures begin here: their network sees the frames before.
 FIRST = 40
+#: Bytes of another program's points of a walk, packed or not.
+_LARGEST = 256 << 20
 
 
 @dataclass(frozen=True)
@@ -97,16 +101,10 @@ class Walk:
 
 
 def _picture(path: Path, shape: tuple[int, int]) -> np.ndarray:
-    rows, columns = shape
-    try:
-        with Image.open(path, formats=("PNG",)) as image:
-            if image.size != (columns, rows):  # before it is unpacked
-                raise InputError(f"{path}: is {image.size[1]} x {image.size[0]}, expected {rows} x {columns} pixels")
-            return np.asarray(image.convert("L"))
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: is missing, expected a picture") from error
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise InputError(f"{path}: is damaged ({error}), expected a PNG picture") from error
+    found = read_picture(path, str(path))
+    if found.shape != shape:
+        raise InputError(f"{path}: is {found.shape[0]} x {found.shape[1]}, expected {shape[0]} x {shape[1]} pixels")
+    return found
 
 
 @dataclass(frozen=True)
@@ -134,24 +132,21 @@ class Predictions:
         pictures = {}
         for path in self.folder.glob(f"*{walk.number}_*.png"):
             words = path.stem.removesuffix("_pred").split("_")
-            if len(words) >= 2 and words[-2] == str(walk.number) and words[-1].isdigit():
+            if len(words) >= 2 and words[-2] == str(walk.number) and words[-1].isdecimal():
                 pictures[int(words[-1])] = polar.cartesian(_picture(path, (polar.ROWS, polar.BEAMS)) > 127)
         return pictures
 
 
 def _packed(path: Path) -> tuple[Int[np.ndarray, "frame"], UInt8[np.ndarray, "frame x byte"]]:
-    most = 1 << 30
-    try:
-        with (lzma.open if path.suffix == ".xz" else open)(path, "rb") as file:
-            content = file.read(most + 1)
-        if len(content) > most:
-            raise ValueError(f"more than {most} bytes")
-        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
-            frames, bits = arrays["frame"], arrays["prediction"]
+    content = read_bytes(path, "packed points", _LARGEST)
+    with explained(f"{path}: is damaged, expected packed bits `prediction` and numbers `frame`"):
+        if path.suffix == ".xz":
+            packed = lzma.LZMADecompressor(memlimit=_LARGEST)
+            content = packed.decompress(content, _LARGEST)
+            if not packed.eof:
+                raise ValueError(f"cut short, or more than {_LARGEST} bytes")
+        arrays = read_npz(io.BytesIO(content), str(path), ("frame", "prediction"), len(content))
+        frames, bits = arrays["frame"], arrays["prediction"]
         if bits.dtype != np.uint8 or bits.shape != (len(frames), len(polar.GRID[0]), len(polar.GRID[1]) // 8):
             raise ValueError(f"prediction is {bits.dtype} of shape {bits.shape}")
-    except (OSError, ValueError, KeyError, EOFError, lzma.LZMAError) as error:
-        raise InputError(
-            f"{path}: is damaged ({error}), expected packed bits `prediction` and numbers `frame`"
-        ) from error
     return frames, bits

@@ -1,32 +1,75 @@
 """YAML files that people write."""
 
-import math
 from pathlib import Path
 from typing import TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from radarize.errors import InputError, explained
+from radarize.errors import InputError
+from radarize.files import read_text
 from radarize.plain import complaint
 
 Settings = TypeVar("Settings", bound=BaseModel)
+#: Bytes of a file, of which PyYAML makes some hundreds each; values in it, counted as often as aliases repeat them; how
+#: deep they nest, and the digits of a number.
+_BYTES, _VALUES, _DEPTH, _DIGITS = 2 << 20, 250_000, 32, 40
+_Loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)  # the same in C, where PyYAML was built with it
 
 
-def read_yaml(path: str | Path, most: float = math.inf) -> object:
-    """What a YAML file holds, of at most so many bytes: PyYAML makes some hundreds of each.
+def read_yaml(path: str | Path, most: int = _BYTES) -> object:
+    """What a YAML file holds, of at most so many bytes.
 
     Raises:
-        InputError: the file cannot be read, or is malformed or too large.
+        InputError: the file cannot be read, is malformed, or holds more than anybody would write.
     """
+    text = read_text(path, "YAML", most)
     try:
-        with explained(f"{path}: cannot be read", OSError, UnicodeDecodeError):
-            if (size := Path(path).stat().st_size) > most:
-                raise InputError(f"{path}: has {size} bytes, expected at most {most}")
-            text = Path(path).read_text(encoding="utf-8")
-        return yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:  # a date like 2026-99-99 is a ValueError
+        return _content(text)
+    except (yaml.YAMLError, ValueError) as error:  # a date like 2026-99-99 is a ValueError
         raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+
+
+def _content(text: str) -> object:
+    depth = 0
+    for count, event in enumerate(yaml.parse(text, _Loader)):  # composing recurses, and takes memory; this does not
+        if count > 2 * _VALUES:
+            raise ValueError(f"it holds more than {_VALUES} values")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEPTH:
+            raise ValueError(f"line {event.start_mark.line + 1} nests deeper than {_DEPTH} levels")
+    loader = _Loader(text)
+    try:
+        if (node := loader.get_single_node()) is None:
+            return None
+        values, depth = _extent(node, {})
+        if values > _VALUES or depth > _DEPTH:
+            raise ValueError(
+                f"it makes {values:.3g} values, {depth} levels deep, expected at most {_VALUES} and {_DEPTH}"
+            )
+        return loader.construct_document(node)
+    finally:
+        loader.dispose()
+
+
+def _extent(node: yaml.Node, known: dict[int, tuple[int, int] | None]) -> tuple[int, int]:
+    """Values within a node, aliases followed, and how deep they nest.
+
+    Raises:
+        ValueError: it holds itself, or a number of too many digits.
+    """
+    if isinstance(node, yaml.ScalarNode):
+        if len(node.value) > _DIGITS and node.tag.endswith((":int", ":float")):
+            raise ValueError(f"line {node.start_mark.line + 1} has a number of more than {_DIGITS} digits")
+        return 1, 0
+    if id(node) not in known:
+        known[id(node)] = None
+        within = [part for pair in node.value for part in pair] if isinstance(node, yaml.MappingNode) else node.value
+        parts = [_extent(part, known) for part in within]
+        known[id(node)] = 1 + sum(values for values, _ in parts), 1 + max((depth for _, depth in parts), default=0)
+    if (found := known[id(node)]) is None:
+        raise ValueError(f"line {node.start_mark.line + 1} has an alias of what it lies in")
+    return found
 
 
 def read_settings(path: str | Path, defaults: Settings, expected: str) -> Settings:
@@ -52,6 +95,6 @@ def changed(settings: BaseModel, changes: dict[str, object]) -> dict[str, object
     within = {
         name: changed(part, changes[name])
         for name in changes
-        if isinstance(part := getattr(settings, name, None), BaseModel) and isinstance(changes[name], dict)
+        if isinstance(part := getattr(settings, str(name), None), BaseModel) and isinstance(changes[name], dict)
     }
     return settings.model_dump() | changes | within

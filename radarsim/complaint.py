@@ -11,7 +11,8 @@ def complaint(error: ValidationError, data: object) -> str:
     for part in loc:
         # Parts that are not there tell which branch of a union was tried, unless it is they that miss or that are odd.
         missing = isinstance(here, dict) and kind == "missing" and part == loc[-1]
-        there = part in here if isinstance(here, dict) else isinstance(here, list | tuple) and isinstance(part, int)
+        within = isinstance(here, list | tuple) and isinstance(part, int) and part < len(here)
+        there = part in here if isinstance(here, dict) else within
         if there or missing:
             field += f"[{part}]" if isinstance(part, int) else f".{part}"
             here = here[part] if there else None

@@ -13,7 +13,7 @@ from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
-from radarize.recording import Recording, RecordingWriter
+from radarize.recording import Recording, RecordingWriter, spare
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
@@ -98,6 +98,7 @@ def record(
     Raises:
         InputError: the motion is shorter than a frame, or the recording cannot be written.
     """
+    spare(Path(output))
     times = scenario.times if times is None else times
     suite, about = Suite(scenario), facts(scenario) | dict(attributes or {})
 

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
+from radarize.files import read_text
 from radarize.tum import read_tum
 from radarize.yamlfile import read_yaml
 
@@ -43,12 +44,8 @@ def _listed(path: Path) -> list[list[float]]:
 
 
 def _lines(path: Path) -> list[list[float]]:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from error
     rows = []
-    for number, line in enumerate(text.splitlines(), 1):
+    for number, line in enumerate(read_text(path, "way-points").splitlines(), 1):
         words = line.split("#")[0].replace(",", " ").split()
         if words and not (not rows and all(word[0].isalpha() for word in words) and number == 1):
             rows.append(_place(f"{path}, line {number}", words))
@@ -60,7 +57,7 @@ def _place(where: str, item: object) -> list[float]:
         x, y = (float(value) for value in item)
         if np.isfinite([x, y]).all():
             return [x, y]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         pass
     found = " ".join(map(str, item)) if isinstance(item, list) else item
     raise InputError(f"{where}: is {str(found)[:60]!r}, expected two finite numbers: x y in m")

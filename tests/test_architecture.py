@@ -1,16 +1,19 @@
 """What depends on what, and how much a function takes."""
 
 import ast
+import re
 import subprocess
 import sys
 from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 #: Packages and modules of `radarize`, lowest first: each imports only what stands before it, or beside it.
 LAYERS = (
-    "errors plain replacing yamlfile jsonfile npyfile pose tum console stopwatch jobs",
+    "errors plain files locks replacing hdf5 yamlfile jsonfile npyfile pixels pose tum console stopwatch jobs",
     "radar",
     "recording",
     "heatmaps points contents polar clouds walks",
@@ -146,3 +149,23 @@ def test_help_is_quick():
     )
     assert "radarize.cli" in found
     assert not found & {"torch", "numpy", "scipy", "numba", "h5py", "gtsam", "matplotlib", "pandas"}
+
+
+@pytest.mark.parametrize(
+    ("call", "home"),
+    [
+        (r"h5py\.File\((?!.*\"w\")", "hdf5"),
+        (r"Image\.open\(", "pixels"),
+        (r"np\.load\(|zipfile\.ZipFile\(", "npyfile"),
+        (r"yaml\.(safe_)?load\(", "yamlfile"),
+    ],
+)
+def test_what_comes_from_elsewhere_is_opened_in_one_place(call, home):
+    """Where its guards are."""
+    found = {
+        path.stem
+        for package in ("radarize", "radarsim")
+        for path in modules(package).values()
+        if any(re.search(call, line) for line in path.read_text().splitlines())
+    }
+    assert found <= {home}

@@ -84,6 +84,7 @@ class Board:
         self._socket = network.bind(network.command_port)
         self._reported = Status(0)
         self._foreign = ""
+        self._port: int | None = None
 
     def __enter__(self) -> "Board":
         return self
@@ -143,7 +144,7 @@ class Board:
                         "expected 0 (success); switch it off and on again"
                     )
                 return reply.status
-        elsewhere = f"; {self._foreign} sent something instead, which is not --dca" if self._foreign else ""
+        elsewhere = f"; {self._foreign} sent something instead, which is not the board" if self._foreign else ""
         raise InputError(
             f"--dca {self.network.dca}: no DCA1000 answers {command.name} at UDP port {self.network.command_port} "
             f"({_ATTEMPTS} times asked); is it powered, its Ethernet cable in, and no firewall before "
@@ -165,21 +166,22 @@ class Board:
     def _hear(self, deadline: float) -> Reply | None:
         """The board's next reply until an instant (monotonic, s); reports of its own are noted.
 
-        It replies from any port of its address (real ones from 1024), and nobody else is heard.
+        It replies from one port of its address, whichever (real ones from 1024): once it has, nobody else is heard.
         """
         while True:
             self._socket.settimeout(max(deadline - time.monotonic(), 0.0))
             try:
-                data, (sender, _) = self._socket.recvfrom(2048)
+                data, (sender, port) = self._socket.recvfrom(2048)
             except OSError:
                 return None
-            if sender != self.network.dca:
-                self._foreign = sender
+            if sender != self.network.dca or self._port not in (None, port):
+                self._foreign = f"{sender}:{port}"
                 continue
             try:
                 reply = Reply.decode(data)
             except InputError:
                 continue
+            self._port = port
             if reply.command == Command.STATUS:
                 self._reported |= Status(reply.status)
             return reply

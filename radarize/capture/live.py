@@ -7,7 +7,7 @@ from threading import Event
 import numpy as np
 import torch
 
-from radarize.batch import BATCH, Intake
+from radarize.batch import Intake
 from radarize.capture.page import Page
 from radarize.capture.stream import Stream, follow
 from radarize.capture.view import View
@@ -16,6 +16,9 @@ from radarize.odometry.blindness import Blindness
 from radarize.recording import Losses, RecordingWriter
 from radarize.stopwatch import stage
 
+#: Frames at a time, at most. Libraries keep what they have made for every number of frames, the more the larger it is:
+#: up to so many all of it is there after `prepare`, and memory then grows with the map alone.
+TOGETHER = 4
 #: s between pictures of a frame, and of the map; redrawing the map takes at most this share of the time.
 _FRAME_INTERVAL, _MAP_INTERVAL, _MAP_SHARE = 0.2, 1.0, 0.05
 
@@ -63,7 +66,7 @@ class Live:
             InputError: see `follow`.
         """
         self.page.send("facts", self.view.facts())
-        for came in follow(stream, stopping, most=BATCH, frames=frames):
+        for came in follow(stream, stopping, most=TOGETHER, frames=frames):
             start = time.monotonic()
             adc, stamps, valid = came["adc"], came["time"], came["valid"]
             if batch := self.intake.take(adc, stamps, valid):
@@ -117,9 +120,9 @@ def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
     torch.set_num_threads(1)  # a frame is too little to share out: threads that wait for each other cost more
     pipeline, intake, radar = Workshop(inputs).pipeline(**methods), Intake(inputs.signal), inputs.radar
     view, rng = View(pipeline, inputs.signal), np.random.default_rng(0)
-    for frames in (1, BATCH):
+    for frames in range(1, TOGETHER + 1):
         adc = rng.integers(-200, 200, (frames, *radar.frame_shape), dtype=np.int16)
-        stamps = intake.taken * radar.frame_period + np.arange(frames)
+        stamps = (intake.taken + np.arange(frames)) * radar.frame_period
         view.add(pipeline.push(intake.take(adc, stamps)))
     view.frame(adc[-1:], np.ones((1, *adc.shape[1:3]), bool), 0.0)
     return inputs

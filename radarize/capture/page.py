@@ -1,15 +1,20 @@
 """A local web page that shows the newest state of things: one file, server-sent events, nothing from the network."""
 
+import contextlib
+import ipaddress
 import json
 import threading
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from radarize.errors import InputError
 from radarize.report.page import STYLE
 
 #: Events (HTML standard, section 9.2); a comment now and then tells whether the browser is still there.
 _KEEP_ALIVE = 5.0
+#: Connections at a time: each browser holds one, and a second while it loads the page.
+_CLIENTS = 32
 
 
 class Page:
@@ -35,7 +40,7 @@ class Page:
         except (OSError, ValueError, OverflowError) as error:
             why = getattr(error, "strerror", None) or "no port number"
             raise InputError(f"--address {address}: {why}, expected HOST:PORT to show the page at") from error
-        self._server.page = self
+        self._server.page, self._server.name = self, host or "127.0.0.1"
         self.url = f"http://{host or '127.0.0.1'}:{self._server.server_address[1]}/"
         self._changed = threading.Condition()
         self._newest: dict[str, tuple[int, str]] = {}
@@ -90,7 +95,29 @@ class Page:
 
 class _Server(ThreadingHTTPServer):
     page: Page
+    name: str  # of the address that was given
     daemon_threads = False  # so that closing waits for the last events
+
+    def __init__(self, *arguments):
+        self._room = threading.BoundedSemaphore(_CLIENTS)
+        super().__init__(*arguments)
+
+    def process_request(self, request, client_address) -> None:
+        """Answer in a thread of its own, while there is room."""
+        if self._room.acquire(blocking=False):
+            super().process_request(request, client_address)
+            return
+        words = f"{_CLIENTS} connections are open already, which is as many as this page serves; close one\n"
+        with contextlib.suppress(OSError):
+            request.sendall(f"HTTP/1.0 503 Service Unavailable\r\nContent-Type: text/plain\r\n\r\n{words}".encode())
+        self.shutdown_request(request)
+
+    def process_request_thread(self, request, client_address) -> None:
+        """Make room again when a connection ends."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._room.release()
 
     def handle_error(self, request, client_address) -> None:
         """A browser that went away is no error."""
@@ -101,7 +128,9 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = 10.0  # a browser that takes nothing is let go
 
     def do_GET(self) -> None:
-        if self.path == "/":
+        if not self._ours():
+            self.send_error(403, explain="expected the address that radarize printed, and no other site's page asking")
+        elif self.path == "/":
             html = Path(__file__).with_name("live.html").read_text().replace("/* STYLE */", STYLE)
             self._head("text/html; charset=utf-8")
             self.wfile.write(html.encode())
@@ -110,6 +139,17 @@ class _Handler(BaseHTTPRequestHandler):
             self.server.page.follow(self.wfile.write)
         else:
             self.send_error(404)
+
+    def _ours(self) -> bool:
+        """Whether the user's browser asks for this very page: by address, or a name that nobody else can point here
+        (DNS rebinding), and not on behalf of another site."""
+        host, origin = self.headers.get("Host", ""), self.headers.get("Origin")
+        try:
+            name = urlsplit(f"//{host}").hostname or ""
+            ours = name in ("localhost", self.server.name) or bool(ipaddress.ip_address(name))
+        except ValueError:
+            return False
+        return ours and origin in (None, f"http://{host}")
 
     def _head(self, kind: str) -> None:
         self.send_response(200)

@@ -2,15 +2,21 @@
 
 import socket
 import time
+from collections.abc import Iterator
+
+import numpy as np
 
 from radarize.capture.stream import GLANCE, Outlet
+from radarize.radar.assembler import FrameAssembler, PacketCounts
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import HEADER, MAX_PAYLOAD, FrameAssembler, decode
+from radarize.radar.dca1000 import HEADER, MAX_PAYLOAD, decode
 
 #: Asked for, bytes: half a second at the DCA1000's fastest.
 SOCKET_BUFFER = 64 << 20
-#: s of samples that may be missing at once before a byte count is taken for damaged.
-_LONGEST_GAP = 60.0
+#: Ports of the board's address that are listened to until packets of one agree.
+_PORTS = 16
+#: s, and share of the time, by which a radar may seem to be ahead of this computer's clock.
+_AHEAD, _DRIFT = 2.0, 1e-3
 #: Packets between two looks at the clock and at whether to stop.
 _BLOCK = 64
 
@@ -37,9 +43,63 @@ def buffer_warning(size: int, config: RadarConfig) -> list[str]:
     ]
 
 
+class Origin:
+    """Frames from the one port of an address whose packets make a stream; those of others are counted.
+
+    A board sends from one port, which nobody knows beforehand: the first one of which several packets agree.
+
+    Args:
+        address: of the board.
+    """
+
+    def __init__(self, address: str, config: RadarConfig):
+        self._address, self._config = address, config
+        self._rate = config.frame_bytes * config.frame_rate  # bytes/s
+        self._known: dict[int, FrameAssembler] = {}
+        self._port: int | None = None
+        self._since = 0.0
+        self.foreign = 0
+
+    def take(self, sender: tuple[str, int], data: bytes) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """As `FrameAssembler.take`, of what came from a sender."""
+        address, port = sender
+        if address != self._address or self._port not in (None, port):
+            self.foreign += 1
+            return
+        if port not in self._known:
+            self._known[port] = FrameAssembler(self._config)
+            if len(self._known) > _PORTS:
+                self._drop(next(iter(self._known)))
+        yield from self._known[port].take(data)
+        if self._port is None and self._known[port].begun is not None:
+            self._port, self._since = port, time.monotonic()
+            for other in self._known.keys() - {port}:
+                self._drop(other)
+
+    def _drop(self, port: int) -> None:
+        list(self._known[port].finish())
+        self.foreign += self._known.pop(port).counts.packets
+
+    def look(self) -> PacketCounts:
+        """Note the time, beyond which no byte count can be; what became of the packets so far."""
+        if self._port is None:
+            return PacketCounts()
+        assembler = self._known[self._port]
+        passed = (1 + _DRIFT) * (time.monotonic() - self._since) + _AHEAD
+        assembler.furthest = assembler.begun + self._rate * passed
+        return assembler.counts
+
+    def finish(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Nothing will come any more: the frames left."""
+        if self._port is None and self._known:
+            self._port = max(self._known, key=lambda port: self._known[port].waiting)
+        if self._port is not None:
+            yield from self._known[self._port].finish()
+
+
 def receive(outlet: Outlet, receiver: socket.socket, sender: str, config: RadarConfig) -> None:
     """A `Source`: frames from packets that `sender` sends to a bound socket, until stopped and nothing more comes."""
-    assembler = FrameAssembler(config, max_jump=int(_LONGEST_GAP * config.frame_bytes * config.frame_rate))
+    origin = Origin(sender, config)
     receiver.settimeout(GLANCE)
     buffer = bytearray(HEADER.size + MAX_PAYLOAD + 1)
     view = memoryview(buffer)
@@ -52,18 +112,17 @@ def receive(outlet: Outlet, receiver: socket.socket, sender: str, config: RadarC
     while not outlet.orphaned:
         try:
             for _ in range(_BLOCK):
-                size, (address, _) = receiver.recvfrom_into(buffer)
-                if address != sender:
-                    outlet.counts.foreign += 1
-                    continue
-                if not outlet.counts.first:
+                size, address = receiver.recvfrom_into(buffer)
+                if not outlet.counts.first and address[0] == sender:
                     outlet.counts.first = time.time()
-                for frame in assembler.take(view[:size]):
+                for frame in origin.take(address, view[:size]):
                     put(*frame)
         except TimeoutError:
             if outlet.stopped:
                 break
-        outlet.publish(assembler.counts)
-    for frame in assembler.finish():
+        counts = origin.look()
+        outlet.counts.foreign = origin.foreign
+        outlet.publish(counts)
+    for frame in origin.finish():
         put(*frame)
-    outlet.publish(assembler.counts)
+    outlet.publish(origin.look())

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from radarize.capture.stream import GLANCE, Outlet, Stream
 from radarize.errors import InputError
-from radarize.radar.dca1000 import PacketCounts
+from radarize.radar.assembler import PacketCounts
 from radarize.recording import Recording
 
 

@@ -12,6 +12,7 @@ from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000_commands import Status
 from radarize.radar.limits import check_limits
+from radarize.recording.captured import FROM_RADAR
 
 #: s: the board holds the end of the last frame back for 2 s, in the hope of filling a packet.
 _LAST_PACKET = 3.0
@@ -103,7 +104,7 @@ class Sensor(Stream):
     @property
     def facts(self) -> dict[str, object]:
         """What a recording should say about its origin."""
-        return {"source": f"radar at {self.port}, DCA1000 at {self._board.network.dca}"}
+        return {"source": f"{FROM_RADAR}{self.port}, DCA1000 at {self._board.network.dca}"}
 
     def silent(self, seconds: float, at_all: bool) -> None:
         """Why nothing comes.

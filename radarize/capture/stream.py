@@ -12,8 +12,8 @@ import numpy as np
 
 from radarize.capture.ring import CONTEXT, FrameRing
 from radarize.errors import InputError
+from radarize.radar.assembler import PacketCounts
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import PacketCounts
 
 #: s, how often a waiting process looks whether it should end.
 GLANCE = 0.2
@@ -147,6 +147,8 @@ class Stream:
         found = []
         if counts.dropped:
             found.append(f"{counts.dropped} of {counts.frames} frames were dropped: this computer is too slow for them")
+        if counts.foreign:
+            found.append(f"{counts.foreign} packets came from elsewhere and are ignored")
         return found + self.packets.warnings()
 
     def silent(self, seconds: float, at_all: bool) -> None:
@@ -191,7 +193,7 @@ def follow(stream: Stream, stopping: Event, *, most: int, frames: int | None = N
     Raises:
         InputError: no frame at all came, or the source failed.
     """
-    stopped, last, number = False, time.monotonic(), -1
+    stopped, last, number, came = False, time.monotonic(), -1, 0
     patience = SILENCE + 2 * stream.config.frame_period
     while (found := stream.frames(most)) is not None:
         if len(found):
@@ -200,6 +202,8 @@ def follow(stream: Stream, stopping: Event, *, most: int, frames: int | None = N
             if len(wanted):
                 yield wanted
             last = time.monotonic()  # after what the reader did, however long that took
+        if (received := stream.packets.received) > came:  # a frame may take long
+            came, last = received, time.monotonic()
         silent = time.monotonic() - last > patience
         enough = frames is not None and number >= frames - 1
         if not stopped and (stopping.is_set() or enough or silent):

@@ -5,6 +5,7 @@ Every command is answered by ``Done``, or by ``Error ...`` and words of the firm
 """
 
 import errno
+import termios
 import time
 
 import serial
@@ -20,6 +21,8 @@ PROMPT = "mmwDemo:/>"
 _PATIENCE, _START_PATIENCE = 3.0, 10.0
 #: Refused by some firmware, and not needed.
 _OPTIONAL = ("calibData",)
+#: What a port that is gone raises; termios's own is no OSError.
+_LOST = (serial.SerialException, OSError, termios.error)
 
 
 class Uart:
@@ -41,7 +44,7 @@ class Uart:
         self.ignored: list[str] = []
         try:
             self._serial = serial.Serial(port, baud, timeout=0.05, write_timeout=_PATIENCE, exclusive=True)
-        except (serial.SerialException, ValueError, OSError) as error:
+        except (*_LOST, ValueError) as error:
             raise InputError(f"--port {port}: {_why(error)}") from error
 
     def __enter__(self) -> "Uart":
@@ -88,7 +91,7 @@ class Uart:
             self._serial.reset_input_buffer()
             self._serial.write(command.encode("ascii", "replace") + b"\n")
             heard = self._listen(patience)
-        except (serial.SerialException, OSError) as error:
+        except _LOST as error:
             raise InputError(f"--port {self.port}: lost while sending {command!r}; is it still plugged in?") from error
         if not heard.isascii():
             raise InputError(

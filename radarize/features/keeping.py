@@ -4,6 +4,7 @@ from pathlib import Path
 
 from radarize.features.maps import AZIMUTHS, MAPS, MapMaker
 from radarize.recording import Product, Recording, RecordingWriter, Stream
+from radarize.recording.recover import along
 
 #: Truth as large as samples, which recordings without samples do without.
 _LARGE = ("truth/adc_by_cause",)
@@ -25,15 +26,9 @@ def keep_maps(source: Path, output: Path) -> Path:
         }
         products = {"maps/azimuths": Product(AZIMUTHS, "rad", "columns of the maps, positive to the left")}
         others = [n for n in recording.names() if not n.startswith(("radar/", "maps/")) and n not in _LARGE]
-        for name in others:
-            data, about = recording.file[name], recording.describe(name)
-            if "clock" in data.attrs:
-                clock = str(data.attrs["clock"])
-                streams[name] = Stream(
-                    data.shape[1:], data.dtype.str, about["unit"], about["about"], clock, recording.labels(name)
-                )
-            else:
-                products[name] = Product(data[()], about["unit"], about["about"])
+        streams_along, products_along = along(recording, others)
+        streams |= streams_along
+        products |= products_along
         own = ("format", "radarize_version")
         attributes = {name: value for name, value in recording.attributes.items() if name not in own}
         with RecordingWriter(
@@ -42,9 +37,8 @@ def keep_maps(source: Path, output: Path) -> Path:
         ) as writer:  # fmt: skip
             for frames, adc in recording.batches(_BATCH):
                 valid = recording.valid(frames.start, frames.stop)
-                for name in others:
-                    if name in streams:
-                        writer.extend(name, recording.rows(name, frames.start, frames.stop))
+                for name in streams_along:
+                    writer.extend(name, recording.rows(name, frames.start, frames.stop))
                 rows = {f"maps/{name}": made for name, made in maker(adc, valid).items()}
                 writer.append(None, recording.times[frames], valid, rows=rows)
     return output

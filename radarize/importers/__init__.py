@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError, explained
+from radarize.files import regular
 from radarize.importers import bin as bin_format
 from radarize.importers import cube as cube_format
 from radarize.importers import pcap as pcap_format
@@ -76,6 +77,11 @@ def import_recording(
     first = next(batches)
     if given.start_time is not None and first.times is not None:
         raise InputError(f"{source}: has stamps of its own, but start_time is {given.start_time}, expected none")
+    if "tx_order" in capture.assumed:
+        capture.warnings.append(
+            "one chirp a loop is assumed, of TX1: of a capture with two transmitters, all speeds would be doubled; "
+            "--tx says how many there are"
+        )
     radar, swapped = _settle_iq_order(capture, first, "iq_order" in given.overrides)
     streams = {name: each for name, each in capture.streams.items() if not products or not name.startswith(_POSES)}
     writer = RecordingWriter(
@@ -126,13 +132,15 @@ def _apart(times: np.ndarray, start: float, end: float, poses: Path) -> list[str
 
 def _open(source: Path, output: Path, given: Given) -> Capture:
     """Choose the format and the configuration."""
-    if not source.exists():
-        raise InputError(f"{source}: no such file or folder, expected {_EXPECTED}")
+    if not source.is_dir():
+        regular(source, _EXPECTED)
     kind = _kind(source)
     if (given.shape or given.variable) and kind != "cube":
         raise InputError(f"{source}: is no array, but shape or variable is given, expected {', '.join(_ARRAYS)}")
     if given.latency is not None and kind != "bag":
         raise InputError(f"{source}: is no ROS bag, but latency is {given.latency:g} s, expected none")
+    if given.encoding != "signed" and kind not in ("studio", "bin"):
+        raise InputError(f"{source}: is no .bin, but encoding is {given.encoding}, expected none")
     if kind == "studio":
         return studio_format.open_studio(source, given)
     beside = bin_format.whole_name(source).with_suffix(".cfg")
@@ -147,7 +155,7 @@ def _open(source: Path, output: Path, given: Given) -> Capture:
     config, assumed = given.configure(str(source))
     if kind == "pcap":
         return pcap_format.open_pcap(source, config, given.cfg_text, assumed)
-    return bin_format.open_bin(bin_format.parts(source), config, given.cfg_text, assumed)
+    return bin_format.open_bin(bin_format.parts(source), config, given.cfg_text, assumed, encoding=given.encoding)
 
 
 def _kind(source: Path) -> str:

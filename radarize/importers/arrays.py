@@ -4,16 +4,20 @@ import math
 import tempfile
 import zipfile
 from abc import ABC, abstractmethod
+from contextlib import ExitStack
 from pathlib import Path
 
 import h5py
 import numpy as np
 
 from radarize.errors import InputError, explained
-from radarize.npyfile import npy_header
+from radarize.hdf5 import dataset, open_hdf5
+from radarize.npyfile import npy_header, open_npz
 
-#: Bytes of a compressed member unpacked at a time.
-_PIECE = 1 << 18
+#: Bytes of a compressed member unpacked at a time, and that deflate makes of one at most (zlib's technical details).
+_PIECE, _DEFLATE = 1 << 18, 1032
+#: Of entries, as numpy calls them: numbers, and pairs of them.
+_KINDS = "iufcV"
 
 
 class ArrayFile(ABC):
@@ -84,6 +88,8 @@ class MemberArray(MappedArray):
         self._file = tempfile.NamedTemporaryFile(dir=folder)
         with archive.open(member) as packed:
             header = npy_header(packed, name)
+            if member.file_size > _DEFLATE * member.compress_size:
+                raise InputError(f"{name}: declares {member.file_size} bytes packed in {member.compress_size}")
             while piece := packed.read(_PIECE):
                 self._file.write(piece)
         self._file.flush()
@@ -104,9 +110,15 @@ class MemoryArray(ArrayFile):
 class MatlabArray(ArrayFile):
     """An array of a ``.mat`` file of version 7.3, which is HDF5 with all axes turned round."""
 
-    def __init__(self, name: str, data: h5py.Dataset):
-        self.name, self._data, self.shape = name, data, data.shape[::-1]
-        self.dtype = _checked(data.dtype, name)
+    def __init__(self, path: Path, variable: str | None):
+        with ExitStack() as stack:
+            file = stack.enter_context(open_hdf5(path))
+            data = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset) and item.shape}
+            shapes = {name: item.shape[::-1] for name, item in data.items() if item.dtype.kind in _KINDS}
+            chosen = _choose(path, variable, shapes)
+            self.name, self._data = f"{path}: {chosen}", dataset(file, chosen, path, kinds=_KINDS)
+            self.shape, self.dtype = self._data.shape[::-1], _checked(self._data.dtype, self.name)
+            self._open = stack.pop_all()  # as long as the array is in use
 
     def _take(self, where: tuple[slice, ...]) -> np.ndarray:
         with explained(f"{self.name}: is damaged"):
@@ -135,13 +147,11 @@ def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
 
 
 def _open_npz(path: Path, variable: str | None, folder: Path) -> ArrayFile:
-    with zipfile.ZipFile(path) as archive:
-        members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+    with open_npz(path, str(path)) as (archive, members):
         headers = {}
         for name, info in members.items():
-            if info.filename.endswith(".npy"):
-                with archive.open(info) as packed:
-                    headers[name] = npy_header(packed, f"{path}: {name}"), packed.tell()
+            with archive.open(info) as packed:
+                headers[name] = npy_header(packed, f"{path}: {name}"), packed.tell()
         shapes = {name: header[0] for name, (header, _) in headers.items() if header[2].kind in "iufcV"}
         chosen = _choose(path, variable, shapes)
         member, (header, length) = members[chosen], headers[chosen]
@@ -156,11 +166,7 @@ def _open_npz(path: Path, variable: str | None, folder: Path) -> ArrayFile:
 
 def _open_mat(path: Path, variable: str | None) -> ArrayFile:
     if h5py.is_hdf5(path):
-        file = h5py.File(path, "r")
-        data = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset)}
-        shapes = {name: item.shape[::-1] for name, item in data.items() if item.dtype.kind in "iufcV"}
-        chosen = _choose(path, variable, shapes)
-        return MatlabArray(f"{path}: {chosen}", data[chosen])
+        return MatlabArray(path, variable)
     from scipy.io import loadmat, whosmat
 
     shapes = {name: shape for name, shape, kind in whosmat(path) if kind not in ("cell", "struct", "object")}

@@ -12,9 +12,12 @@ from jaxtyping import Bool, Int16
 
 from radarize.errors import InputError, explained
 from radarize.importers.capture import Batch, Capture, batch_frames
+from radarize.importers.words import oddity, signed
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import check_layout, decode
 
+#: Bytes by which a capture is judged.
+_LOOKED_AT = 1 << 20
 _PART = re.compile(r"(?P<name>.+)_Raw_(?P<number>\d+)\.bin", re.IGNORECASE)
 
 
@@ -58,11 +61,13 @@ def open_bin(
     cfg_text: str = "",
     assumed: tuple[str, ...] = (),
     warnings: Sequence[str] = (),
+    encoding: str = "signed",
 ) -> Capture:
     """Open raw files that follow each other.
 
     An incomplete last frame is left out with a warning, unless the samples show that it is the configuration which
-    does not fit. Chirps of nothing but zeros count as lost: capture programs fill lost packets with zeros.
+    does not fit; of words that are plainly something else than `encoding` says there is a warning, too. Chirps of
+    nothing but zeros count as lost: capture programs fill lost packets with zeros.
 
     Raises:
         InputError: less than one frame, or the samples repeat with another period than the configuration's loop.
@@ -76,7 +81,11 @@ def open_bin(
     layout = f"{config.frame_bytes} bytes a frame ({loops} loops x {tx} TX x {rx} RX x {samples} samples x 4 bytes)"
     if not whole:
         raise InputError(f"{name}: has {size} bytes, less than one frame; expected a multiple of {layout}")
-    if period := _other_period(files[0], config):
+    with files[0].open("rb") as file:
+        odd = oddity(file.read(_LOOKED_AT), encoding)
+    if odd:
+        warnings.append(f"{name}: {odd}")
+    elif period := _other_period(files[0], config):
         expected = tx * rx * samples
         message = (
             f"{name}: has {size} bytes, {whole} frames and {rest} bytes of {layout}, but its samples repeat every "
@@ -90,15 +99,15 @@ def open_bin(
             f"{name}: has {size} bytes, {whole} whole frames and {rest} bytes of an incomplete one, which is left out; "
             f"expected {layout}"
         )
-    return Capture(config, cfg_text, _batches(files, config), whole, assumed, warnings)
+    return Capture(config, cfg_text, _batches(files, config, encoding), whole, assumed, warnings)
 
 
-def _batches(files: Sequence[Path], config: RadarConfig) -> Iterator[Batch]:
+def _batches(files: Sequence[Path], config: RadarConfig, encoding: str) -> Iterator[Batch]:
     for data in _blocks(files, batch_frames(config) * config.frame_bytes):
         words = np.frombuffer(data, "<i2", len(data) // config.frame_bytes * config.frame_bytes // 2)
         words = words.astype(np.int16, copy=False)
         if words.size:
-            yield Batch(decode(words, config), ~all_zero(words, config))
+            yield Batch(decode(signed(words, encoding), config), ~all_zero(words, config))
 
 
 def _blocks(files: Sequence[Path], size: int) -> Iterator[bytes]:

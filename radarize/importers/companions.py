@@ -10,10 +10,10 @@ from collections.abc import Mapping
 
 import numpy as np
 from jaxtyping import Float, UInt16
-from PIL import Image
 from scipy.spatial.transform import Rotation, Slerp
 
-from radarize.errors import InputError, explained
+from radarize.errors import InputError
+from radarize.pixels import read_picture
 from radarize.points import COLUMNS
 from radarize.radar.config import RadarConfig
 from radarize.recording import Product, Stream
@@ -221,11 +221,9 @@ def depth_picture(message: object) -> UInt16[np.ndarray, "row column"]:
         picture = np.ascontiguousarray(picture).view(kind)
         return picture.astype(np.uint16) if kind.kind == "u" else _millimetres(picture)
     data = bytes(message.data)
-    with explained(f"depth picture ({message.format}) is no readable PNG"):
-        with Image.open(io.BytesIO(data[_DEPTH_HEADER:]), formats=["PNG"]) as packed:
-            if packed.width * packed.height > _MOST_PIXELS:
-                raise InputError(f"depth picture has {packed.width} x {packed.height} pixels, expected a camera's")
-            picture = np.asarray(packed)
+    picture = read_picture(
+        io.BytesIO(data[_DEPTH_HEADER:]), f"depth picture ({message.format})", most=_MOST_PIXELS, gray=False
+    )
     if picture.ndim != 2:
         raise InputError(f"depth picture ({message.format}) has {picture.ndim} axes, expected one grey value a pixel")
     if message.format.strip().startswith("32FC1"):  # quantised inverse depth: a / (value - b)

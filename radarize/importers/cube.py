@@ -1,6 +1,7 @@
 """Raw samples as an array with axes of any order: ``.npy``, ``.npz`` and ``.mat``."""
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +15,8 @@ from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.importers.parameters import Given
 from radarize.radar.config import RadarConfig
 
+#: A length of an axis.
+_LENGTH = re.compile(r"[0-9]{1,9}")
 #: Axes of a recording's samples; ``iq`` is missing where entries are complex.
 STANDARD = ("frame", "loop", "tx", "rx", "sample", "iq")
 #: Names that axes may have besides, and what they are made of, the last one running fastest. `slot` is the transmitter
@@ -43,7 +46,7 @@ class Axes:
             InputError: an unknown or doubtful name, or a number of axes that the array does not have.
         """
         words = [word.strip() for word in text.split(",")]
-        if all(word.isdigit() for word in words) and len(words) in (5, 6):
+        if all(_LENGTH.fullmatch(word) for word in words) and len(words) in (5, 6):
             array.reshaped(tuple(int(word) for word in words))
             return cls(STANDARD[: len(words)])
         known = (*STANDARD, *JOINED, *_OTHER_ORDER)

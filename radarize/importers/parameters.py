@@ -42,6 +42,7 @@ class Given:
         latency: from a frame's start to its receipt in a ROS bag, s; by default what the headers say, else the burst's
             length.
         walk: number of a walk in a data set of pictures.
+        encoding: of a .bin's words, ``signed`` or ``offset-binary``.
     """
 
     config: RadarConfig | None = None
@@ -53,6 +54,7 @@ class Given:
     variable: str | None = None
     latency: float | None = None
     walk: int | None = None
+    encoding: str = "signed"
 
     def or_else(self, config: RadarConfig, cfg_text: str) -> "Given":
         """The same with a configuration, and its text, unless there is one."""

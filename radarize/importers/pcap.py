@@ -11,8 +11,9 @@ import numpy as np
 
 from radarize.errors import InputError
 from radarize.importers.capture import Batch, Capture, batch_frames
+from radarize.radar.assembler import FrameAssembler
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import DATA_PORT, FrameAssembler, decode
+from radarize.radar.dca1000 import DATA_PORT, decode
 
 #: Magic number -> byte order and ticks per second of the time stamps.
 MAGIC = {

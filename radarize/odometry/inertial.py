@@ -19,6 +19,8 @@ GRAVITY = 9.80665  # m/s^2
 #: 1/s, at which specific force, which averages to gravity, pulls the axes upright (Mahony, Hamel and Pflimlin,
 #: "Nonlinear complementary filters on the special orthogonal group", 2008).
 _UPRIGHT = 0.1
+#: s between samples in the mean, and m/s^2 or rad/s: beyond, it is no IMU.
+_LONGEST, _STRONGEST = 1.0, 1e4
 _STREAMS = ("imu/time", "imu/accelerometer", "imu/gyroscope")
 
 
@@ -67,8 +69,16 @@ class Imu:
         time, force, turn = (recording.read(name).astype(float) for name in _STREAMS)
         if len(time) < 2 or time[-1] - time[0] < 2 * PERIOD or not (np.diff(time) > 0).all():
             raise InputError(f"{recording.path}: /imu/time has {len(time)} instants, expected ascending ones")
-        if not (np.isfinite(force).all() and np.isfinite(turn).all()):
-            raise InputError(f"{recording.path}: /imu has values that are no numbers, expected m/s^2 and rad/s")
+        if not time[-1] - time[0] < _LONGEST * len(time):
+            raise InputError(
+                f"{recording.path}: /imu/time has {len(time)} instants in {time[-1] - time[0]:g} s, expected one every "
+                f"{_LONGEST:g} s at least"
+            )
+        if not (np.abs(force) <= _STRONGEST).all() or not (np.abs(turn) <= _STRONGEST).all():
+            raise InputError(
+                f"{recording.path}: /imu has values that are no numbers of m/s^2 or rad/s, expected them within "
+                f"{_STRONGEST:g}"
+            )
         if recording.has("imu/mount"):
             mount = Rotation.from_quat(recording.read("imu/mount")[3:])
             force, turn = mount.apply(force), mount.apply(turn)

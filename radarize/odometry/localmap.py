@@ -9,6 +9,8 @@ from scipy.ndimage import shift as moved
 
 #: m, by how far the sensor may be off the grid's middle.
 _OFF_MIDDLE = 1.0
+#: Cells along a side of the map: what a frame takes does not grow with how far the radar sees.
+_MOST = 640
 
 
 class View(NamedTuple):
@@ -40,10 +42,12 @@ class LocalMap:
 
     Args:
         reach: m, the farthest range.
-        cell: m, side of a cell.
+        cell: m, least side of a cell; so many cells as there may be cover what a radar of coarse range sees in larger
+            ones, which its range cells are anyway.
     """
 
     def __init__(self, reach: float, cell: float):
+        cell = max(cell, 2 * (reach + 2 * _OFF_MIDDLE) / _MOST)
         side = 2 * int((reach + 2 * _OFF_MIDDLE) / cell)
         self._grid = Grid(*np.zeros((2, side, side), np.float32), cell)
 

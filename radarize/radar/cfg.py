@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from radarize.errors import InputError, explained
+from radarize.errors import InputError
+from radarize.files import read_bytes
 from radarize.radar.array import BOARDS, board_of
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
 
@@ -35,6 +36,8 @@ FIELDS: dict[str, tuple[str, ...]] = {
     "antPhaseRot": tuple(f"rotation{i}" for i in range(12)),
 }
 REQUIRED = ("dfeDataOutputMode", "channelCfg", "adcCfg", "adcbufCfg", "profileCfg", "chirpCfg", "frameCfg")
+#: Bytes of a file.
+_LARGEST = 1 << 20
 REFUSED = {"advFrameCfg": "advanced frames", "subFrameCfg": "advanced frames", "contModeCfg": "continuous mode"}
 
 
@@ -44,8 +47,7 @@ def read_text(path: Path) -> str:
     Raises:
         InputError: it cannot be read, or is not text.
     """
-    with explained(f"{path}: cannot be read", OSError):
-        data = path.read_bytes()
+    data = read_bytes(path, "a radar's configuration", _LARGEST)
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:

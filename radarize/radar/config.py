@@ -1,6 +1,6 @@
 """The radar's configuration: what is transmitted, when, on which antennas, and how it is sampled."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -13,6 +13,9 @@ SPEED_OF_LIGHT = 299_792_458.0
 #: High-pass corner frequencies (Hz) that the codes 0-3 of a profile select (data sheet SWRS228).
 HIGH_PASS_1 = (175e3, 235e3, 350e3, 700e3)
 HIGH_PASS_2 = (350e3, 700e3, 1.4e6, 2.8e6)
+#: Bytes of a frame: what the largest of the limits below would make together is no radar's.
+_LARGEST = 64 << 20
+Factor = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
 class RadarConfig(BaseModel):
@@ -43,23 +46,24 @@ class RadarConfig(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     board: Literal["iwr1843boost", "iwr6843isk", "iwr6843ods", "iwr6843aop"] = "iwr1843boost"
-    start_frequency: float = Field(gt=0)
-    slope: float = Field(gt=0)
-    idle_time: float = Field(gt=0)
-    adc_start_time: float = Field(ge=0)
-    ramp_end_time: float = Field(gt=0)
-    samples: int = Field(gt=0)
-    sample_rate: float = Field(gt=0)
-    loops: int = Field(gt=0)
-    frame_period: float = Field(gt=0)
+    # Limits are those of any radar, so that whatever is computed from a file stays finite; `limits` has the chips'.
+    start_frequency: float = Field(ge=1e9, le=1e12)
+    slope: float = Field(ge=1e9, le=1e17)
+    idle_time: float = Field(ge=1e-9, le=10)
+    adc_start_time: float = Field(ge=0, le=10)
+    ramp_end_time: float = Field(ge=1e-9, le=10)
+    samples: int = Field(gt=0, le=1 << 14)
+    sample_rate: float = Field(ge=1e3, le=1e12)
+    loops: int = Field(gt=0, le=1 << 12)
+    frame_period: float = Field(ge=1e-9, le=1e4)
     tx_order: tuple[int, ...] = Field(min_length=1, max_length=3)
     rx: tuple[int, ...] = Field((0, 1, 2, 3), min_length=1, max_length=4)
-    rx_gain_db: float = 30.0
-    tx_backoff_db: float = 0.0
+    rx_gain_db: float = Field(30.0, ge=-1000, le=1000)
+    tx_backoff_db: float = Field(0.0, ge=-1000, le=1000)
     high_pass: tuple[float, float] = (HIGH_PASS_1[0], HIGH_PASS_2[0])
     iq_order: Literal["iiqq", "qqii"] = "qqii"
-    range_bias: float = 0.0
-    channel_calibration: tuple[tuple[float, float], ...] = ((1.0, 0.0),) * 12
+    range_bias: float = Field(0.0, ge=-1000, le=1000)
+    channel_calibration: tuple[tuple[Factor, Factor], ...] = ((1.0, 0.0),) * 12
 
     @model_validator(mode="after")
     def _consistent(self) -> "RadarConfig":
@@ -69,6 +73,11 @@ class RadarConfig(BaseModel):
             raise ValueError(f"rx is {self.rx}, expected ascending distinct numbers of 0, 1, 2, 3")
         if len(self.channel_calibration) != 12:
             raise ValueError(f"channel_calibration has {len(self.channel_calibration)} pairs, expected 12")
+        if self.frame_bytes > _LARGEST:
+            raise ValueError(
+                f"a frame of {self.loops} loops x {len(self.tx)} TX x {len(self.rx)} RX x {self.samples} samples has "
+                f"{self.frame_bytes} bytes, expected at most {_LARGEST}"
+            )
         if self.adc_start_time + self.samples / self.sample_rate > self.ramp_end_time * (1 + 1e-9):
             raise ValueError(
                 f"the ADC window ends {1e6 * (self.adc_start_time + self.samples / self.sample_rate):.2f} us into the "

@@ -14,9 +14,11 @@ Layout (one chunk per frame, readable while it grows):
 without a clock were written once.
 """
 
+from radarize.recording.captured import spare
 from radarize.recording.interrupted import keeping
 from radarize.recording.losses import Losses
 from radarize.recording.reader import Recording
+from radarize.recording.recover import recover
 from radarize.recording.writer import Product, RecordingWriter, Stream, add
 
-__all__ = ["Losses", "Product", "Recording", "RecordingWriter", "Stream", "add", "keeping"]
+__all__ = ["Losses", "Product", "Recording", "RecordingWriter", "Stream", "add", "keeping", "recover", "spare"]

@@ -11,9 +11,13 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16
 
 from radarize.errors import InputError, explained
+from radarize.files import regular
+from radarize.hdf5 import dataset, open_hdf5
 from radarize.radar.config import RadarConfig
-from radarize.recording.damage import dataset
 from radarize.recording.growing import GrowingFile, is_growing
+
+#: s, of stamps, also such as count from 1970.
+_LATEST = 1e11
 
 
 @dataclass
@@ -33,12 +37,11 @@ class Recording:
 
     def __post_init__(self):
         self.path = Path(self.path)
-        if not self.path.is_file():
-            raise InputError(f"{self.path}: no such file, expected a recording (.h5)")
+        regular(self.path, "a recording (.h5)")
         with ExitStack() as stack:
             with explained(f"{self.path}: not a readable HDF5 recording"):
-                source = stack.enter_context(GrowingFile(self.path)) if is_growing(self.path) else self.path
-                self.file = stack.enter_context(h5py.File(source, "r"))
+                growing = stack.enter_context(GrowingFile(self.path)) if is_growing(self.path) else None
+                self.file = stack.enter_context(open_hdf5(self.path, growing))
             with explained(f"{self.path}: not a recording of this project"):
                 self._look()
             self._files = stack.pop_all()
@@ -67,6 +70,8 @@ class Recording:
         whole = min(len(data) for data in (times, self._adc, self._valid) if data is not None)
         unwritten = np.flatnonzero(~np.isfinite(times[:whole]))
         self.times = times[: unwritten[0] if len(unwritten) else whole]
+        if len(self.times) and (np.abs(self.times[[0, -1]]).max() > _LATEST or np.diff(self.times).min(initial=1) <= 0):
+            raise InputError(f"{self.path}: /radar/time does not ascend, expected stamps in s within {_LATEST:g}")
 
     def __len__(self) -> int:
         return len(self.times)

@@ -19,7 +19,10 @@ from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
 from radarize.errors import InputError, explained, reason
+from radarize.hdf5 import open_hdf5
+from radarize.locks import hold
 from radarize.radar.config import RadarConfig
+from radarize.recording.captured import spare
 from radarize.recording.losses import Losses
 from radarize.replacing import replacing
 
@@ -71,13 +74,15 @@ class RecordingWriter:
         streams: growing data sets by path, e.g. ``"truth/pose"``.
         products: fixed data sets by path.
         raw: False for a recording without samples (heat maps for training): `append` then takes None for them.
+        overwrite: replace a recording of a radar, too, which cannot be made again.
 
     Attributes:
         frames: flushed so far.
         losses: of the frames appended so far.
 
     Raises:
-        InputError: the file cannot be created or a write failed (for instance, no space left).
+        InputError: the file cannot be created, or another program writes it; a write failed (for instance, no space
+            left); a recording of a radar is there already.
     """
 
     def __init__(
@@ -90,6 +95,7 @@ class RecordingWriter:
         streams: Mapping[str, Stream] | None = None,
         products: Mapping[str, Product] | None = None,
         raw: bool = True,
+        overwrite: bool = False,
     ):
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + ".part")
@@ -99,11 +105,16 @@ class RecordingWriter:
         self._notes: dict[str, object] = {}
         self._pending: list[tuple] = []
         self._unflushed = 0
+        if not overwrite:
+            spare(self.path)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
             self._require_space(sum(product.data.nbytes for product in (products or {}).values()))
+            if self.part.exists():
+                os.close(hold(self.part))  # of one who died, or refused
             self._file = h5py.File(self.part, "w", libver="latest")
             self._create(cfg_text, attributes or {}, streams or {}, products or {})
+            self._held = hold(self.part)  # HDF5 itself does so until readers may follow
         except OSError as error:
             raise InputError(f"cannot write {self.part}: {reason(error)}") from error
 
@@ -197,12 +208,11 @@ class RecordingWriter:
 
     @contextmanager
     def _telling(self, what: str) -> Iterator[None]:
-        """Say what could not be done, and what is left."""
+        """Say what could not be done."""
         try:
             yield
         except (OSError, RuntimeError) as error:
-            kept = f"{self.frames} whole frames are kept there"
-            raise InputError(f"cannot {what} {self.part}: {reason(error)}; {kept}") from error
+            raise InputError(f"cannot {what} {self.part}: {reason(error)}") from error
 
     def close(self, keep_part: bool = False) -> None:
         """Flush, close and give the file its final name, unless `keep_part`."""
@@ -210,11 +220,12 @@ class RecordingWriter:
             with self._telling("finish"):
                 self.flush()
                 self._file.close()
+                os.close(self._held)
                 if self._notes:  # HDF5 takes no new attributes while readers may follow
-                    with h5py.File(self.part, "r+", libver="latest") as file:
+                    with open_hdf5(self.part, mode="r+") as file:
                         file.attrs.update(_storable(self._notes))
-            if not keep_part:
-                os.replace(self.part, self.path)
+                if not keep_part:
+                    os.replace(self.part, self.path)
 
     def __enter__(self) -> "RecordingWriter":
         return self
@@ -251,7 +262,7 @@ def add(
         shutil.copyfile(path, part)
         with (
             explained(f"{path}: cannot be added to", OSError, RuntimeError),
-            h5py.File(part, "r+", libver="latest") as file,
+            open_hdf5(part, mode="r+") as file,
         ):
             for name in (*streams, *(products or {})):
                 if name in file:

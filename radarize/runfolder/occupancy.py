@@ -15,7 +15,9 @@ import yaml
 from jaxtyping import Bool, Float, UInt8
 from pydantic import BaseModel, Field, ValidationError
 
-from radarize.errors import InputError, explained
+from radarize.errors import InputError
+from radarize.files import read_bytes
+from radarize.pixels import MOST_PIXELS
 from radarize.plain import complaint
 from radarize.pose import transform
 from radarize.replacing import replacing
@@ -25,6 +27,7 @@ from radarize.yamlfile import read_yaml
 Number = Annotated[float, Field(allow_inf_nan=False)]
 #: Bytes of a description, and of a picture's header, comments included.
 _DESCRIPTION, _HEADER = 16 << 10, 4 << 10
+_PICTURE = MOST_PIXELS + _HEADER
 #: Of an 8-bit PGM: width and height, with comments between the words, and one space before the pixels.
 _PGM = re.compile(rb"P5~(\d{1,9})~(\d{1,9})~255\s".replace(b"~", rb"(?:\s|#[^\n]*\n)+"))
 
@@ -136,10 +139,7 @@ def read_pgm(path: Path) -> UInt8[np.ndarray, "row column"]:
     Raises:
         InputError: not such a file, or cut short.
     """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, expected a map's picture (.pgm)")
-    with explained(f"{path}: cannot be read", OSError):
-        content = path.read_bytes()
+    content = read_bytes(path, "a map's picture (.pgm)", _PICTURE)
     head = _PGM.match(content, 0, _HEADER)
     if not head:
         raise InputError(f"{path}: starts with {content[:20]!r}, expected an 8-bit binary PGM (P5)")

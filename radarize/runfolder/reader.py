@@ -13,10 +13,11 @@ from jaxtyping import Float
 from pydantic import ValidationError
 
 from radarize.errors import InputError, explained
+from radarize.files import regular
+from radarize.hdf5 import dataset, open_hdf5
 from radarize.jsonfile import read_json
 from radarize.odometry.blindness import BlindSpans
 from radarize.plain import complaint
-from radarize.recording.damage import dataset
 from radarize.replacing import write_whole
 from radarize.runfolder.occupancy import OccupancyMap
 from radarize.tum import read_tum
@@ -171,8 +172,7 @@ class Scans(Mapping[str, np.ndarray]):
         self._names: list[str] = []
         if path is None:
             return
-        if not path.is_file():
-            raise InputError(f"{path}: no such file, expected the scans of a run")
+        regular(path, "the scans of a run")
         with self._open() as file:
             file.visititems(lambda name, item: self._names.append(name) if isinstance(item, h5py.Dataset) else None)
             for name in _NEEDED:
@@ -211,7 +211,7 @@ class Scans(Mapping[str, np.ndarray]):
 
     @contextmanager
     def _open(self) -> Iterator[h5py.File]:
-        with explained(f"{self.path}: is no readable HDF5 file"), h5py.File(self.path, "r") as file:
+        with explained(f"{self.path}: is no readable HDF5 file"), open_hdf5(self.path) as file:
             yield file
 
     def _check(self, name: str, data: h5py.Dataset) -> None:

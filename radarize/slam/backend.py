@@ -18,7 +18,7 @@ from radarize.slam.grid import OccupancyGrid
 from radarize.slam.loops import Jury, LoopSearch, Question, uncertainty
 from radarize.slam.matcher import match, thin
 from radarize.slam.node import Node, Scan
-from radarize.slam.odometry import Drift, Odometry, Stillness
+from radarize.slam.odometry import FARTHEST, Drift, Odometry, Stillness
 from radarize.slam.posegraph import PoseGraph
 from radarize.slam.rows import Rows
 from radarize.slam.submap import Submap
@@ -82,7 +82,7 @@ class Slam:
                 None: as configured in `SlamConfig.odometry`.
 
         Raises:
-            InputError: a value is not finite, or the covariance is none.
+            InputError: a value is not finite, or not within `FARTHEST`, or the covariance is none.
         """
         if self.odometry.add(time, pose, covariance):
             self._drain()
@@ -98,13 +98,16 @@ class Slam:
             ranges: m; inf: nothing seen on this beam; nan: not known.
 
         Raises:
-            InputError: the time is not finite, or the lengths differ.
+            InputError: the time is not finite, an azimuth not within `FARTHEST`, or the lengths differ.
         """
         azimuths, ranges = np.asarray(azimuths, float), np.asarray(ranges, float)
         if not np.isfinite(time):
             raise InputError(f"scan: time is {time}, expected a finite number of seconds")
         if azimuths.ndim != 1 or azimuths.shape != ranges.shape:
             raise InputError(f"scan at {time}: {ranges.shape} ranges on {azimuths.shape} azimuths, expected one each")
+        if not (np.abs(azimuths) <= FARTHEST).all():
+            worst = azimuths[~(np.abs(azimuths) <= FARTHEST)][0]
+            raise InputError(f"scan at {time}: has azimuth {worst:g} rad, expected within {FARTHEST:g} rad of ahead")
         if len(self._scan_times) and time <= self._scan_times.values[-1]:
             self.skipped["scans"] += 1
             return

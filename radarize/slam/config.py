@@ -44,8 +44,8 @@ class NodeConfig(Frozen):
 class GridConfig(Frozen):
     """Probability grids of submaps and of the final map."""
 
-    resolution: float = setting(0.05, "cell size of submaps, m", gt=0)
-    map_resolution: float = setting(0.05, "cell size of the final map, m", gt=0, le=1)
+    resolution: float = setting(0.05, "cell size of submaps, m", ge=0.005)
+    map_resolution: float = setting(0.05, "cell size of the final map, m", ge=0.005, le=1)
     hit: float = setting(0.7, "probability that a cell is occupied given one echo from it", gt=0.5, lt=1)
     miss: float = setting(0.45, "the same given one ray through it", gt=0, lt=0.5)
     lowest: float = setting(0.12, "least probability, so that a map can change its mind", gt=0, lt=0.5)
@@ -61,9 +61,9 @@ class MatcherConfig(Frozen):
 
     enabled: bool = setting(True, "else nodes follow odometry, and submaps serve the loop search only")
     presearch_distance: float = setting(
-        0.3, "half-width of the correlative search before refinement, m; 0 switches it off", ge=0
+        0.3, "half-width of the correlative search before refinement, m; 0 switches it off", ge=0, le=100
     )
-    presearch_angle: float = setting(0.17, "half-width of that search, rad", ge=0)
+    presearch_angle: float = setting(0.17, "half-width of that search, rad", ge=0, le=4)
     presearch_sigma: float = setting(
         2.0, "as sigma, for the weight of odometry in that search: far from a match the points, most of them on the "
         "same few walls, are wrong together", gt=0
@@ -74,8 +74,8 @@ class MatcherConfig(Frozen):
     )  # fmt: skip
     translation_floor: float = setting(0.01, "no match is believed better than this, m", gt=0)
     rotation_floor: float = setting(0.003, "nor than this, rad", gt=0)
-    iterations: int = setting(20, "at most so many Gauss-Newton steps", gt=0)
-    spacing: float = setting(0.05, "points are thinned to one per square of this size, m", gt=0)
+    iterations: int = setting(20, "at most so many Gauss-Newton steps", gt=0, le=1000)
+    spacing: float = setting(0.05, "points are thinned to one per square of this size, m", ge=0.005)
 
 
 class LoopConfig(Frozen):
@@ -83,8 +83,8 @@ class LoopConfig(Frozen):
 
     enabled: bool = setting(True, "search for loops at all")
     radius: float = setting(10.0, "submaps with their centre this near to a node are searched, m", gt=0)
-    distance: float = setting(3.0, "half-width of the search window, m", gt=0)
-    angle: float = setting(0.5, "half-width of the search window, rad", gt=0)
+    distance: float = setting(3.0, "half-width of the search window, m", gt=0, le=100)
+    angle: float = setting(0.5, "half-width of the search window, rad", gt=0, le=4)
     candidates: int = setting(4, "at most so many submaps are searched per node, nearest first", gt=0)
     every: int = setting(4, "only every so-many-th node is searched for", gt=0)
     nodes: int = setting(

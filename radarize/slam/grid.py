@@ -16,8 +16,8 @@ from radarize.errors import InputError
 from radarize.slam.config import GridConfig
 
 _MARGIN = 32  # cells added around whatever a grid has to hold when it grows
-#: Cells of a map: 2 GB.
-_MOST = 1 << 29
+#: Cells of a map: half a kilometre square, 512 MB.
+_MOST = 1 << 27
 
 
 class Evidence(NamedTuple):

@@ -11,6 +11,9 @@ from radarize.pose import adjoint, between, interpolate, inverse
 from radarize.slam.config import OdometryConfig
 from radarize.slam.rows import Rows
 
+#: m and rad, of everything that comes in: cells of it are numbers that compiled loops can index with.
+FARTHEST = 1e6
+
 
 class Odometry:
     """Poses in an odometry frame, in order of time.
@@ -37,15 +40,19 @@ class Odometry:
         """Append a pose and the covariance of the motion since the one before; False if it comes too late.
 
         Raises:
-            InputError: a value is not finite, or the covariance is not symmetric and positive semidefinite.
+            InputError: a value is not within `FARTHEST`, or the covariance is not symmetric and positive semidefinite.
         """
         pose = np.asarray(pose, float)
-        if pose.shape != (3,) or not np.isfinite(pose).all() or not np.isfinite(time):
-            raise InputError(f"odometry at {time}: pose is {pose}, expected finite time, x, y and yaw")
+        if pose.shape != (3,) or not (np.abs(pose) <= FARTHEST).all() or not np.isfinite(time):
+            raise InputError(
+                f"odometry at {time}: pose is {pose}, expected finite time, and x, y, yaw within {FARTHEST:g} m or rad"
+            )
         if covariance is not None:
             covariance = np.asarray(covariance, float)
-            if covariance.shape != (3, 3) or not np.isfinite(covariance).all():
-                raise InputError(f"odometry at {time}: covariance is {covariance.tolist()}, expected a finite 3 x 3")
+            if covariance.shape != (3, 3) or not (np.abs(covariance) <= FARTHEST**2).all():
+                raise InputError(
+                    f"odometry at {time}: covariance is {covariance.tolist()}, expected a 3 x 3 within {FARTHEST**2:g}"
+                )
             slack = 1e-6 * np.abs(covariance).max()
             if np.abs(covariance - covariance.T).max() > slack or np.linalg.eigvalsh(covariance)[0] < -slack:
                 raise InputError(

@@ -1,6 +1,5 @@
 """Make a data set: look what is there, hand out the rest, report, and go on where an earlier run ended."""
 
-import fcntl
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator
@@ -12,8 +11,9 @@ from pathlib import Path
 import psutil
 
 from radarize import __version__
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.jobs import Job, Report, perform
+from radarize.locks import hold
 from radarize.replacing import replacing
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Stale, Task
@@ -117,16 +117,10 @@ def _make(task: Task, folder: Path, report: Report) -> str:
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
     """Hold a folder for one run; the lock goes with the process, however that ends."""
-    try:
+    with explained(f"{folder}: cannot be written", OSError):
         folder.mkdir(parents=True, exist_ok=True)
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be written ({error.strerror})") from error
+    handle = hold(folder)
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(f"{folder}: another run is making a data set here, expected to be alone") from None
         yield
     finally:
         os.close(handle)

@@ -37,6 +37,7 @@ import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from radarize.errors import InputError
+from radarize.files import within
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
@@ -216,7 +217,7 @@ class Specification(Strict):
         given = self.buildings[building]
         if isinstance(given, str):
             try:
-                file = find(self._beside(given)).resolve()
+                file = within(find(self._beside(given)), "it", self._folder, Path("scenes"), shipped()).resolve()
                 level = level or split_level(given)[1]
                 described(read_yaml(file), file.name, level)
             except InputError as error:
@@ -236,7 +237,8 @@ class Specification(Strict):
     def _beside(self, name: str) -> str:
         """A file that the specification names: beside it where there is one, else left to those who look further."""
         beside = self._folder / name
-        return str(beside.resolve()) if beside.is_file() else name
+        found = next((path for path in (beside, Path(name)) if path.is_file()), None)
+        return name if found is None else str(within(found, "it", self._folder, Path("scenes"), shipped()).resolve())
 
 
 def _find(path: str | Path) -> Path:

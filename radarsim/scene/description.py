@@ -36,6 +36,7 @@ import trimesh
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from radarize.errors import InputError
+from radarize.files import within
 from radarize.yamlfile import read_yaml
 from radarsim.complaint import complaint
 from radarsim.scene import shapes
@@ -136,7 +137,7 @@ class Mesh(_Turned):
     scale: Length = 1.0
 
     def mesh(self, folder: Path) -> trimesh.Trimesh:
-        path = folder / self.file
+        path = within(folder / self.file, f"object {self.name!r}", folder)
         if not path.is_file():
             raise InputError(f"object {self.name!r}: file {path} does not exist, expected a mesh (.ply, .obj, .stl)")
         try:

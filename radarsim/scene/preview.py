@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from radarize.replacing import replacing
 from radarsim.scene.blueprint import blueprint
 from radarsim.scene.rendering import render
 from radarsim.scene.scene import Scene
@@ -16,12 +17,17 @@ def preview(scene: Scene, folder: str | Path, width: int = 1100, samples: int = 
         scene: the world.
         folder: is made where it is missing.
         width, samples: of the rendering, pixels and paths per pixel.
+
+    Raises:
+        InputError: they cannot be written.
     """
     from PIL import Image
 
     folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / f"{scene.name}.plan.png", folder / f"{scene.name}.view.png"]
-    blueprint(scene).savefig(paths[0], dpi=110, bbox_inches="tight")
-    Image.fromarray((255 * render(scene, width, samples)).astype(np.uint8)).save(paths[1])
+    with replacing(paths[0]) as part:
+        blueprint(scene).savefig(part, format="png", dpi=110, bbox_inches="tight")
+    picture = Image.fromarray((255 * render(scene, width, samples)).astype(np.uint8))
+    with replacing(paths[1]) as part:
+        picture.save(part, format="png")
     return paths

@@ -7,8 +7,8 @@ import numpy as np
 
 from radarize.capture.stream import Outlet
 from radarize.errors import InputError
+from radarize.radar.assembler import PacketCounts
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import PacketCounts
 
 
 def frame(config: RadarConfig, number: int) -> np.ndarray:

@@ -95,8 +95,19 @@ def test_replies_of_others_are_not_heard(monkeypatch):
             forger.sendto(reply.encode(), (where.host, where.command_port))
         assert client.status(0.1) == Status(0)
         forger.sendto(Reply(Command.ALIVE).encode(), (where.host, where.command_port))
-        with pytest.raises(InputError, match="no DCA1000 answers ALIVE.*127.0.0.3 sent something instead"):
+        with pytest.raises(InputError, match="no DCA1000 answers ALIVE.*127.0.0.3:.* sent something instead"):
             client.request(Command.ALIVE)
+
+
+def test_nor_are_those_from_another_port_of_the_board(monkeypatch):
+    with Scripted() as board, Board(board.network) as client:
+        client.request(Command.ALIVE)
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger:
+            forger.bind((board.network.dca, 0))
+            for reply in (Reply(Command.START, 1), Reply(Command.STATUS, Status.MEMORY_FULL)):
+                forger.sendto(reply.encode(), (board.network.host, board.network.command_port))
+        client.start()
+        assert client.status(0.1) == Status(0)
 
 
 def test_a_forged_failure_and_noise_stop_nothing():

@@ -101,7 +101,7 @@ def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
 def test_only_a_held_folder_is_anothers(tmp_path):
     with pytest.raises(BlockingIOError), run._alone(tmp_path):
         raise BlockingIOError("of something else")
-    with run._alone(tmp_path), pytest.raises(InputError, match="another run"), run._alone(tmp_path):
+    with run._alone(tmp_path), pytest.raises(InputError, match="another program"), run._alone(tmp_path):
         pass
 
 
@@ -127,7 +127,7 @@ def test_workers_end_with_a_killed_parent_and_runs_exclude_each_other(tmp_path):
         assert time.monotonic() < waited and parent.poll() is None
         time.sleep(0.02)
     tasks = FakeSpecification(fake("a"), fake("b", "slow", 40))
-    with pytest.raises(InputError, match="another run is making a data set here"):
+    with pytest.raises(InputError, match="another program is writing there"):
         make(tasks, folder)
     children = subprocess.run(["ps", "--ppid", str(parent.pid), "-o", "pid="], capture_output=True, text=True)
     parent.kill()

@@ -231,7 +231,7 @@ GROUP = PLAIN["recordings"][0]
         ({"sensors": ["deph"]}, "sensors: 'deph' is unknown, expected all or some of depth"),
         ({"storage": "both"}, "storage is 'both': input should be 'raw' or 'heatmaps'"),
         ({"radar": "x.cfg"}, "x.cfg: no such radar configuration"),
-        ({"frontend": "x.yaml"}, "x.yaml: cannot be read"),
+        ({"frontend": "x.yaml"}, "x.yaml: no such file"),
         ({"buildings": {"old": {"kind": "Z"}}}, "buildings.old: "),
         ({"buildings": {"old": {"kind": "B", "seed": -4}}}, "buildings.old: seed is -4"),
         ({"buildings": {"office": "nowhere.yaml"}}, "buildings.office: scene file nowhere.yaml does not exist"),

@@ -46,6 +46,7 @@ TYPED_INSTEAD = (
     # The virtual radar in place of a real one, on ports that are free, its recording left alone.
     (r"--port \S+( --host \S+ --dca \S+)?", "--port {tty} --host 127.0.0.1 --dca 127.0.0.2 {ports}"),
     (r"^(radarize (?:capture|live) .*)-o walk\.h5", r"\1-o captured.h5"),
+    (r"^(radarize (?:capture|live) .*-o .*)$", r"\1 --overwrite"),  # README's is typed before
     (r"^(radarize live .*)$", r"\1 --address 127.0.0.1:0"),
     (r"^(radarsim emulate \S+) --port-link \S+", r"\1 --port-link {tty} {ports} --loop"),
     # A window needs a screen.
@@ -57,6 +58,7 @@ TYPED_INSTEAD = (
 #: What is not typed at all, and why.
 NOT_TYPED = {
     r"make test": "this is part of it",
+    r"radarize recover .*": "nothing was killed (tests/capture/test_kept.py)",
     r"sudo .*": "changes the machine's network and groups",
     r"building: .*": "a line of a scene file, as scenes/buildings have it",
     r"scene = Scene\.of.*": "Python; tests/scene/test_buildings.py has it",

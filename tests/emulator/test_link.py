@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from radarize.errors import InputError
-from radarize.radar.dca1000 import FrameAssembler, Packet, decode, encode
+from radarize.radar.assembler import FrameAssembler
+from radarize.radar.dca1000 import Packet, decode, encode
 from radarize.radar.dca1000_commands import Status
 from radarsim.emulator.disturbance import DELAYED, REORDERED, Disturbance
 from radarsim.emulator.link import Link

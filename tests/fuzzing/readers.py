@@ -30,9 +30,10 @@ from radarize.log import Log
 from radarize.methods.radarize.motion import RotationNet
 from radarize.nets.weights import Header, build, save
 from radarize.nets.weights import load as load_weights
+from radarize.radar.assembler import FrameAssembler
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import FrameAssembler, decode, encode
+from radarize.radar.dca1000 import decode, encode
 from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings, read_packet_settings
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import PRESETS, load_config
@@ -231,12 +232,13 @@ def udp_packets() -> Reader:
     others += [Reply(Command.STATUS, Status.MEMORY_FULL).encode()]
 
     def read(stream: list[bytes]) -> None:
-        assembler = FrameAssembler(CONFIG, max_jump=100 * CONFIG.frame_bytes)
+        assembler = FrameAssembler(CONFIG)
+        assembler.furthest = 100 * CONFIG.frame_bytes
         for frames in (*map(assembler.take, stream), assembler.finish()):
             for words, valid in frames:
                 assert decode(words, CONFIG).shape[1:] == CONFIG.frame_shape and valid.shape == (2, 3)
         counts = assembler.counts
-        assert counts.received + counts.duplicates + counts.late + counts.damaged == len(stream)
+        assert counts.received + counts.duplicates + counts.late + counts.damaged + counts.stray == len(stream)
         for data in stream:
             for meaning in (Request.decode, Reply.decode, read_packet_settings):
                 try:

@@ -3,10 +3,14 @@
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 
-from tests.fuzzing.readers import READERS, attempt, clear
+from tests.fuzzing.readers import READERS as OF_RECORDINGS
+from tests.fuzzing.readers import attempt, clear
+from tests.fuzzing.worlds import WORLDS
+
+READERS = OF_RECORDINGS | WORLDS
 
 #: Inputs by reader, as far as they fit into a few seconds in all.
-EXAMPLES = {name: 60 if name.startswith("ROS") else 150 for name in READERS}
+EXAMPLES = {name: 60 if name.startswith("ROS") or name in WORLDS else 150 for name in READERS}
 
 
 @pytest.mark.filterwarnings("ignore")  # numpy and scipy about numbers that make no sense

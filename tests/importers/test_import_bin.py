@@ -1,4 +1,5 @@
 import itertools
+import re
 import tracemalloc
 from pathlib import Path
 
@@ -265,3 +266,44 @@ def test_memory_does_not_grow_with_the_file(tmp_path, monkeypatch):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.1 * peaks[0]
+
+
+def quiet(count: int = 3) -> np.ndarray:
+    """Frames as real ones are: far from full scale."""
+    return np.random.default_rng(1).normal(0, 200, (count, *CONFIG.frame_shape)).astype(np.int16)
+
+
+@pytest.mark.parametrize(
+    ("written", "words"),
+    [
+        (lambda raw: (raw.astype(np.int32) + 2**15).astype("<u2").tobytes(), "--encoding offset-binary reads"),
+        (lambda raw: raw.astype("<f8").tobytes(), r"floating-point numbers \(complex128\)"),
+        (lambda raw: (raw / 7).astype("<f4").tobytes(), r"floating-point numbers \(complex64\)"),
+        (lambda raw: raw.tobytes(), None),
+        (lambda raw: np.random.default_rng(2).bytes(raw.nbytes), None),  # full scale, but of both signs
+    ],
+)
+def test_captures_that_are_plainly_something_else(tmp_path, written, words):
+    (tmp_path / "a.bin").write_bytes(written(encode(quiet(), CONFIG)))
+    with Recording(import_recording(tmp_path / "a.bin", tmp_path / "a.h5", Given(CONFIG))) as recording:
+        assert bool(re.search("look like|near full scale", recording.attributes["warnings"])) == bool(words)
+        assert re.search(words or "", recording.attributes["warnings"])
+
+
+def test_offset_binary(tmp_path):
+    (tmp_path / "a.bin").write_bytes((encode(quiet(), CONFIG).astype(np.int32) + 2**15).astype("<u2").tobytes())
+    given = Given(CONFIG, encoding="offset-binary")
+    with Recording(import_recording(tmp_path / "a.bin", tmp_path / "a.h5", given)) as recording:
+        assert np.array_equal(recording.adc(0, 3), quiet()) and recording.attributes["warnings"] == ""
+    with pytest.raises(InputError, match="is no .bin, but encoding is offset-binary"):
+        np.save(tmp_path / "a.npy", quiet())
+        import_recording(tmp_path / "a.npy", tmp_path / "b.h5", given)
+
+
+def test_one_chirp_a_loop_is_told_where_it_is_assumed(tmp_path):
+    (tmp_path / "a.bin").write_bytes(encode(quiet(), CONFIG).tobytes())
+    counts = {"samples": CONFIG.samples, "loops": CONFIG.loops * 3, "rx": 4}
+    for more, told in (({}, True), ({"tx": 1}, False)):
+        given = Given(overrides=counts | more)
+        with Recording(import_recording(tmp_path / "a.bin", tmp_path / "a.h5", given)) as recording:
+            assert ("all speeds would be doubled" in recording.attributes["warnings"]) == told

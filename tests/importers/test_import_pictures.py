@@ -73,9 +73,9 @@ def test_a_real_walk(recordings, tmp_path):
 
 @pytest.mark.parametrize("spoil, words", [
     (lambda f: (f / "radar/R_7_3.png").unlink(), r"R_7_3\.png: is missing"),
-    (lambda f: (f / "lidar/L_7_4.png").unlink(), r"L_7_4\.png: is missing"),
-    (lambda f: os.truncate(f / "radar/R_7_5.png", 60), r"R_7_5\.png: is damaged"),
-    (lambda f: (f / "radar/R_7_6.png").write_text("none"), r"R_7_6\.png: is damaged"),
+    (lambda f: (f / "lidar/L_7_4.png").unlink(), r"L_7_4\.png: no such file"),
+    (lambda f: os.truncate(f / "radar/R_7_5.png", 60), r"R_7_5\.png: is no readable PNG"),
+    (lambda f: (f / "radar/R_7_6.png").write_text("none"), r"R_7_6\.png: is no readable PNG"),
     (lambda f: shutil.copy(f / "lidar/L_7_6.png", f / "radar/R_7_6.png"), r"is 256 x 512, expected 256 x 64"),
 ])  # fmt: skip
 def test_missing_and_damaged_pictures(clone, tmp_path, spoil, words):

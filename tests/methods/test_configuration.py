@@ -83,5 +83,5 @@ def test_what_is_wrong_is_named(tmp_path, capsys, text, expected):
 
 
 def test_a_missing_file_is_named(tmp_path):
-    with pytest.raises(InputError, match="none.yaml: cannot be read"):
+    with pytest.raises(InputError, match="none.yaml: no such file"):
         Configuration.load(tmp_path / "none.yaml")

@@ -133,3 +133,11 @@ def test_a_corner_of_the_map_that_fits_by_chance_is_no_match():
     yaw = np.radians(np.concatenate([75 * times[:30], 75 * times[29] + 40 + 20 * (times[30:] - times[30])]))
     found = follow(times, np.stack([np.zeros(60), np.zeros(60), yaw], axis=1))
     assert np.degrees(found.yaw[30]) == pytest.approx(40, abs=3)
+
+
+def test_what_a_frame_takes_does_not_grow_with_how_far_the_radar_sees():
+    """A slow chirp, which sees 170 m, once took fifty times as long as a fast one."""
+    for reach in (4.3, 170.0, 5000.0):
+        side = len(LocalMap(reach, CELL)._grid.mean)
+        cell = LocalMap(reach, CELL)._grid.cell
+        assert side <= 640 and side * cell / 2 >= reach and (cell == CELL or reach > 10)

@@ -133,3 +133,11 @@ def test_run_json_of_today_is_read(tmp_path):
         _ = RunFolder(tmp_path).methods
     (tmp_path / "run.json").unlink()
     assert RunFolder(tmp_path).facts == {} and RunFolder(tmp_path).methods == {}
+
+
+def test_a_second_run_into_a_folder_is_refused(tmp_path):
+    with RunWriter(tmp_path / "RUN"):
+        with pytest.raises(InputError, match="another program is writing there"):
+            RunWriter(tmp_path / "RUN")
+    with RunWriter(tmp_path / "RUN"):
+        pass

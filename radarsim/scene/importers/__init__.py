@@ -15,7 +15,7 @@ import numpy as np
 import trimesh
 import yaml
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.replacing import replacing
 from radarsim.scene.importers import carmen, floorplan, meshes, mitsuba, rosmap
 from radarsim.scene.importers.cleaning import clean, decimate, edges_of_many
@@ -122,7 +122,8 @@ def import_scene(
         rows.append(Row(part.name, name, why, len(part.mesh.faces), float(part.mesh.area)))
     if unsure := sum(row.chosen_by == "default" for row in rows):
         remarks.append(f"{unsure} of {len(rows)} parts got the default material {default}; --materials can name theirs")
-    _write(path, parts, source)
+    with explained(f"{path}: cannot be written", OSError):
+        _write(path, parts, source)
     return Imported(path, rows, remarks)
 
 

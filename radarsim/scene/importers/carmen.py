@@ -6,7 +6,6 @@ A CARMEN line ``FLASER n r1 ... rn x y theta ...`` holds n ranges over 180 degre
 ``angle_min``, ``angle_increment`` and ``range_max``, the poses lie beside it in `NAME.truth.tum`.
 """
 
-import gzip
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,7 +16,9 @@ from jaxtyping import Float
 from numba import njit
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
+from radarize.files import read_bytes
+from radarize.npyfile import read_npz
 from radarize.tum import read_tum
 from radarsim.scene.importers.grid import OccupancyGrid
 
@@ -28,7 +29,11 @@ USABLE = 30.0
 OCCUPIED = 0.3
 #: Free ground is seen at least this often.
 SEEN = 2
-_LARGEST = 60e6  # cells
+_LARGEST = 20e6  # cells, of 8 bytes
+#: Bytes of a log, unpacked.
+_BYTES = 256 << 20
+#: Of scans in an ``.npz``.
+_FIELDS = ("ranges", "angle_min", "angle_increment", "range_max")
 
 
 @dataclass(frozen=True)
@@ -63,13 +68,13 @@ def grid(path: Path, resolution: float, progress: Callable[..., None] | None = N
         raise InputError(f"{path}: holds no range between 0.05 and {USABLE:g} m, expected a log of lidar scans")
     low = np.minimum(seen.min(axis=0), np.min([scan.pose[:2] for scan in scans], axis=0)) - 0.5
     high = np.maximum(seen.max(axis=0), np.max([scan.pose[:2] for scan in scans], axis=0)) + 0.5
-    shape = np.ceil((high - low) / resolution).astype(int)
-    if shape.prod(dtype=float) > _LARGEST:
+    shape = np.ceil((high - low) / resolution)
+    if not shape.prod() <= _LARGEST:
         raise InputError(
             f"{path}: spans {high[0] - low[0]:.0f} x {high[1] - low[1]:.0f} m, too much for cells of {resolution:g} m, "
             "expected corrected poses of one building"
         )
-    hits, passes = np.zeros(shape, np.int32), np.zeros(shape, np.int32)
+    hits, passes = np.zeros(shape.astype(int), np.int32), np.zeros(shape.astype(int), np.int32)
     for number, (start, end, ok) in enumerate(zip(starts, ends, usable, strict=True), 1):
         _cast((start[ok] - low) / resolution, (end[ok] - low) / resolution, hits, passes)
         if progress and (number % 16 == 0 or number == len(scans)):
@@ -109,11 +114,14 @@ def scans_of(path: Path) -> list[Scan]:
     """
     if path.suffix == ".npz":
         return _numpy_scans(path)
-    try:
-        raw = path.read_bytes()
-        text = (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode("ascii", errors="replace")
-    except (OSError, EOFError, zlib.error) as error:
-        raise InputError(f"{path}: cannot be read ({error})") from error
+    raw = read_bytes(path, "a log of lidar scans", _BYTES)
+    if raw[:2] == b"\x1f\x8b":
+        with explained(f"{path}: cannot be unpacked"):
+            packed = zlib.decompressobj(wbits=zlib.MAX_WBITS | 16)
+            raw = packed.decompress(raw, _BYTES)
+            if not packed.eof:
+                raise ValueError(f"it is cut short, or makes more than {_BYTES} bytes")
+    text = raw.decode("ascii", errors="replace")
     scans = []
     for number, line in enumerate(text.splitlines(), 1):
         words = line.split()
@@ -154,13 +162,15 @@ def _robot_laser(words: list[str]) -> Scan:
 
 def _numpy_scans(path: Path) -> list[Scan]:
     poses_file = path.with_name(path.name.removesuffix(".npz").removesuffix(".scans") + ".truth.tum")
-    try:
-        with np.load(path, allow_pickle=False) as file:
-            ranges = np.asarray(file["ranges"], float)
-            bearings = float(file["angle_min"]) + float(file["angle_increment"]) * np.arange(ranges.shape[1])
-            farthest = float(file["range_max"])
-    except (OSError, KeyError, ValueError, IndexError, zlib.error) as error:
-        raise InputError(f"{path}: is no file of scans ({error}), expected ranges and their angles") from error
+    found = read_npz(path, str(path), _FIELDS, path.stat().st_size)
+    for name in _FIELDS:
+        if name not in found or found[name].ndim != (2 if name == "ranges" else 0):
+            raise InputError(f"{path}: has no {name}, expected ranges (scan, beam) and one each of {_FIELDS[1:]}")
+    ranges = found["ranges"].astype(float)
+    bearings = float(found["angle_min"]) + float(found["angle_increment"]) * np.arange(ranges.shape[1])
+    farthest = float(found["range_max"])
+    if not np.isfinite(bearings).all():
+        raise InputError(f"{path}: angle_increment is {found['angle_increment']}, expected finite angles")
     _, poses = read_tum(poses_file)
     if len(poses) != len(ranges):
         raise InputError(f"{poses_file}: holds {len(poses)} poses, expected {len(ranges)}, one for each scan")

@@ -5,13 +5,17 @@ file gives its faces (``object_id``, ``category``, ``label``; Replica's `mesh_se
 `info_semantic.json` beside it). STL files and plain PLY files are one part.
 """
 
-import json
+import os
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from trimesh.resolvers import FilePathResolver
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
+from radarize.files import OUTSIDE, read_text, within
+from radarize.jsonfile import parse_json
+from radarsim.scene.importers import gltf
 from radarsim.scene.importers.part import Part
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl")
@@ -27,12 +31,29 @@ def parts(path: Path) -> list[Part]:
     """
     if path.suffix.lower() == ".obj":
         _require_materials(path)
+    if path.suffix.lower() in (".glb", ".gltf"):
+        gltf.check(path)
+    anywhere = FilePathResolver(str(path), allow_anywhere=bool(os.environ.get(OUTSIDE)))
     try:
         scene = trimesh.load_scene(
-            path, process=False, maintain_order=True, split_objects=True, split_groups=True, group_material=True
+            path,
+            resolver=anywhere,
+            process=False,
+            maintain_order=True,
+            split_objects=True,
+            split_groups=True,
+            group_material=True,
         )
     except Exception as error:  # trimesh's readers raise whatever their parsers do
         raise InputError(f"{path}: is not a readable {path.suffix[1:]} file ({_reason(error)})") from error
+    with explained(f"{path}: is not a readable {path.suffix[1:]} file"):  # of points with two coordinates, say
+        found = _parts(scene, path)
+    if not found:
+        raise InputError(f"{path}: holds no triangles")
+    return sorted(found, key=lambda part: part.name)
+
+
+def _parts(scene: trimesh.Scene, path: Path) -> list[Part]:
     found = []
     for node in scene.graph.nodes_geometry:
         transform, key = scene.graph[node]
@@ -47,9 +68,7 @@ def parts(path: Path) -> list[Part]:
         labels = tuple(dict.fromkeys(str(label) for label in (material, key, node) if label and label != name))
         placed = trimesh.Trimesh(vertices, faces, process=False)
         found += _by_category(path, mesh, placed) or [Part(name, placed, labels=labels)]
-    if not found:
-        raise InputError(f"{path}: holds no triangles")
-    return sorted(found, key=lambda part: part.name)
+    return found
 
 
 def _reason(error: Exception) -> str:
@@ -67,7 +86,7 @@ def _require_materials(path: Path) -> None:
     for word in words:
         if word[0] == b"mtllib" and len(word) > 1:
             name = word[1].decode(errors="replace").strip()
-            if not (path.parent / name).is_file():
+            if not within(path.parent / name, path, path.parent).is_file():
                 raise InputError(f"{path}: names the material file {name!r}, which does not lie beside it")
 
 
@@ -96,7 +115,7 @@ def _replica_classes(path: Path) -> dict[int, str]:
     """Class names by object number, from Replica's file; empty without it."""
     if not path.is_file():
         return {}
-    try:
-        return {int(item["id"]): str(item["class_name"]) for item in json.loads(path.read_text())["objects"]}
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: is no list of Replica's objects ({error}), expected id and class_name") from error
+    with explained(f"{path}: is no list of Replica's objects, expected id and class_name"):
+        return {
+            int(item["id"]): str(item["class_name"]) for item in parse_json(read_text(path, "JSON"), "it")["objects"]
+        }

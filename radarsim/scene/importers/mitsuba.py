@@ -12,6 +12,7 @@ import trimesh
 from jaxtyping import Float
 
 from radarize.errors import InputError
+from radarize.files import read_bytes, within
 from radarsim.scene import shapes
 from radarsim.scene.importers import meshes
 from radarsim.scene.importers.naming import Choice, meaning
@@ -58,8 +59,8 @@ def _parse(path: Path) -> ElementTree.Element:
             raise InputError(f"{path}: declares a document type, which could hold entities; expected plain XML")
 
     try:
-        root = ElementTree.fromstring(path.read_bytes(), ElementTree.XMLParser(target=Refusing()))
-    except (OSError, ElementTree.ParseError, ValueError) as error:
+        root = ElementTree.fromstring(read_bytes(path, "a Mitsuba scene"), ElementTree.XMLParser(target=Refusing()))
+    except (ElementTree.ParseError, ValueError) as error:
         raise InputError(f"{path}: is not readable XML ({error})") from error
     if root.tag != "scene":
         raise InputError(f"{path}: its root is <{root.tag}>, expected <scene> of a Mitsuba scene")
@@ -74,7 +75,7 @@ def _values(item: ElementTree.Element) -> dict[str, str]:
 def _mesh(shape: ElementTree.Element, folder: Path) -> trimesh.Trimesh:
     kind, values = shape.get("type"), _values(shape)
     if kind in _FILES:
-        file = folder / values.get("filename", "")
+        file = within(folder / values.get("filename", ""), "filename", folder)
         if not file.is_file():
             raise InputError(f"file {file} does not exist")
         mesh = shapes.joined(*(part.mesh for part in meshes.parts(file)))

@@ -8,12 +8,17 @@ in percent. Row 0 is the top; ``origin`` is x, y, yaw of the lower left corner. 
 from pathlib import Path
 
 import numpy as np
-from PIL import Image
 
 from radarize.errors import InputError
+from radarize.files import within
+from radarize.pixels import read_picture
 from radarize.runfolder.occupancy import MapFile
 from radarize.yamlfile import read_yaml
 from radarsim.scene.importers.grid import OccupancyGrid
+
+#: That map_server reads and writes, as Pillow calls them.
+_FORMATS = ("PPM", "PNG", "BMP")
+_FARTHEST = 500.0  # m, of a building
 
 
 def is_map(path: Path) -> bool:
@@ -37,18 +42,17 @@ def grid(path: Path) -> OccupancyGrid:
             raise InputError(f"{path}: has no {beside.name} beside it, expected the map's resolution and origin there")
         path = beside
     about = MapFile.read(path)
-    picture = path.parent / about.image
-    try:
-        with Image.open(picture) as image:
-            value = np.asarray(image.convert("L"), float)
-    except FileNotFoundError:
-        raise InputError(f"{path}: image {about.image} does not exist") from None
-    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError) as error:
-        raise InputError(f"{picture}: is not a readable picture ({error})") from error
+    picture = within(path.parent / about.image, path, path.parent)
+    value, values = read_picture(picture, str(picture), _FORMATS), np.arange(256)
+    if max(value.shape) * about.resolution > _FARTHEST:
+        raise InputError(
+            f"{path}: resolution is {about.resolution:g} m for {value.shape[1]} x {value.shape[0]} pixels, expected a "
+            f"building of at most {_FARTHEST:g} m"
+        )
     if about.mode == "raw":
-        known, share = value <= 100, value / 100
+        known, share = values <= 100, values / 100
     else:
-        known, share = True, (value if about.negate else 255 - value) / 255
-    occupied, free = known & (share > about.occupied_thresh), known & (share < about.free_thresh)
+        known, share = True, (values if about.negate else 255 - values) / 255
+    occupied, free = (known & (share > about.occupied_thresh))[value], (known & (share < about.free_thresh))[value]
     # Rows run downwards from the top, cells upwards from the origin.
     return OccupancyGrid(occupied[::-1].T.copy(), free[::-1].T.copy(), about.resolution, about.origin)

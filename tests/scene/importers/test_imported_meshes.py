@@ -220,7 +220,7 @@ TRIANGLE = "v 0 0 0\nv 4 0 0\nv 0 4 0\nf 1 2 3\n"
         ("flat.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", {}, "holds no triangle with an area"),
         ("lost.obj", "mtllib lost.mtl\nusemtl red\n" + TRIANGLE, {}, "names the material file 'lost.mtl'"),
         ("lost.gltf", json.dumps(GLTF), {}, "lost.gltf: is not a readable gltf file .*no.bin"),
-        ("cut.glb", "glTF\x02", {}, "cut.glb: is not a readable glb file"),
+        ("cut.glb", "glTF\x02", {}, "cut.glb: is not a readable glTF file"),
         ("text.docx", "x", {}, "text.docx: unknown format, expected a mesh"),
         ("far.obj", TRIANGLE.replace("4 0 0", "9e30 0 0"), {}, "far.obj: is 9e.30 m long in m, expected at most"),
         ("a.obj", TRIANGLE, {"units": "yd"}, "--units is 'yd', expected one of: m, cm"),

@@ -1,0 +1,68 @@
+"""What a glTF file declares, before a library takes it at its word (glTF 2.0 specification, sections 3.5.2 and 3.6)."""
+
+import struct
+from pathlib import Path
+
+from radarize.errors import explained
+from radarize.files import read_bytes
+from radarize.jsonfile import parse_json
+
+#: Bytes of a file, and corners that all places of its meshes have together.
+_BYTES, _CORNERS = 512 << 20, 15_000_000
+#: Bytes of a component, and components of an entry.
+_COMPONENTS = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
+_ENTRIES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+
+
+def check(path: Path) -> None:
+    """Refuse a file whose nodes are no trees, whose arrays reach beyond their bytes, or that makes far more of itself.
+
+    Raises:
+        InputError: it does, or is no such file.
+    """
+    content = read_bytes(path, "a glTF file", _BYTES)
+    with explained(f"{path}: is not a readable glTF file"):
+        if content[:4] == b"glTF":
+            (length,) = struct.unpack_from("<I", content, 12)
+            content = content[20 : 20 + length]
+        tree = parse_json(content.decode(), "its header")
+        for number, accessor in enumerate(tree.get("accessors", ())):
+            _within(tree, number, accessor)
+        corners = [sum(_corners(tree, part) for part in mesh["primitives"]) for mesh in tree.get("meshes", ())]
+        nodes = tree.get("nodes", [])
+        _trees(nodes)
+        total = sum(corners[node["mesh"]] for node in nodes if "mesh" in node)
+        if total > _CORNERS:
+            raise ValueError(f"its nodes show {total} corners, expected at most {_CORNERS}")
+
+
+def _trees(nodes: list[dict]) -> None:
+    """Whether every node has one parent at most, and a root above it."""
+    children = [child for node in nodes for child in node.get("children", ())]
+    if len(set(children)) < len(children) or not set(children) <= set(range(len(nodes))):
+        raise ValueError("a node is the child of several, expected trees of nodes")
+    below, reached = [k for k in range(len(nodes)) if k not in set(children)], 0
+    while below:
+        reached += 1
+        below += nodes[below.pop()].get("children", ())
+    if reached < len(nodes):
+        raise ValueError("a node is its own ancestor, expected trees of nodes")
+
+
+def _within(tree: dict, number: int, accessor: dict) -> None:
+    """Whether an accessor's entries lie in its view, and that in its buffer."""
+    size = _COMPONENTS[accessor["componentType"]] * _ENTRIES[accessor["type"]]
+    count, start = accessor["count"], accessor.get("byteOffset", 0)
+    if "bufferView" in accessor:
+        view = tree["bufferViews"][accessor["bufferView"]]
+        room, offset = view["byteLength"], view.get("byteOffset", 0)
+        fits = offset >= 0 and offset + room <= tree["buffers"][view["buffer"]]["byteLength"]
+        fits &= start >= 0 and start + (count - 1) * view.get("byteStride", size) + size <= room
+    else:
+        fits = count <= _CORNERS  # zeros
+    if not fits or count < 0:
+        raise ValueError(f"accessor {number} has {count} entries, expected no more than its bytes hold")
+
+
+def _corners(tree: dict, part: dict) -> int:
+    return tree["accessors"][part.get("indices", part["attributes"]["POSITION"])]["count"]

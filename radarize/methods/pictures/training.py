@@ -9,12 +9,16 @@ from torch import Generator, Tensor, nn
 
 from radarize import polar
 from radarize.clouds import Apart
+from radarize.features.grid import Grid
 from radarize.features.maps import Maps
 from radarize.features.table import Reading
 from radarize.methods.pictures import roughening
+from radarize.methods.pictures.maps import PictureMaker
 from radarize.methods.pictures.network import COLUMNS, PictureNet
 from radarize.methods.pictures.points import points
 from radarize.methods.task import Settings, Task
+from radarize.nets.weights import Header
+from radarize.radar.presets import PRESETS
 
 #: Choices for the least probability of a point.
 _LEAST = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
@@ -23,14 +27,21 @@ _LEAST = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 class Pictures(Task):
     """Points of a lidar from polar pictures; labels are its pictures, packed."""
 
-    network, maps = PictureNet, ("levels",)
+    network, maps = PictureNet, ("antennas",)
     truth = (Reading("lidar", "truth/lidar"),)
     defaults = Settings(width=8, frames=5, epochs=30, batch=16, rate=2e-3, schedule="cosine")
     reads = ("picture",)
 
+    def header(self, settings: Settings, grid: Grid | None, **about) -> Header:
+        """Of pictures, although training reads what they are made of."""
+        if grid is not None:
+            picture = Grid.of(PRESETS["radarhd"], "picture", PictureMaker)
+            grid = picture.model_copy(update={"frame_period": grid.frame_period})
+        return super().header(settings, grid, **about)
+
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         pictures = roughening.rough(maps, generator)
-        left = torch.rand(len(maps), generator=generator) < 0.5
+        left = torch.rand(len(maps), generator=generator, device=maps.device) < 0.5
         pictures = torch.where(left[:, None, None, None, None], pictures.flip(4), pictures)
         label = unpacked(label)
         return pictures, torch.where(left[:, None, None], label.flip(2), label)
@@ -48,7 +59,7 @@ class Pictures(Task):
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Choose the probability from which a column has a point: the least mean Chamfer distance."""
-        total = torch.zeros(len(_LEAST))
+        total = torch.zeros(len(_LEAST), device=net.least.device)
         for maps, label in batches:
             probability, label = net.estimate(self._validated(maps)), unpacked(label)
             total += torch.stack([self._chamfer(probability, label, least).sum() for least in _LEAST])
@@ -57,21 +68,22 @@ class Pictures(Task):
     @staticmethod
     def _validated(maps: Maps) -> Maps:
         """The same roughening in every epoch."""
-        return roughening.rough(maps, Generator().manual_seed(int(maps.abs().sum()) % 2**31))
+        seed = int(maps.abs().double().sum()) % 2**31
+        return roughening.rough(maps, Generator(maps.device).manual_seed(seed))
 
     @staticmethod
     def _chamfer(probability: Tensor, label: Tensor, least: float | Tensor) -> Float[Tensor, "item"]:
-        found = points(probability, least).numpy()
+        found = points(probability, least).cpu().numpy()
         apart = [
             Apart.of(polar.cartesian(one), polar.cartesian(true)).chamfer
-            for one, true in zip(found, label.bool().numpy(), strict=True)
+            for one, true in zip(found, label.bool().cpu().numpy(), strict=True)
         ]
-        return torch.tensor(np.nan_to_num(apart, nan=polar.REACH / 2), dtype=torch.float32)
+        return torch.tensor(np.nan_to_num(apart, nan=polar.REACH / 2), dtype=torch.float32, device=label.device)
 
 
 def unpacked(label: Tensor) -> Float[Tensor, "item row column"]:
     """Pictures of a lidar on the network's columns: 1 where any of its beams has a point."""
-    bits = (label[..., None].to(torch.uint8) >> torch.arange(7, -1, -1, dtype=torch.uint8)) & 1
+    bits = (label[..., None].to(torch.uint8) >> torch.arange(7, -1, -1, dtype=torch.uint8, device=label.device)) & 1
     return bits.flatten(2).unflatten(2, (COLUMNS, -1)).amax(dim=3).float()
 
 

@@ -13,12 +13,11 @@ from radarize.features.grid import Grid
 from radarize.features.maps import Maps
 from radarize.features.table import Reading
 from radarize.methods.pictures import roughening
-from radarize.methods.pictures.maps import PictureMaker
+from radarize.methods.pictures.maps import picture_grid
 from radarize.methods.pictures.network import COLUMNS, PictureNet
 from radarize.methods.pictures.points import points
 from radarize.methods.task import Settings, Task
 from radarize.nets.weights import Header
-from radarize.radar.presets import PRESETS
 
 #: Choices for the least probability of a point.
 _LEAST = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
@@ -34,10 +33,7 @@ class Pictures(Task):
 
     def header(self, settings: Settings, grid: Grid | None, **about) -> Header:
         """Of pictures, although training reads what they are made of."""
-        if grid is not None:
-            picture = Grid.of(PRESETS["radarhd"], "picture", PictureMaker)
-            grid = picture.model_copy(update={"frame_period": grid.frame_period})
-        return super().header(settings, grid, **about)
+        return super().header(settings, grid and picture_grid(grid), **about)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         pictures = roughening.rough(maps, generator)
@@ -50,7 +46,7 @@ class Pictures(Task):
         return entropy(net(maps), label)
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
-        logits, label = net(self._validated(maps)), unpacked(label)
+        logits, label = net(roughening.validated(maps)), unpacked(label)
         return torch.stack([entropy(logits, label), self._chamfer(logits.exp(), label, net.least)], dim=1)
 
     def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
@@ -61,15 +57,9 @@ class Pictures(Task):
         """Choose the probability from which a column has a point: the least mean Chamfer distance."""
         total = torch.zeros(len(_LEAST), device=net.least.device)
         for maps, label in batches:
-            probability, label = net.estimate(self._validated(maps)), unpacked(label)
+            probability, label = net.estimate(roughening.validated(maps)), unpacked(label)
             total += torch.stack([self._chamfer(probability, label, least).sum() for least in _LEAST])
         net.least.fill_(_LEAST[int(total.argmin())])
-
-    @staticmethod
-    def _validated(maps: Maps) -> Maps:
-        """The same roughening in every epoch."""
-        seed = int(maps.abs().double().sum()) % 2**31
-        return roughening.rough(maps, Generator(maps.device).manual_seed(seed))
 
     @staticmethod
     def _chamfer(probability: Tensor, label: Tensor, least: float | Tensor) -> Float[Tensor, "item"]:

@@ -2,9 +2,9 @@
 by cart with the same chirps, both through the picture chain of that paper.
 
 A picture (`radarize.polar`) keeps cells of at least 5 % of the frame's largest magnitude. Levels of clutter and
-unevenness were chosen beside the training walks; the test walks are only reported. The beam of the real pictures, too, is
-told from training walks alone: what a row of four or of eight antennas makes of a lone echo is laid upon the row of each
-frame's strongest cell.
+unevenness were chosen beside the training walks; the test walks are only reported. The beam of the real pictures, too,
+is told from training walks alone: what a row of four or of eight antennas makes of a lone echo is laid upon the row of
+each frame's strongest cell.
 """
 
 import io
@@ -40,7 +40,7 @@ def shares(kept: Bool[np.ndarray, "frame range azimuth"]) -> tuple[float, float,
 
 
 def real(folder: Path, part: str, every: int) -> tuple[list[tuple[float, float, float]], dict[int, list[float]]]:
-    """Shares of each real walk of the ``train`` or ``test`` part, of every few frames, and the misfits of both beams."""
+    """Shares of each real walk of a part (train, test), of every few frames, and the misfits of both beams."""
     found, misfits = [], {4: [], 8: []}
     for path in sorted((folder / "walks").glob("*.npz.xz")):
         with np.load(io.BytesIO(lzma.open(path).read())) as walk:
@@ -139,10 +139,10 @@ def main() -> None:
         data=Data("RadarHD's walks and walks by cart with their chirps", tuple(walks), options.seed),
         networks=(),
         notes=[
-            f"Cells of at least {100 * polar.THRESHOLD:g} % of the frame's largest magnitude, in the picture chain of RadarHD "
+            f"Cells of at least {100 * polar.THRESHOLD:g} % of the frame's largest magnitude, in RadarHD's picture chain "
             "(one loop, no windows, 256 ranges by 64 azimuths); means over walks, and the least and the "
             "most of any walk.",
-            f"Rows of strong echoes in the training walks fit the beam of four antennas within {beams[4]:.1f} dB (median), "
+            f"Rows of strong echoes in the training walks fit the beam of four antennas within {beams[4]:.1f} dB, "
             f"of eight within {beams[8]:.1f} dB: the published pictures are of one transmitter.",
             f"Simulated: {', '.join(SCENES)}. Levels of clutter were chosen beside the training walks; the test walks "
             "are only reported.",

@@ -1,5 +1,5 @@
-"""`radarize benchmark real`: points, turns, trajectories and maps from a real radar's pictures against the lidar beside it
-(`radarize.walks`, `radarize.benchmark.realmotion`)."""
+"""`radarize benchmark real`: what methods make of a real radar's pictures, against the lidar beside it: points (here),
+turns, trajectories and maps (`radarize.benchmark.realmotion`)."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -45,8 +45,8 @@ NOTES = (
     "independent frames as the errors' autocorrelation leaves.",
     "`network` has seen simulated walks alone, and nothing of it was chosen on test walks. Training walks of the set "
     "told what the model card names.",
-    f"Turns over {SPAN * PERIOD:g} s, from pictures alone. ATE and map (F1 within 20 cm) of SLAM with each method's scans "
-    "and an odometry whose errors are drawn; `lidar`: with the lidar's own first points, the most that can be had.",
+    f"Turns over {SPAN * PERIOD:g} s, from pictures alone. ATE and map (F1 within 20 cm) of SLAM with each method's "
+    "scans and an odometry whose errors are drawn; `lidar`: with the lidar's own first points, the most that can be had.",
 )
 MAP_NOTE = (
     "With the same odometry for all methods: the lidar's poses with errors added, see `radarize.benchmark.realmotion`; "

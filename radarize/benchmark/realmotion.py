@@ -3,12 +3,11 @@
 The reference is the lidar beside the radar: its poses, and its points at these poses as the map.
 """
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Float, UInt8
 from scipy.spatial import cKDTree
 
 from radarize import polar

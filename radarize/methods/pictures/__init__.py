@@ -1,4 +1,4 @@
-"""Points like a lidar's, and turns, from polar pictures (`radarize.polar`), by networks that learn from simulation alone."""
+"""Points like a lidar's, and turns, from polar pictures (`radarize.polar`), by networks that saw simulation alone."""
 
 TASKS = {
     "pictures": "radarize.methods.pictures.training:Pictures",

@@ -1,10 +1,10 @@
 """What real pictures have and simulated ones lack: drawn at random, so that a network relies on neither.
 
-Simulated boards have their gains and phases, walls are flatter and rooms emptier than real ones. Here what four antennas
-hear of an item's frames is changed as another board and another room might have done it: gains and phases differ,
-flashes lose what they have above a random level, echoes that nobody explains are added, gain wanders over range, noise
-comes on top. A picture is then made of it as RadarHD makes them, but keeps a random share of its cells, of which some go
-missing, and reads as much too far as the real ones do.
+Simulated boards have gains and phases of their own, walls are flatter and rooms emptier than real ones. Here what four
+antennas hear is changed as another board and another room might have done it: gains and phases differ, flashes lose
+what they have above a random level, echoes that nobody explains are added, gain wanders over range, noise comes on top.
+A picture is then made of it as RadarHD makes them, but keeps a random share of its cells, of which some go missing, and
+reads as much too far as the real ones do.
 """
 
 from collections.abc import Callable

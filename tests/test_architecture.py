@@ -21,7 +21,7 @@ LAYERS = (
     "slam",
     "pipeline runfolder",
     "methods",
-    "run log training",
+    "run log walkposes training",
     "evaluation",
     "report",
     "benchmark",

@@ -11,17 +11,13 @@ from jaxtyping import Bool, Float, UInt8
 
 from radarize import polar
 from radarize.benchmark.realmotion import (
-    BEARINGS,
     SPAN,
     disturbed,
     drift,
-    lidar_poses,
     mapped,
     network_turns,
-    scan,
     shifted_turns,
     surface_of,
-    true_poses,
     turn_errors,
 )
 from radarize.benchmark.results import Data, Network, Results, command, machine
@@ -36,6 +32,7 @@ from radarize.methods.pictures.turns import PictureTurnNet
 from radarize.nets.weights import Header, load
 from radarize.points import Cfar, level_around
 from radarize.radar.presets import PRESETS
+from radarize.walkposes import BEARINGS, lidar_poses, scan, true_poses
 from radarize.walks import FIRST, PERIOD, Predictions, Walk
 
 #: What stands in every picture, by name: all cells; the first one of each azimuth that stands out; all that do.

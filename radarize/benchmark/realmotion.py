@@ -3,7 +3,6 @@
 The reference is the lidar beside the radar: its poses, and its points at these poses as the map.
 """
 
-from pathlib import Path
 
 import numpy as np
 import torch
@@ -21,60 +20,22 @@ from radarize.radar.presets import PRESETS
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.slam.grid import OccupancyGrid
-from radarize.tum import planar, planar_poses, read_tum
+from radarize.tum import planar_poses
+from radarize.walkposes import BEARINGS, EVERY
 from radarize.walks import PERIOD, Walk
 
 #: Frames over which turns are measured: 0.2 s.
 SPAN = 4
 #: Columns by which pictures are shifted against each other at most: 57 deg/s.
 _MOST = 4
-#: Bearings of scans that are made of points.
-BEARINGS = np.radians(np.linspace(-90, 90, 181))
 #: Errors of the odometry that SLAM is given: of a step's length and m per step; rad per step and as a bias, rad/s. A
 #: cart's wheel odometry as the lidar logs have it.
 _STEP, _YAW, _BIAS = (0.05, 0.001), np.radians(0.1), np.radians(0.3)
-#: Of so many scans one is taken where nothing says where the sensor went: matching is then a wide search.
-_EVERY = 2
+#: Of the back end: that for radar scans, as far as pictures reach.
+_RADAR = SlamConfig.preset("radar")
+_CONFIG = _RADAR.model_copy(update={"grid": _RADAR.grid.model_copy(update={"max_range": polar.REACH})})
 #: m: cells of the lidar's map, how many frames must have seen one, and the distances at which maps agree.
 _CELL, _SEEN, NEAR = 0.05, 3, (0.1, 0.2)
-
-
-def true_poses(folder: Path, walk: Walk) -> Float[np.ndarray, "frame 3"]:
-    """x, y (m), yaw (rad) of each frame of a walk, from FOLDER/NUMBER.tum, whose times begin with the first frame.
-
-    Raises:
-        InputError: no such file, or none for each frame.
-    """
-    path = Path(folder) / f"{walk.number}.tum"
-    times, poses = read_tum(path)
-    frames = np.rint(times / PERIOD).astype(int)
-    if not set(range(walk.frames)) <= set(frames.tolist()):
-        raise InputError(f"{path}: has {len(times)} poses, expected one every {PERIOD} s for {walk.frames} frames")
-    found = np.empty((walk.frames, 3))
-    inside = (frames >= 0) & (frames < walk.frames)
-    found[frames[inside]] = planar(poses)[inside]
-    return found
-
-
-def lidar_poses(walk: Walk) -> Float[np.ndarray, "frame 3"]:
-    """The same by SLAM with the lidar's scans, where nobody gives poses."""
-    slam = Slam(SlamConfig.preset("lidar"))
-    for frame in range(0, walk.frames, _EVERY):
-        slam.add_scan(PERIOD * frame, BEARINGS, scan(polar.cartesian(walk.lidar(frame))))
-    slam.finish()
-    times, poses = slam.trajectory()
-    frames = PERIOD * np.arange(walk.frames)
-    yaw = np.interp(frames, times, np.unwrap(poses[:, 2]))
-    return np.column_stack([np.interp(frames, times, poses[:, 0]), np.interp(frames, times, poses[:, 1]), wrap(yaw)])
-
-
-def scan(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "bearing"]:
-    """Range of the nearest point on each of `BEARINGS`, m; inf where there is none."""
-    found = np.full(len(BEARINGS), np.inf)
-    bearing = np.arctan2(points[:, 1], points[:, 0])
-    column = np.rint((bearing - BEARINGS[0]) / (BEARINGS[1] - BEARINGS[0])).astype(int)
-    np.minimum.at(found, column.clip(0, len(BEARINGS) - 1), np.hypot(*points.T))
-    return found
 
 
 def turn_errors(found: Float[np.ndarray, "frame"], poses: Float[np.ndarray, "frame 3"]) -> dict[str, float]:
@@ -152,20 +113,21 @@ def mapped(
         surface: of the lidar's map, m, in the frame of the poses.
         odometry: that SLAM is given; scans alone if None.
     """
-    slam = Slam(SlamConfig.preset("radar"))
-    for frame in range(0, len(ranges), 1 if odometry is not None else _EVERY):
+    slam = Slam(_CONFIG)
+    for frame in range(0, len(ranges), 1 if odometry is not None else EVERY):
         if odometry is not None:
             slam.add_odometry(PERIOD * frame, odometry[frame])
         slam.add_scan(PERIOD * frame, BEARINGS, ranges[frame])
     slam.finish()
     times, found = slam.trajectory()
-    errors = _compared(times, found, poses)
-    return {"ate_m": errors.position.mean, **map_agreement(slam.map(), errors, surface)}
+    turn, shift = _alignment(found, np.array([np.interp(times, _stamps(poses), each) for each in _unwrapped(poses)]).T)
+    agreement = map_agreement(slam.map(), turn, shift, surface)
+    return {"ate_m": float(_compared(times, found, poses).position.mean), **agreement}
 
 
 def drift(odometry: Float[np.ndarray, "frame 3"], poses: Float[np.ndarray, "frame 3"]) -> float:
     """ATE of an odometry, m."""
-    return _compared(PERIOD * np.arange(len(poses)), odometry, poses).position.mean
+    return float(_compared(_stamps(poses), odometry, poses).position.mean)
 
 
 def surface_of(walk: Walk, poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "point 2"]:
@@ -179,12 +141,18 @@ def surface_of(walk: Walk, poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndar
 
 
 def map_agreement(
-    grid: OccupancyGrid, errors: TrajectoryErrors, surface: Float[np.ndarray, "point 2"]
+    grid: OccupancyGrid, turn: float, shift: Float[np.ndarray, "2"], surface: Float[np.ndarray, "point 2"]
 ) -> dict[str, float]:
-    """Share of occupied cells near the surface (precision), of the surface near occupied cells (recall), and F1."""
+    """Share of occupied cells near the surface (precision), of the surface near occupied cells (recall), and F1.
+
+    Args:
+        grid: map.
+        turn, shift: rad, m; from its frame to that of the surface.
+        surface: of the lidar's map, m.
+    """
     row, column = np.nonzero(grid.probability > (0.5 if grid.probability.dtype.kind == "f" else 127))
     cells = grid.origin + (np.column_stack([column, row]) + 0.5) * grid.resolution
-    cells = (np.column_stack([cells, np.zeros(len(cells))]) @ errors.turn.T + errors.shift)[:, :2]
+    cells = transform(np.array([*shift, turn]), cells)
     found = {}
     for near in NEAR:
         precision = float(np.mean(cKDTree(surface).query(cells)[0] <= near)) if len(cells) else np.nan
@@ -195,8 +163,25 @@ def map_agreement(
     return found
 
 
+def _alignment(
+    found: Float[np.ndarray, "scan 3"], true: Float[np.ndarray, "scan 3"]
+) -> tuple[float, Float[np.ndarray, "2"]]:
+    """Turn (rad) and shift (m) from one frame to the other, by headings: who stands has no positions to tell it."""
+    apart = true[:, 2] - found[:, 2]
+    turn = float(np.arctan2(np.sin(apart).mean(), np.cos(apart).mean()))
+    return turn, true[:, :2].mean(axis=0) - transform(np.array([0.0, 0.0, turn]), found[:, :2]).mean(axis=0)
+
+
+def _stamps(poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "frame"]:
+    return PERIOD * np.arange(len(poses))
+
+
+def _unwrapped(poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "3 frame"]:
+    return np.stack([poses[:, 0], poses[:, 1], np.unwrap(poses[:, 2])])
+
+
 def _compared(
     times: Float[np.ndarray, "scan"], found: Float[np.ndarray, "scan 3"], poses: Float[np.ndarray, "frame 3"]
 ) -> TrajectoryErrors:
-    reference = trajectory(PERIOD * np.arange(len(poses)), planar_poses(poses))
+    reference = trajectory(_stamps(poses), planar_poses(poses))
     return evaluate_trajectory(trajectory(times, planar_poses(found)), reference)

@@ -10,10 +10,11 @@ from typer.testing import CliRunner
 
 from radarize import polar
 from radarize.benchmark.real import median_error
-from radarize.benchmark.realmotion import BEARINGS, disturbed, scan, shifted_turns, true_poses, turn_errors
+from radarize.benchmark.realmotion import disturbed, shifted_turns, turn_errors
 from radarize.cli import app
 from radarize.errors import InputError
 from radarize.tum import write_tum
+from radarize.walkposes import BEARINGS, scan, true_poses
 from radarize.walks import Walk
 
 FRAMES = 46

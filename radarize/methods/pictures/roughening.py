@@ -3,8 +3,7 @@
 Simulated boards have gains and phases of their own, walls are flatter and rooms emptier than real ones. Here what four
 antennas hear is changed as another board and another room might have done it: gains and phases differ, flashes lose
 what they have above a random level, echoes that nobody explains are added, gain wanders over range, noise comes on top.
-A picture is then made of it as RadarHD makes them, but keeps a random share of its cells, of which some go missing, and
-reads as much too far as the real ones do.
+A picture is then made of it as RadarHD makes them, but keeps a random share of its cells, of which some go missing.
 """
 
 from collections.abc import Callable
@@ -33,9 +32,6 @@ TILT, PATCHY, PATCHES, NOISE = 6.0, 4.0, 32, (-60.0, -25.0)
 MISSING, BLOCK = 0.3, 8
 #: Shares of the pixels that are kept: the spread of the training walks (6 to 14 %), and more to either side.
 KEPT = (0.02, 0.18)
-#: Rows by which the radar reads too far: range bias and lever arm of the data set's rig, 0.17 to 0.34 m on its training
-#: walks.
-BIAS = (4, 8)
 #: dB below the largest: where no cell of the radar lies.
 FLOOR = -90.0
 
@@ -73,14 +69,7 @@ def rough(antennas: Maps, generator: Generator) -> Maps:
     # The share is of the newest picture; the threshold is every picture's.
     newest = (level[:, -1] - level[:, -1].amax(dim=(1, 2), keepdim=True)).flatten(1).sort(dim=1, descending=True).values
     kept = (draw(*KEPT, 1) * newest.shape[1]).long()
-    found = picture(level, newest.gather(1, kept)[:, :, None, None].clamp(-50.0, -15.0))
-    return shifted(found, draw(BIAS[0], BIAS[1] + 1).long())[:, :, None]
-
-
-def validated(antennas: Maps) -> Maps:
-    """The same roughening in every epoch."""
-    seed = int(antennas.abs().double().sum()) % 2**31
-    return rough(antennas, Generator(antennas.device).manual_seed(seed))
+    return picture(level, newest.gather(1, kept)[:, :, None, None].clamp(-50.0, -15.0))[:, :, None]
 
 
 def levels(heard: Heard) -> Float[Tensor, "item frame row column"]:
@@ -105,13 +94,6 @@ def picture(
     kept = level >= threshold
     least = torch.where(kept, level, torch.zeros_like(level)).amin(dim=(2, 3), keepdim=True)
     return torch.where(kept, (255 * (1 - level / least.clamp_max(-1e-3))).floor(), torch.zeros_like(level))
-
-
-def shifted(found: Float[Tensor, "item frame row column"], rows: Tensor) -> Float[Tensor, "item frame row column"]:
-    """Pictures that read so many rows too far."""
-    place = torch.arange(polar.ROWS, device=found.device)[None] - rows[:, None]
-    moved = found.gather(2, place.clamp_min(0)[:, None, :, None].expand_as(found))
-    return moved * (place >= 0)[:, None, :, None]
 
 
 def _amplitude(decibels: Tensor) -> Tensor:

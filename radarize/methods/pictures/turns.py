@@ -12,6 +12,7 @@ from radarize.features.maps import Maps
 from radarize.features.table import YAW, Table
 from radarize.methods.pictures import roughening
 from radarize.methods.pictures.maps import PictureMaker, picture_grid
+from radarize.methods.pictures.training import validated
 from radarize.methods.task import Motion, Settings, turns
 from radarize.nets import losses
 from radarize.nets.correlation import Correlation
@@ -86,4 +87,4 @@ class PictureTurns(Motion):
         return losses.likelihood(net(maps), label)
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
-        return super().judge(net, roughening.validated(maps), label)
+        return super().judge(net, validated(maps), label)

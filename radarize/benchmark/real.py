@@ -43,7 +43,7 @@ NOTES = (
     "`network` has seen simulated walks alone, and nothing of it was chosen on test walks. Training walks of the set "
     "told what the model card names.",
     f"Turns over {SPAN * PERIOD:g} s, from pictures alone. ATE and map (F1 within 20 cm) of SLAM with each method's "
-    "scans and an odometry whose errors are drawn; `lidar`: with the lidar's own first points, the most that can be had.",
+    "scans and an odometry whose errors are drawn; `lidar`: with the lidar's own first points, the best there is.",
 )
 MAP_NOTE = (
     "With the same odometry for all methods: the lidar's poses with errors added, see `radarize.benchmark.realmotion`; "

@@ -3,7 +3,6 @@
 The reference is the lidar beside the radar: its poses, and its points at these poses as the map.
 """
 
-
 import numpy as np
 import torch
 from jaxtyping import Float, UInt8

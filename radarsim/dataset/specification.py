@@ -228,8 +228,8 @@ class Specification(Strict):
         if level:
             raise InputError(f"buildings.{building}: is generated and has no levels, expected a scene file")
         life = {key: given[key] for key in LIFE if key in given}
-        building = {key: value for key, value in given.items() if key not in LIFE}
-        description = {"building": building if floor is None else building | {"floor": floor}} | life
+        place = {} if floor is None else {"floor": floor}
+        description = {"building": {key: given[key] for key in given if key not in LIFE} | place} | life
         try:
             Description.model_validate(description)
         except ValidationError as error:

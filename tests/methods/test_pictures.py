@@ -38,7 +38,7 @@ def heard(bins: list[float], items: int = 4, frames: int = 5, sine: float = 0.0)
 
 def plain(antennas: torch.Tensor) -> torch.Tensor:
     """Pictures by the authors' threshold, with nothing drawn."""
-    levels = roughening.levels(torch.view_as_complex(antennas[:, :, 0].unflatten(3, (-1, 2))))
+    levels = roughening.levels(roughening.antennas_of(antennas))
     threshold = torch.full((len(levels), 1, 1, 1), 20 * math.log10(polar.THRESHOLD))
     return roughening.picture(levels, threshold)[:, :, None]
 
@@ -48,7 +48,7 @@ def test_plain_pictures_are_those_of_the_samples():
     adc = samples([(2.5, 0.4, 400), (6.1, -0.8, 150), (8.0, 0.0, 60), (3.0, 1.0, 200)])
     made = PictureMaker(RADAR)(adc)
     antennas = torch.from_numpy(made["antennas"])[:, None, None].float()
-    levels = roughening.levels(torch.view_as_complex(antennas[:, :, 0].unflatten(3, (-1, 2))))
+    levels = roughening.levels(roughening.antennas_of(antennas))
     threshold = torch.full((len(levels), 1, 1, 1), 20 * math.log10(polar.THRESHOLD))
     found = roughening.picture(levels, threshold)[:, 0].numpy()
     assert ((found > 0) == (made["picture"] > 0)).mean() > 0.999
@@ -117,7 +117,9 @@ def test_augmented_labels_stay_on_their_echoes():
     label = torch.zeros((8, polar.ROWS, polar.BEAMS), dtype=torch.bool)
     label[:, 100, 232:280] = True  # 16 columns of pictures about the middle... the echo's own azimuth
     packed = torch.from_numpy(np.packbits(label.numpy(), axis=2))
-    pictures, truth = task.augment(heard([100.0], items=1).repeat(8, 1, 1, 1, 1), packed, torch.Generator().manual_seed(2))
+    pictures, truth = task.augment(
+        heard([100.0], items=1).repeat(8, 1, 1, 1, 1), packed, torch.Generator().manual_seed(2)
+    )
     for picture, true in zip(pictures[:, -1, 0], truth, strict=True):
         rows, columns = (true == 1).nonzero().T.tolist()
         assert rows
@@ -190,7 +192,7 @@ def test_it_learns_turns(one_thread):
     settings = replace(task.defaults, width=4, frames=2, rate=3e-3)
     net, rng = task.net(settings, None).train(), np.random.default_rng(0)
     optimiser = task.optimise(net.parameters(), settings)
-    wide = torch.from_numpy(rng.random((16, polar.ROWS, polar.COLUMNS + 8)) > 0.9).float() * 200
+    wide = torch.from_numpy(rng.random((16, 64, polar.COLUMNS + 8)) > 0.9).float() * 200
 
     def batch() -> tuple[torch.Tensor, torch.Tensor]:
         shift, which = rng.integers(-2, 3, 16), rng.permutation(16)
@@ -199,7 +201,7 @@ def test_it_learns_turns(one_thread):
         # What lies at a greater azimuth before lies at a lesser one after a turn to the left.
         return torch.stack([first, second], dim=1)[:, :, None], torch.from_numpy(shift * STEP)[:, None].float()
 
-    for _ in range(60):
+    for _ in range(120):
         optimiser.zero_grad()
         task.loss(net, *batch()).mean().backward()
         optimiser.step()

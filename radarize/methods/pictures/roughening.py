@@ -19,17 +19,17 @@ from radarize.methods.pictures.maps import BINS
 from radarize.radar.presets import PRESETS
 
 #: Of antennas, standard deviation: gain, dB; phase, rad, at most. Sine of the mount's yaw, at most.
-GAIN, PHASE, YAW = 1.0, 0.6, 0.03
+GAIN, PHASE, YAW = 0.5, 0.15, 0.02
 #: dB re the frame's largest, of what flashes may keep.
-CEILING = (-25.0, 0.0)
+CEILING = (-5.0, 15.0)
 #: Echoes that are added at most, their levels, dB re the largest, and the bins and sines that they wander from frame to
 #: frame, standard deviations.
-ADDED, LEVELS, WANDER = 32, (-40.0, -6.0), (2.0, 0.02)
+ADDED, LEVELS, WANDER = 8, (-45.0, -15.0), (2.0, 0.02)
 #: dB: gain over range, at either end; its patches, standard deviation at most, and how many there are; noise re the
 #: frame's largest.
-TILT, PATCHY, PATCHES, NOISE = 6.0, 4.0, 32, (-60.0, -25.0)
+TILT, PATCHY, PATCHES, NOISE = 2.0, 1.0, 32, (-60.0, -40.0)
 #: Blocks of pixels, a row high, that are missing at most, and columns of one.
-MISSING, BLOCK = 0.3, 8
+MISSING, BLOCK = 0.1, 8
 #: Shares of the pixels that are kept: the spread of the training walks (6 to 14 %), and more to either side.
 KEPT = (0.02, 0.18)
 #: dB below the largest: where no cell of the radar lies.
@@ -54,7 +54,7 @@ def rough(antennas: Maps, generator: Generator) -> Maps:
     def normal(*shape: int) -> Tensor:
         return torch.randn((len(antennas), *shape), generator=generator, device=generator.device)
 
-    heard = torch.view_as_complex(antennas[:, :, 0].float().unflatten(3, (-1, 2)))
+    heard = antennas_of(antennas)
     heard = _dimmed(heard, draw(*CEILING, 1, 1))
     heard = heard + _largest(heard) * _added(heard.shape[1], draw, normal)
     gain = draw(0.0, PATCHY, 1, 1) * interpolate(normal(1, PATCHES), size=BINS, mode="linear")
@@ -65,11 +65,20 @@ def rough(antennas: Maps, generator: Generator) -> Maps:
     heard = heard * _board(draw, normal)[:, None, None]
     level = levels(heard)
     blocks = draw(0.0, 1.0, *level.shape[1:3], polar.COLUMNS // BLOCK) < draw(0.0, MISSING, 1, 1, 1)
-    level = level.masked_fill(blocks.repeat_interleave(BLOCK, dim=3), FLOOR)
-    # The share is of the newest picture; the threshold is every picture's.
+    return kept(level.masked_fill(blocks.repeat_interleave(BLOCK, dim=3), FLOOR), generator)
+
+
+def kept(level: Float[Tensor, "item frame row column"], generator: Generator) -> Maps:
+    """Pictures that keep a random share of their pixels: the share is of the newest, the threshold every one's."""
     newest = (level[:, -1] - level[:, -1].amax(dim=(1, 2), keepdim=True)).flatten(1).sort(dim=1, descending=True).values
-    kept = (draw(*KEPT, 1) * newest.shape[1]).long()
-    return picture(level, newest.gather(1, kept)[:, :, None, None].clamp(-50.0, -15.0))[:, :, None]
+    share = torch.empty((len(level), 1), device=level.device).uniform_(*KEPT, generator=generator)
+    threshold = newest.gather(1, (share * newest.shape[1]).long())[:, :, None, None]
+    return picture(level, threshold.clamp(-50.0, -15.0))[:, :, None]
+
+
+def antennas_of(maps: Maps) -> Heard:
+    """What antennas hear, of maps of `PictureMaker`."""
+    return torch.view_as_complex(maps[:, :, 0].float().unflatten(3, (-1, 2)))
 
 
 def levels(heard: Heard) -> Float[Tensor, "item frame row column"]:

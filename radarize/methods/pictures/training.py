@@ -20,9 +20,9 @@ from radarize.methods.task import Settings, Task
 from radarize.nets.weights import Header
 
 #: Choices for the least probability of a point.
-_LEAST = (0.004, 0.006, 0.008, 0.01, 0.012, 0.015, 0.02, 0.03)
+LEAST = (0.004, 0.006, 0.008, 0.01, 0.012, 0.015, 0.02, 0.03)
 #: By how much rooms are larger or smaller, and columns of a picture by which they are turned, at most.
-ZOOM, TURN = 0.15, 4
+ZOOM, TURN = 0.25, 8
 #: m: the radar reads too far by range bias and lever arm of the data set's rig, on its training walks.
 BIAS = (0.17, 0.34)
 #: Of cells of a label.
@@ -34,7 +34,7 @@ class Pictures(Task):
 
     network, maps = PictureNet, ("antennas",)
     truth = (Reading("lidar", "truth/lidar"),)
-    defaults = Settings(width=8, frames=5, epochs=30, batch=16, rate=2e-3, schedule="cosine")
+    defaults = Settings(width=12, frames=5, epochs=20, batch=64, rate=2e-3, schedule="cosine")
     reads = ("picture",)
 
     def header(self, settings: Settings, grid: Grid | None, **about) -> Header:
@@ -69,11 +69,11 @@ class Pictures(Task):
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Choose the probability from which a column has a point: the least mean Chamfer distance."""
-        total = torch.zeros(len(_LEAST), device=net.least.device)
+        total = torch.zeros(len(LEAST), device=net.least.device)
         for maps, label in batches:
             probability, label = net.estimate(validated(maps)), unpacked(label)
-            total += torch.stack([self._chamfer(probability, label, least).sum() for least in _LEAST])
-        net.least.fill_(_LEAST[int(total.argmin())])
+            total += torch.stack([self._chamfer(probability, label, least).sum() for least in LEAST])
+        net.least.fill_(LEAST[int(total.argmin())])
 
     @staticmethod
     def _chamfer(probability: Tensor, label: Tensor, least: float | Tensor) -> Float[Tensor, "item"]:

@@ -12,7 +12,6 @@ from radarize.features.maps import Maps
 from radarize.features.table import YAW, Table
 from radarize.methods.pictures import roughening
 from radarize.methods.pictures.maps import PictureMaker, picture_grid
-from radarize.methods.pictures.training import validated
 from radarize.methods.task import Motion, Settings, turns
 from radarize.nets import losses
 from radarize.nets.correlation import Correlation
@@ -62,13 +61,14 @@ class PictureTurnNet(Network):
 
 
 class PictureTurns(Motion):
-    """Turn from the picture before the newest to the newest, rad."""
+    """Turn from the picture before the newest to the newest, rad. Pictures are as simulated, but for the share of them
+    that is kept: echoes that are added at random turn with nothing."""
 
     network, maps = PictureTurnNet, ("antennas",)
     truth = (YAW,)
     reads = ("picture",)
     error, size = "rmse_rad", "rms_turn_rad"
-    defaults = Settings(width=8, frames=5, epochs=30, batch=32, rate=2e-3, schedule="cosine")
+    defaults = Settings(width=8, frames=5, epochs=24, batch=64, rate=1e-3, schedule="cosine")
 
     def header(self, settings: Settings, grid: Grid | None, **about) -> Header:
         """Of pictures, although training reads what they are made of."""
@@ -78,7 +78,7 @@ class PictureTurns(Motion):
         return turns(table, frames[:, -2:])
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
-        pictures = roughening.rough(maps, generator)
+        pictures = roughening.kept(roughening.levels(roughening.antennas_of(maps)), generator)
         left = torch.rand(len(maps), generator=generator, device=maps.device) < 0.5
         pictures = torch.where(left[:, None, None, None, None], pictures.flip(4), pictures)
         return pictures, torch.where(left[:, None], -label, label)
@@ -87,4 +87,5 @@ class PictureTurns(Motion):
         return losses.likelihood(net(maps), label)
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
-        return super().judge(net, validated(maps), label)
+        generator = Generator(maps.device).manual_seed(0)
+        return super().judge(net, roughening.kept(roughening.levels(roughening.antennas_of(maps)), generator), label)

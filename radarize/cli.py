@@ -427,6 +427,7 @@ def benchmark(
     predictions: Annotated[
         list[str] | None, typer.Option(metavar="NAME=FOLDER", help="real: what another program says of the walks.")
     ] = None,
+    poses: Annotated[Path | None, typer.Option(help="real: folder of true poses, WALK.tum; else by the lidar.")] = None,
 ):
     """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
     import os
@@ -437,13 +438,13 @@ def benchmark(
         width = max(map(len, BENCHMARKS))
         for each, about in BENCHMARKS.items():
             print(f"{each:<{width}}  {about.about}")
-        print(f"{'real':<{width}}  Points of real walks against a lidar (RadarHD's repository).")
+        print(f"{'real':<{width}}  Points, turns and maps of real walks against a lidar (RadarHD's repository).")
         return
     for option, value in (("--data", data), ("--out", out)):
         if value is None:
             raise InputError(f"{option} is missing, expected a folder")
     if name == "real":
-        return _benchmark_real(data, out, weights, walks, predictions or [])
+        return _benchmark_real(data, out, weights, walks, predictions or [], poses)
     from radarize.benchmark.run import benchmark as compare
     from radarize.benchmark.study import Options
 
@@ -456,7 +457,9 @@ def benchmark(
     print(out / "index.html")
 
 
-def _benchmark_real(data: Path, out: Path, weights: Path | None, walks: str | None, predictions: list[str]) -> None:
+def _benchmark_real(
+    data: Path, out: Path, weights: Path | None, walks: str | None, predictions: list[str], poses: Path | None
+) -> None:
     from radarize.benchmark.real import Options, real
 
     numbers = [number.strip() for number in walks.split(",")] if walks else []
@@ -466,7 +469,8 @@ def _benchmark_real(data: Path, out: Path, weights: Path | None, walks: str | No
     for name, folder in named.items():
         if not (name and folder and Path(folder).is_dir()):
             raise InputError(f"--predictions is {name}={folder}, expected NAME=FOLDER of a folder that is there")
-    options = Options([int(number) for number in numbers], {name: Path(each) for name, each in named.items()}, weights)
+    others = {name: Path(each) for name, each in named.items()}
+    options = Options([int(number) for number in numbers], others, weights, poses)
     with progress("real") as report:
         results = real(data, out, options, progress=report)
     print(results.tables[0].markdown())

@@ -24,7 +24,7 @@ LAYERS = (
     "slam",
     "pipeline runfolder",
     "methods",
-    "run log training",
+    "run log walkposes training",
     "evaluation",
     "report",
     "benchmark",

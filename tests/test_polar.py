@@ -68,12 +68,18 @@ def test_silence_has_no_cells():
     assert not polar.pictures(np.zeros((1, *RADAR.frame_shape), np.int16), RADAR).any()
 
 
-def test_levels_are_what_pictures_are_made_of():
-    adc = samples([(2.5, 0.4, 400), (6.1, -0.8, 150)])
-    levels, pictures = polar.levels(adc, RADAR), polar.pictures(adc, RADAR)
-    assert levels.max() == pytest.approx(0.0, abs=1e-9)
-    lit = levels >= 20 * np.log10(polar.THRESHOLD)
-    assert np.array_equal(lit | (pictures > 0), lit) and (lit & (pictures == 0)).sum() <= 0.02 * lit.sum() + 2
+@pytest.mark.parametrize(("transmitters", "width"), [(polar.PUBLISHED, 8), (polar.MEASURED, 4)])
+def test_beams_are_as_wide_as_the_row_of_antennas(transmitters, width):
+    """A lone echo ahead: sin(n x) / (n sin x) over the sine of azimuth, 26 dB deep."""
+    row = polar.pictures(samples([(4.0, 0.0, 500)], noise=0.0), RADAR, transmitters)[0]
+    row = row[row.max(axis=1).argmax()].astype(float)
+    sine = np.sin(polar.AZIMUTHS)
+    beam = np.abs(np.sinc(width * sine / 2) / np.sinc(sine / 2))
+    shown = row > 0
+    level = 20 * np.log10(np.maximum(beam, 1e-3))
+    inside = shown & (beam > 0.5)  # cells go to the next column: where the beam is steep they differ
+    assert np.median(np.abs(row[inside] / 255 * 26 - 26 - level[inside])) < 1.0
+    assert inside.sum() == pytest.approx(1.2 / width * 2 * 32 / 1.57, rel=0.35)
 
 
 def test_a_wall_in_the_lidars_picture():

@@ -1,4 +1,5 @@
-"""`radarize benchmark real`: points from a real radar's pictures against the lidar beside it (`radarize.walks`)."""
+"""`radarize benchmark real`: what methods make of a real radar's pictures, against the lidar beside it: points (here),
+turns, trajectories and maps (`radarize.benchmark.realmotion`)."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -9,6 +10,16 @@ import torch
 from jaxtyping import Bool, Float, UInt8
 
 from radarize import polar
+from radarize.benchmark.realmotion import (
+    SPAN,
+    disturbed,
+    drift,
+    mapped,
+    network_turns,
+    shifted_turns,
+    surface_of,
+    turn_errors,
+)
 from radarize.benchmark.results import Data, Network, Results, command, machine
 from radarize.benchmark.results import Walk as Facts
 from radarize.benchmark.table import Table
@@ -17,9 +28,11 @@ from radarize.features.windows import Windows
 from radarize.methods.method import Weights
 from radarize.methods.pictures.network import PictureNet
 from radarize.methods.pictures.points import points
+from radarize.methods.pictures.turns import PictureTurnNet
 from radarize.nets.weights import Header, load
 from radarize.points import Cfar, level_around
 from radarize.radar.presets import PRESETS
+from radarize.walkposes import BEARINGS, lidar_poses, scan, true_poses
 from radarize.walks import FIRST, PERIOD, Predictions, Walk
 
 #: What stands in every picture, by name: all cells; the first one of each azimuth that stands out; all that do.
@@ -28,8 +41,14 @@ NOTES = (
     "Medians over all frames from the 40th on, points through the authors' grid; +-: standard error, with as many "
     "independent frames as the errors' autocorrelation leaves.",
     "`network` has seen simulated walks alone, and nothing of it was chosen on test walks. Training walks of the set "
-    "told how far the radar reads beyond the lidar (0.17 to 0.34 m) and which share of a picture's cells is lit (6 to "
-    "14 %), which the roughening of its training spans.",
+    "told what the model card names.",
+    f"Turns over {SPAN * PERIOD:g} s, from pictures alone. ATE and map (F1 within 20 cm) of SLAM with each method's "
+    "scans and an odometry whose errors are drawn; `lidar`: with the lidar's own first points, the best there is.",
+)
+MAP_NOTE = (
+    "With the same odometry for all methods: the lidar's poses with errors added, see `radarize.benchmark.realmotion`; "
+    "`alone`: by matching scans alone. Maps against the lidar's points at its poses, of which three frames have seen a "
+    "cell of 5 cm. `odometry`: its ATE without SLAM."
 )
 
 Cells = Bool[np.ndarray, "range column"]
@@ -42,13 +61,15 @@ class Options:
     Attributes:
         walks: numbers; all that test if none.
         predictions: of other programs by name.
-        weights: folder of the network's weights; the shipped ones if None.
+        weights: folder of the networks' weights; the shipped ones if None.
+        poses: folder of true poses, NUMBER.tum; by SLAM with the lidar's scans if None.
         command: that the results name.
     """
 
     walks: Sequence[int] = ()
     predictions: dict[str, Path] = field(default_factory=dict)
     weights: Path | None = None
+    poses: Path | None = None
     command: str = field(default_factory=lambda: command("radarize"))
 
 
@@ -72,34 +93,96 @@ def real(
     """
     machine()  # as things are now
     walks = [Walk.find(data, number) for number in options.walks] or Walk.tests(data)
-    weights = Weights(options.weights).of("pictures")
-    network = load(weights, PictureNet, PRESETS["radarhd"]) if weights.is_file() else None
-    total, done, rows, errors = sum(walk.frames for walk in walks), 0, [], {}
+    weights = [Weights(options.weights).of(kind) for kind in ("pictures", "picture-turns")]
+    scans, turns = (
+        load(path, kind, PRESETS["radarhd"]) if path.is_file() else None
+        for path, kind in zip(weights, (PictureNet, PictureTurnNet), strict=True)
+    )
+    steps = _Steps(sum(walk.frames for walk in walks), progress)
+    rows, maps, errors = [], [], {}
     for walk in walks:
-        found: dict[str, list[Apart]] = {}
+        poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
         others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
-        for frame, cells in _methods(walk, network):
-            done += 1
-            progress(done, total)
-            if frame < FIRST:
-                continue
-            true = polar.cartesian(walk.lidar(frame))
-            clouds = {name: polar.cartesian(each) for name, each in cells.items()}
-            clouds |= {name: known[frame] for name, known in others.items() if frame in known}
-            for name, each in clouds.items():
-                found.setdefault(name, []).append(Apart.of(each, true))
-        for name, apart in found.items():
-            errors[walk.number, name] = apart
-            rows.append({"walk": walk.number, "part": walk.folder.name, "method": name, **_row(apart)})
+        found, ranges, pictures = _judged(walk, scans, others, steps)
+        errors |= {(walk.number, name): [one for one in apart if one] for name, apart in found.items()}
+        moved = {"shifted pictures": turn_errors(shifted_turns(pictures), poses)}
+        if turns:
+            moved["network"] = turn_errors(network_turns(turns, pictures), poses)
+        drawn = _maps(walk, ranges, poses)
+        maps += drawn
+        mapped_by = {row["method"]: row for row in drawn}
+        for name in dict.fromkeys([*found, *moved, *mapped_by]):
+            about = {"walk": walk.number, "part": walk.folder.name, "method": name}
+            row = about | _row(errors.get((walk.number, name), [])) | moved.get(name, {})
+            best = mapped_by.get(name, {})
+            rows.append(row | {"ate_m": best.get("ate_m", np.nan), "map_f1": best.get("map_f1_20cm", np.nan)})
     data_of = Data("RadarHD's walks", tuple(Facts(f"radarhd {walk.number}", None, None, False) for walk in walks))
-    tables = [Table("Points of real walks", rows, list(NOTES)), Table("Between methods", _paired(errors))]
-    results = Results("In the real world", tables, data_of, (Network.of(weights),) if network else (), options.command)
+    tables = [
+        Table("Real walks", rows, list(NOTES)),
+        Table("Between methods", _paired(errors)),
+        Table("SLAM and maps", maps, [MAP_NOTE]),
+    ]
+    networks = tuple(Network.of(path) for path, net in zip(weights, (scans, turns), strict=True) if net)
+    results = Results("In the real world", tables, data_of, networks, options.command)
     results.write(Path(output), "real")
     return results
 
 
-def _methods(walk: Walk, network: tuple[PictureNet, Header] | None) -> Iterator[tuple[int, dict[str, Cells]]]:
-    """Where each method sees something in a walk's frames, frame by frame."""
+@dataclass
+class _Steps:
+    """How far the comparison has come, in frames."""
+
+    total: int
+    report: Callable[[int, int], None]
+    done: int = 0
+
+    def __call__(self) -> None:
+        self.done += 1
+        self.report(self.done, self.total)
+
+
+def _judged(
+    walk: Walk, network: tuple[PictureNet, Header] | None, others: dict[str, dict[int, np.ndarray]], steps: _Steps
+) -> tuple[dict[str, list[Apart | None]], dict[str, Float[np.ndarray, "frame bearing"]], np.ndarray]:
+    """Of each method: how far its points are from the lidar's by frame, None of those that are not judged, and its
+    scans. And all pictures."""
+    found, ranges = {}, {}
+    pictures = np.empty((walk.frames, polar.ROWS, polar.COLUMNS), np.uint8)
+    for frame, picture, cells in _methods(walk, network):
+        steps()
+        pictures[frame] = picture
+        true = polar.cartesian(walk.lidar(frame))
+        clouds = {name: polar.cartesian(each) for name, each in cells.items()}
+        clouds |= {name: known[frame] for name, known in others.items() if frame in known}
+        for name, each in clouds.items():
+            if frame >= FIRST:
+                found.setdefault(name, []).append(Apart.of(each, true))
+            if name not in ("picture", "cfar"):  # they have many points on a bearing
+                ranges.setdefault(name, np.full((walk.frames, len(BEARINGS)), np.nan))[frame] = scan(each)
+        ranges.setdefault("lidar", np.full((walk.frames, len(BEARINGS)), np.nan))[frame] = scan(true)
+    return found, ranges, pictures
+
+
+def _maps(
+    walk: Walk, ranges: dict[str, Float[np.ndarray, "frame bearing"]], poses: Float[np.ndarray, "frame 3"]
+) -> list[dict[str, object]]:
+    """A row for the scans of each method."""
+    surface, odometry = surface_of(walk, poses), disturbed(poses, walk.number)
+    rows = []
+    for name, each in ranges.items():
+        alone = mapped(each, poses, surface, None)
+        rows.append(
+            {"walk": walk.number, "method": name, "odometry_ate_m": drift(odometry, poses)}
+            | mapped(each, poses, surface, odometry)
+            | {"alone_ate_m": alone["ate_m"], "alone_map_f1_20cm": alone["map_f1_20cm"]}
+        )
+    return rows
+
+
+def _methods(
+    walk: Walk, network: tuple[PictureNet, Header] | None
+) -> Iterator[tuple[int, UInt8[np.ndarray, "range azimuth"], dict[str, Cells]]]:
+    """A walk's pictures, frame by frame, and where each method sees something in them."""
     windows = network[1].windows(PRESETS["radarhd"]) if network else None
     for frames, pictures in walk.batches():
         stamps = PERIOD * np.arange(frames.start, frames.stop)
@@ -108,7 +191,7 @@ def _methods(walk: Walk, network: tuple[PictureNet, Header] | None) -> Iterator[
             stands = picture > level_around(picture.astype(float), _CFAR, 0, False) + _CFAR.threshold
             first = stands & (np.cumsum(stands, axis=0) == 1)
             cells = {"picture": picture > 0, "cfar": stands, "first-echo": first}
-            yield frames.start + k, cells | ({"network": likely[k]} if network else {})
+            yield frames.start + k, picture, cells | ({"network": likely[k]} if network else {})
 
 
 @torch.inference_mode()
@@ -128,6 +211,8 @@ def _row(found: Sequence[Apart]) -> dict[str, float]:
         "chamfer_m": float(np.median(chamfer[known])) if known.any() else np.nan,
         "chamfer +-": median_error(chamfer[known]),
         "mod_hausdorff_m": float(np.median(hausdorff[known])) if known.any() else np.nan,
+        "yaw_rmse_deg": np.nan,
+        "turns_rms_deg": np.nan,
     }
 
 
@@ -135,10 +220,10 @@ def _paired(errors: dict[tuple[int, str], list[Apart]]) -> list[dict]:
     """Of each pair of methods, how much nearer the first one is, mean over walks of the mean over common frames."""
     names = list(dict.fromkeys(name for _, name in errors))
     rows = []
-    for name in names:
-        for other in names:
+    for k, name in enumerate(names):
+        for other in names[:k]:
             walks = [walk for walk, each in errors if each == name and (walk, other) in errors]
-            if name == other or not walks:
+            if not walks:
                 continue
             apart = []
             for walk in walks:

@@ -9,6 +9,8 @@ from radarize import polar
 from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, RecordingWriter, Stream
+from radarize.tum import planar_poses
+from radarize.walkposes import lidar_poses
 from radarize.walks import PERIOD, Walk
 
 
@@ -25,7 +27,7 @@ def import_walk(
         data: ``dataset_5`` of a user's clone.
         number: of the walk.
         output: recording to write.
-        products: poses from elsewhere.
+        products: poses from elsewhere; by SLAM with the lidar's scans where there are none.
         progress: called with frames done and in all.
 
     Raises:
@@ -40,7 +42,12 @@ def import_walk(
     bearings = Product(polar.BEAM_AZIMUTHS, "rad", "bearings of /truth/scan, positive to the left")
     about = {"source": f"RadarHD walk {number} ({walk.folder.name})"}
     if "truth/pose" not in products:
-        about["warnings"] = "no poses were given: there is nothing to compare trajectories with"
+        about["found"] = "no poses were given: they are by SLAM with the lidar's scans"
+        poses = planar_poses(lidar_poses(walk, lambda done, total: progress(done, 2 * total)))
+        products = products | {
+            "truth/time": Product(PERIOD * np.arange(walk.frames), "s", "of poses"),
+            "truth/pose": Product(poses, "m; x y z qx qy qz qw", "sensor in the lidar's map"),
+        }
     writer = RecordingWriter(
         output, PRESETS["radarhd"], attributes=about, streams=streams,
         products={"truth/scan_azimuths": bearings, **products}, raw=False,
@@ -51,7 +58,7 @@ def import_walk(
             first = np.where(lidar.any(axis=1), polar.RANGES[lidar.argmax(axis=1)], np.inf)
             rows = {"maps/picture": pictures, "truth/scan": first, "truth/lidar": np.packbits(lidar, axis=2)}
             writer.append(None, PERIOD * np.arange(frames.start, frames.stop), rows=rows)
-            progress(frames.stop, walk.frames)
+            progress(walk.frames + frames.stop, 2 * walk.frames)
     return output
 
 

@@ -4,6 +4,7 @@
     seed: 1
     buildings:
       A: {kind: A, seed: 3}            # as `building` in a scene file; `floors` below picks a floor
+      B: {kind: B, seed: 3, clutter: 1, unevenness: 1}                  # both as in a scene file, too
       shop: shop.yaml                  # a scene of the project, or a scene file beside this one
     recordings:
       - {building: A, floors: [0, 1], platform: handheld, count: 15, duration: 60}
@@ -48,6 +49,8 @@ from radarsim.dataset.task import Task
 from radarsim.dataset.variant import Attributes, Strict, Variant
 from radarsim.scene.description import Description, described, find, shipped, split_level
 
+#: What a building here may say of itself that stands beside `building` in a scene file.
+LIFE = "clutter", "unevenness"
 Platform = Literal["handheld", "cart", "robot"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 
@@ -225,7 +228,9 @@ class Specification(Strict):
             return f"{file}@{level}" if level else str(file)
         if level:
             raise InputError(f"buildings.{building}: is generated and has no levels, expected a scene file")
-        description = {"building": given if floor is None else given | {"floor": floor}}
+        life = {key: given[key] for key in LIFE if key in given}
+        place = {} if floor is None else {"floor": floor}
+        description = {"building": {key: given[key] for key in given if key not in LIFE} | place} | life
         try:
             Description.model_validate(description)
         except ValidationError as error:

@@ -10,8 +10,12 @@ from typer.testing import CliRunner
 
 from radarize import polar
 from radarize.benchmark.real import median_error
+from radarize.benchmark.realmotion import disturbed, shifted_turns, turn_errors
 from radarize.cli import app
 from radarize.errors import InputError
+from radarize.tum import write_tum
+from radarize.walkposes import BEARINGS, scan, true_poses
+from radarize.walks import Walk
 
 FRAMES = 46
 
@@ -50,7 +54,11 @@ def test_every_walk_and_method_has_a_row(clone, tmp_path):
     assert done.exit_code == 0, done.exception
     rows = json.loads((tmp_path / "out" / "real.json").read_text())["tables"][0]["rows"]
     found = {row["method"]: row for row in rows}
-    assert {row["walk"] for row in rows} == {7} and {"picture", "cfar", "first-echo", "others"} == found.keys()
+    methods = {"picture", "cfar", "first-echo", "others", "shifted pictures", "lidar"}
+    assert {row["walk"] for row in rows} == {7} and methods == found.keys()
+    # Who stands has not moved, and nothing turned; maps of the wall agree as its scans do.
+    assert found["lidar"]["ate_m"] < 0.02 and found["shifted pictures"]["yaw_rmse_deg"] < 0.1
+    assert found["lidar"]["map_f1"] > 0.9 and found["others"]["map_f1"] > 0.9 > found["first-echo"]["map_f1"]
     assert found["others"]["chamfer_m"] == 0 and found["others"]["frames"] == FRAMES - 40
     # A wall that is read 5 rows too far is off by that, 0.21 m, but for its ends.
     assert found["picture"]["mod_hausdorff_m"] == pytest.approx(0.21, abs=0.04)
@@ -78,3 +86,37 @@ def test_frames_that_are_alike_count_less():
         told.append(median_error(values))
         medians.append(np.median(values))
     assert np.median(told) == pytest.approx(np.std(medians), rel=0.25)
+
+
+def test_turns_to_the_left_are_positive():
+    """What lies at a greater azimuth before lies at a lesser one after a turn to the left."""
+    rng = np.random.default_rng(0)
+    wide = (255 * (rng.random((256, 64 + 60)) > 0.95)).astype(np.uint8)
+    pictures = np.stack([wide[:, frame // 4 : frame // 4 + 64] for frame in range(40)])  # a column every 0.2 s
+    step = polar.AZIMUTHS[1] - polar.AZIMUTHS[0]
+    found = shifted_turns(pictures)
+    assert np.isnan(found[:4]).all() and np.median(found[4:]) == pytest.approx(step, rel=0.02)
+    poses = np.column_stack([np.zeros((40, 2)), step / 4 * np.arange(40)])
+    errors = turn_errors(found, poses)
+    assert errors["turns_rms_deg"] == pytest.approx(np.degrees(step)) and errors["yaw_median_deg"] < 0.05
+
+
+def test_scans_have_the_nearest_point_of_each_bearing():
+    points = np.array([[2.0, 0.0], [1.0, 0.0], [1.0, 1.0]])
+    found = scan(points)
+    assert found[90] == 1.0 and found[135] == pytest.approx(np.sqrt(2)) and np.isinf(found).sum() == len(BEARINGS) - 2
+
+
+def test_odometry_drifts_as_its_errors_say():
+    """Variance of the end's yaw over many seeds: that of the steps, added up, and of the bias."""
+    poses = np.zeros((201, 3))
+    ends = [disturbed(poses, seed)[-1, 2] for seed in range(100)]
+    expected = np.hypot(np.sqrt(200) * np.radians(0.1), 200 * 0.05 * np.radians(0.3))
+    assert np.std(ends) == pytest.approx(expected, rel=0.25)
+
+
+def test_poses_must_be_there(clone, tmp_path):
+    path = tmp_path / "7.tum"
+    write_tum(path, 0.05 * np.arange(10), np.tile([0.0, 0, 0, 0, 0, 0, 1], (10, 1)))
+    with pytest.raises(InputError, match=r"7\.tum: has 10 poses, expected one every 0\.05 s for 46 frames"):
+        true_poses(tmp_path, Walk.find(clone, 7))

@@ -47,6 +47,15 @@ def test_recordings_of_a_specification(tmp_path):
     assert len({task.seed for task in tasks}) == 7
 
 
+def test_buildings_say_how_lived_in_they_are(tmp_path):
+    """Clutter and unevenness stand beside the building in its scene, and change neither seed nor walk."""
+    lived = load(tmp_path, buildings=PLAIN["buildings"] | {"old": {"kind": "B", "seed": 3, "clutter": 2}})
+    assert lived.tasks[1].scene == {"building": {"kind": "B", "seed": 3, "floor": 2}, "clutter": 2}
+    assert [task.seed for task in lived.tasks] == [task.seed for task in load(tmp_path).tasks]
+    with pytest.raises(InputError, match=r"buildings\.old: clutter is -1"):
+        load(tmp_path, buildings={"old": {"kind": "B", "seed": 3, "clutter": -1}, "office": "office"})
+
+
 def test_seeds_depend_on_nothing_but_seed_and_name(tmp_path):
     seeds = {task.name: task.seed for task in load(tmp_path).tasks}
     turned = load(tmp_path, recordings=PLAIN["recordings"][::-1], radar="two-tx", name="other")

@@ -10,49 +10,86 @@ import torch
 from radarize import polar
 from radarize.features.table import Table
 from radarize.methods.pictures import roughening
-from radarize.methods.pictures.maps import FLOOR
+from radarize.methods.pictures.maps import BINS, PictureMaker
 from radarize.methods.pictures.network import COLUMNS
 from radarize.methods.pictures.points import points
-from radarize.methods.pictures.training import entropy, unpacked
+from radarize.methods.pictures.training import BIAS, UNKNOWN, biased, entropy, rolled, unpacked, zoomed
 from radarize.methods.registry import find_task
+from radarize.radar.presets import PRESETS
+from tests.test_polar import samples
+
+#: rad, from column to column of a picture.
+STEP = polar.AZIMUTHS[1] - polar.AZIMUTHS[0]
 
 
-def levels(rows: list[int], items: int = 4, frames: int = 5) -> torch.Tensor:
-    """A wall at each item's row, 40 dB above the rest."""
-    found = torch.full((items, frames, 1, polar.ROWS, polar.COLUMNS), FLOOR)
-    found[:, :, :, 6:, 8:56] = -40.0
-    for item, row in zip(found, rows, strict=True):
-        item[:, :, row, 8:56] = 0.0
-    return found
+RADAR = PRESETS["radarhd"].model_copy(update={"loops": 1})
 
 
-def plain(levels: torch.Tensor) -> torch.Tensor:
-    """Pictures by the authors' threshold, with nothing drawn but the middle of the bias."""
+def heard(bins: list[float], items: int = 4, frames: int = 5, sine: float = 0.0) -> torch.Tensor:
+    """What four antennas hear of an echo in each item's range bin, 40 dB above noise."""
+    rng = np.random.default_rng(0)
+    found = 0.005 * rng.normal(size=(items, frames, 1, BINS, 4, 2)) @ [1, 1j]
+    for item, place in zip(found, bins, strict=True):
+        apart = np.arange(BINS) - place
+        over_range = np.sinc(apart) * np.exp(-1j * np.pi * apart)
+        item += over_range[:, None] * np.exp(-1j * np.pi * sine * np.arange(4))
+    return torch.view_as_real(torch.from_numpy(found).to(torch.complex64)).flatten(4)
+
+
+def plain(antennas: torch.Tensor) -> torch.Tensor:
+    """Pictures by the authors' threshold, with nothing drawn."""
+    levels = roughening.levels(roughening.antennas_of(antennas))
     threshold = torch.full((len(levels), 1, 1, 1), 20 * math.log10(polar.THRESHOLD))
-    found = roughening.picture(levels[:, :, 0].float(), threshold)
-    return roughening.shifted(found, torch.full((len(levels),), sum(roughening.BIAS) // 2))[:, :, None]
+    return roughening.picture(levels, threshold)[:, :, None]
 
 
-def test_plain_pictures_are_the_authors():
-    """Kept within 26 dB and scaled per frame, read farther by the rig's bias."""
-    found = plain(levels([20, 60, 100, 200]))
-    for picture, row in zip(found[:, -1, 0], (20, 60, 100, 200), strict=True):
-        assert set(picture.nonzero()[:, 0].tolist()) == {row + sum(roughening.BIAS) // 2} and picture.max() == 255
+def test_plain_pictures_are_those_of_the_samples():
+    """What training makes of antennas is what `radarize.polar` makes of samples, to a grey level."""
+    adc = samples([(2.5, 0.4, 400), (6.1, -0.8, 150), (8.0, 0.0, 60), (3.0, 1.0, 200)])
+    made = PictureMaker(RADAR)(adc)
+    antennas = torch.from_numpy(made["antennas"])[:, None, None].float()
+    levels = roughening.levels(roughening.antennas_of(antennas))
+    threshold = torch.full((len(levels), 1, 1, 1), 20 * math.log10(polar.THRESHOLD))
+    found = roughening.picture(levels, threshold)[:, 0].numpy()
+    assert ((found > 0) == (made["picture"] > 0)).mean() > 0.999
+    assert np.quantile(np.abs(found - made["picture"]), 0.999) <= 2
 
 
 def test_roughened_pictures_keep_as_much_as_real_ones():
-    maps = levels([20, 60, 100, 200]).repeat(16, 1, 1, 1, 1)
-    maps = maps + 4 * torch.randn(maps.shape, generator=torch.Generator().manual_seed(0)) * (maps > FLOOR)
-    found = roughening.rough(maps, torch.Generator().manual_seed(1))
-    again = roughening.rough(maps, torch.Generator().manual_seed(1))
-    assert torch.equal(found, again) and found.shape == maps.shape
+    bins = [20, 60, 100, 200]
+    antennas = heard(bins).repeat(16, 1, 1, 1, 1)
+    found = roughening.rough(antennas, torch.Generator().manual_seed(1))
+    again = roughening.rough(antennas, torch.Generator().manual_seed(1))
+    assert torch.equal(found, again) and found.shape == (64, 5, 1, polar.ROWS, polar.COLUMNS)
     share = (found[:, -1, 0] > 0).float().mean(dim=(1, 2)).numpy()
     _, high = roughening.KEPT
     assert share.max() <= high + 0.06 and np.quantile(share, 0.1) < 0.07 and np.quantile(share, 0.9) > 0.1
     assert (found >= 0).all() and (found <= 255).all()
-    # The wall stays the strongest row of most, within the spread of the bias.
-    best = found[:, -1, 0].sum(dim=2).argmax(dim=1).reshape(16, 4) - torch.tensor([20, 60, 100, 200])
-    assert ((best >= roughening.BIAS[0]) & (best <= roughening.BIAS[1])).float().mean() > 0.6
+    # The echo stays the strongest row of most.
+    best = found[:, -1, 0].sum(dim=2).argmax(dim=1).reshape(16, 4) - torch.tensor(bins)
+    assert (best.abs() <= 1).float().mean() > 0.5
+
+
+def test_added_echoes_are_as_antennas_hear_them():
+    """A lone added echo turned to a spectrum: one range, one azimuth."""
+    generator = torch.Generator().manual_seed(3)
+
+    def draw(low, high, *shape):
+        return low + (high - low) * torch.rand((1, *shape), generator=generator)
+
+    def normal(*shape):
+        return torch.zeros((1, *shape))
+
+    count, roughening.ADDED = roughening.ADDED, 1
+    try:
+        found = max((roughening._added(2, draw, normal) for _ in range(8)), key=lambda each: float(each.abs().max()))
+    finally:
+        roughening.ADDED = count
+    power = found[0, 0].abs().square()
+    assert torch.allclose(power, power[:, :1].expand(-1, 4), atol=1e-6)  # one azimuth: antennas differ in phase alone
+    assert power[:, 0].max() / power[:, 0].sum() > 0.35  # one range: a sinc
+    steps = (found[0, 0, 1:, 0] * found[0, 0, :-1, 0].conj())[power[1:, 0] > 0.01 * power.max()]
+    assert len(steps) and found.abs().max() <= 10 ** (roughening.LEVELS[1] / 20)
 
 
 def test_labels_are_the_lidars():
@@ -62,24 +99,51 @@ def test_labels_are_the_lidars():
     assert found.shape == (1, polar.ROWS, COLUMNS) and found.sum() == 2 and found[0, 7, 10] == found[0, 9, 127] == 1
 
 
+def test_worlds_that_are_larger_turned_and_read_too_far():
+    """Cell by cell: a row at r of a world 1.1 times as large is at 1.1 r; columns move to the left; the bias adds."""
+    picture = torch.zeros((2, 1, polar.ROWS, polar.COLUMNS))
+    picture[:, 0, 100, 30] = 1.0
+    place = zoomed(picture, torch.tensor([1.1, 0.9])).nonzero()[:, 2].tolist()
+    assert set(place) <= {90, 110, 111} and 90 in place
+    turned = rolled(picture, torch.tensor([3, -40]), -1.0)
+    assert turned[0, 0, 100, 33] == 1 and (turned[0, 0, :, :3] == -1).all() and (turned[0, 0, :, 3:] >= 0).all()
+    assert turned[1].max() <= 0 and (turned[1, 0, :, -40:] == -1).all()
+    assert biased(picture, torch.tensor([0.21, 0.34])).nonzero()[:, 3].tolist() == [105, 108]
+
+
+def test_augmented_labels_stay_on_their_echoes():
+    """Whatever is drawn: where the label has its point, the picture has its echo, but for the bias."""
+    task = find_task("pictures")
+    label = torch.zeros((8, polar.ROWS, polar.BEAMS), dtype=torch.bool)
+    label[:, 100, 232:280] = True  # 16 columns of pictures about the middle... the echo's own azimuth
+    packed = torch.from_numpy(np.packbits(label.numpy(), axis=2))
+    pictures, truth = task.augment(
+        heard([100.0], items=1).repeat(8, 1, 1, 1, 1), packed, torch.Generator().manual_seed(2)
+    )
+    for picture, true in zip(pictures[:, -1, 0], truth, strict=True):
+        rows, columns = (true == 1).nonzero().T.tolist()
+        assert rows
+        lit = picture[:, columns[len(columns) // 2] // 2].nonzero()[:, 0]
+        off = (lit[:, None] - torch.tensor(sorted(set(rows)))[None]) * polar.RANGES[1]
+        assert ((off > BIAS[0] - 0.1) & (off < BIAS[1] + 0.1)).any()
+
+
 def test_loss_and_points_against_loops():
     generator = torch.Generator().manual_seed(0)
     logits = torch.randn((3, 257, COLUMNS), generator=generator).log_softmax(dim=1)
     label = (torch.rand((3, 256, COLUMNS), generator=generator) < 0.004).float()
-    loss, found = entropy(logits, label), points(logits.exp(), 0.5)
+    label[1, :, 5:9] = UNKNOWN
+    loss, found = entropy(logits, label), points(logits.exp(), 0.01)
     for item in range(3):
-        total = 0.0
+        total, known = 0.0, 0
         for column in range(COLUMNS):
+            if label[item, 0, column] == UNKNOWN:
+                continue
             rows = label[item, :, column].nonzero()[:, 0]
             total -= logits[item, rows, column].mean() if len(rows) else logits[item, 256, column]
-            likely = logits[item, :, column].exp()
-            there = found[item, :, column].nonzero()[:, 0].tolist()
-            if 1 - likely[256] < 0.5:
-                assert not there
-            else:
-                half = likely[:256].sum() / 2
-                assert len(there) == 1 and likely[: there[0]].sum() < half <= likely[: there[0] + 1].sum() + 1e-6
-        assert loss[item] == pytest.approx(float(total) / COLUMNS, rel=1e-5)
+            known += 1
+        assert loss[item] == pytest.approx(float(total) / known, rel=1e-5)
+        assert torch.equal(found[item], logits[item, :256].exp() >= 0.01)
 
 
 def test_it_learns_where_the_wall_is(one_thread):
@@ -88,7 +152,7 @@ def test_it_learns_where_the_wall_is(one_thread):
     task = find_task("pictures")
     settings = replace(task.defaults, width=4, rate=1e-2)
     rows = torch.tensor([40, 80, 120, 160])
-    pictures = plain(levels(rows.tolist()))
+    pictures = plain(heard(rows.tolist()))
     label = torch.zeros((4, polar.ROWS, COLUMNS))
     label[torch.arange(4), rows] = 1.0
     net = task.net(settings, None).train()
@@ -98,15 +162,15 @@ def test_it_learns_where_the_wall_is(one_thread):
         task.loss(net, pictures, label).mean().backward()
         optimiser.step()
     with torch.inference_mode():  # as it trains: forty steps are few for running means
-        found = points(net.estimate(pictures), 0.5)[:, :, 20:108].float()
+        likely = net.estimate(pictures)[:, :-1, 20:108]
+        found = (likely == likely.amax(dim=1, keepdim=True)).float()
     row = (found * torch.arange(polar.ROWS)[:, None]).sum(dim=(1, 2)) / found.sum(dim=(1, 2)).clamp_min(1)
     assert (row - rows).abs().max() < 4
 
 
 def test_recordings_of_the_simulator_are_read(tmp_path):
-    """Levels are made of samples of one loop; labels come packed."""
+    """Antennas are made of samples of one loop; labels come packed; the network says what it reads: pictures."""
     from radarize.recording import RecordingWriter, Stream
-    from tests.test_polar import RADAR, samples
 
     with RecordingWriter(
         tmp_path / "a.h5", RADAR, streams={"truth/lidar": Stream((polar.ROWS, polar.BEAMS // 8), "u1", "", "")}
@@ -115,6 +179,33 @@ def test_recordings_of_the_simulator_are_read(tmp_path):
         writer.append(samples([(3.0, 0.2, 300)], frames=6), 0.05 * np.arange(6), rows=rows)
     task = find_task("pictures")
     table = task.table([tmp_path / "a.h5"])
-    assert isinstance(table, Table) and table.maps["levels"].shape == (6, polar.ROWS, polar.COLUMNS)
-    assert table.maps["levels"].max() == 0 and table.maps["levels"].min() == FLOOR
-    assert task.header(task.defaults, table.grid).maps == ("picture",)
+    assert isinstance(table, Table) and table.maps["antennas"].shape == (6, BINS, 8)
+    header = task.header(task.defaults, table.grid)
+    assert header.maps == ("picture",) and (header.grid.rows, header.grid.azimuths) == (polar.ROWS, polar.COLUMNS)
+    assert header.grid.frame_period == 0.05
+
+
+def test_it_learns_turns(one_thread):
+    """A scene that turns by some columns from picture to picture; left is positive."""
+    torch.manual_seed(0)
+    task = find_task("picture-turns")
+    settings = replace(task.defaults, width=4, frames=2, rate=3e-3)
+    net, rng = task.net(settings, None).train(), np.random.default_rng(0)
+    optimiser = task.optimise(net.parameters(), settings)
+    wide = torch.from_numpy(rng.random((16, 64, polar.COLUMNS + 8)) > 0.9).float() * 200
+
+    def batch() -> tuple[torch.Tensor, torch.Tensor]:
+        shift, which = rng.integers(-2, 3, 16), rng.permutation(16)
+        first = torch.stack([wide[k, :, 4:-4] for k in which])
+        second = torch.stack([wide[k, :, 4 + s : 4 + s + polar.COLUMNS] for k, s in zip(which, shift, strict=True)])
+        # What lies at a greater azimuth before lies at a lesser one after a turn to the left.
+        return torch.stack([first, second], dim=1)[:, :, None], torch.from_numpy(shift * STEP)[:, None].float()
+
+    for _ in range(120):
+        optimiser.zero_grad()
+        task.loss(net, *batch()).mean().backward()
+        optimiser.step()
+    with torch.inference_mode():
+        pictures, turn = batch()
+        found = (net(pictures).mean - net(pictures.flip(4)).mean) / 2
+    assert float((found - turn).square().mean().sqrt()) < 0.5 * STEP

@@ -1,3 +1,6 @@
-"""Points like a lidar's from polar pictures (`radarize.polar`), by a network that learns from simulation alone."""
+"""Points like a lidar's, and turns, from polar pictures (`radarize.polar`), by networks that saw simulation alone."""
 
-TASKS = {"pictures": "radarize.methods.pictures.training:Pictures"}
+TASKS = {
+    "pictures": "radarize.methods.pictures.training:Pictures",
+    "picture-turns": "radarize.methods.pictures.turns:PictureTurns",
+}

@@ -1,17 +1,19 @@
-"""Polar pictures as maps that networks see."""
+"""Polar pictures as maps that networks see, and what they are made of."""
 
 import numpy as np
 
 from radarize import polar
+from radarize.features.grid import Grid
 from radarize.features.maps import Axes, Maker
 from radarize.radar.config import RadarConfig
+from radarize.radar.presets import PRESETS
 
-#: What `levels` reads where no cell of the radar lies, and the least that it reads elsewhere, dB.
-FLOOR = -90.0
+#: Range bins within reach of a picture; numbers of a bin: real and imaginary part of four antennas.
+BINS, NUMBERS = 257, 8
 
 
 class PictureMaker(Maker):
-    """Makes polar pictures of one radar configuration.
+    """Makes polar pictures of one radar configuration, with the beam that the real ones have.
 
     Args:
         config: radar configuration.
@@ -19,7 +21,7 @@ class PictureMaker(Maker):
 
     maps = {
         "picture": "RadarHD's picture of one loop, 0...255",
-        "levels": "what a picture is made of before anything is dropped, dB below the largest",
+        "antennas": "what a picture is made of: four antennas over range, the frame's largest magnitude 1",
     }
 
     def __init__(self, config: RadarConfig):
@@ -28,12 +30,22 @@ class PictureMaker(Maker):
     @staticmethod
     def axes(config: RadarConfig, name: str) -> Axes:
         """Rows and columns of a map."""
+        if name == "antennas":
+            return Axes(BINS, config.range_resolution, np.arange(float(NUMBERS)))
         return Axes(polar.ROWS, polar.RANGES[1], polar.AZIMUTHS)
 
     def __call__(self, adc, valid=None, names=None, frames=slice(None)):
         made = {}
         if "picture" in (names or self.names):
-            made["picture"] = polar.pictures(adc[frames], self.config).astype(np.float16)
-        if "levels" in (names or self.names):
-            made["levels"] = np.maximum(polar.levels(adc[frames], self.config), FLOOR).astype(np.float16)
+            made["picture"] = polar.pictures(adc[frames], self.config, polar.MEASURED).astype(np.float16)
+        if "antennas" in (names or self.names):
+            heard = polar.antennas(adc[frames], self.config, polar.MEASURED)[:, :, :BINS].swapaxes(1, 2)
+            largest = np.abs(heard[:, polar.LEAKAGE :]).max(axis=(1, 2), keepdims=True)
+            heard = (heard / np.maximum(largest, 1e-30)).astype(np.complex64)
+            made["antennas"] = np.ascontiguousarray(heard).view(np.float32).astype(np.float16)
         return made
+
+
+def picture_grid(grid: Grid) -> Grid:
+    """Of pictures that come as often as what they are made of."""
+    return Grid.of(PRESETS["radarhd"], "picture", PictureMaker).model_copy(update={"frame_period": grid.frame_period})

@@ -36,8 +36,8 @@ class PictureNet(Network):
         super().__init__(frames, maps, width)
         self.unet = UNet(_FOLD * frames * len(self.maps) + 2, _FOLD * COLUMNS // polar.COLUMNS, width)
         self.nothing = nn.Parameter(torch.zeros(()))
-        #: Least probability of anything from which a column has a point; training fits it.
-        self.register_buffer("least", torch.tensor(0.5))
+        #: Least probability of a cell with a point; training fits it.
+        self.register_buffer("least", torch.tensor(0.01))
 
     def forward(self, maps: Maps) -> Float[Tensor, "item 257 column"]:
         """Logarithms of the probability of each row, and last, of nothing."""

@@ -4,42 +4,63 @@ from collections.abc import Iterable
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Generator, Tensor, nn
 
 from radarize import polar
 from radarize.clouds import Apart
+from radarize.features.grid import Grid
 from radarize.features.maps import Maps
 from radarize.features.table import Reading
 from radarize.methods.pictures import roughening
+from radarize.methods.pictures.maps import picture_grid
 from radarize.methods.pictures.network import COLUMNS, PictureNet
 from radarize.methods.pictures.points import points
 from radarize.methods.task import Settings, Task
+from radarize.nets.weights import Header
 
 #: Choices for the least probability of a point.
-_LEAST = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
+LEAST = (0.004, 0.006, 0.008, 0.01, 0.012, 0.015, 0.02, 0.03)
+#: By how much rooms are larger or smaller, and columns of a picture by which they are turned, at most.
+ZOOM, TURN = 0.25, 8
+#: m: the radar reads too far by range bias and lever arm of the data set's rig, on its training walks.
+BIAS = (0.17, 0.34)
+#: Of cells of a label.
+UNKNOWN = -1.0
 
 
 class Pictures(Task):
     """Points of a lidar from polar pictures; labels are its pictures, packed."""
 
-    network, maps = PictureNet, ("levels",)
+    network, maps = PictureNet, ("antennas",)
     truth = (Reading("lidar", "truth/lidar"),)
-    defaults = Settings(width=8, frames=5, epochs=30, batch=16, rate=2e-3, schedule="cosine")
+    defaults = Settings(width=12, frames=5, epochs=20, batch=64, rate=2e-3, schedule="cosine")
     reads = ("picture",)
 
+    def header(self, settings: Settings, grid: Grid | None, **about) -> Header:
+        """Of pictures, although training reads what they are made of."""
+        return super().header(settings, grid and picture_grid(grid), **about)
+
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
-        pictures = roughening.rough(maps, generator)
-        left = torch.rand(len(maps), generator=generator) < 0.5
-        pictures = torch.where(left[:, None, None, None, None], pictures.flip(4), pictures)
-        label = unpacked(label)
-        return pictures, torch.where(left[:, None, None], label.flip(2), label)
+        def draw(low: float, high: float) -> Tensor:
+            return low + (high - low) * torch.rand(len(maps), generator=generator, device=generator.device)
+
+        pictures, label = roughening.rough(maps, generator)[:, :, 0], unpacked(label)
+        left = draw(0.0, 1.0)[:, None, None] < 0.5
+        pictures, label = (
+            torch.where(left[..., None], pictures.flip(3), pictures),
+            torch.where(left, label.flip(2), label),
+        )
+        factor, turn = draw(1 - ZOOM, 1 + ZOOM), draw(-TURN, TURN).round().long()
+        pictures = rolled(zoomed(pictures, factor), turn, 0.0)
+        label = rolled(zoomed(label[:, None], factor), 2 * turn, UNKNOWN)[:, 0]
+        return biased(pictures, draw(*BIAS)), label
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
         return entropy(net(maps), label)
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
-        logits, label = net(self._validated(maps)), unpacked(label)
+        logits, label = net(validated(maps)), unpacked(label)
         return torch.stack([entropy(logits, label), self._chamfer(logits.exp(), label, net.least)], dim=1)
 
     def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
@@ -48,35 +69,69 @@ class Pictures(Task):
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """Choose the probability from which a column has a point: the least mean Chamfer distance."""
-        total = torch.zeros(len(_LEAST))
+        total = torch.zeros(len(LEAST), device=net.least.device)
         for maps, label in batches:
-            probability, label = net.estimate(self._validated(maps)), unpacked(label)
-            total += torch.stack([self._chamfer(probability, label, least).sum() for least in _LEAST])
-        net.least.fill_(_LEAST[int(total.argmin())])
-
-    @staticmethod
-    def _validated(maps: Maps) -> Maps:
-        """The same roughening in every epoch."""
-        return roughening.rough(maps, Generator().manual_seed(int(maps.abs().sum()) % 2**31))
+            probability, label = net.estimate(validated(maps)), unpacked(label)
+            total += torch.stack([self._chamfer(probability, label, least).sum() for least in LEAST])
+        net.least.fill_(LEAST[int(total.argmin())])
 
     @staticmethod
     def _chamfer(probability: Tensor, label: Tensor, least: float | Tensor) -> Float[Tensor, "item"]:
-        found = points(probability, least).numpy()
+        found = points(probability, least).cpu().numpy()
         apart = [
             Apart.of(polar.cartesian(one), polar.cartesian(true)).chamfer
-            for one, true in zip(found, label.bool().numpy(), strict=True)
+            for one, true in zip(found, label.bool().cpu().numpy(), strict=True)
         ]
-        return torch.tensor(np.nan_to_num(apart, nan=polar.REACH / 2), dtype=torch.float32)
+        return torch.tensor(np.nan_to_num(apart, nan=polar.REACH / 2), dtype=torch.float32, device=label.device)
+
+
+def validated(maps: Maps) -> Maps:
+    """The same roughening in every epoch, and the middle of the bias."""
+    seed = int(maps.abs().double().sum()) % 2**31
+    pictures = roughening.rough(maps, Generator(maps.device).manual_seed(seed))[:, :, 0]
+    return biased(pictures, torch.full((len(maps),), sum(BIAS) / 2, device=maps.device))
+
+
+def biased(pictures: Float[Tensor, "item frame row column"], metres: Float[Tensor, "item"]) -> Maps:
+    """Pictures that read so much too far."""
+    rows = (metres / polar.RANGES[1]).round().long()
+    return _gathered(pictures, torch.arange(polar.ROWS, device=pictures.device) - rows[:, None])[:, :, None]
+
+
+def zoomed(
+    pictures: Float[Tensor, "item frame row column"], factor: Float[Tensor, "item"]
+) -> Float[Tensor, "item frame row column"]:
+    """Of a world that is so much larger."""
+    rows = torch.arange(polar.ROWS, device=pictures.device)
+    return _gathered(pictures, (rows / factor[:, None]).round().long())
+
+
+def rolled(
+    pictures: Float[Tensor, "item frame row column"], columns: Int[Tensor, "item"], beyond: float
+) -> Float[Tensor, "item frame row column"]:
+    """Of a world that is turned by so many columns; `beyond` is what nobody has seen."""
+    place = torch.arange(pictures.shape[3], device=pictures.device) - columns[:, None]
+    inside = (place >= 0) & (place < pictures.shape[3])
+    index = place.clamp(0, pictures.shape[3] - 1)[:, None, None].expand_as(pictures)
+    return pictures.gather(3, index).masked_fill(~inside[:, None, None], beyond)
+
+
+def _gathered(pictures: Tensor, place: Int[Tensor, "item row"]) -> Tensor:
+    """Rows of pictures, 0 where there is none."""
+    inside = (place >= 0) & (place < polar.ROWS)
+    found = pictures.gather(2, place.clamp(0, polar.ROWS - 1)[:, None, :, None].expand_as(pictures))
+    return found * inside[:, None, :, None]
 
 
 def unpacked(label: Tensor) -> Float[Tensor, "item row column"]:
     """Pictures of a lidar on the network's columns: 1 where any of its beams has a point."""
-    bits = (label[..., None].to(torch.uint8) >> torch.arange(7, -1, -1, dtype=torch.uint8)) & 1
+    bits = (label[..., None].to(torch.uint8) >> torch.arange(7, -1, -1, dtype=torch.uint8, device=label.device)) & 1
     return bits.flatten(2).unflatten(2, (COLUMNS, -1)).amax(dim=3).float()
 
 
 def entropy(logits: Float[Tensor, "item 257 column"], label: Float[Tensor, "item row column"]) -> Float[Tensor, "item"]:
-    """Cross-entropy to the lidar's points of each column, evenly, or to nothing."""
+    """Cross-entropy to the lidar's points of each known column, evenly, or to nothing."""
+    known = label[:, 0] != UNKNOWN
     count = label.sum(dim=1)
     rows = (label * logits[:, :-1]).sum(dim=1) / count.clamp_min(1)
-    return -torch.where(count > 0, rows, logits[:, -1]).mean(dim=1)
+    return -(torch.where(count > 0, rows, logits[:, -1]) * known).sum(dim=1) / known.sum(dim=1)

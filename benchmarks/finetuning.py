@@ -1,0 +1,166 @@
+"""What simulation saves of reality: the network for RadarHD's pictures trained on real walks alone, and the same walks
+shown to one that was trained in simulation first.
+
+Only training walks are shown; `radarize benchmark real` judges the weights that come out on the test walks. The weights
+stay with whoever makes them. Made for a GPU; `--steps 10` tries it on two cores.
+"""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Bool
+from torch import Generator, Tensor
+
+from benchmarks.results import command_line
+from radarize import polar
+from radarize.clouds import Apart
+from radarize.console import progress
+from radarize.features.maps import Maps
+from radarize.methods.method import Weights
+from radarize.methods.pictures.network import PictureNet
+from radarize.methods.pictures.points import points
+from radarize.methods.pictures.training import (
+    LEAST,
+    TURN,
+    UNKNOWN,
+    ZOOM,
+    entropy,
+    rolled,
+    unpacked,
+    zoomed,
+)
+from radarize.nets.weights import build, load, save
+from radarize.radar.presets import PRESETS
+from radarize.walks import Walk
+
+#: Walks by how many of them are shown; steps and rates of both trainings.
+SHOWN = {
+    1: (112,),
+    5: (112, 118, 123, 129, 136),
+    25: (*range(112, 117), *range(118, 124), *range(125, 132), *range(133, 139), 140),
+}
+RATES = {"alone": 1e-3, "tuned": 3e-4}
+STEPS = {
+    (1, "alone"): 1000,
+    (5, "alone"): 2000,
+    (25, "alone"): 3000,
+    (1, "tuned"): 400,
+    (5, "tuned"): 800,
+    (25, "tuned"): 2500,
+}
+#: Frames of a walk from one that is read to the next, as the network's windows have them: 0.2 s.
+EVERY, BATCH = 4, 64
+
+
+class Seen:
+    """Real walks in memory."""
+
+    def __init__(self, walks: list[Walk], device: torch.device):
+        frames = [range(0, walk.frames, EVERY) for walk in walks]
+        read = zip(walks, frames, strict=True)
+        self.radar = [torch.from_numpy(np.stack([walk.radar(k) for k in at])).to(device) for walk, at in read]
+        read = zip(walks, frames, strict=True)
+        lidar = [np.stack([np.packbits(walk.lidar(k), axis=1) for k in at]) for walk, at in read]
+        self.lidar = [torch.from_numpy(each).to(device) for each in lidar]
+
+    def items(self, window: int) -> list[tuple[int, int]]:
+        """Walk and newest frame of each window."""
+        return [(walk, k) for walk, radar in enumerate(self.radar) for k in range(window - 1, len(radar))]
+
+    def windows(self, items: list[tuple[int, int]], window: int) -> tuple[Maps, Tensor]:
+        """Pictures and labels."""
+        pictures = torch.stack([self.radar[walk][k - window + 1 : k + 1] for walk, k in items]).float()
+        return pictures[:, :, None], unpacked(torch.stack([self.lidar[walk][k] for walk, k in items]))
+
+
+def augmented(pictures: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
+    """Mirrored, of larger and smaller and of turned worlds, as in the training on simulated walks."""
+
+    def draw(low: float, high: float) -> Tensor:
+        return low + (high - low) * torch.rand(len(label), generator=generator, device=label.device)
+
+    left, pictures = draw(0.0, 1.0)[:, None, None] < 0.5, pictures[:, :, 0]
+    pictures = torch.where(left[..., None], pictures.flip(3), pictures)
+    label = torch.where(left, label.flip(2), label)
+    factor, turn = draw(1 - ZOOM, 1 + ZOOM), draw(-TURN, TURN).round().long()
+    pictures = rolled(zoomed(pictures, factor), turn, 0.0)
+    return pictures[:, :, None], rolled(zoomed(label[:, None], factor), 2 * turn, UNKNOWN)[:, 0]
+
+
+def trained(seen: Seen, start: Path | None, rate: float, steps: int, report) -> tuple[PictureNet, object]:
+    """The network after so many steps on real walks, and its header."""
+    device = seen.radar[0].device
+    net, header = load(Weights().of("pictures") if start is None else start, PictureNet, PRESETS["radarhd"])
+    if start is None:
+        torch.manual_seed(0)
+        net = build(PictureNet, header)
+    net = net.to(device).train().requires_grad_(True)
+    items, rng = seen.items(header.frames), np.random.default_rng(0)
+    generator, optimiser = Generator(device).manual_seed(0), torch.optim.Adam(net.parameters(), rate)
+    for step in range(steps):
+        optimiser.param_groups[0]["lr"] = (
+            rate * min(1, 20 * (step + 1) / steps) * (1 + math.cos(math.pi * step / steps)) / 2
+        )
+        chosen = [items[k] for k in rng.integers(0, len(items), BATCH)]
+        pictures, label = augmented(*seen.windows(chosen, header.frames), generator)
+        loss = entropy(net(pictures), label).mean()
+        optimiser.zero_grad()
+        loss.backward()
+        torch.nn.utils.clip_grad_norm_(net.parameters(), 1.0)
+        optimiser.step()
+        report()
+    return net.eval(), header
+
+
+@torch.inference_mode()
+def least(net: PictureNet, seen: Seen, window: int, every: int = 12) -> float:
+    """The least probability of a point that brings the points nearest to the lidar's, on the walks that were shown."""
+    apart = {value: [] for value in LEAST}
+    for item in seen.items(window)[::every]:
+        pictures, label = seen.windows([item], window)
+        likely = net.estimate(pictures)
+        for value, found in apart.items():
+            found.append(_chamfer(points(likely, value)[0].cpu().numpy(), label[0].bool().cpu().numpy()))
+    return min(apart, key=lambda value: np.nanmedian(apart[value]))
+
+
+def _chamfer(found: Bool[np.ndarray, "row column"], true: Bool[np.ndarray, "row column"]) -> float:
+    return Apart.of(polar.cartesian(found), polar.cartesian(true)).chamfer
+
+
+PARSER = command_line(
+    __doc__,
+    data=(Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"),
+    start=(Weights().of("pictures"), "weights that were trained in simulation"),
+    steps=(0, "of each training; as many as it is worth if 0"),
+    out=(Path("tuned"), "folder of the weights, one folder each"),
+)
+
+
+def main() -> None:
+    options = PARSER.parse_args()
+    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
+    plan = {key: options.steps or steps for key, steps in STEPS.items()}
+    done, total = 0, sum(plan.values())
+    with progress("steps") as report:
+
+        def step() -> None:
+            nonlocal done
+            done += 1
+            report(done, total)
+
+        for (count, how), steps in plan.items():
+            seen = Seen([Walk.find(options.data, number) for number in SHOWN[count]], device)
+            net, header = trained(seen, options.start if how == "tuned" else None, RATES[how], steps, step)
+            net.least.fill_(least(net, seen, header.frames))
+            folder = options.out / f"{how}-{count}"
+            folder.mkdir(parents=True, exist_ok=True)
+            about = {"data": f"{count} real walks" + (f" after {header.data}" if how == "tuned" else "")}
+            save(net, header.model_copy(update=about | {"metrics": {}}), folder / "pictures.safetensors")
+            print(f"radarize benchmark real --data {options.data} --weights {folder} --out {folder}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,186 @@
+"""Turns, trajectories and maps of real walks, from a radar's pictures and from scans that methods make of them.
+
+The reference is the lidar beside the radar: its poses, and its points at these poses as the map.
+"""
+
+import numpy as np
+import torch
+from jaxtyping import Float, UInt8
+from scipy.spatial import cKDTree
+
+from radarize import polar
+from radarize.errors import InputError
+from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
+from radarize.evaluation.trajectory import trajectory
+from radarize.methods.pictures.turns import PictureTurnNet
+from radarize.nets.weights import Header
+from radarize.pose import between, compose, transform, wrap
+from radarize.radar.presets import PRESETS
+from radarize.slam.backend import Slam
+from radarize.slam.config import SlamConfig
+from radarize.slam.grid import OccupancyGrid
+from radarize.tum import planar_poses
+from radarize.walkposes import BEARINGS, EVERY
+from radarize.walks import PERIOD, Walk
+
+#: Frames over which turns are measured: 0.2 s.
+SPAN = 4
+#: Columns by which pictures are shifted against each other at most: 57 deg/s.
+_MOST = 4
+#: Errors of the odometry that SLAM is given: of a step's length and m per step; rad per step and as a bias, rad/s. A
+#: cart's wheel odometry as the lidar logs have it.
+_STEP, _YAW, _BIAS = (0.05, 0.001), np.radians(0.1), np.radians(0.3)
+#: Of the back end: that for radar scans, as far as pictures reach.
+_RADAR = SlamConfig.preset("radar")
+_CONFIG = _RADAR.model_copy(update={"grid": _RADAR.grid.model_copy(update={"max_range": polar.REACH})})
+#: m: cells of the lidar's map, how many frames must have seen one, and the distances at which maps agree.
+_CELL, _SEEN, NEAR = 0.05, 3, (0.1, 0.2)
+
+
+def turn_errors(found: Float[np.ndarray, "frame"], poses: Float[np.ndarray, "frame 3"]) -> dict[str, float]:
+    """Of turns over `SPAN` frames up to each frame (nan: none), rad: RMSE in degrees, and how large turns are."""
+    true = np.full(len(poses), np.nan)
+    true[SPAN:] = wrap(poses[SPAN:, 2] - poses[:-SPAN, 2])
+    known = np.isfinite(found) & np.isfinite(true)
+    error = np.degrees(wrap(found - true)[known])
+    return {
+        "yaw_rmse_deg": float(np.sqrt(np.mean(error**2))),
+        "yaw_median_deg": float(np.median(np.abs(error))),
+        "turns_rms_deg": float(np.sqrt(np.mean(np.degrees(true[known]) ** 2))),
+    }
+
+
+@torch.inference_mode()
+def network_turns(
+    network: tuple[PictureTurnNet, Header], pictures: UInt8[np.ndarray, "frame range azimuth"]
+) -> Float[np.ndarray, "frame"]:
+    """Turns by a network that was trained in simulation."""
+    net, header = network
+    stride = header.stride(PRESETS["radarhd"])
+    if stride != SPAN:
+        raise InputError(f"picture-turns: is of frames {stride * PERIOD:g} s apart, expected {SPAN * PERIOD:g} s")
+    first = (net.frames - 1) * stride
+    found = np.full(len(pictures), np.nan)
+    for end in range(first, len(pictures), 64):
+        ends = torch.arange(end, min(end + 64, len(pictures)))
+        frames = ends[:, None] - stride * torch.arange(net.frames - 1, -1, -1)
+        found[ends] = net.estimate(torch.from_numpy(pictures)[frames][:, :, None].float())[0][:, 0]
+    return found
+
+
+def shifted_turns(pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float[np.ndarray, "frame"]:
+    """Turns by shifting pictures against each other over azimuth: the place of the largest correlation, between
+    columns by a parabola."""
+    size = 2 * polar.COLUMNS
+    spectra = np.fft.rfft(pictures.astype(np.float32), size, axis=2)
+    found = np.full(len(pictures), np.nan)
+    shifts = np.arange(-_MOST, _MOST + 1)
+    for frame in range(SPAN, len(pictures)):
+        both = np.fft.irfft((spectra[frame - SPAN] * spectra[frame].conj()).sum(axis=0), size)[shifts]
+        best = int(both.argmax())
+        if 0 < best < len(shifts) - 1:
+            before, at, after = both[best - 1 : best + 2]
+            best += (before - after) / (2 * (before - 2 * at + after) or 1.0)
+        found[frame] = (best - _MOST) * (polar.AZIMUTHS[1] - polar.AZIMUTHS[0])
+    return found
+
+
+def disturbed(poses: Float[np.ndarray, "frame 3"], seed: int) -> Float[np.ndarray, "frame 3"]:
+    """Poses as an odometry with errors would have added them up."""
+    rng = np.random.default_rng(seed)
+    steps = between(poses[:-1], poses[1:])
+    length = np.hypot(steps[:, 0], steps[:, 1])
+    steps[:, :2] += rng.normal(size=(len(steps), 2)) * (_STEP[0] * length + _STEP[1])[:, None]
+    steps[:, 2] += rng.normal(0, _YAW, len(steps)) + PERIOD * rng.normal(0, _BIAS)
+    found = [poses[0]]
+    for step in steps:
+        found.append(compose(found[-1], step))
+    return np.array(found)
+
+
+def mapped(
+    ranges: Float[np.ndarray, "frame bearing"],
+    poses: Float[np.ndarray, "frame 3"],
+    surface: Float[np.ndarray, "point 2"],
+    odometry: Float[np.ndarray, "frame 3"] | None,
+) -> dict[str, float]:
+    """SLAM with scans: error of its trajectory, and its map against the lidar's.
+
+    Args:
+        ranges: scans on `BEARINGS`, m; nan: not known.
+        poses: true ones.
+        surface: of the lidar's map, m, in the frame of the poses.
+        odometry: that SLAM is given; scans alone if None.
+    """
+    slam = Slam(_CONFIG)
+    for frame in range(0, len(ranges), 1 if odometry is not None else EVERY):
+        if odometry is not None:
+            slam.add_odometry(PERIOD * frame, odometry[frame])
+        slam.add_scan(PERIOD * frame, BEARINGS, ranges[frame])
+    slam.finish()
+    times, found = slam.trajectory()
+    turn, shift = _alignment(found, np.array([np.interp(times, _stamps(poses), each) for each in _unwrapped(poses)]).T)
+    agreement = map_agreement(slam.map(), turn, shift, surface)
+    return {"ate_m": float(_compared(times, found, poses).position.mean), **agreement}
+
+
+def drift(odometry: Float[np.ndarray, "frame 3"], poses: Float[np.ndarray, "frame 3"]) -> float:
+    """ATE of an odometry, m."""
+    return float(_compared(_stamps(poses), odometry, poses).position.mean)
+
+
+def surface_of(walk: Walk, poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "point 2"]:
+    """The lidar's map: middles of the cells that it has points in from several frames, m."""
+    counts: dict[tuple[int, int], int] = {}
+    for frame in range(walk.frames):
+        points = transform(poses[frame], polar.cartesian(walk.lidar(frame)))
+        for cell in map(tuple, np.unique(np.floor(points / _CELL).astype(int), axis=0)):
+            counts[cell] = counts.get(cell, 0) + 1
+    return (np.array([cell for cell, count in counts.items() if count >= _SEEN]) + 0.5) * _CELL
+
+
+def map_agreement(
+    grid: OccupancyGrid, turn: float, shift: Float[np.ndarray, "2"], surface: Float[np.ndarray, "point 2"]
+) -> dict[str, float]:
+    """Share of occupied cells near the surface (precision), of the surface near occupied cells (recall), and F1.
+
+    Args:
+        grid: map.
+        turn, shift: rad, m; from its frame to that of the surface.
+        surface: of the lidar's map, m.
+    """
+    row, column = np.nonzero(grid.probability > (0.5 if grid.probability.dtype.kind == "f" else 127))
+    cells = grid.origin + (np.column_stack([column, row]) + 0.5) * grid.resolution
+    cells = transform(np.array([*shift, turn]), cells)
+    found = {}
+    for near in NEAR:
+        precision = float(np.mean(cKDTree(surface).query(cells)[0] <= near)) if len(cells) else np.nan
+        recall = float(np.mean(cKDTree(cells).query(surface)[0] <= near)) if len(cells) else 0.0
+        f1 = 2 * precision * recall / max(precision + recall, 1e-12)
+        name = f"{100 * near:.0f}cm"
+        found |= {f"map_precision_{name}": precision, f"map_recall_{name}": recall, f"map_f1_{name}": f1}
+    return found
+
+
+def _alignment(
+    found: Float[np.ndarray, "scan 3"], true: Float[np.ndarray, "scan 3"]
+) -> tuple[float, Float[np.ndarray, "2"]]:
+    """Turn (rad) and shift (m) from one frame to the other, by headings: who stands has no positions to tell it."""
+    apart = true[:, 2] - found[:, 2]
+    turn = float(np.arctan2(np.sin(apart).mean(), np.cos(apart).mean()))
+    return turn, true[:, :2].mean(axis=0) - transform(np.array([0.0, 0.0, turn]), found[:, :2]).mean(axis=0)
+
+
+def _stamps(poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "frame"]:
+    return PERIOD * np.arange(len(poses))
+
+
+def _unwrapped(poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "3 frame"]:
+    return np.stack([poses[:, 0], poses[:, 1], np.unwrap(poses[:, 2])])
+
+
+def _compared(
+    times: Float[np.ndarray, "scan"], found: Float[np.ndarray, "scan 3"], poses: Float[np.ndarray, "frame 3"]
+) -> TrajectoryErrors:
+    reference = trajectory(_stamps(poses), planar_poses(poses))
+    return evaluate_trajectory(trajectory(times, planar_poses(found)), reference)

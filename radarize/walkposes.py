@@ -1,0 +1,61 @@
+"""Where a real walk's rig was (`radarize.walks`): as somebody says, or by SLAM with the lidar beside the radar."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize import polar
+from radarize.errors import InputError
+from radarize.pose import wrap
+from radarize.slam.backend import Slam
+from radarize.slam.config import SlamConfig
+from radarize.tum import planar, read_tum
+from radarize.walks import PERIOD, Walk
+
+#: Bearings of scans that are made of points.
+BEARINGS = np.radians(np.linspace(-90, 90, 181))
+#: Of so many scans one is taken where nothing says where the sensor went: matching is then a wide search.
+EVERY = 2
+
+
+def true_poses(folder: Path, walk: Walk) -> Float[np.ndarray, "frame 3"]:
+    """x, y (m), yaw (rad) of each frame of a walk, from FOLDER/NUMBER.tum, whose times begin with the first frame.
+
+    Raises:
+        InputError: no such file, or none for each frame.
+    """
+    path = Path(folder) / f"{walk.number}.tum"
+    times, poses = read_tum(path)
+    frames = np.rint(times / PERIOD).astype(int)
+    if not set(range(walk.frames)) <= set(frames.tolist()):
+        raise InputError(f"{path}: has {len(times)} poses, expected one every {PERIOD} s for {walk.frames} frames")
+    found = np.empty((walk.frames, 3))
+    inside = (frames >= 0) & (frames < walk.frames)
+    found[frames[inside]] = planar(poses)[inside]
+    return found
+
+
+def lidar_poses(
+    walk: Walk, progress: Callable[[int, int], None] = lambda done, total: None
+) -> Float[np.ndarray, "frame 3"]:
+    """x, y (m), yaw (rad) of each frame by SLAM with the lidar's scans; `progress` takes frames done and in all."""
+    slam = Slam(SlamConfig.preset("lidar"))
+    for frame in range(0, walk.frames, EVERY):
+        slam.add_scan(PERIOD * frame, BEARINGS, scan(polar.cartesian(walk.lidar(frame))))
+        progress(frame, walk.frames)
+    slam.finish()
+    times, poses = slam.trajectory()
+    frames = PERIOD * np.arange(walk.frames)
+    yaw = np.interp(frames, times, np.unwrap(poses[:, 2]))
+    return np.column_stack([np.interp(frames, times, poses[:, 0]), np.interp(frames, times, poses[:, 1]), wrap(yaw)])
+
+
+def scan(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "bearing"]:
+    """Range of the nearest point on each of `BEARINGS`, m; inf where there is none."""
+    found = np.full(len(BEARINGS), np.inf)
+    bearing = np.arctan2(points[:, 1], points[:, 0])
+    column = np.rint((bearing - BEARINGS[0]) / (BEARINGS[1] - BEARINGS[0])).astype(int)
+    np.minimum.at(found, column.clip(0, len(BEARINGS) - 1), np.hypot(*points.T))
+    return found

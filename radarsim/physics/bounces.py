@@ -39,7 +39,7 @@ class Ways:
         self._size += len(rows)
         self._chains.append(chains)
         self._frame.append(np.full(len(chains), frame))
-        self._range.append(np.broadcast_to(span, (len(chains), 2)))
+        self._range.append(np.tile(span, (len(chains), 1)))
         for column, values in ((self._rows, rows), (self._longest, longest), (self._weakest, weakest)):
             column.append(values)
 

@@ -50,12 +50,14 @@ def parts(
         facet of each part, a point for a ray to it to aim at (m), isometry of the receiver, amplitude.
     """
     size = 1024
+    # Of one facet the slice would be of another layout than of many, and the loop be compiled twice.
+    reflection = np.ascontiguousarray(facets.reflection[:, 0, -1])
     while True:
         facet, aim, isometry = np.empty(size, np.int64), np.empty((size, 3)), np.empty((size, 3, 4))
         amplitude = np.empty(size, complex)
         count = _parts(
-            facets.corners, facets.normal, facets.two_sided, facets.reflection[:, 0, -1], view.position, view.rotation,
-            view.reach, view.wavelength, view.weakest, *view.tables, facet, aim, isometry, amplitude,
+            facets.corners, facets.normal, facets.two_sided, reflection, view.position, view.rotation, view.reach,
+            view.wavelength, view.weakest, *view.tables, facet, aim, isometry, amplitude,
         )  # fmt: skip
         if count <= size:
             return facet[:count], aim[:count], isometry[:count], amplitude[:count]

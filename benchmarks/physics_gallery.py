@@ -21,20 +21,18 @@ from radarize.heatmaps import Heatmaps
 from radarize.radar.array import rx_positions, tx_positions, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.physics import chains, plates
-from radarsim.physics.antenna import ISOTROPIC, gain_tables
+from radarsim.physics import imagemethod, plates, sight
+from radarsim.physics.antenna import ISOTROPIC, gain_pattern
 from radarsim.physics.coefficients import TABLE, reflection, transmission
-from radarsim.physics.curved import Curved
 from radarsim.physics.echoes import Echoes, Provenance
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig, PhaseNoise
-from radarsim.physics.mirrors import Mirrors
 from radarsim.physics.phasenoise import density
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.search import Search
 from radarsim.physics.surface import Surface
-from radarsim.physics.view import View
 from radarsim.scene import shapes
 from radarsim.scene.materials import material
 from radarsim.scene.scene import Scene, SceneObject
@@ -77,9 +75,9 @@ def target(*place: float) -> EchoFinder:
     return EchoFinder(None, Scatterers.points(np.array(place), np.ones(1)), None, CONFIG, antenna=ISOTROPIC)
 
 
-def walls_of(scene: Scene, curved: Curved | None = None) -> EchoFinder:
+def walls_of(scene: Scene) -> EchoFinder:
     """Finds the surfaces of a scene alone."""
-    return EchoFinder(scene, NOWHERE, Facets.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC, curved=curved)
+    return EchoFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)
 
 
 def clutter(rng: np.random.Generator, count: int) -> Scatterers:
@@ -146,7 +144,7 @@ def round_and_corners(axis) -> str:
     width or area that all plates share (Robertson, BSTJ 26, 1947)."""
     off, a, worst = np.arange(-20, 21, 2.0), 0.04, 0.0
     ball = Scene("ball", [SceneObject("ball", shapes.sphere((0, 0, 0), 0.1), material("metal"))])
-    finder = walls_of(ball, curved=Curved.of(ball, CONFIG))
+    finder = walls_of(ball)
     curves = {"trihedral, 4 cm": [], "dihedral, 4 cm": [], "sphere, 10 cm": []}
     for angle in np.deg2rad(off):
         towards = direction(np.pi / 4 + angle, np.arcsin(1 / np.sqrt(3)))
@@ -172,17 +170,17 @@ def round_and_corners(axis) -> str:
 
 def box_room(axis) -> str:
     """Images of the radar by order in a metal box room, walls, edges and corners: 6, 18 and 38."""
-    facets, reach = Facets.of(Scene.load("physics/room"), CONFIG), 14.0
+    flat = Reflectors.of(Scene.load("physics/room"), CONFIG).flat
     p, low, high = np.array([0.37, -0.21, 1.23]), np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
     # A level of -1 keeps those too that leave ahead and come back from behind, between opposite walls: unheard.
-    view = View(p, AHEAD, reach, LAMBDA, -1.0, gain_tables(ISOTROPIC))
-    _, _, single, _ = plates.parts(facets, view)
+    search = Search(p[None], AHEAD[None], np.zeros(1), 14.0, LAMBDA, -1.0, *gain_pattern(ISOTROPIC))
+    single = plates.parts(flat, search, 0).isometry
     walls = single[np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1) < 1e-6]
-    chain, isometry, _, _ = chains.images(Mirrors.of(facets, None, 50.0), np.arange(6), view)
-    double = chain[:, 1] == chain[:, 2]
+    chains = imagemethod.chains(flat, sight.couples(search, 0, flat, np.arange(6)), search, 0)
+    double = chains.mirrors[:, 1] == chains.mirrors[:, 2]
     found = []
-    for some in (walls, isometry[double], isometry[~double]):
-        some = np.concatenate([some, chains.reverse(some)])
+    for some in (walls, chains.isometry[double], chains.isometry[~double]):
+        some = np.concatenate([some, imagemethod.reverse(some)])
         found.append({tuple(np.round(place, 6)) for place in some[:, :, :3] @ p + some[:, :, 3]})
     theory = [[], [], []]
     for cell in product(range(-3, 4), repeat=3):
@@ -221,7 +219,7 @@ def phantom(axis) -> str:
     """Behind a metal door a target appears a second time, mirrored: the range-azimuth map of all echoes together."""
     door = SceneObject("door", shapes.rectangle((2.0, 0, 0), (3.0, 2.4), (-1, 0, 0)), material("metal"))
     scene, place = Scene("door", [door]), np.array([0.6, 0.55, 0.0])
-    finder = EchoFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Facets.of(scene, CONFIG), CONFIG)
+    finder = EchoFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Reflectors.of(scene, CONFIG), CONFIG)
     maps, signal = Heatmaps(CONFIG), burst(CONFIG, finder(HERE, AHEAD), Rig())
     signal *= 20000 / np.abs(signal).max()
     power = maps.range_azimuth(np.rint(np.stack([signal.real, signal.imag], axis=-1)).astype(np.int16)[None])[0].numpy()
@@ -333,7 +331,7 @@ def phase_noise(axis) -> str:
 
 def speckle(axis) -> str:
     """Many scatterers in a cell: Rayleigh amplitudes."""
-    finder = EchoFinder(None, clutter(np.random.default_rng(5), 20000), None, CONFIG, reach=10.0, antenna=ISOTROPIC)
+    finder = EchoFinder(None, clutter(np.random.default_rng(5), 20000), None, CONFIG, range=10.0, antenna=ISOTROPIC)
     amplitude = []
     for k in range(150):
         position = np.array([0.0, (0.2 * k) % 3 - 1.5, 0.1 * (0.2 * k // 3) - 0.4])
@@ -349,7 +347,7 @@ def decorrelation(axis) -> str:
     """Speckle belongs to the world: what a moved radar finds anew is the field of the same frozen scatterers."""
     shifts = np.geomspace(1e-4, 0.1, 16)
     own, frozen, kept = [], [], []
-    finders = [EchoFinder(None, clutter(np.random.default_rng(k), 3000), None, CONFIG, reach=9.0) for k in range(40)]
+    finders = [EchoFinder(None, clutter(np.random.default_rng(k), 3000), None, CONFIG, range=9.0) for k in range(40)]
     first = [f(HERE, AHEAD) for f in finders]
     start = np.array([field(e, HERE) for e in first])
     for shift in shifts:
@@ -374,7 +372,7 @@ def convergence(axis) -> str:
     for count in counts:
         power = []
         for seed in range(draws):
-            finder = EchoFinder(None, clutter(np.random.default_rng((count, seed)), count), None, once, reach=9.0)
+            finder = EchoFinder(None, clutter(np.random.default_rng((count, seed)), count), None, once, range=9.0)
             spectrum = np.fft.fft(burst(once, finder(HERE, AHEAD), Rig()), axis=-1)
             power.append(np.mean(np.abs(spectrum[..., 67:85]) ** 2))  # 3 to 3.8 m
         levels.append(db(np.mean(power)))
@@ -389,7 +387,7 @@ def reciprocity(axis) -> str:
     scene = Scene.load("office")
     surface = Surface(scene, np.random.default_rng(1), density=60.0)
     position = np.array([8.0, 6.0, 1.2])
-    echoes = EchoFinder(scene, surface, Facets.of(scene, CONFIG), CONFIG, 1e-7)(position, AHEAD)
+    echoes = EchoFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 1e-7)(position, AHEAD)
     names, levels = [], []
     for cause in Provenance:
         some = echoes.of(cause)

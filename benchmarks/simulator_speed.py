@@ -127,7 +127,7 @@ def density_error(name: str, draws: int, seed: int, frames: int = 8, factor: int
             simulator.finder.surface = Surface(scene, world, density)
             found.append(np.concatenate([cell_powers(simulator, times[k : k + 1]) for k in range(0, len(times), 60)]))
         powers.append(np.array(found).reshape(draws, frames, -1).mean(axis=1))
-        simulator.finder.weakest /= np.sqrt(factor)  # each of the more scatterers is weaker
+        simulator.finder.threshold /= np.sqrt(factor)  # each of the more scatterers is weaker
     # cells that hold a hundredth of the mean or more
     powers = np.array(powers)[:, :, (np.mean(powers, axis=(0, 1)) > 0.01 * np.mean(powers))]
     decibel = 10 / np.log(10)

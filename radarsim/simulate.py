@@ -13,15 +13,14 @@ from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
 from radarize.recording import RecordingWriter
 from radarsim.motion import Motion, Mounting, motion_from_tum
-from radarsim.physics.crowd import Crowd
-from radarsim.physics.curved import Curved
 from radarsim.physics.direct import DirectSum
 from radarsim.physics.echoes import Echoes, Provenance
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.pathsolver import PathSolverFinder
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
 from radarsim.planner import plan_motion
@@ -70,8 +69,8 @@ class Simulator:
             band = self.front_end.settings.band
             reach = None if band is None else band.high * config.max_range  # where the IF filter closes
             self.finder = EchoFinder(
-                scene, Surface(scene, world), Facets.of(scene, config), config, weakest, reach, antenna,
-                curved=Curved.of(scene, config), crowd=Crowd(scene.movers, crowd),
+                scene, Surface(scene, world), Reflectors.of(scene, config), config, weakest, reach, antenna,
+                MovingTargets(scene.movers, crowd),
             )  # fmt: skip
         self.synthesize = Synthesizer(config) if device == "cpu" else DirectSum(config, device)
 
@@ -217,7 +216,7 @@ def simulate(
         "warnings": f"{trajectory or 'walk'}: {crossed}" if crossed else "",
     }
     if engine == "radarsim":
-        facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.facets)}
+        facts |= {"scatterers": len(simulator.finder.surface), "facets": len(simulator.finder.reflectors.flat)}
     suite = Suite(Rig(world, motion, config, simulator.front_end, Sight(world)), sensors, seed, provenance)
     return record(
         output, simulator, suite, times, cfg_text=cfg_text, attributes=facts | dict(attributes or {}),

@@ -34,9 +34,9 @@ from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.search import Search
 from radarsim.physics.surface import Surface
 from radarsim.scene import shapes
-from radarsim.scene.materials import material
+from radarsim.scene.materials import MATERIALS, material
 from radarsim.scene.scene import Scene, SceneObject
-from tests.physics.brute_force import transfer_matrix
+from tests.physics.brute_force import kirchhoff_mirror, transfer_matrix
 from tests.physics.corners import corner, cross_section, direction
 from tests.physics.rigs import Rig, burst, locate, polar
 
@@ -48,6 +48,20 @@ DOCS = Path(__file__).parents[1] / "docs"
 THEORY = {"color": "black", "lw": 1, "label": "theory"}
 LEVEL = "received / transmitted, dB"
 FOUND = {"color": "tab:red", "marker": "o", "ms": 3.5, "ls": "", "label": "simulated"}
+
+
+WORDS = (
+    ("one-way, two-way path", "from the radar to a scatterer; out on one and back on another", "radar equation"),
+    ("flat, round reflector", "a flat part of a scene with its aperture; a sphere or cylinder", "Knott, RCS"),
+    ("specular candidate", "a mirror, or two, over which a scatterer may be seen", "image theory, Balanis"),
+    ("image method, chain", "the radar seen in two or three mirrors one after another", "Allen, Berkley, JASA 1979"),
+    ("Fresnel unit, aperture", "sqrt(lambda d (L - d) / 2L); what an opening passes", "Born, Wolf, ch. 8"),
+    ("flash", "the echo of a reflector that faces the radar", "Gordon, IEEE TAP 1975"),
+    ("scattering pattern", "how a rough surface shares out its diffuse echo", "Degli-Esposti, IEEE TAP 2007"),
+    ("transmission, slab", "what a pane, door or board lets through, and how late", "ITU-R P.2040"),
+    ("moving target", "what moves by itself", "Skolnik, Radar Handbook"),
+    ("sideband", "phase noise beside an echo", "Richards, Fundamentals of Radar Signal Processing"),
+)
 
 
 def db(power):
@@ -193,6 +207,26 @@ def box_room(axis) -> str:
         lengths = np.sort([np.linalg.norm(np.array(place) - p) for place in places])
         axis.plot(lengths, np.arange(len(lengths)), "o", ms=3.5, label=f"order {order}: {len(lengths)} of {len(paths)}")
     return f"Found {', '.join(str(len(places)) for places in found)} of 6, 18, 38."
+
+
+def small_mirrors(axis) -> str:
+    """A ghost over a square metal mirror of any size, against Kirchhoff's integral over the mirror."""
+    place, sides = np.array([3.0, 0.0, 0.0]), np.geomspace(0.02, 1.0, 15)
+    straight, theory, found = LAMBDA / (4 * np.pi) ** 1.5 / np.linalg.norm(place), [], []
+    for side in sides:
+        board = SceneObject("board", shapes.rectangle((1.5, 1.0, 0), (side, side), (0, -1, 0)), MATERIALS["metal"])
+        scene = Scene("mirror", [board])
+        finder = EchoFinder(
+            scene, Scatterers.points(place, np.ones(1)), Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC
+        )
+        found.append(2 * db(abs(finder(HERE, AHEAD).of(Provenance.GHOST_1).amplitude[0])))
+        theory.append(2 * db(straight * abs(kirchhoff_mirror((side / 2, side / 2), place, LAMBDA))))
+    worst = compare(axis, sides, np.array(theory), np.array(found))
+    return (
+        f"Worst of {len(sides)} sizes: {worst:.1f} dB (edges farther off than two Fresnel units fade from the sum). "
+        "Every flat part of a squared wavelength or more echoes and mirrors so; scatterers are seen over two mirrors "
+        "in turn only where both have 0.05 m^2."
+    )
 
 
 def slab(axis) -> str:
@@ -422,6 +456,7 @@ LAWS = {
     "Point target": (point_target, "range, m", LEVEL),
     "Wall": (wall_flash, "distance of a concrete wall, m", LEVEL),
     "Plate": (plate, "angle off the normal, deg", LEVEL),
+    "Small mirrors": (small_mirrors, "side, m", LEVEL),
     "Sphere and corners": (round_and_corners, "angle off the axis, deg", "radar cross section, dBsm"),
     "Box room": (box_room, "path, m", "images up to it"),
     "Slab": (slab, "angle of incidence, deg", "TE coefficient, dB"),
@@ -446,6 +481,8 @@ def main() -> None:
         "Each plot sets a closed form, or an independent sum, against what the simulator makes of it, with the "
         f"`radarize` preset (centre {CONFIG.center_frequency / 1e9:.2f} GHz). Text, figures and plots are written by "
         "`python -m benchmarks.physics_gallery`; the same laws are tests in `tests/physics`.\n"
+        "\n## Words\n\n| here | is | source |\n|---|---|---|\n"
+        + "".join(f"| {' | '.join(row)} |\n" for row in WORDS)
     )
     for title, (draw, x, y) in LAWS.items():
         figure, axis = plt.subplots(figsize=(5.4, 3.2))

@@ -206,61 +206,61 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
     mirror = _mirror(flat, last)
     before = _mirror(flat, one)
     n = chains.slots[k]
-    for i in range(chains.aims[k, 0], chains.aims[k, 1]):
-        if (i - chains.aims[k, 0]) % BALL == 0:
-            ball = chains.balls[k] + (i - chains.aims[k, 0]) // BALL
-            missed = _misses(image, h, vec(aims.ball[ball]), aims.radius[ball], search.wavelength, mirror)
-        if missed:
+    begin, end = chains.aims[k]
+    for ball in range(chains.balls[k], chains.balls[k] + (end - begin + BALL - 1) // BALL):
+        if _misses(image, h, vec(aims.ball[ball]), aims.radius[ball], search.wavelength, mirror):
             continue
-        s = vec(aims.place[i])
-        hs = dot(minus(s, cl), nl)
-        if hs * h < 0 or abs(hs) < 0.01:
-            continue
-        way = minus(s, image)
-        full = length(way)
-        if full > aims.longest[i] or full < 1e-2:
-            continue
-        part = h / (h + hs)  # of the way at which the last mirror lies
-        stop = along(image, part, way)
-        square = 0.5 * search.wavelength * full
-        way = (way[0] / full, way[1] / full, way[2] / full)
-        j = aims.scatterer[i]
-        cosine = facing(scatterers.normal[j], (-way[0], -way[1], -way[2]), scatterers.two_sided[j])
-        if cosine <= 0:
-            continue
-        passed = _share(stop, way, square * part * (1 - part), mirror)
-        if passed == 0:
-            continue
-        begin = stop
-        if two >= 0:
-            hb = dot(minus(stop, c1), n1)
-            hp = dot(minus(p, c1), n1)
-            if hb * hp <= 0 or abs(hb) < 0.005:
+        start = begin + (ball - chains.balls[k]) * BALL
+        for i in range(start, min(start + BALL, end)):
+            s = vec(aims.place[i])
+            hs = dot(minus(s, cl), nl)
+            if hs * h < 0 or abs(hs) < 0.01:
                 continue
-            part *= hp / (hp + hb)
-            begin = _crossing(source, stop, c1, n1)
-            passed *= _share(begin, unit(minus(stop, source)), square * part * (1 - part), before)
+            way = minus(s, image)
+            full = length(way)
+            if full > aims.longest[i] or full < 1e-2:
+                continue
+            part = h / (h + hs)  # of the way at which the last mirror lies
+            stop = along(image, part, way)
+            square = 0.5 * search.wavelength * full
+            way = (way[0] / full, way[1] / full, way[2] / full)
+            j = aims.scatterer[i]
+            cosine = facing(scatterers.normal[j], (-way[0], -way[1], -way[2]), scatterers.two_sided[j])
+            if cosine <= 0:
+                continue
+            passed = _share(stop, way, square * part * (1 - part), mirror)
             if passed == 0:
                 continue
-        leaving = minus(begin, p)
-        size = gain_towards(leaving, rotation, search) / full
-        least = aims.weakest[i] / np.sqrt(cosine)
-        if abs(passed) * size <= least:
-            continue
-        now = unit(leaving)
-        sent = upright(up, now)
-        field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
-        if two >= 0:
-            after = unit(minus(stop, begin))
-            field = reflected(field, now, after, n1, flat.reflection[one])
-            now = after
-        after = unit(minus(s, stop))
-        field = reflected(field, now, after, nl, flat.reflection[last])
-        value = size * passed * dot(field, upright(up, after))
-        if abs(value) > least:
-            hits.aim[n] = i
-            hits.amplitude[n] = value
-            n += 1
+            bounce = stop
+            if two >= 0:
+                hb = dot(minus(stop, c1), n1)
+                hp = dot(minus(p, c1), n1)
+                if hb * hp <= 0 or abs(hb) < 0.005:
+                    continue
+                part *= hp / (hp + hb)
+                bounce = _crossing(source, stop, c1, n1)
+                passed *= _share(bounce, unit(minus(stop, source)), square * part * (1 - part), before)
+                if passed == 0:
+                    continue
+            leaving = minus(bounce, p)
+            size = gain_towards(leaving, rotation, search) / full
+            least = aims.weakest[i] / np.sqrt(cosine)
+            if abs(passed) * size <= least:
+                continue
+            now = unit(leaving)
+            sent = upright(up, now)
+            field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
+            if two >= 0:
+                after = unit(minus(stop, bounce))
+                field = reflected(field, now, after, n1, flat.reflection[one])
+                now = after
+            after = unit(minus(s, stop))
+            field = reflected(field, now, after, nl, flat.reflection[last])
+            value = size * passed * dot(field, upright(up, after))
+            if abs(value) > least:
+                hits.aim[n] = i
+                hits.amplitude[n] = value
+                n += 1
     hits.count[k] = n - chains.slots[k]
 
 

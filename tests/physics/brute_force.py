@@ -1,6 +1,6 @@
 """Independent float64 references. `beat`: the beat signal of world points sample by sample, from the motion itself.
 
-`transfer_matrix`: layers.
+`transfer_matrix`: layers. `kirchhoff_mirror`: what a mirror of any size passes on.
 """
 
 import numpy as np
@@ -51,3 +51,19 @@ def transfer_matrix(layers, cosine, frequency, tm):
     air = 1 / cosine if tm else cosine
     electric, magnetic = total[0] @ [1, air] * air, total[1] @ [1, air]
     return 2 * air / (electric + magnetic), (electric - magnetic) / (electric + magnetic)
+
+
+def kirchhoff_mirror(half, place, wavelength, across=1601):
+    """Amplitude (1/m) of the way from the origin over a mirror about (1.5, 1, 0), facing -y, to a place, summed.
+
+    (1 / (j lambda)) int cos exp(jk (r1 + r2)) / (r1 r2) dA, Kirchhoff's approximation with the mean of both cosines,
+    relative to the image's phase.
+    """
+    x, z = (((np.arange(across) + 0.5) / across * 2 - 1) * h for h in half)
+    x = x[:, None] + 1.5
+    there = np.sqrt(x**2 + 1 + z**2)
+    back = np.sqrt((x - place[0]) ** 2 + (1 - place[1]) ** 2 + (z - place[2]) ** 2)
+    cosine = (1 / there + (1 - place[1]) / back) / 2
+    image = np.linalg.norm(place * [1, -1, 1] + [0, 2, 0])
+    field = np.sum(cosine * np.exp(2j * np.pi * (there + back - image) / wavelength) / (there * back))
+    return field * np.prod(2 * np.array(half) / across) / (1j * wavelength)

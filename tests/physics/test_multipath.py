@@ -20,7 +20,7 @@ from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
 from radarsim.scene.shapes import box, rectangle
-from tests.physics.brute_force import transfer_matrix
+from tests.physics.brute_force import kirchhoff_mirror, transfer_matrix
 from tests.physics.rigs import Rig, burst
 
 CONFIG = PRESETS["radarize"]
@@ -243,22 +243,6 @@ def test_thinning_keeps_the_power_of_ghosts():
     assert 10 * np.log10(power["thinned"] / power["whole"]) == pytest.approx(0, abs=0.5)
 
 
-def kirchhoff_mirror(half, place, across=1601):
-    """Amplitude (1/m) of the way from the origin over a mirror in the plane y = 1 to a place, summed over the mirror.
-
-    (1 / (j lambda)) int cos exp(jk (r1 + r2)) / (r1 r2) dA, Kirchhoff's approximation with the mean of both cosines,
-    relative to the image's phase.
-    """
-    x, z = (((np.arange(across) + 0.5) / across * 2 - 1) * h for h in half)
-    x = x[:, None] + 1.5
-    there = np.sqrt(x**2 + 1 + z**2)
-    back = np.sqrt((x - place[0]) ** 2 + (1 - place[1]) ** 2 + (z - place[2]) ** 2)
-    cosine = (1 / there + (1 - place[1]) / back) / 2
-    image = np.linalg.norm(place * [1, -1, 1] + [0, 2, 0])
-    field = np.sum(cosine * np.exp(2j * np.pi * (there + back - image) / LAMBDA) / (there * back))
-    return field * np.prod(2 * np.array(half) / across) / (1j * LAMBDA)
-
-
 @pytest.mark.parametrize("half", [(0.02, 0.02), (0.05, 0.03), (0.1, 0.1), (0.245, 0.25), (0.255, 0.25), (0.6, 0.5)])
 @pytest.mark.parametrize("off", [0.0, 0.03])
 def test_a_mirror_of_any_size(half, off):
@@ -271,7 +255,7 @@ def test_a_mirror_of_any_size(half, off):
     echoes = finder([board], place, antenna=ISOTROPIC_ANTENNA)(HERE, AHEAD).of(Provenance.GHOST_1)
     assert len(echoes.points) == 2
     other = LAMBDA / (4 * np.pi) ** 1.5 / np.linalg.norm(place)
-    truth = abs(kirchhoff_mirror(half, place)) * other
+    truth = abs(kirchhoff_mirror(half, place, LAMBDA)) * other
     assert 20 * np.log10(abs(echoes.amplitude[0]) / truth) == pytest.approx(0, abs=1.1)
 
 

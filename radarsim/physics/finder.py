@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from radarize.radar.config import RadarConfig
-from radarsim.physics import images, sight
+from radarsim.physics import images, roundghosts, sight
 from radarsim.physics.antenna import Antenna, gain_pattern
 from radarsim.physics.candidates import Candidates
 from radarsim.physics.echoes import Echoes, Provenance
@@ -97,7 +97,17 @@ class EchoFinder:
                 images.flashes(search, flat, self.reflectors.round, self.obstacles),
                 images.by_chains(search, flat, mirrors, self.obstacles),
             ])  # fmt: skip
-        return self._echoes(search, targets, candidates, one_way, two_way, found)
+        echoes = self._echoes(search, targets, candidates, one_way, two_way, found)
+        if self.reflectors is None or not len(self.reflectors.round):
+            return echoes
+        ghosts = roundghosts.seen(search, flat, mirrors, self.reflectors.round, self.obstacles)
+        return [
+            replace(
+                e, points=np.concatenate([g.points, e.points]), amplitude=np.concatenate([g.amplitude, e.amplitude]),
+                provenance=np.concatenate([g.cause, e.provenance]),
+            )
+            for e, g in zip(echoes, ghosts, strict=True)
+        ]  # fmt: skip
 
     def _mirrors(self, search: Search) -> tuple[Flat, list[Mirrors]]:
         """Flat reflectors in range of any frame, and those that play a part in each."""

@@ -14,13 +14,16 @@ its axis.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Complex, Float, Int, UInt8
 
 from radarsim.physics.amplitudes import gain_towards, reflected, unit, upright
 from radarsim.physics.apertures import STRIP_FAR, strip
 from radarsim.physics.curved import RoundBodies
+from radarsim.physics.echoes import Provenance
+from radarsim.physics.obstacles import Obstacles
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
+from radarsim.physics.sight import Mirrors
 from radarsim.physics.table import Table
 
 #: Steps to the point between two images; each shrinks the error by at least the share of the radius in the distance.
@@ -42,6 +45,22 @@ class RoundGhosts(Table):
     stops: Float[np.ndarray, "ghost 2 2 3"]
     bounces: Int[np.ndarray, "ghost"]
     amplitude: Complex[np.ndarray, "ghost"]
+
+    @property
+    def cause(self) -> UInt8[np.ndarray, "ghost"]:
+        """A `Provenance` each."""
+        return np.where(self.bounces == 1, Provenance.GHOST_1, Provenance.GHOST_2).astype(np.uint8)
+
+
+def seen(search: Search, flat: Flat, mirrors: list[Mirrors], bodies: RoundBodies, obstacles: Obstacles) -> list:
+    """Ghosts in each frame that nothing hides; slabs are opaque to them."""
+    found = [find(search, k, flat, some.seen, bodies) for k, some in enumerate(mirrors)]
+    frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
+    clear, never = np.ones(len(every), bool), np.zeros(len(every), bool)
+    for way in range(2):
+        factor, _ = obstacles.way(search, frame, every.stops[:, way], np.full(len(every), 2), never)
+        clear &= factor != 0
+    return [every[clear & (frame == k)] for k in range(search.frames)]
 
 
 def _dot(a, b):
@@ -106,8 +125,7 @@ def _spread(bodies: RoundBodies, b, n, there, back, r1, r2):
 
 
 def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bodies: RoundBodies) -> RoundGhosts:
-    """Ghosts over one mirror of those seen on one way, or on either, above the threshold, not yet tested for what is in
-    the way."""
+    """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
     p, rotation = search.position[frame], search.rotation[frame]
     body, mirror, image = _ways(search, frame, flat, seen, bodies)
     one, two = np.nonzero((body[:, None] == body) & ((mirror[:, None] >= 0) | (mirror >= 0)))
@@ -138,7 +156,8 @@ def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bod
                                [(mirror[end], way[0]) for end, way in zip((one[k], two[k]), ways, strict=True)])  # fmt: skip
         if abs(value) > search.threshold:
             clear = place[k] + 2e-3 * n[k]
-            stops = [[way[0] if mirror[end] >= 0 else clear, clear] for end, way in zip((one[k], two[k]), ways, strict=True)]
+            ends = zip((one[k], two[k]), ways, strict=True)
+            stops = [[way[0] if mirror[end] >= 0 else clear, clear] for end, way in ends]
             found.append(([way[1] for way in ways], stops, int(mirror[one[k]] >= 0) + int(mirror[two[k]] >= 0), value))
     if not found:
         return RoundGhosts(np.zeros((0, 2, 3)), np.zeros((0, 2, 2, 3)), np.zeros(0, int), np.zeros(0, complex))
@@ -146,7 +165,7 @@ def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bod
 
 
 def _over(search: Search, flat: Flat, m: int, image, place, far: float):
-    """Where the way from the radar to a place leaves for, where the place is seen, and what the mirror's aperture passes."""
+    """Where the way to a place leaves for, where the place is seen, and what the mirror's aperture passes."""
     if m < 0:
         return place, place, 1.0
     center, normal = flat.center[m], flat.normal[m]
@@ -157,7 +176,8 @@ def _over(search: Search, flat: Flat, m: int, image, place, far: float):
     aside, cosine = _dot(way, flat.u[m]), abs(_dot(way, normal))
     across, size = np.sqrt(max(1 - aside**2, 1e-6)), np.sqrt(0.5 * search.wavelength * far * share * (1 - share)) + 1e-12
     passed = 1.0
-    for axis, half, unit_ in ((flat.u[m], flat.half[m, 0], size / across), (flat.v[m], flat.half[m, 1], size * across / max(cosine, 1e-3))):
+    units = size / across, size * across / max(cosine, 1e-3)
+    for axis, half, unit_ in zip((flat.u[m], flat.v[m]), flat.half[m], units, strict=True):
         at = _dot(stop - center, axis)
         passed *= strip((-half - at) / unit_, (half - at) / unit_)
     return stop, place - 2 * _dot(place - center, normal) * normal, passed

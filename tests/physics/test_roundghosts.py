@@ -1,11 +1,13 @@
-"""Round bodies seen over mirrors, against the physical-optics integral over the body between two images of the radar."""
+"""Round bodies seen over mirrors, against the physical-optics integral between two images of the radar."""
 
 import numpy as np
 import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics import roundghosts
+from radarsim.physics.finder import EchoFinder
 from radarsim.physics.reflectors import Reflectors
+from radarsim.physics.scatterers import Scatterers
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
@@ -54,7 +56,7 @@ def pole(center, radius, length, around=400, along=2500):
 
 @pytest.mark.parametrize("kind", ["sphere", "pole"])
 def test_ghosts_of_round_bodies(kind):
-    """A 10 cm sphere and a 3 cm pole beside a metal wall: out straight and back over the wall, and over it both ways."""
+    """A 10 cm sphere and a 3 cm pole beside a metal wall: straight and over the wall, and over it both ways."""
     center = np.array([2.5, 0.2, 0.1])
     if kind == "sphere":
         body, surface = shapes.sphere(center, 0.1, 4), sphere(center, 0.1)
@@ -72,3 +74,17 @@ def test_ghosts_of_round_bodies(kind):
         # each conductor turns the sign of an upright field; over j from stationary phase, once for every wall
         turned = ghost.amplitude[0] / truth * (-1) ** (1 + ghost.bounces[0])
         assert np.rad2deg(np.angle(turned)) == pytest.approx(0, abs=6)
+
+
+def test_a_finder_has_them():
+    """A lamp beside a wall: its ghosts are among the echoes; a board in the way of the wall hides them."""
+    lamp = SceneObject("lamp", shapes.sphere((2.5, 0.2, 0.1), 0.1, 3), MATERIALS["metal"])
+    board = SceneObject("board", shapes.box((1.3, 0.75, 0), (0.8, 0.05, 1.0)), MATERIALS["metal"])
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    found = []
+    for objects in ([WALL, lamp], [WALL, lamp, board]):
+        scene = Scene("lamp", objects)
+        echoes = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(np.zeros(3), np.eye(3))
+        at_image = np.linalg.norm(echoes.points - [2.5, 1.8, 0.1], axis=2) < 0.11
+        found.append(at_image.any(axis=1).sum())
+    assert found == [3, 0]

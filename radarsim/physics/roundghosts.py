@@ -152,8 +152,11 @@ def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bod
             ways.append((stop, seen_at))
         if abs(value) <= search.threshold:
             continue
-        value *= _polarisation(flat, bodies, b[k], n[k], rotation[:, 2], p, place[k],
-                               [(mirror[end], way[0]) for end, way in zip((one[k], two[k]), ways, strict=True)])  # fmt: skip
+        bounces = [(mirror[end], way[0]) for end, way in zip((one[k], two[k]), ways, strict=True)]
+        course = [p, *(stop for m, stop in bounces[:1] if m >= 0), place[k], *(s for m, s in bounces[1:] if m >= 0), p]
+        met = [(flat.normal[m], flat.reflection[m]) for m, _ in bounces if m >= 0]
+        met.insert(int(bounces[0][0] >= 0), (n[k], bodies.reflection[b[k]]))
+        value *= _polarisation(tuple(rotation[:, 2]), course, met)
         if abs(value) > search.threshold:
             clear = place[k] + 2e-3 * n[k]
             ends = zip((one[k], two[k]), ways, strict=True)
@@ -174,7 +177,8 @@ def _over(search: Search, flat: Flat, m: int, image, place, far: float):
     way = (place - image) / far
     stop = image + share * far * way
     aside, cosine = _dot(way, flat.u[m]), abs(_dot(way, normal))
-    across, size = np.sqrt(max(1 - aside**2, 1e-6)), np.sqrt(0.5 * search.wavelength * far * share * (1 - share)) + 1e-12
+    across = np.sqrt(max(1 - aside**2, 1e-6))
+    size = np.sqrt(0.5 * search.wavelength * far * share * (1 - share)) + 1e-12
     passed = 1.0
     units = size / across, size * across / max(cosine, 1e-3)
     for axis, half, unit_ in zip((flat.u[m], flat.v[m]), flat.half[m], units, strict=True):
@@ -183,15 +187,10 @@ def _over(search: Search, flat: Flat, m: int, image, place, far: float):
     return stop, place - 2 * _dot(place - center, normal) * normal, passed
 
 
-def _polarisation(flat: Flat, bodies: RoundBodies, b, n, up, p, place, ways) -> complex:
-    """Product of the reflection coefficients for an upright field, sent and taken."""
-    course = [p, *([ways[0][1]] if ways[0][0] >= 0 else []), place, *([ways[1][1]] if ways[1][0] >= 0 else []), p]
-    surfaces = [(flat.normal[ways[0][0]], flat.reflection[ways[0][0]])] if ways[0][0] >= 0 else []
-    surfaces.append((n, bodies.reflection[b]))
-    surfaces += [(flat.normal[ways[1][0]], flat.reflection[ways[1][0]])] if ways[1][0] >= 0 else []
+def _polarisation(up, course, surfaces) -> complex:
+    """Product of the reflection coefficients over surfaces (normal, table), an upright field sent and taken."""
     steps = [unit(tuple(after - before)) for before, after in zip(course, course[1:], strict=False)]
-    field = tuple(complex(x) for x in upright(tuple(up), steps[0]))
+    field = tuple(complex(x) for x in upright(up, steps[0]))
     for now, after, (normal, table) in zip(steps, steps[1:], surfaces, strict=False):
         field = reflected(field, now, after, tuple(normal), table)
-    taken = upright(tuple(up), steps[-1])
-    return sum(f * t for f, t in zip(field, taken, strict=True))
+    return sum(f * t for f, t in zip(field, upright(up, steps[-1]), strict=True))

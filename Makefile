@@ -1,5 +1,5 @@
 # make demo: sets this machine up and runs the main job end to end      make test: sets up and passes the tests
-# make documents: types every command of README and docs where nothing is compiled yet, in some ten minutes
+# make documents: types every command of docs, too, as `make test` does of README, where nothing is compiled yet
 RUN := runs/demo
 
 .PHONY: setup demo test documents lint clean

@@ -1,7 +1,7 @@
 """`radarize capture` against `radarsim emulate`, each a process of its own: frames lost, and what each side costs."""
 
+import os
 import re
-import signal
 import subprocess
 import sys
 import tempfile
@@ -18,35 +18,16 @@ from radarize.radar.dca1000 import MAX_PAYLOAD
 from radarize.radar.presets import load_config
 from radarize.recording import Losses, Recording, RecordingWriter
 from radarsim.emulator.disturbance import Disturbance
+from tests.virtual import BOARD, COMPUTER, emulator
 
-BOARD, COMPUTER = "127.0.0.2", "127.0.0.1"
 LOOP = 64  # frames played again and again
 NOISE = 40  # counts, RMS: about an IWR1843's at 30 dB of gain in a room
 
 
-class Cost:
-    """Processor time of a process and its children, those that have ended included.
-
-    Args:
-        process: started already.
-    """
-
-    def __init__(self, process: subprocess.Popen):
-        self._root, self._seconds = psutil.Process(process.pid), {}
-
-    def look(self) -> None:
-        """Note what has been used so far; call now and then."""
-        try:
-            for each in [self._root, *self._root.children(recursive=True)]:
-                times = each.cpu_times()
-                self._seconds[each.pid] = times.user + times.system
-        except psutil.NoSuchProcess:
-            pass
-
-    @property
-    def seconds(self) -> float:
-        """Used up to the last look."""
-        return sum(self._seconds.values())
+def used(process: subprocess.Popen) -> float:
+    """Processor time of a process and its children, those that have ended included, s."""
+    root = psutil.Process(process.pid)
+    return sum(sum(each.cpu_times()[:4]) for each in (root, *root.children(recursive=True)))
 
 
 def chirps_that_arrive(config: RadarConfig, frames: int, network: Disturbance) -> Bool[np.ndarray, "frame loop tx"]:
@@ -64,39 +45,29 @@ def chirps_that_arrive(config: RadarConfig, frames: int, network: Disturbance) -
     return (hit == 0).reshape(frames, loops, tx)[:, :, list(config.slot)]
 
 
-def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: int, shares: dict[str, float]) -> dict:
-    """One capture; a row of the table."""
+def run(
+    config: RadarConfig, preset: str, seconds: float, folder: Path, seed: int, shares: dict[str, float]
+) -> tuple[dict[str, object], str]:
+    """One capture: a row of the table, and what the recording warns of."""
     options = [word for name, share in shares.items() for word in (f"--{name}", str(share))]
     rng = np.random.default_rng(seed)
     played = rng.normal(0, NOISE, (LOOP, *config.frame_shape)).round().astype(np.int16)
     with RecordingWriter(folder / "played.h5", config) as writer:
         writer.append(played, np.arange(LOOP) * config.frame_period)
     frames = round(seconds / config.frame_period)
-    ours = [sys.executable, "-m", "radarize.cli", "capture", "--config", preset, "--port", str(folder / "tty")]
-    ours += ["--host", COMPUTER, "--dca", BOARD, "--frames", str(frames), "-o", str(folder / "captured.h5")]
-    theirs = [sys.executable, "-m", "radarsim.cli", "emulate", str(folder / "played.h5"), "--loop", *options]
-    theirs += ["--host", COMPUTER, "--board", BOARD, "--port-link", str(folder / "tty"), "--seed", str(seed)]
-    emulator = subprocess.Popen(theirs, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
-    try:
-        emulator.stdout.readline()
-        emulator.stdout.readline()
+    with emulator(folder / "played.h5", folder, "--loop", *options, "--seed", seed) as board:
         time.sleep(3)  # frames are made ahead
-        capture = subprocess.Popen(ours)
-        costs = Cost(emulator), Cost(capture)
-        for cost in costs:
-            cost.look()
-        before, start = [cost.seconds for cost in costs], time.monotonic()
-        while capture.poll() is None:
-            for cost in costs:
-                cost.look()
-            time.sleep(0.5)
-        wall = time.monotonic() - start
-    finally:
-        emulator.send_signal(signal.SIGINT)
-        said = emulator.communicate()[0]
-    if capture.returncode:
-        raise SystemExit("the capture failed")
-    late = re.findall(r"(\d+) of them late, ([\d.]+) s", said)
+        capture = [
+            sys.executable, "-m", "radarize.cli", "capture", "--config", preset, "--port", board.port,
+            "--host", COMPUTER, "--dca", BOARD, "--command-port", board.command_port, "--data-port", board.data_port,
+            "--frames", frames, "-o", folder / "captured.h5",
+        ]  # fmt: skip
+        before, begun = used(board.process), os.times()
+        subprocess.run([*map(str, capture)], check=True)
+        theirs, ended = used(board.process) - before, os.times()
+    wall = ended.elapsed - begun.elapsed
+    ours = ended.children_user + ended.children_system - begun.children_user - begun.children_system
+    late = re.findall(r"(\d+) of them late, ([\d.]+) s", board.said)
     arriving = chirps_that_arrive(config, frames, Disturbance(**shares, rng=np.random.default_rng(seed)))
     losses = Losses()
     wrong = mismarked = 0
@@ -110,7 +81,7 @@ def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: in
             wrong += int((adc[valid] != sent[valid]).any(axis=(1, 2, 3)).sum())
             wrong += int(((adc != sent) & (adc != 0))[~valid].any(axis=(1, 2, 3)).sum())
         warnings = recording.attributes["warnings"]
-    return {
+    row = {
         "configuration": " ".join([preset, *options]),
         "frames": frames,
         "frames/s": config.frame_rate,
@@ -121,17 +92,17 @@ def run(config: RadarConfig, preset: str, seconds: float, folder: Path, seed: in
         "lost but not marked, or marked but not lost": mismarked,
         "chirps with a wrong sample": wrong,
         "emulator late, s": float(late[-1][1]) if late else 0.0,
-        "capture, share of a core": (costs[1].seconds - before[1]) / wall,
-        "emulator, share of a core": (costs[0].seconds - before[0]) / wall,
-        "_warnings": warnings,
+        "capture, share of a core": ours / wall,
+        "emulator, share of a core": theirs / wall,
     }
+    return row, warnings
 
 
 PARSER = command_line(
     __doc__,
     seconds=(300.0, "length of the capture"),
     config=("radarize", "preset or .cfg"),
-    bad_seconds=(60.0, "length of another one over a bad network"),
+    bad_seconds=(60.0, "length of another one over a bad network; 0: none"),
     seed=(0, "of noise and network"),
 )
 
@@ -140,21 +111,21 @@ def main() -> None:
     """The table."""
     arguments = PARSER.parse_args()
     config, _ = load_config(arguments.config)
-    runs = [(arguments.seconds, {})]
-    if arguments.bad_seconds:
-        runs.append((arguments.bad_seconds, {"loss": 0.01, "duplicate": 0.01, "reorder": 0.01}))
-    rows = []
-    for seconds, shares in runs:
-        with tempfile.TemporaryDirectory() as folder:
-            rows.append(run(config, arguments.config, seconds, Path(folder), arguments.seed, shares))
-    heard = [row.pop("_warnings") for row in rows]
+    rows: list[dict[str, object]] = []
     notes = [
         f"Noise of {NOISE} counts RMS, {LOOP} frames played again and again; every sample compared with the one sent, "
         "and every chirp's mark with what the network's seed says was lost.",
         "Frames are not written if disk or processor are too slow for them; the emulator is late if it gets no time.",
+        surroundings(),
     ]
-    notes.append(surroundings())
-    notes += [f"{row['configuration']}: {said}." for row, said in zip(rows, heard, strict=True) if said]
+    bad = {"loss": 0.01, "duplicate": 0.01, "reorder": 0.01}
+    for seconds, shares in ((arguments.seconds, {}), (arguments.bad_seconds, bad)):
+        if not seconds:
+            continue
+        with tempfile.TemporaryDirectory() as folder:
+            row, warnings = run(config, arguments.config, seconds, Path(folder), arguments.seed, shares)
+        rows.append(row)
+        notes += [f"{row['configuration']}: {warnings}."] if warnings else []
     data = Data("simulated noise, played by `radarsim emulate`", (), arguments.seed)
     publish("capture_speed", "Capture at the virtual radar", rows, data=data, networks=(), notes=notes)
 

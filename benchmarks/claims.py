@@ -44,7 +44,8 @@ def judge(case: Case, networks: Networks) -> tuple[dict[str, float], np.ndarray]
         turns, ranges = [], []
         for frames, adc in recording.batches(BATCH):
             batch = intake.take(adc, recording.times[frames], recording.valid(frames.start, frames.stop))
-            turns.append(rotation.turns(batch, velocity.estimate(batch)))
+            told, _ = rotation.turns(batch, velocity.estimate(batch))
+            turns.append(told)
             ranges.append(likeliest(scans.occupancy(batch)))
         yaw = planar(recording.read("truth/pose"))[:, 2]
         true = true_ranges(BEARINGS, recording.read("truth/scan"), recording.read("truth/scan_azimuths"))

@@ -32,7 +32,6 @@ SCENE, PLATFORM = "office", "handheld"
 AWAY, CELL = 2.5, round(2.5 / CONFIG.range_resolution)
 #: Azimuths to read bearings off, rad.
 FINE = np.radians(np.arange(-60, 60.1, 0.1))
-_BATCH = 16
 
 
 class Uncompensated(Heatmaps):
@@ -189,13 +188,10 @@ def ego_velocity(source: Recording) -> list[dict]:
     swapped = source.config.model_copy(update={"channel_calibration": _typical(np.random.default_rng(0))})
 
     def median(maps: Heatmaps) -> float:
-        signal, estimator, found = Signal(source.config), DopplerVelocity(maps), []
+        signal = Signal(source.config)
         signal.heatmaps = maps
-        intake = Intake(signal)
-        for first in range(0, count, _BATCH):
-            stop = min(first + _BATCH, count)
-            found.append(estimator.estimate(intake.take(source.adc(first, stop), source.times[first:stop])).velocity)
-        return np.median(np.linalg.norm(np.concatenate(found) - truth, axis=1))
+        found = DopplerVelocity(maps).estimate(Intake(signal).take(source.adc(0, count), source.times[:count]))
+        return np.median(np.linalg.norm(found.velocity - truth, axis=1))
 
     variants = {
         "TDM phase": Uncompensated(source.config),

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import psutil
 
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import Data, command_line, publish, timed
 from radarize.jobs import perform
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
@@ -38,21 +39,17 @@ def steps(frames: int, seed: int, folder: Path) -> dict[str, float]:
     simulator = Simulator(scene, motion, CONFIG, physics)
     rig = Rig(scene, motion, CONFIG, simulator.front_end, Sight(scene))
     suites = {"truth always there": Suite(rig, (), seed), "all truth sensors": Suite(rig, ("all",), seed)}
-    spent: dict[str, list[float]] = {"simulation": [], **{name: [] for name in suites}, "writing all": []}
-    full = suites["all truth sensors"]
+    full, spent = suites["all truth sensors"], []
     with RecordingWriter(folder / "steps.h5", CONFIG, streams=full.streams, products=full.products) as writer:
         for first in range(0, frames, BATCH):
-            start = time.perf_counter()
-            batch = simulator.observe(np.arange(first, first + BATCH) * CONFIG.frame_period)
-            spent["simulation"].append(time.perf_counter() - start)
+            batch, simulation = timed(simulator.observe, np.arange(first, first + BATCH) * CONFIG.frame_period)
+            took = {"simulation": simulation}
             for name, suite in suites.items():
-                start = time.perf_counter()
-                rows = suite.observe(batch)
-                spent[name].append(time.perf_counter() - start)
+                rows, took[name] = timed(suite.observe, batch)
             start = time.perf_counter()
             writer.append(batch.samples, batch.times, rows=rows)
-            spent["writing all"].append(time.perf_counter() - start)
-    return {name: float(np.median(seconds[1:])) / BATCH for name, seconds in spent.items()}
+            spent.append(took | {"writing all": time.perf_counter() - start})
+    return dict(pd.DataFrame(spent[1:]).median() / BATCH)
 
 
 @dataclass

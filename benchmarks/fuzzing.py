@@ -10,8 +10,8 @@ import signal
 import tempfile
 import time
 import warnings
+from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
-from multiprocessing.connection import Connection
 from pathlib import Path
 
 from hypothesis import HealthCheck, Phase, given, seed, settings
@@ -20,38 +20,14 @@ from rich.progress import track
 from benchmarks.results import Data, command_line, publish, surroundings
 from tests.fuzzing.readers import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, READERS, attempt
 
-#: Inputs by reader, at --scale 1: more than 100,000 in all.
-INPUTS = {
-    "SDK .cfg": 16_000,
-    "mmWave Studio JSON": 10_000,
-    "TUM poses": 5_000,
-    "UDP packets": 20_000,
-    "pcap": 12_000,
-    ".bin": 6_000,
-    "npy": 6_000,
-    "npz": 6_000,
-    "mat": 6_000,
-    "HDF5 recording": 12_000,
-    "ROS 1 bag": 2_000,
-    "ROS 2 mcap": 2_000,
-    "ROS 2 db3": 2_000,
-    "run: scans.h5": 6_000,
-    "run: run.json": 3_000,
-    "run: metrics.json": 2_000,
-    "run: map.yaml": 4_000,
-    "run: map.pgm": 4_000,
-    "run: trajectory.tum": 3_000,
-    "scans .npz": 6_000,
-    "weights": 6_000,
-}
 #: Inputs of one seed: hypothesis remembers what it has tried.
 _BATCH = 500
 #: Address space beyond what a process has before it starts, bytes; and s until a hang is the end of it.
 _ADDRESSES, _HANG = 4 << 30, 60
 
 
-def try_all(name: str, count: int, first: int, folder: Path, answer: Connection) -> None:
-    """Inputs for one reader, in its process; sends a row of the table."""
+def try_all(name: str, count: int, first: int, folder: Path) -> dict[str, object]:
+    """Inputs for one reader, in its process; a row of the table."""
     warnings.simplefilter("ignore")  # numpy and scipy about numbers that make no sense
     reader, found = READERS[name](), []
     used = resource.getpagesize() * int(Path("/proc/self/statm").read_text().split()[0])
@@ -69,22 +45,20 @@ def try_all(name: str, count: int, first: int, folder: Path, answer: Connection)
         )(given(reader.inputs)(one))  # fmt: skip
         seed(first + number)(run)()
     accepted = sum(each.accepted for each in found)
-    answer.send(
-        {
-            "reader": name,
-            "inputs": len(found),
-            "read": accepted,
-            "refused": len(found) - accepted,
-            "s": time.perf_counter() - start,
-            "longest, ms": 1e3 * max(each.seconds for each in found),
-            "most memory, MB": 1e-6 * max(each.memory for each in found),
-        }
-    )
+    return {
+        "reader": name,
+        "inputs": len(found),
+        "read": accepted,
+        "refused": len(found) - accepted,
+        "s": time.perf_counter() - start,
+        "longest, ms": 1e3 * max(each.seconds for each in found),
+        "most memory, MB": 1e-6 * max(each.memory for each in found),
+    }
 
 
 PARSER = command_line(
     __doc__,
-    scale=(1.0, "times the usual number of inputs"),
+    inputs=(5000, "for each reader"),
     seed=(0, "of hypothesis"),
 )
 PARSER.add_argument("--reader", choices=list(READERS), help="this one alone, without a table")
@@ -92,21 +66,14 @@ PARSER.add_argument("--reader", choices=list(READERS), help="this one alone, wit
 
 def main() -> None:
     """The table; ends at the first input that a reader fails on."""
-    options = PARSER.parse_args()
-    context, rows = get_context("spawn"), []
-    for name in track([options.reader] if options.reader else list(INPUTS), "readers"):
+    options, rows = PARSER.parse_args(), []
+    for name in track([options.reader] if options.reader else list(READERS), "readers"):
         folder = Path(tempfile.mkdtemp(prefix="fuzzing-"))
-        ours, theirs = context.Pipe(duplex=False)
-        count = round(options.scale * INPUTS[name])
-        process = context.Process(target=try_all, args=(name, count, options.seed, folder, theirs), daemon=True)
-        process.start()
-        theirs.close()
-        try:
-            rows.append(ours.recv())
-        except EOFError:
-            process.join()
-            raise SystemExit(f"{name}: failed (exit code {process.exitcode}) on what lies in {folder}") from None
-        process.join()
+        with ProcessPoolExecutor(1, get_context("spawn")) as process:
+            try:
+                rows.append(process.submit(try_all, name, options.inputs, options.seed, folder).result())
+            except Exception as error:  # the reader's own, or that its process has died
+                raise SystemExit(f"{name}: failed on what lies in {folder} ({error})") from error
         folder.rmdir()
     if options.reader:
         print(json.dumps(rows[0], indent=2))

@@ -6,12 +6,11 @@ import numpy as np
 import pandas as pd
 from rich.progress import track
 
-from benchmarks.results import Data, Walk, command_line, publish
+from benchmarks.results import Data, command_line, publish, walked
 from radarize.benchmark.table import PAPER
 from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
 from radarsim.scene.scene import Scene
-from radarsim.statistics import Statistics
 
 DURATION = 60.0
 #: What the paper says of its platforms and data set; the gaps it leaves are "-".
@@ -22,31 +21,29 @@ THEIRS = {
 }
 
 
-def walks(count: int, seed: int) -> tuple[dict[str, list[Statistics]], list[Walk], list[float]]:
-    """Statistics by platform of one walk each through some buildings, the walks, and the CPU times of planning, s."""
-    rng = np.random.default_rng(seed)
-    found: dict[str, list[Statistics]] = {name: [] for name in PLATFORMS}
-    times, made = [], []
+def walks(count: int, seed: int) -> pd.DataFrame:
+    """Statistics of one walk of each platform through some buildings, with the CPU time of planning, s."""
+    rng, found = np.random.default_rng(seed), []
     for number in track(range(count), "buildings"):
         building = {"kind": "ABCD"[number % 4], "seed": int(rng.integers(10_000)), "floor": int(rng.integers(4))}
         scene = Scene.of({"building": building}, f"{building['kind']}{building['seed']}")
-        for platform, statistics in found.items():
+        for platform in PLATFORMS:
             start = time.process_time()
             motion = plan_motion(scene, platform, DURATION, np.random.default_rng(building["seed"]))
-            times.append(time.process_time() - start)
-            statistics.append(motion.statistics(scene))
-            made.append(Walk(scene.name, building["seed"], statistics[-1].distance, simulated=True))
-    return found, made, times
+            took = time.process_time() - start
+            about = {"platform": platform, "took": took, "walk": walked(scene.name, building["seed"], motion)}
+            found.append(about | vars(motion.statistics(scene)))
+    return pd.DataFrame(found)
 
 
-def row(platform: str, found: list[Statistics]) -> dict[str, object]:
+def row(platform: str, walks: pd.DataFrame) -> dict[str, object]:
     """Means over the walks, or the extreme where it says so."""
-    walks = pd.DataFrame(list(map(vars, found)))
-    mean, top, least, paper = walks.mean(), walks.max(), walks.min(), THEIRS[platform]
+    figures, paper = walks.drop(columns=["platform", "walk"]), THEIRS[platform]
+    mean, top, least = figures.mean(), figures.max(), figures.min()
     ways = mean[["forward", "backward", "sideways", "standing"]]
     return {
         "platform": platform,
-        "walks": len(found),
+        "walks": len(walks),
         "distance m": f"{mean['distance']:.1f} ({least['distance']:.0f} to {top['distance']:.0f})",
         "paper": paper["distance"],
         "mean speed m/s": mean["mean_speed"],
@@ -70,12 +67,13 @@ PARSER = command_line(
 def main() -> None:
     """Walk and publish."""
     arguments = PARSER.parse_args()
-    found, made, times = walks(arguments.buildings, arguments.seed)
+    found = walks(arguments.buildings, arguments.seed)
+    took = found["took"]
     publish(
         "motion_statistics",
         f"How the platforms move in {DURATION:.0f} s, and in the paper's data set",
-        [row(platform, statistics) for platform, statistics in found.items()],
-        data=Data("planned walks", tuple(made), arguments.seed),
+        [row(platform, found[found["platform"] == platform]) for platform in PLATFORMS],
+        data=Data("planned walks", tuple(found["walk"]), arguments.seed),
         networks=(),
         beside=[PAPER],
         notes=[
@@ -83,7 +81,7 @@ def main() -> None:
             "The paper gives its means over trajectories of about a minute: over 50 m by hand and on the cart, about "
             "20 m on the robot. Its totals, 4,680 m in 226,800 frames at 30 Hz, are 32 m in 52 s per trajectory, "
             "less than those means would give.",
-            f"Planning takes {np.median(times):.2f} s of CPU time (median, at most {max(times):.2f} s) a walk.",
+            f"Planning a walk takes {took.median():.2f} s of CPU time (median, at most {took.max():.2f} s).",
         ],
     )
 

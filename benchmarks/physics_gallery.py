@@ -2,11 +2,11 @@
 
     python -m benchmarks.physics_gallery
 
-A law is a function that draws on an axis and returns what it measured. To add one, write it and enter it in `LAWS`.
+A law is a function that draws on an axis, by what `tests/physics` measure where they do, and returns what came of it.
+To add one, write it and enter it in `LAWS`.
 """
 
 from dataclasses import replace
-from itertools import product
 from pathlib import Path
 
 import matplotlib
@@ -18,17 +18,14 @@ from matplotlib.axes import Axes
 from scipy import stats
 
 from radarize.heatmaps import Heatmaps
-from radarize.radar.array import rx_positions, tx_positions, virtual_positions
-from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.radar.array import virtual_positions
 from radarize.radar.presets import PRESETS
-from radarsim.physics import imagemethod, plates, sight
 from radarsim.physics.antenna import ISOTROPIC, gain_pattern
 from radarsim.physics.coefficients import TABLE, reflection, transmission
-from radarsim.physics.echoes import Echoes, Provenance
+from radarsim.physics.echoes import Provenance
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
-from radarsim.physics.frontend_config import FrontEndConfig, PhaseNoise
-from radarsim.physics.phasenoise import density
+from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.search import Search
@@ -37,8 +34,15 @@ from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS, material
 from radarsim.scene.scene import Scene, SceneObject
 from tests.physics.brute_force import kirchhoff_mirror, transfer_matrix
-from tests.physics.corners import corner, cross_section, direction
-from tests.physics.rigs import Rig, burst, locate, polar
+from tests.physics.corners import corner, cross_section, direction, seen_by_all, seen_by_both
+from tests.physics.rigs import Rig, burst, field, locate, polar
+from tests.physics.test_echoes import speckle as speckles
+from tests.physics.test_frontend import db, law, noise_factor, skirt
+from tests.physics.test_imagemethod import images_of_a_room, lattice
+from tests.physics.test_laws import slot_phases, tone_ranges
+from tests.physics.test_multipath import DOOR, there_and_back
+from tests.physics.test_plates import physical_optics
+from tests.physics.test_signature import ridge
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -62,19 +66,6 @@ WORDS = (
     ("moving target", "what moves by itself", "Skolnik, Radar Handbook"),
     ("sideband", "phase noise beside an echo", "Richards, Fundamentals of Radar Signal Processing"),
 )
-
-
-def db(power):
-    """Decibels of a power."""
-    return 10 * np.log10(power)
-
-
-def field(echoes: Echoes, position: np.ndarray) -> complex:
-    """Sum of all echoes at one antenna at `position`, at the centre frequency."""
-    away = np.linalg.norm(echoes.points - position, axis=2).sum(axis=1)
-    mirrored = np.einsum("eij,j->ei", echoes.images[:, :, :3], position) + echoes.images[:, :, 3]
-    lengths = np.concatenate([away, np.linalg.norm(position - mirrored, axis=1)])
-    return complex(np.sum(echoes.amplitude * np.exp(2j * np.pi * lengths / LAMBDA)))
 
 
 def compare(axis: Axes, x, theory, found) -> float:
@@ -136,21 +127,21 @@ def wall_flash(axis) -> str:
 def plate(axis) -> str:
     """A 10 cm metal plate from a circle of 3 m around it: physical optics, summed point by point."""
     finder = walls_of(Scene.load("physics/plate"))
-    angles, side = np.linspace(-20, 20, 321), 0.1
-    grid = (np.arange(400) + 0.5) / 400 * side - side / 2
-    found, theory = [], []
-    for angle in np.deg2rad(angles):
-        position = np.array([3 - 3 * np.cos(angle), 3 * np.sin(angle), 0.0])
-        found.append(field(finder(position, AHEAD), position))
-        rho = np.sqrt((3 - position[0]) ** 2 + (position[1] - grid[:, None]) ** 2 + grid**2)
-        part = (3 - position[0]) / rho**3 * np.exp(4j * np.pi * rho / LAMBDA)
-        theory.append(part.sum() * (side / 400) ** 2 / (4 * np.pi))
+    angles = np.linspace(-20, 20, 321)
+    places = 3 * np.stack([1 - np.cos(np.deg2rad(angles)), np.sin(np.deg2rad(angles)), 0 * angles], axis=1)
+    found = [field(finder(place, AHEAD), place, LAMBDA) for place in places]
+    theory = [physical_optics((0.05, 0.05), place - [3, 0, 0], across=400) for place in places]
     found, theory = (20 * np.log10(np.abs(x)) for x in (found, theory))
     axis.plot(angles, theory, **THEORY)
     axis.plot(angles, found, color="tab:red", lw=0.8, ls="--", label="simulated")
     axis.set(ylim=(theory.max() - 45, None))
     off = np.abs(found - theory)[theory > theory.max() - 30]
     return f"Within 30 dB of the peak: median {np.median(off):.3f} dB off, 95 % within {np.quantile(off, 0.95):.2f} dB."
+
+
+def plate_of(area: float) -> float:
+    """Cross section of a plate seen face on."""
+    return 4 * np.pi * area**2 / LAMBDA**2
 
 
 def round_and_corners(axis) -> str:
@@ -162,17 +153,12 @@ def round_and_corners(axis) -> str:
     curves = {"trihedral, 4 cm": [], "dihedral, 4 cm": [], "sphere, 10 cm": []}
     for angle in np.deg2rad(off):
         towards = direction(np.pi / 4 + angle, np.arcsin(1 / np.sqrt(3)))
-        low, middle, high = np.sort(towards)
-        total = low + middle + high
-        area = a**2 * (total - 2 / total if low + middle >= high else 4 * low * middle / total)
         found = cross_section(corner(3, a, a, triangles=True), towards)
-        curves["trihedral, 4 cm"].append((found, 4 * np.pi * area**2 / LAMBDA**2))
-        azimuth = np.pi / 4 + angle
-        area = 2 * a * a * min(np.sin(azimuth), np.cos(azimuth))
-        found = cross_section(corner(2, a, a), direction(azimuth, 0))
-        curves["dihedral, 4 cm"].append((found, 4 * np.pi * area**2 / LAMBDA**2))
+        curves["trihedral, 4 cm"].append((found, plate_of(seen_by_all(a, towards))))
+        found = cross_section(corner(2, a, a), direction(np.pi / 4 + angle, 0))
+        curves["dihedral, 4 cm"].append((found, plate_of(seen_by_both(a, a, np.pi / 4 + angle))))
         position = 4.0 * np.array([-np.cos(angle), np.sin(angle), 0.0])
-        echo = field(finder(position, AHEAD), position)
+        echo = field(finder(position, AHEAD), position, LAMBDA)
         curves["sphere, 10 cm"].append((abs(echo) ** 2 * (4 * np.pi) ** 3 * 4.0**4 / LAMBDA**2, np.pi * 0.1**2))
     for (name, values), color in zip(curves.items(), ("tab:red", "tab:blue", "tab:green"), strict=True):
         found, theory = db(np.array(values)).T
@@ -184,29 +170,19 @@ def round_and_corners(axis) -> str:
 
 def box_room(axis) -> str:
     """Images of the radar by order in a metal box room, walls, edges and corners: 6, 18 and 38."""
-    flat = Reflectors.of(Scene.load("physics/room"), CONFIG).flat
-    p, low, high = np.array([0.37, -0.21, 1.23]), np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
+    p = np.array([0.37, -0.21, 1.23])
     # A level of -1 keeps those too that leave ahead and come back from behind, between opposite walls: unheard.
-    search = Search(p[None], AHEAD[None], np.zeros(1), 14.0, LAMBDA, -1.0, *gain_pattern(ISOTROPIC))
-    single = plates.parts(flat, search, 0).isometry
-    walls = single[np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1) < 1e-6]
-    chains = imagemethod.chains(flat, sight.couples(search, 0, flat, np.arange(6)), search, 0)
-    double = chains.mirrors[:, 1] == chains.mirrors[:, 2]
-    found = []
-    for some in (walls, chains.isometry[double], chains.isometry[~double]):
-        some = np.concatenate([some, imagemethod.reverse(some)])
-        found.append({tuple(np.round(place, 6)) for place in some[:, :, :3] @ p + some[:, :, 3]})
-    theory = [[], [], []]
-    for cell in product(range(-3, 4), repeat=3):
-        order = int(np.abs(cell).sum())
-        if 1 <= order <= 3:
-            even = np.array(cell) % 2 == 0
-            theory[order - 1].append(np.linalg.norm(low + cell * (high - low) + np.where(even, p - low, high - p) - p))
-    for order, (places, paths) in enumerate(zip(found, theory, strict=True), start=1):
-        axis.plot(np.sort(paths), np.arange(len(paths)), **THEORY | {"label": "theory" if order == 1 else None})
-        lengths = np.sort([np.linalg.norm(np.array(place) - p) for place in places])
-        axis.plot(lengths, np.arange(len(lengths)), "o", ms=3.5, label=f"order {order}: {len(lengths)} of {len(paths)}")
-    return f"Found {', '.join(str(len(places)) for places in found)} of 6, 18, 38."
+    isometry, _, orders = images_of_a_room(
+        Search(p[None], AHEAD[None], np.zeros(1), 14.0, LAMBDA, -1.0, *gain_pattern(ISOTROPIC))
+    )
+    places, counts = isometry[:, :, :3] @ p + isometry[:, :, 3], []
+    for order in (1, 2, 3):
+        theory = np.sort([np.linalg.norm(image - p) for length, _, image in lattice(p) if length == order])
+        found = np.sort(np.linalg.norm(np.unique(places[orders == order].round(6), axis=0) - p, axis=1))
+        counts.append(str(len(found)))
+        axis.plot(theory, np.arange(len(theory)), **THEORY | {"label": "theory" if order == 1 else None})
+        axis.plot(found, np.arange(len(found)), "o", ms=3.5, label=f"order {order}: {len(found)} of {len(theory)}")
+    return f"Found {', '.join(counts)} of 6, 18, 38."
 
 
 def small_mirrors(axis) -> str:
@@ -251,8 +227,7 @@ def slab(axis) -> str:
 
 def phantom(axis) -> str:
     """Behind a metal door a target appears a second time, mirrored: the range-azimuth map of all echoes together."""
-    door = SceneObject("door", shapes.rectangle((2.0, 0, 0), (3.0, 2.4), (-1, 0, 0)), material("metal"))
-    scene, place = Scene("door", [door]), np.array([0.6, 0.55, 0.0])
+    scene, place = Scene("door", [DOOR]), np.array([0.6, 0.55, 0.0])
     finder = EchoFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Reflectors.of(scene, CONFIG), CONFIG)
     maps, signal = Heatmaps(CONFIG), burst(CONFIG, finder(HERE, AHEAD), Rig())
     signal *= 20000 / np.abs(signal).max()
@@ -273,34 +248,18 @@ def phantom(axis) -> str:
 
 def doppler(axis) -> str:
     """The static world draws v cos(phi - theta) into the Doppler-azimuth map of a moving radar."""
-    rng = np.random.default_rng(7)
-    azimuth, range_ = rng.uniform(-np.pi / 2, np.pi / 2, 4000), rng.uniform(1.5, 4.0, 4000)
-    place = np.stack([range_ * np.cos(azimuth), range_ * np.sin(azimuth), 0 * range_], axis=1)
-    rig = Rig(velocity=(0.85, 0.85, 0))
-    center = rig.position(np.array([CONFIG.burst_center]))[0]
-    scatterers = Scatterers.points(place + center, 1e-3 * range_**4, rng.uniform(0, 2 * np.pi, 4000))
-    signal = burst(CONFIG, EchoFinder(None, scatterers, None, CONFIG)(center, AHEAD), rig)
-    maps = Heatmaps(CONFIG)
-    power = maps.doppler_azimuth(FrontEnd(CONFIG).digitize(signal, rng)[None])[0].numpy()
+    maps, power, found = ridge(Rig(velocity=(0.85, 0.85, 0)))
     axis.pcolormesh(np.rad2deg(maps.azimuths), maps.velocities, db(power), vmin=db(power.max()) - 25, rasterized=True)
     theory = 0.85 * np.cos(maps.azimuths) + 0.85 * np.sin(maps.azimuths)
     axis.plot(np.rad2deg(maps.azimuths), theory, color="white", lw=1, label="0.85 cos + 0.85 sin")
-    bins = np.clip(power.argmax(axis=0) + np.arange(-1, 2)[:, None], 0, len(maps.velocities) - 1)
-    weight = np.take_along_axis(power, bins, axis=0)
-    error = ((maps.velocities[bins] * weight).sum(axis=0) / weight.sum(axis=0) - theory)[np.abs(maps.azimuths) < 0.87]
+    error = (found - theory)[np.abs(maps.azimuths) < 0.87]
     return f"The ridge lies {abs(np.median(error)):.4f} m/s off the curve in the median of all columns within 50 deg."
 
 
 def tdm(axis) -> str:
     """TX3 fires one slot after TX1 and TX2 two: a closing echo's phase has moved by -4 pi v Tc / lambda a slot."""
     speeds = np.linspace(-1.8, 1.8, 13)
-    echoes, middle = target(3.0, 0, 0)(HERE, AHEAD), CONFIG.samples // 2
-    still, found = burst(CONFIG, echoes, Rig())[:, :, 0, middle], []
-    for v in speeds:
-        turn = np.angle(burst(CONFIG, echoes, Rig(velocity=(v, 0, 0)))[:, :, 0, middle] * still.conj())
-        found.append(np.angle(np.exp(1j * (turn - turn[:, :1])).mean(axis=0)))
-    found = np.array(found)
-    theory = -4 * np.pi * np.outer(speeds, CONFIG.slot) * CONFIG.chirp_time / LAMBDA
+    found, theory = map(np.array, zip(*map(slot_phases, speeds), strict=True))
     for k, name in ((2, "TX3"), (1, "TX2")):
         axis.plot(speeds, np.rad2deg(theory[:, k]), color="black", lw=1)
         axis.plot(speeds, np.rad2deg(np.unwrap(found[:, k])), ls="", marker="o", ms=3.5, label=name)
@@ -310,11 +269,8 @@ def tdm(axis) -> str:
 
 def range_walk(axis) -> str:
     """An echo moves through range bins within one burst, chirp by chirp."""
-    speed, n = 1.6, np.arange(CONFIG.samples) / CONFIG.sample_rate
-    signal = burst(CONFIG, target(3.0, 0, 0)(HERE, AHEAD), Rig(velocity=(speed, 0, 0)))[:, 0, 0]
-    expected = 2 * CONFIG.slope * 3.0 / SPEED_OF_LIGHT
-    phase = np.unwrap(np.angle(signal * np.exp(-2j * np.pi * expected * n)), axis=1)
-    found = 3 + np.polyfit(n, phase.T, 1)[0] / (2 * np.pi) * SPEED_OF_LIGHT / (2 * CONFIG.slope)
+    speed = 1.6
+    found = tone_ranges(burst(CONFIG, target(3.0, 0, 0)(HERE, AHEAD), Rig(velocity=(speed, 0, 0))), 3.0)
     # the Doppler shift within the ramp makes range read f_c v / S too short
     theory = 3 - speed * CONFIG.chirp_times[:, 0] - CONFIG.center_frequency * speed / CONFIG.slope
     worst = compare(axis, np.arange(len(found)), theory, found)
@@ -329,49 +285,32 @@ def noise(axis) -> str:
     """k T B F, with the noise figure of the receive gain (Friis's formula through 15.6 dB at 30, 15 dB at 48 dB)."""
     gains, found = np.arange(24.0, 50, 4), []
     silence = np.zeros(CONFIG.frame_shape[:-1], np.complex64)
-    later = (10**1.56 - 10**1.5) / (10**-3.0 - 10**-4.8)
-    theory = 10**1.5 + later * (10 ** (-gains / 10) - 10**-4.8)
     for gain in gains:
         front = FrontEnd(CONFIG.model_copy(update={"rx_gain_db": gain}), FrontEndConfig.ideal(noise=True))
         counts = front.receive(silence, np.random.default_rng(0))
         watts = np.mean(np.abs(counts) ** 2) / front.counts**2
         found.append(watts / (BOLTZMANN * ROOM_TEMPERATURE * CONFIG.sample_rate))
-    worst = compare(axis, gains, db(theory), db(np.array(found)))
+    worst = compare(axis, gains, db(noise_factor(gains)), db(np.array(found)))
     return f"Worst of {len(gains)} gains: {worst:.3f} dB."
 
 
 def phase_noise(axis) -> str:
     """4 L(f) sin^2(pi f tau): the skirt of an echo vanishes with its delay."""
-    n, worst = CONFIG.samples, 0.0
-    step = CONFIG.sample_rate / n
+    bins, step, worst = np.arange(CONFIG.samples), CONFIG.sample_rate / CONFIG.samples, 0.0
     for cell, color in ((10, "tab:blue"), (40, "tab:orange"), (90, "tab:green")):
-        tone = 0.01 * np.exp(2j * np.pi * cell * np.arange(n) / n) * np.ones(CONFIG.frame_shape[:-1])
-        front = FrontEnd(CONFIG, FrontEndConfig.ideal(phase_noise=PhaseNoise()))
-        counts = front.receive(tone.astype(np.complex64), np.random.default_rng(0))
-        power = np.mean(np.abs(np.fft.fft(counts, axis=-1) / n) ** 2, axis=(0, 1, 2))
-        off = step * np.abs(np.arange(n) - cell)
-        theory = density(PhaseNoise(), CONFIG.center_frequency, off) * 4
-        theory *= np.sin(np.pi * off * cell / CONFIG.bandwidth) ** 2
-        skirt = power / power[cell] / step
-        beside = off > 0
-        axis.plot(np.arange(n)[beside], db(theory[beside]), color="black", lw=1)
+        off = np.where(bins == cell, np.nan, bins - cell)  # the echo itself is none of its skirt
+        theory, found, far = law(cell, off) / step, skirt(cell) / step + 0 * off, np.abs(bins - cell) > 4
+        axis.plot(bins, db(theory), color="black", lw=1)
         label = f"echo at {CONFIG.ranges[cell]:.2f} m"
-        axis.plot(np.arange(n)[beside], db(skirt[beside]), ".", ms=4, color=color, label=label)
-        far = off > 4 * step
-        worst = max(worst, abs(db(skirt[far].mean() / theory[far].mean())))
+        axis.plot(bins, db(found), ".", ms=4, color=color, label=label)
+        worst = max(worst, abs(db(found[far].mean() / theory[far].mean())))
     axis.set(ylim=(-150, -98))
     return f"Mean level of each skirt: {worst:.2f} dB off at worst."
 
 
 def speckle(axis) -> str:
     """Many scatterers in a cell: Rayleigh amplitudes."""
-    finder = EchoFinder(None, clutter(np.random.default_rng(5), 20000), None, CONFIG, range=10.0, antenna=ISOTROPIC)
-    amplitude = []
-    for k in range(150):
-        position = np.array([0.0, (0.2 * k) % 3 - 1.5, 0.1 * (0.2 * k // 3) - 0.4])
-        amplitude.append(abs(field(finder(position, AHEAD), position)))
-    amplitude /= np.sqrt(np.mean(np.square(amplitude)) / 2)
-    x = np.linspace(0, 4, 200)
+    amplitude, x = speckles(150), np.linspace(0, 4, 200)
     axis.plot(x, stats.rayleigh.cdf(x), **THEORY)
     axis.plot(np.sort(amplitude), (np.arange(150) + 0.5) / 150, **FOUND | {"ms": 2})
     return f"Kolmogorov-Smirnov: p = {stats.kstest(amplitude, stats.rayleigh.cdf).pvalue:.2f} over 150 positions."
@@ -383,11 +322,11 @@ def decorrelation(axis) -> str:
     own, frozen, kept = [], [], []
     finders = [EchoFinder(None, clutter(np.random.default_rng(k), 3000), None, CONFIG, range=9.0) for k in range(40)]
     first = [f(HERE, AHEAD) for f in finders]
-    start = np.array([field(e, HERE) for e in first])
+    start = np.array([field(e, HERE, LAMBDA) for e in first])
     for shift in shifts:
         moved = np.array([0.0, shift, 0.0])
-        anew = np.array([field(f(moved, AHEAD), moved) for f in finders])
-        same = np.array([field(e, moved) for e in first])
+        anew = np.array([field(f(moved, AHEAD), moved, LAMBDA) for f in finders])
+        same = np.array([field(e, moved, LAMBDA) for e in first])
         for values, pair in ((own, (start, anew)), (frozen, (start, same)), (kept, (same, anew))):
             values.append(abs(np.vdot(*pair)) / np.linalg.norm(pair[0]) / np.linalg.norm(pair[1]))
     axis.semilogx(1e3 * shifts, frozen, **THEORY | {"label": "frozen scatterers"})
@@ -422,33 +361,16 @@ def reciprocity(axis) -> str:
     surface = Surface(scene, np.random.default_rng(1), density=60.0)
     position = np.array([8.0, 6.0, 1.2])
     echoes = EchoFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 1e-7)(position, AHEAD)
-    names, levels = [], []
-    for cause in Provenance:
-        some = echoes.of(cause)
-        if not len(some):
-            continue
-        there, back = (signal_between(some, position, *swap) for swap in ((0, 1), (1, 0)))
-        names.append(f"{cause.name.lower()} ({len(some)})".replace("_", " "))
-        levels.append(db(np.sum(np.abs(there - back) ** 2) / np.sum(np.abs(there) ** 2) + 1e-30))
+    (there, back), names, levels = there_and_back(echoes, position), [], []
+    for cause in sorted(map(Provenance, set(echoes.provenance))):
+        some = echoes.provenance == cause
+        names.append(f"{cause.name.lower()} ({some.sum()})".replace("_", " "))
+        levels.append(2 * db(abs((there - back)[some].sum()) / abs(there[some].sum()) + 1e-15))
     axis.barh(names, levels, color="tab:red")
     axis.axvline(-60, color="black", lw=1)
     axis.set(xlim=(min(levels) * 1.1, 0))
     axis.figure.subplots_adjust(left=0.3)
     return f"Worst cause: {max(levels):.0f} dB."
-
-
-def signal_between(echoes: Echoes, position, first: int, second: int) -> np.ndarray:
-    """Field from each TX to each RX place, or the other way round, over a few frequencies of the sweep."""
-    ends = [position + tx_positions(CONFIG)[:, None], position + rx_positions(CONFIG)[None]]
-    sender, taker = np.broadcast_arrays(ends[first], ends[second])
-    out = []
-    for p, q in zip(sender.reshape(-1, 3), taker.reshape(-1, 3), strict=True):
-        legs = np.linalg.norm(echoes.points[:, 0] - p, axis=1) + np.linalg.norm(echoes.points[:, 1] - q, axis=1)
-        mirrored = np.einsum("eij,j->ei", echoes.images[:, :, :3], q) + echoes.images[:, :, 3]
-        lengths = np.concatenate([legs, np.linalg.norm(p - mirrored, axis=1)])
-        for f in CONFIG.center_frequency + CONFIG.bandwidth * np.linspace(-0.5, 0.5, 5):
-            out.append(np.sum(echoes.amplitude * np.exp(2j * np.pi * f / SPEED_OF_LIGHT * lengths)))
-    return np.array(out)
 
 
 #: Sections of the page: what draws and measures, its docstring says the law; and labels of x and y.

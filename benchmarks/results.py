@@ -4,8 +4,10 @@
 import argparse
 import os
 import resource
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 from radarize.benchmark.results import Data, Network, Results, Walk, command, machine
 from radarize.benchmark.table import Beside, Table
@@ -14,6 +16,7 @@ from radarsim.motion import Motion
 FOLDER = Path(__file__).parent / "results"
 #: Captures and logs that others made, beside the checkout.
 SHARED = Path(__file__).parents[2] / "shared" / "recordings"
+T = TypeVar("T")
 machine()  # as things are now: sources may change while a script runs
 
 
@@ -60,6 +63,12 @@ def publish(
 def walked(scene: str, seed: int, motion: Motion) -> Walk:
     """A simulated walk of which no recording was made."""
     return Walk(scene, seed, motion.statistics().distance, simulated=True)
+
+
+def timed(work: Callable[..., T], *arguments: object) -> tuple[T, float]:
+    """What some work gives, and the s that it took."""
+    start = time.perf_counter()
+    return work(*arguments), time.perf_counter() - start
 
 
 def peak_memory_mb() -> float:

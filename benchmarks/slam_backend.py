@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import SHARED, Data, Walk, command_line, memory_mb, publish
+from benchmarks.results import SHARED, Data, Walk, command_line, memory_mb, publish, timed
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Beside
@@ -19,9 +19,9 @@ from radarize.pose import between, compose, wrap
 from radarize.run import run
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
-from radarize.slam.posegraph import PoseGraph
-from radarize.tum import planar, planar_poses, read_tum, write_tum
+from radarize.tum import planar, read_tum
 from radarsim.simulate import simulate
+from tests.slam.world import align, ate, lap
 
 RADISH = SHARED / "radish"
 #: Cartographer on the same files, its best settings: mean ATE in m and rad, and s.
@@ -30,31 +30,19 @@ CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "ore
 #: Recordings made where none are given: scene, platform, duration in s, seed.
 RECORDINGS = [("office", "handheld", 110, 11), ("office", "cart", 110, 12), ("floor", "handheld", 120, 3),
               ("floor", "handheld", 120, 4), ("floor", "cart", 120, 2), ("floor", "cart", 120, 5),
-              ("corridor", "cart", 60, 3), ("corridor", "handheld", 90, 1)]  # fmt: skip
+              ("corridor", "cart", 60, 3), ("corridor", "handheld", 90, 1),
+              ("physics/plain", "handheld", 60, 1)]  # fmt: skip
 #: How rows of the preset that the paper's settings make are marked.
 CLASSIC = "preset cartographer"
-#: A corridor of 48 m without any feature.
-PLAIN = """name: plain
-objects:
-""" + "".join(
-    f"  - {{name: {name}, shape: rectangle, size: {size}, position: {at}, facing: {facing}, material: {material}}}\n"
-    for name, size, at, facing, material in [
-        ("south", [48, 2.6], [20, -1.2, 1.3], [0, 1, 0], "plasterboard"),
-        ("north", [48, 2.6], [20, 1.2, 1.3], [0, -1, 0], "plasterboard"),
-        ("floor", [48, 2.4], [20, 0, 0], [0, 0, 1], "concrete"),
-        ("ceiling", [48, 2.4], [20, 0, 2.6], [0, 0, -1], "concrete"),
-    ]
-)
+#: The corridor without any feature, and a walk of 40 m along it.
+PLAIN, ALONG = "physics/plain", np.array([[0.0, 0.0], [40.0, 0.0]])
 
 
-def ate(truth: np.ndarray, estimate: np.ndarray) -> tuple[float, float]:
+def errors(truth: np.ndarray, estimate: np.ndarray) -> tuple[float, float]:
     """Mean error of position (m) and heading (rad) after the best rigid alignment of the positions."""
-    p, q = truth[:, :2] - truth[:, :2].mean(axis=0), estimate[:, :2] - estimate[:, :2].mean(axis=0)
-    dot, cross = (q * p).sum(), (q[:, 0] * p[:, 1] - q[:, 1] * p[:, 0]).sum()
-    angle = np.arctan2(cross, dot)
-    c, s = np.cos(angle), np.sin(angle)
-    position = np.hypot(*(q @ np.array([[c, s], [-s, c]]) - p).T).mean()
-    return float(position), float(np.abs(wrap(estimate[:, 2] + angle - truth[:, 2])).mean())
+    turn, _ = align(truth, estimate)
+    heading = wrap(estimate[:, 2] + np.arctan2(turn[1, 0], turn[0, 0]) - truth[:, 2])
+    return ate(truth, estimate), float(np.abs(heading).mean())
 
 
 def loop_length(truth: np.ndarray) -> float:
@@ -96,8 +84,8 @@ def row(case: str, log: Log, truth: np.ndarray, config: SlamConfig, against: str
     times, poses = slam.trajectory()
     kept = np.searchsorted(log.times, times)
     alone = np.array([slam.odometry.pose(t) for t in times])
-    position, heading = ate(truth[kept], poses)
-    before, _ = ate(truth[kept], alone)
+    position, heading = errors(truth[kept], poses)
+    before = ate(truth[kept], alone)
     farthest, true = (np.hypot(*(path - path[0])[:, :2].T).max() for path in (poses, truth[kept]))
     return {
         "case": case,
@@ -141,57 +129,37 @@ def to_and_fro(log: Log, truth: np.ndarray, legs: int) -> tuple[Log, np.ndarray]
 
 
 def graph_rows(seed: int) -> list[dict[str, object]]:
-    """201 nodes, two laps of a square, ten true closures and some false ones."""
-    rows, clean, sigma = [], np.nan, np.array([0.02, 0.02, 0.01])
+    """A lap (see `tests.slam.world`) with ten true closures and some false ones."""
+    rows = []
     for false in (0, 2, 5):
-        rng = np.random.default_rng(seed)
-        truth = [np.zeros(3)]
-        for k in range(200):
-            truth.append(compose(truth[-1], np.array([1.0, 0, np.pi / 2 if k % 25 == 24 else 0.0])))
-        truth, graph = np.array(truth), PoseGraph()
-        graph.add_node(truth[0])
-        for k in range(200):
-            step = between(truth[k], truth[k + 1]) + rng.normal(0, sigma)
-            graph.add_node(compose(graph.poses[-1], step))
-            graph.add_motion(k, k + 1, step, np.diag(sigma**2))
-        before, _ = ate(truth, graph.poses)
-        for i in range(5, 95, 9):
-            seen = between(truth[i], truth[i + 100]) + rng.normal(0, 0.03, 3)
-            graph.add_closure(i, i + 100, seen, np.eye(3) * 0.03**2)
-        for i, j in [(10, 60), (30, 180), (55, 85), (3, 140), (20, 70)][:false]:
-            graph.add_closure(i, j, np.array([0.3, -0.2, 0.1]), np.eye(3) * 0.03**2)
-        start = time.perf_counter()
-        graph.optimise()
-        position, heading = ate(truth, graph.poses)
-        clean = position if not false else clean
+        graph, truth, before = lap(false, seed)
+        _, took = timed(graph.optimise)
+        position, heading = errors(truth, graph.poses)
+        clean = rows[0]["ATE m"] if rows else position
         rows.append({
-            "case": f"graph of 201 nodes, {false} false loops", "path m": 200.0, "odometry ATE m": before,
+            "case": f"graph of {len(truth)} nodes, {false} false loops", "path m": 200.0, "odometry ATE m": before,
             "ATE m": position, "ATE rad": heading, "ratio": position / before, "to beat": f"{1.05 * clean:.3f} m",
-            "closures": f"{int(graph.accepted.sum())}/{len(graph.closures)}", "s": time.perf_counter() - start,
+            "closures": f"{int(graph.accepted.sum())}/{len(graph.closures)}", "s": took,
         })  # fmt: skip
     return rows
 
 
 def simulated(folder: Path) -> Path:
     """Make recordings, run the pipeline on them, and keep the runs; what is there already is left as it is."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "plain.yaml").write_text(PLAIN)
-    t = np.arange(0, 41.01, 0.05)
-    x = np.where(t < 1, t**2 / 2, np.where(t < 40, t - 0.5, 39.5 + (t - 40) - (t - 40) ** 2 / 2))
-    yaw = 0.05 * np.sin(2 * np.pi * 0.9 * t) * np.minimum(t, 1)
-    poses = planar_poses(np.column_stack([x, 0.05 * np.sin(t / 2), yaw])) + [0, 0, 1.2, 0, 0, 0, 0]
-    route = write_tum(folder / "plain.tum", t, poses)
-    jobs = {"plain": (str(folder / "plain.yaml"), {"trajectory": route, "duration": 41, "seed": 1})}
-    jobs |= {f"{s}_{p}{n}": (s, {"platform": p, "duration": d, "seed": n}) for s, p, d, n in RECORDINGS}
-    for name, (scene, settings) in jobs.items():
-        if not (folder / name / "run.json").is_file():
-            recording = folder / f"{name}.h5"
-            if not recording.is_file():
-                with progress(f"{name}: recording") as move:
-                    simulate(scene, recording, **settings, progress=move)
-            with progress(f"{name}: odometry and scans") as move:
-                run(recording, folder / name, progress=move)
-            recording.unlink()
+    for scene, platform, duration, seed in RECORDINGS:
+        name = f"{Path(scene).name}_{platform}{seed}"
+        if (folder / name / "run.json").is_file():
+            continue
+        recording = folder / f"{name}.h5"
+        if not recording.is_file():
+            with progress(f"{name}: recording") as move:
+                simulate(
+                    scene, recording, platform=platform, duration=duration, seed=seed, progress=move,
+                    waypoints=ALONG if scene == PLAIN else None,
+                )  # fmt: skip
+        with progress(f"{name}: odometry and scans") as move:
+            run(recording, folder / name, progress=move)
+        recording.unlink()
     return folder
 
 
@@ -236,8 +204,8 @@ def main() -> None:
             noise = noisier(log, truth, rng), truth
             keep = np.sort(rng.permutation(len(truth))[: 2 * len(truth) // 3])
             fewer = replace(log, times=log.times[keep], ranges=log.ranges[keep]), truth[keep]
-            for errors, case in zip(disturbed.values(), (noise, fewer), strict=True):
-                errors.append(f"{row('', *case, lidar_preset)['ATE m']:.3f}")
+            for found, case in zip(disturbed.values(), (noise, fewer), strict=True):
+                found.append(f"{row('', *case, lidar_preset)['ATE m']:.3f}")
         notes += [f"{name}, {what}, {options.seeds} seeds: ATE {', '.join(disturbed[what])} m." for what in disturbed]
     rows += graph_rows(options.seed)
     log, truth = to_and_fro(*lidar("intel"), legs=3)

@@ -6,95 +6,48 @@ are about each map's mean, as the networks see them.
 """
 
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from benchmarks.results import FOLDER, SHARED, Data, Walk, command_line, publish
 from radarize.console import progress
-from radarize.errors import InputError
 from radarize.features.maps import MapMaker, maps_of
-from radarize.importers import Given, import_recording
 from radarize.methods.registry import best_methods
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.run import run
 from radarize.training.dataset import recordings
 from radarsim.calibrate import calibrate
+from radarsim.motion import Motion
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.planner import plan_motion
 from radarsim.scene.scene import Scene
 from radarsim.simulate import Simulator
 from radarsim.twin.likeness import frechet_distance, patch_statistics
+from tests.importers.public import captures
 
 SCENES = ("office", "visitors", "buildings/b")
-#: s that the radar stands at a place.
-STAY = 1.0
 
 
-def captures(source: Path, folder: Path) -> dict[str, Path]:
-    """The public captures (see their README) as recordings, by name: one frame each, of a radar at rest.
-
-    Args:
-        source: folder of the captures.
-        folder: where recordings are written.
-    """
-    pcap = source / "iwr1843-pcap" / "test_one_frame.pcap"
-    people = source / "xwr-moving-people" / "doppler_example_1.npy"
-    chirps = {"tx": (0, 2), "start_frequency": 77e9, "slope": 60.012e12, "sample_rate": 2.5e6, "idle_time": 30e-6,
-              "ramp_end_time": 62e-6, "adc_start_time": 6e-6}  # fmt: skip
-    return {
-        "pcap": import_recording(pcap, folder / "pcap.h5", Given(overrides={"samples": 256, "loops": 16, "rx": 1})),
-        "studio": import_recording(source / "iwr6843-studio", folder / "studio.h5"),
-        "people": import_recording(people, folder / "people.h5", Given(shape="loop,virtual,sample", overrides=chirps)),
-    }
-
-
-@dataclass(frozen=True)
-class Standing:
-    """A motion (see `radarsim.motion.Motion`) that stands at one place after the other, `STAY` at each.
-
-    Attributes:
-        places: (place, 3) m.
-        attitudes: one per place.
-    """
-
-    places: np.ndarray
-    attitudes: Rotation
-
-    @classmethod
-    def along(cls, scene: Scene, count: int, rng: np.random.Generator) -> "Standing":
-        """Places of a walk."""
-        motion = plan_motion(scene, "handheld", 60.0, rng)
-        times = np.linspace(0, motion.duration, count + 2)[1:-1]
-        return cls(motion.position(times), motion.rotation(times))
-
-    def _place(self, t: np.ndarray) -> np.ndarray:
-        return np.clip(np.asarray(t) // STAY, 0, len(self.places) - 1).astype(int)
-
-    def position(self, t: np.ndarray) -> np.ndarray:
-        return self.places[self._place(t)]
-
-    def rotation(self, t: np.ndarray) -> Rotation:
-        return self.attitudes[self._place(t)]
-
-    def velocity(self, t: np.ndarray) -> np.ndarray:
-        return np.zeros((len(np.atleast_1d(t)), 3))
-
-    angular_velocity = acceleration = velocity
+def standing(scene: Scene, count: int, rng: np.random.Generator) -> list[Motion]:
+    """A radar at rest, at places of a walk."""
+    walk = plan_motion(scene, "handheld", 60.0, rng)
+    times = np.linspace(0, walk.duration, count + 2)[1:-1]
+    turns = walk.rotation(times).as_euler("ZYX")
+    return [Motion.still(place, *turn) for place, turn in zip(walk.position(times), turns, strict=True)]
 
 
 def simulated(
-    config: RadarConfig, board: FrontEndConfig | None, scenes: dict[str, tuple[Scene, Standing]], seed: int
+    config: RadarConfig, board: FrontEndConfig | None, scenes: dict[str, tuple[Scene, list[Motion]]], seed: int
 ) -> dict[str, np.ndarray]:
     """Maps of a frame at every place, (frame, row, azimuth), by name; the same worlds whatever the board."""
     maker, parts = MapMaker(config), []
-    for number, (scene, standing) in enumerate(scenes.values()):
-        simulator = Simulator(scene, standing, config, np.random.default_rng([seed, number]), front_end=board)
-        for k in range(len(standing.places)):
-            parts.append(maker(simulator.frames(np.array([(k + 0.25) * STAY]))[0]))
+    for number, (scene, stays) in enumerate(scenes.values()):
+        simulator = Simulator(scene, stays[0], config, np.random.default_rng([seed, number]), front_end=board)
+        for second, simulator.motion in enumerate(stays):  # people move on meanwhile
+            parts.append(maker(simulator.frames(np.array([second + 0.25]))[0]))
     return {name: np.concatenate([part[name] for part in parts]) for name in maker.names}
 
 
@@ -118,21 +71,14 @@ def distances(maps: np.ndarray, real: np.ndarray) -> tuple[float, np.ndarray]:
 
 
 def refusal(path: Path) -> str:
-    """What the networks say to a capture, and what the pipeline makes of it without them."""
+    """What the networks say to a capture, and by what the pipeline goes through it without them."""
     with Recording(path) as recording:
         methods, why = best_methods(recording.config)
-    try:
-        with tempfile.TemporaryDirectory() as folder:
-            run(path, Path(folder) / "run")
-        ran = f"radarize run takes {methods['odometry']} and {methods['scans']} and goes through"
-    except InputError as error:
-        ran = f"radarize run ends in a sentence: {_nameless(str(error))}"
-    return f"{'networks: ' + _nameless(why) if why else 'the networks fit'}; {ran}."
-
-
-def _nameless(sentence: str) -> str:
-    """Without the machine's folders."""
-    return " ".join(Path(word).name if word.startswith("/") else word for word in sentence.split())
+    with tempfile.TemporaryDirectory() as folder:
+        run(path, Path(folder) / "run")
+    words = [Path(word).name if word.startswith("/") else word for word in why.split()]  # without folders
+    said = f"networks: {' '.join(words)}" if why else "the networks fit"
+    return f"{said}; radarize run takes {methods['odometry']} and {methods['scans']} and goes through."
 
 
 def draw(shown: dict[str, dict[str, dict[str, np.ndarray]]], path: Path) -> None:
@@ -172,7 +118,7 @@ def main() -> None:
         found = captures(options.captures, Path(temporary))
         loaded = {name: Scene.load(name) for name in SCENES}
         rng = np.random.default_rng(options.seed)
-        scenes = {name: (scene, Standing.along(scene, options.places, rng)) for name, scene in loaded.items()}
+        scenes = {name: (scene, standing(scene, options.places, rng)) for name, scene in loaded.items()}
         trained = spread(options.data, 24) if options.data else []
         for done, (capture, path) in enumerate(found.items()):
             report(2 * done, 2 * len(found))

@@ -1,65 +1,30 @@
 """Twins of a walk that plays the real one, each with one error: what the figures of `radarsim twin` make of it."""
 
-import shutil
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import h5py
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
-from scipy.spatial.transform import Rotation
 
 from benchmarks.results import Data, command_line, publish
 from radarize.console import progress
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene
 from radarsim.simulate import simulate
-from radarsim.twin.comparison import Comparison, compare
+from radarsim.twin.comparison import FIGURES, Comparison, compare
 from radarsim.twin.twin import make_twin
+from tests.twin.poses import Change, altered, shaken
 
-#: Takes a recording's poses and the open file; returns other poses.
-Change = Callable[[np.ndarray, h5py.File], np.ndarray]
-#: Columns: name of the figure, its words, factor.
-COLUMNS = {
-    "correlation_range_azimuth": ("correlation of range-azimuth", 1),
-    "correlation_doppler_azimuth": ("of Doppler-azimuth", 1),
-    "similarity_range_azimuth": ("MS-SSIM of range-azimuth", 1),
-    "profile_correlation": ("correlation of range profiles", 1),
-    "gain": ("gain dB", 1),
-    "noise": ("noise dB", 1),
-    "velocity": ("velocities differ by m/s", 1),
-    "bearings_within_10cm": ("bearings within 10 cm %", 100),
-}
-
-
-def altered(recording: Path, path: Path, change: Change) -> Path:
-    """A copy of a recording whose poses, and more, were changed."""
-    shutil.copy(recording, path)
-    with h5py.File(path, "r+") as file:
-        file["truth/pose"][:] = change(file["truth/pose"][:], file)
-    return path
-
-
-def shaken(metres: float, degrees: float) -> Change:
-    """Slow errors of poses, standard deviations."""
-
-    def change(poses: np.ndarray, file: h5py.File) -> np.ndarray:
-        noise = gaussian_filter1d(np.random.default_rng(1).standard_normal((len(poses), 6)), 2, axis=0)
-        noise /= noise.std(axis=0)
-        turn = Rotation.from_rotvec(np.deg2rad(degrees) * noise[:, 3:]) * Rotation.from_quat(poses[:, 3:])
-        return np.hstack([poses[:, :3] + metres * noise[:, :3], turn.as_quat()])
-
-    return change
+#: Of `radarsim.twin.comparison.FIGURES`.
+SHOWN = ("correlation_range_azimuth", "correlation_doppler_azimuth", "similarity_range_azimuth", "profile_correlation",
+         "gain", "noise", "velocity", "bearings_within_10cm")  # fmt: skip
 
 
 def row(name: str, found: Comparison) -> dict[str, object]:
     """Medians over frames."""
-    medians = {
-        words: factor * float(np.nanmedian(found.figures[figure])) for figure, (words, factor) in COLUMNS.items()
-    }
-    return {"twin": name, **medians, "Fréchet distance dB": found.frechet["range_azimuth"][0]}
+    words = {figure: ", ".join(filter(None, (figure.replace("_", " "), FIGURES[figure][0]))) for figure in SHOWN}
+    medians = {words[figure]: float(np.nanmedian(found.figures[figure])) for figure in SHOWN}
+    return {"twin": name, **medians, "Fréchet distance, dB": found.frechet["range_azimuth"][0]}
 
 
 PARSER = command_line(
@@ -71,32 +36,29 @@ PARSER = command_line(
 
 def main() -> None:
     options = PARSER.parse_args()
-    place = Scene.load("office")
+    office, other, rows = Scene.load("office"), options.seed + 6, []
 
     def all_of(material: str) -> Scene:
-        return Scene("office", [replace(thing, material=MATERIALS[material]) for thing in place.objects])
+        return Scene("office", [replace(thing, material=MATERIALS[material]) for thing in office.objects])
 
-    rows = []
+    twins: list[tuple[str, Scene, Change | None, int]] = [
+        ("the same again", office, None, options.seed),
+        ("other speckle and noise", office, None, other),
+        *(
+            (f"poses off by {metres:g} m and {degrees:g} deg", office, shaken(metres, degrees), other)
+            for metres, degrees in ((0.01, 0.3), (0.03, 1.0), (0.1, 3.0))
+        ),
+        *((f"all of {name}", all_of(name), None, other) for name in ("brick", "metal")),
+        ("another building", Scene.load("floor"), None, other),
+    ]
     with TemporaryDirectory() as temporary, progress("twins") as report:
         folder = Path(temporary)
         real = simulate("office", folder / "real.h5", platform="cart", duration=options.duration, seed=options.seed)
-        twins = [
-            ("the same again", place, real, options.seed),
-            ("other speckle and noise", place, real, options.seed + 6),
-            *(
-                (f"poses off by {metres:g} m and {degrees:g} deg", place, (metres, degrees), options.seed + 6)
-                for metres, degrees in ((0.01, 0.3), (0.03, 1.0), (0.1, 3.0))
-            ),
-            *((f"all of {name}", all_of(name), real, options.seed + 6) for name in ("brick", "metal")),
-            ("another building", Scene.load("floor"), real, options.seed + 6),
-        ]
-        for k, (name, scene, recording, seed) in enumerate(twins):
-            report(k, len(twins))
-            if isinstance(recording, tuple):
-                recording = altered(real, folder / f"poses{k}.h5", shaken(*recording))
-            made = make_twin(recording, scene, folder / f"twin{k}.h5", every=3, seed=seed)
+        for k, (name, scene, change, seed) in enumerate(twins):
+            source = altered(real, folder / f"poses{k}.h5", change) if change else real
+            made = make_twin(source, scene, folder / f"twin{k}.h5", every=3, seed=seed)
             rows.append(row(name, compare(real, made)))
-        report(len(twins), len(twins))
+            report(k + 1, len(twins))
         data = Data.of("a walk in the place of the real one, and twins", [real, *folder.glob("twin*.h5")], options.seed)
     publish(
         "twin",

@@ -24,12 +24,7 @@ Made = TypeVar("Made")
 
 
 class Signal:
-    """What turns samples of one radar into spectra, maps and points; all batches of a stream share it.
-
-    Args:
-        radar: configuration.
-        settings: of the heat maps.
-    """
+    """What turns samples of one radar into spectra, maps and points; all batches of a stream share it."""
 
     def __init__(self, radar: RadarConfig, settings: HeatmapConfig | None = None):
         self.radar = radar
@@ -124,9 +119,6 @@ class Batch:
 class Intake:
     """Makes batches of what a radar delivers.
 
-    Args:
-        signal: that the batches share.
-
     Attributes:
         taken: frames so far.
         lost: of these, frames that are lost, nearly lost, or silent: left out, for a gap says more than nothing does.
@@ -143,13 +135,7 @@ class Intake:
         stamps: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
     ) -> Batch:
-        """The next frames, without those that are left out.
-
-        Args:
-            samples: raw I/Q.
-            stamps: starts of the frames' first chirps, s.
-            valid: False where a chirp was lost.
-        """
+        """The next frames, without those that are left out; arguments are those of `Batch`."""
         used = samples.reshape(len(samples), -1).any(axis=1)
         if valid is not None:
             used &= valid.mean(axis=(1, 2)) >= LEAST_SHARE

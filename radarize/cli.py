@@ -1,5 +1,6 @@
 """`radarize`: the pipeline's command line. Heavy modules load inside the commands, so that --help is instant."""
 
+import json
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -43,8 +44,8 @@ def import_(
         Path,
         typer.Argument(
             metavar="SOURCE",
-            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), or "
-            "an array of samples (.npy, .npz, .mat).",
+            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), "
+            "an array of samples (.npy, .npz, .mat), or RadarHD's dataset_5.",
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
@@ -60,6 +61,7 @@ def import_(
             help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
         ),
     ] = None,
+    walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -88,7 +90,7 @@ def import_(
     from radarize.recording import keeping
 
     radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency)
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk)
     with keeping(output), progress("import") as report:
         _tell(import_recording(source, output, given, progress=report))
 
@@ -174,7 +176,7 @@ def live(
         warnings = stream.troubles() + live.losses.warnings()
         if writer:
             writer.annotate(warnings="; ".join(warnings))
-    for words in (*warnings, *filter(None, [live.blindness.warning])):
+    for words in (*warnings, *live.blindness.warnings()):
         typer.echo(f"warning: {words}", err=True)
     print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
 
@@ -203,7 +205,7 @@ def info(recording: RecordingFile, as_json: AsJson = False):
     from radarize.contents import contents, show
 
     found = contents(recording)
-    _print_json(found) if as_json else show(found)
+    print(json.dumps(found, indent=2)) if as_json else show(found)
 
 
 @app.command("run")
@@ -235,14 +237,11 @@ def run_(
                 raise InputError(f"{option} is {value!r}, expected none with --settings published, which has its own")
         odometry = scans = "published"
     configuration = Configuration() if config is None else Configuration.load(config)
-    try:
-        with progress("run") as report:
-            written = run(
-                recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,
-                progress=report,
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        raise InputError(f"stopped; {output} is as it was before, and so is the recording") from None
+    with progress("run", f"{output} is as it was before, and so is the recording") as report:
+        written = run(
+            recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,
+            progress=report,
+        )  # fmt: skip
     for words in RunFolder(written).facts["warnings"]:
         typer.echo(f"warning: {words}", err=True)
     print(written)
@@ -295,14 +294,11 @@ def train(
     given = {name: value for name, value in choices.items() if value is not None}
     task = f"published-{task}" if settings == "published" and not task.startswith("published-") else task
     hyper = replace(find_task(task).defaults, **given)
-    try:
-        with progress("train") as report:
-            written = train(
-                task, data, output, hyper, Options(split, device, workers, resume, onnx),
-                progress=report, say=lambda line: typer.echo(line, err=True),
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        raise InputError("stopped; with --resume the same command goes on after the last whole epoch") from None
+    with progress("train", "with --resume the same command goes on after the last whole epoch") as report:
+        written = train(
+            task, data, output, hyper, Options(split, device, workers, resume, onnx),
+            progress=report, say=lambda line: typer.echo(line, err=True),
+        )  # fmt: skip
     print(written)
 
 
@@ -349,7 +345,7 @@ def evaluate(
         compared = [(methods(other), evaluate(other, reference)) for other in others]
         folder.write_metrics(metrics)
     if as_json:
-        _print_json(metrics)
+        print(json.dumps(metrics, indent=2))
         return
     for part in words.everything(metrics):
         print(part) if isinstance(part, str) else print_table(*part)
@@ -405,6 +401,10 @@ def benchmark(
     protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; by default one per core.")] = None,
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
+    walks: Annotated[str | None, typer.Option(help="real: walks to judge, 227,230; by default all that test.")] = None,
+    predictions: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=FOLDER", help="real: what another program says of the walks.")
+    ] = None,
 ):
     """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
     import os
@@ -415,23 +415,40 @@ def benchmark(
         width = max(map(len, BENCHMARKS))
         for each, about in BENCHMARKS.items():
             print(f"{each:<{width}}  {about.about}")
+        print(f"{'real':<{width}}  Points of real walks against a lidar (RadarHD's repository).")
         return
     for option, value in (("--data", data), ("--out", out)):
         if value is None:
             raise InputError(f"{option} is missing, expected a folder")
+    if name == "real":
+        return _benchmark_real(data, out, weights, walks, predictions or [])
     from radarize.benchmark.run import benchmark as compare
     from radarize.benchmark.study import Options
 
     chosen = [method for word in methods or () for method in word.split(",")]
     options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
-    try:
-        with progress("benchmark") as report:
-            published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
-    except KeyboardInterrupt:
-        raise InputError(f"stopped; what has ended is kept in {out}, and the same command goes on after it") from None
+    with progress("benchmark", f"what has ended is kept in {out}, and the same command goes on after it") as report:
+        published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
     for each in published:
         print(out / f"{each}.html")
     print(out / "index.html")
+
+
+def _benchmark_real(data: Path, out: Path, weights: Path | None, walks: str | None, predictions: list[str]) -> None:
+    from radarize.benchmark.real import Options, real
+
+    numbers = [number.strip() for number in walks.split(",")] if walks else []
+    if wrong := [number for number in numbers if not number.isdecimal()]:
+        raise InputError(f"--walks names {wrong[0]!r}, expected numbers as in 227,230")
+    named = dict(each.partition("=")[::2] for each in predictions)
+    for name, folder in named.items():
+        if not (name and folder and Path(folder).is_dir()):
+            raise InputError(f"--predictions is {name}={folder}, expected NAME=FOLDER of a folder that is there")
+    options = Options([int(number) for number in numbers], {name: Path(each) for name, each in named.items()}, weights)
+    with progress("real") as report:
+        results = real(data, out, options, progress=report)
+    print(results.tables[0].markdown())
+    print(out / "real.md")
 
 
 @app.command()
@@ -447,12 +464,6 @@ def view(
         written = view(source, run, save, progress=report)
     if written:
         print(written)
-
-
-def _print_json(content: dict) -> None:
-    import json
-
-    print(json.dumps(content, indent=2))
 
 
 def main() -> None:

@@ -1,5 +1,6 @@
 """What both command lines share: errors as one sentence, progress bars, and how a command is stopped."""
 
+import os
 import signal
 import sys
 import threading
@@ -9,7 +10,7 @@ from typing import Annotated
 
 import typer
 
-from radarize.errors import InputError, first_line, reason
+from radarize.errors import DEBUG, InputError, first_line, of_system
 
 #: Exit code of everything that ends in an error sentence.
 FAILED = 2
@@ -32,12 +33,13 @@ def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None
     """Run a command line and exit: 0, or 2 with one sentence on stderr.
 
     Args:
-        app: its commands.
-        name: as the user typed it.
+        app: its commands; name: as the user typed it.
         arguments: the process's own if None.
     """
     arguments = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in arguments
+    if debug:
+        os.environ[DEBUG] = "1"  # jobs show theirs, too, wherever they are done
     arguments = [argument for argument in arguments if argument != "--debug"]
     try:
         code = typer.main.get_command(app).main(arguments, prog_name=name, standalone_mode=False)
@@ -62,15 +64,16 @@ def _sentence(error: BaseException) -> str:
     if isinstance(error, MemoryError) or type(error).__name__ == "OutOfMemoryError":
         return f"not enough memory ({first_line(error)}); a shorter recording or a smaller scene needs less"
     if isinstance(error, OSError):
-        return f"{error.filename}: {reason(error)}" if error.filename else reason(error)
+        return of_system(error)
     return f"internal error, {type(error).__name__}: {first_line(error)}; --debug shows where"
 
 
 @contextmanager
-def progress(label: str) -> Iterator[Callable[..., None]]:
+def progress(label: str, stopped: str = "") -> Iterator[Callable[..., None]]:
     """Progress bars on stderr, moved by calling what this yields with (done, in all) or (stage, done, in all).
 
-    Until the first call, while things are being prepared, a spinner turns; so an error then comes without a bar.
+    Until the first call, while things are being prepared, a spinner turns; so an error then comes without a bar. Ctrl-C
+    becomes an InputError of what `stopped` says.
     """
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
@@ -95,6 +98,8 @@ def progress(label: str) -> Iterator[Callable[..., None]]:
     spinner.start()
     try:
         yield move
+    except KeyboardInterrupt:
+        raise InputError(f"stopped; {stopped}") if stopped else KeyboardInterrupt from None
     finally:
         spinner.stop()
         bars.stop()

@@ -1,5 +1,6 @@
 """What a recording holds, as plain data and as tables."""
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -48,18 +49,13 @@ def contents(path: Path) -> dict[str, object]:
             "config": recording.config.model_dump(mode="json"),
             "derived": {name: float(getattr(config, name)) for name in DERIVED},
             "data_sets": {name: _plain(recording.describe(name)) for name in recording.names()},
-            "attributes": {name: _plain(value) for name, value in recording.attributes.items()},
+            "attributes": _plain(recording.attributes),
         }
 
 
 def _plain(value: object) -> object:
-    if isinstance(value, dict):
-        return {key: _plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return _plain(value.tolist())
-    if isinstance(value, tuple | list):
-        return [_plain(item) for item in value]
-    return value if isinstance(value, bool | int | float | str) or value is None else str(value)
+    """As JSON has it."""
+    return json.loads(json.dumps(value, default=lambda each: each.tolist() if hasattr(each, "tolist") else str(each)))
 
 
 def _readable(value: float, unit: str) -> tuple[str, str]:

@@ -1,5 +1,10 @@
 """The one exception that users meet."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+#: Environment variable of processes that show tracebacks.
+DEBUG = "RADARIZE_DEBUG"
 #: Characters of a sentence that somebody reads.
 _LONGEST = 1000
 
@@ -18,6 +23,11 @@ class InputError(Exception):
         return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
+def of_system(error: OSError) -> str:
+    """What the system says, and of which file."""
+    return f"{error.filename}: {reason(error)}" if error.filename else reason(error)
+
+
 def first_line(error: BaseException) -> str:
     """The first line of an error's own words, or what kind it is if it has none."""
     return str(error).strip().split("\n", 1)[0] or type(error).__name__
@@ -32,3 +42,16 @@ def reason(error: Exception) -> str:
         return error.strerror
     line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
     return line[:120] or type(error).__name__
+
+
+@contextmanager
+def explained(message: str, *kinds: type[Exception]) -> Iterator[None]:
+    """Turn errors, of any kind if none is named, into an InputError of `message` and the reason: of damaged files,
+    libraries raise whatever their parsers meet."""
+    expected = kinds or (Exception,)
+    try:
+        yield
+    except InputError:
+        raise
+    except expected as error:
+        raise InputError(f"{message} ({reason(error)})") from error

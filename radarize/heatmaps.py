@@ -13,10 +13,10 @@ from typing import Literal
 import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float32, Int16
-from pydantic import BaseModel, ConfigDict, Field
 from scipy.signal import windows
 
 from radarize.errors import InputError
+from radarize.plain import Frozen, setting
 from radarize.radar.array import azimuth_row, elevation_pairs, virtual_positions
 from radarize.radar.config import RadarConfig
 
@@ -24,14 +24,10 @@ from radarize.radar.config import RadarConfig
 AZIMUTHS = np.radians(np.arange(-60.0, 61.0))
 
 
-class HeatmapConfig(BaseModel):
+class HeatmapConfig(Frozen):
     """Settings of the heat maps."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    loading: float = Field(
-        0.01, gt=0, description="diagonal loading of Capon's covariance, as a share of its mean eigenvalue"
-    )
+    loading: float = setting(0.01, "diagonal loading of Capon's covariance, as a share of its mean eigenvalue", gt=0)
 
 
 class Heatmaps:
@@ -43,7 +39,6 @@ class Heatmaps:
     widens the 12.8 deg beam of 8 elements to 15 deg.
 
     Args:
-        config: radar configuration.
         azimuths: (azimuth,) columns of all maps, rad, ascending.
         settings: of the beamformers.
 
@@ -187,17 +182,17 @@ class Heatmaps:
 
     def elevation_aware_of(self, spectrum: torch.Tensor) -> torch.Tensor:
         """`elevation_aware` of a spectrum at hand."""
-        if self.pairs is None:
-            raise self._no_pairs()
-        pairs = spectrum[..., torch.as_tensor(self.pairs)].mean(dim=-1)
-        covariance = self.covariance(pairs, np.arange(len(self.pairs)))
+        covariance = self.covariance(self._paired(spectrum).mean(dim=-1), np.arange(len(self.pairs)))
         return self._bartlett(covariance, self._pair_steering)
 
-    def _no_pairs(self) -> InputError:
-        return InputError(
-            f"tx {self.config.tx} and rx {self.config.rx} of {self.config.board} hold no antenna pairs of different "
-            "height, expected all three transmitters for elevation"
-        )
+    def _paired(self, spectrum: torch.Tensor) -> torch.Tensor:
+        """Spectra of the elevation pairs, lower and upper along a last axis."""
+        if self.pairs is None:
+            raise InputError(
+                f"tx {self.config.tx} and rx {self.config.rx} of {self.config.board} hold no antenna pairs of "
+                "different height, expected all three transmitters for elevation"
+            )
+        return spectrum[..., torch.as_tensor(self.pairs)]
 
     def elevation_of(
         self, spectrum: torch.Tensor
@@ -210,10 +205,7 @@ class Heatmaps:
         Raises:
             InputError: the array has no such pairs.
         """
-        if self.pairs is None:
-            raise self._no_pairs()
-        pairs = torch.as_tensor(self.pairs)
-        lower, upper = spectrum[..., pairs[:, 0]], spectrum[..., pairs[:, 1]]
+        lower, upper = self._paired(spectrum).unbind(dim=-1)
 
         def beam(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
             steering = self._pair_steering
@@ -269,10 +261,7 @@ class Heatmaps:
             InputError: `elevation_aware` without elevation pairs.
         """
         if elevation_aware:
-            if self.pairs is None:
-                raise self._no_pairs()
-            x = spectrum[..., torch.as_tensor(self.pairs)].mean(dim=-1)
-            steering = self._pair_steering
+            x, steering = self._paired(spectrum).mean(dim=-1), self._pair_steering
         else:
             x, steering = spectrum[..., torch.as_tensor(self.row)], self._steering
         x = x.transpose(1, 2)  # (frame, doppler, range, antenna)

@@ -1,9 +1,10 @@
 """JSON files that this package writes, and reads whatever became of them."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 
 #: Bytes of a file: Python makes some 25 of each.
 _LARGEST = 8 << 20
@@ -19,10 +20,19 @@ def read_json(path: Path) -> dict:
         return {}
     if (size := path.stat().st_size) > _LARGEST:
         raise InputError(f"{path}: has {size} bytes, expected at most {_LARGEST}")
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{path}: is not JSON ({error})") from error
+    with explained(f"{path}: cannot be read", OSError, UnicodeDecodeError):
+        text = path.read_text(encoding="utf-8")
+    return parse_json(text, str(path))
+
+
+def parse_json(text: str, name: str, number: Callable[[str], object] = float) -> dict:
+    """A JSON object, whose fractions become what `number` makes of them; errors call it `name`.
+
+    Raises:
+        InputError: it is not JSON, or no object.
+    """
+    with explained(f"{name}: is not JSON", ValueError, RecursionError):  # thousands of digits, too deep
+        content = json.loads(text, parse_float=number)
     if not isinstance(content, dict):
-        raise InputError(f"{path}: holds a {type(content).__name__}, expected an object")
+        raise InputError(f"{name}: holds a {type(content).__name__}, expected an object")
     return content

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.npyfile import npy_header
-from radarize.recording.damage import reading
 from radarize.runfolder import RunFolder, RunWriter
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
@@ -73,21 +72,15 @@ class Log:
             covariances = None  # the odometry is another one
         return cls(times, azimuths, ranges, stamps, planar(poses), covariances)
 
-    def feed(self, slam: Slam, progress: Callable[[int, int], None] | None = None) -> None:
-        """Give everything to a session, in order of time, and finish it.
-
-        Args:
-            slam: a new session.
-            progress: called with (scans done, scans in all).
-        """
+    def feed(self, slam: Slam, progress: Callable[[int, int], None] = lambda done, total: None) -> None:
+        """Give everything to a new session, in order of time, and finish it; `progress` takes scans done and in all."""
         spreads = self.covariances if self.covariances is not None else [None] * len(self.odometry_times)
         odometry = deque(zip(self.odometry_times, self.odometry, spreads, strict=True))
         for done, i in enumerate(np.argsort(self.times, kind="stable"), 1):
             while odometry and odometry[0][0] <= self.times[i]:
                 slam.add_odometry(*odometry.popleft())
             slam.add_scan(self.times[i], self.azimuths, self.ranges[i])
-            if progress:
-                progress(done, len(self.times))
+            progress(done, len(self.times))
         for entry in odometry:
             slam.add_odometry(*entry)
         slam.finish()
@@ -100,7 +93,7 @@ def run(
     *,
     config: SlamConfig,
     reference: Path | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """SLAM on plain files.
 
@@ -112,9 +105,6 @@ def run(
         config: of the back end.
         reference: TUM file of true poses; of a run's folder its ``reference.tum`` by default.
         progress: called with (scans done, scans in all).
-
-    Returns:
-        the folder.
 
     Raises:
         InputError: unusable input, or the folder cannot be written.
@@ -148,7 +138,7 @@ def _npz_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     found: dict[str, np.ndarray] = {}
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected scans (.npz) or the folder of a run")
-    with reading(f"{path}: is no .npz of numbers, expected ranges, angle_min, angle_increment and range_max"):
+    with explained(f"{path}: is no .npz of numbers, expected ranges, angle_min, angle_increment and range_max"):
         with zipfile.ZipFile(path) as archive:
             _check_size(archive, path)
         with np.load(path, allow_pickle=False) as file:

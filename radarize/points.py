@@ -14,12 +14,13 @@ import numpy as np
 import scipy.fft
 import torch
 from jaxtyping import Bool, Complex64, Float, Int, Int16
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from scipy.ndimage import maximum_filter
 from scipy.signal import windows
 
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
+from radarize.plain import Frozen
 from radarize.radar.array import azimuth_row, rows, virtual_positions
 from radarize.radar.config import RadarConfig
 
@@ -27,7 +28,7 @@ from radarize.radar.config import RadarConfig
 COLUMNS = ("x", "y", "z", "velocity", "snr", "noise")
 
 
-class Cfar(BaseModel):
+class Cfar(Frozen):
     """One ``cfarCfg`` line: a cell is detected that stands `threshold` above the level of its neighbours.
 
     Attributes:
@@ -37,15 +38,13 @@ class Cfar(BaseModel):
         smallest: compare with the lower of the two sides (CASO) rather than with their mean (CA).
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     window: int = Field(8, ge=1)
     guard: int = Field(4, ge=0)
     threshold: float = 15.0
     smallest: bool = False
 
 
-class PointCloudConfig(BaseModel):
+class PointCloudConfig(Frozen):
     """Settings of the chain, with the defaults of TI's profile for the xWR1843.
 
     Attributes:
@@ -57,8 +56,6 @@ class PointCloudConfig(BaseModel):
         angles: azimuth cells.
         min_range: nearer cells hold the transmitters' leakage, m (``cfarFovCfg``).
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     range_cfar: Cfar = Cfar(window=8, guard=4, smallest=True)
     doppler_cfar: Cfar = Cfar(window=4, guard=2)
@@ -77,10 +74,6 @@ DENSE = PointCloudConfig(
 
 class PointClouds:
     """Makes point clouds for one radar configuration.
-
-    Args:
-        config: radar configuration.
-        settings: of the chain.
 
     Raises:
         InputError: the configuration has too few loops or samples for the CFAR windows.
@@ -240,14 +233,7 @@ class PointClouds:
 
 
 def level_around(level: np.ndarray, cfar: Cfar, axis: int, cyclic: bool) -> np.ndarray:
-    """Mean level of the cells around each along an axis; at the ends of an axis that is no circle, of one side only.
-
-    Args:
-        level: dB.
-        cfar: which cells count.
-        axis: along which.
-        cyclic: its ends meet.
-    """
+    """Mean level (dB) of the cells around each along an axis; at the ends of one that is no circle, of one side."""
     reach = cfar.window + cfar.guard
     level = np.moveaxis(level, axis, -1)
     padded = np.pad(level, [(0, 0)] * (level.ndim - 1) + [(reach, reach)], mode="wrap")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from radarize.errors import InputError
+from radarize.errors import explained
 
 
 @contextmanager
@@ -20,14 +20,13 @@ def replacing(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     part = path.with_name(path.name + ".part")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        yield part
-        os.replace(part, path)
-    except BaseException as error:
+        with explained(f"{path}: cannot be written", OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield part
+            os.replace(part, path)
+    except BaseException:
         with contextlib.suppress(OSError):
             part.unlink()
-        if isinstance(error, OSError):
-            raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
         raise
 
 
@@ -49,12 +48,10 @@ class Replacement:
     def __init__(self, folder: Path, names: Sequence[str]):
         self.folder, self.names, self.part = folder, names, folder / ".part"
         self._new = not folder.exists()
-        try:
+        with explained(f"{folder}: cannot be written", OSError):
             if self.part.exists():
                 shutil.rmtree(self.part)  # of one who died here
             self.part.mkdir(parents=True)
-        except OSError as error:
-            raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
 
     def place(self) -> None:
         """Let the files take their places; those of the folder that are not among them go.
@@ -62,15 +59,13 @@ class Replacement:
         Raises:
             InputError: they cannot.
         """
-        try:
+        with explained(f"{self.folder}: cannot be written", OSError):
             for name in self.names:
                 (self.folder / name).unlink(missing_ok=True)
             for name in reversed(self.names):
                 if (self.part / name).exists():
                     os.replace(self.part / name, self.folder / name)
             self.part.rmdir()
-        except OSError as error:
-            raise InputError(f"{self.folder}: cannot be written ({error.strerror or error})") from error
 
     def discard(self) -> None:
         """Leave the folder as it was; nothing to do after `place`."""

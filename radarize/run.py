@@ -1,6 +1,6 @@
 """From a recording to a folder with trajectory, map and all that they were made of."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -35,18 +35,15 @@ def run(
         configuration: of the pipeline.
         progress: called with (frames done, frames in all).
 
-    Returns:
-        the folder.
-
     Raises:
         InputError: unusable recording or unknown method.
     """
     with Recording(recording) as source:
         best, why = (BEST, "") if weights else best_methods(source.config)
-        pair = odometry or best["odometry"], scans or best["scans"]
-        inputs = Inputs(source.config, configuration or Configuration(), Weights(weights), source)
-        for failed in _run_each(inputs, {Path(output): pair}, progress, {"no networks": why} if why else {}).values():
-            raise failed
+    pairs = {Path(output): (odometry or best["odometry"], scans or best["scans"])}
+    given = {"weights": weights, "configuration": configuration, "facts": {"no networks": why} if why else None}
+    for failed in run_each(recording, pairs, **given, progress=progress).values():
+        raise failed
     return Path(output)
 
 
@@ -56,6 +53,7 @@ def run_each(
     *,
     weights: Path | None = None,
     configuration: Configuration | None = None,
+    facts: Mapping[str, str] | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[Path, InputError]:
     """Run the pipeline with several methods on a recording, at once: what they have in common is made once.
@@ -64,6 +62,7 @@ def run_each(
         recording: ``.h5`` file.
         pairs: odometry and scans by name, for each folder to write; see `run`.
         weights, configuration, progress: see `run`.
+        facts: what ``run.json`` says of the methods beside their names.
 
     Returns:
         folders that were not written, and why not.
@@ -71,17 +70,7 @@ def run_each(
     Raises:
         InputError: unusable recording.
     """
-    with Recording(recording) as source:
-        inputs = Inputs(source.config, configuration or Configuration(), Weights(weights), source)
-        return _run_each(inputs, pairs, progress, {})
-
-
-def _run_each(
-    inputs: Inputs, pairs: dict[Path, tuple[str, str]], progress: Callable[[int, int], None], facts: dict[str, str]
-) -> dict[Path, InputError]:
-    source, workshop, failed = inputs.recording, Workshop(inputs), {}
-    if not len(source):
-        raise InputError(f"{source.path}: has no whole frame, expected at least one")
+    failed: dict[Path, InputError] = {}
     pipelines: dict[Path, Pipeline] = {}
     writers: dict[Path, RunWriter] = {}
 
@@ -93,6 +82,10 @@ def _run_each(
                 failed[folder] = error
                 pipelines.pop(folder, None)
 
+    def make(folder: Path) -> None:
+        pipelines[folder] = workshop.pipeline(*pairs[folder])
+        writers[folder] = stack.enter_context(RunWriter(folder))
+
     def end(folder: Path) -> None:
         if intake.lost == intake.taken:
             frames = f"all its {len(source)} frames are lost or silent"
@@ -102,21 +95,19 @@ def _run_each(
         writer.describe(source, inputs.signal.heatmaps)
         told = {
             "frames_lost": intake.lost,
-            "methods": dict(zip(("odometry", "scans"), pairs[folder], strict=True)) | facts,
+            "methods": dict(zip(("odometry", "scans"), pairs[folder], strict=True)) | dict(facts or {}),
             "configuration": inputs.configuration.model_dump(),
         }
         if len(pairs) == 1:  # what several share is nobody's
             told["ms_per_frame"] = {name: 1e3 * seconds / len(source) for name, seconds in pipeline.seconds.items()}
         writer.finish(pipeline.slam, told)
 
-    with ExitStack() as stack:
-
-        def make(folder: Path) -> None:
-            pipelines[folder] = workshop.pipeline(*pairs[folder])
-            writers[folder] = stack.enter_context(RunWriter(folder))
-
+    with Recording(recording) as source, ExitStack() as stack:
+        if not len(source):
+            raise InputError(f"{source.path}: has no whole frame, expected at least one")
+        inputs = Inputs(source.config, configuration or Configuration(), Weights(weights), source)
+        workshop, intake = Workshop(inputs), Intake(inputs.signal)
         each(make, pairs)
-        intake = Intake(inputs.signal)
         for frames, adc in source.batches(BATCH):
             if not pipelines:
                 break

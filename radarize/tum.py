@@ -6,7 +6,7 @@ from typing import TextIO
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.replacing import replacing
 
 #: Poses that are written at a time.
@@ -19,10 +19,8 @@ def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndar
     Raises:
         InputError: naming the line: not eight finite numbers, times that do not ascend, or no unit quaternion.
     """
-    try:
+    with explained(f"{path}: cannot be read", OSError):
         lines = Path(path).read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     rows = []
     for number, line in enumerate(lines, 1):
         words = line.split("#")[0].replace(",", " ").split()

@@ -35,7 +35,10 @@ _CAUSES = ("#39d0d8", "#8b949e", "#e4572e", "#f2703a", "#f2a33a", "#9a6fd0", "#2
 
 
 def view(
-    source: Path, run: Path | None = None, save: Path | None = None, progress: Callable[[int, int], None] | None = None
+    source: Path,
+    run: Path | None = None,
+    save: Path | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path | None:
     """Show a recording or a run.
 
@@ -45,18 +48,14 @@ def view(
         save: file to write (``.rrd``) instead of opening a window.
         progress: called with (frames done, frames in all).
 
-    Returns:
-        The file written, if any.
-
     Raises:
         InputError: rerun-sdk is not installed, unusable source, or the file cannot be written.
     """
     try:
         import rerun
-    except ImportError as error:
-        raise InputError("viewing needs rerun-sdk, which is not installed; type: pip install 'radarize[viewer]'") from (
-            error
-        )
+    except ImportError:
+        words = "viewing needs rerun-sdk, which is not installed; type: pip install 'radarize[viewer]'"
+        raise InputError(words) from None
     source, run = Path(source), None if run is None else Path(run)
     if source.is_dir():
         if run is not None:
@@ -105,9 +104,6 @@ def _layout():
 
 class Screen:
     """Sends to a Rerun stream, column-wise.
-
-    Args:
-        stream: where to.
 
     Attributes:
         start: stamp of the time line's zero, s.
@@ -175,7 +171,7 @@ class Screen:
             self.over_time(f"velocity/{axis}/{who}", times[known], self.rr.Scalars.columns(scalars=column[known]))
 
 
-def show_recording(screen: Screen, recording: Recording, progress: Callable[[int, int], None] | None = None) -> None:
+def show_recording(screen: Screen, recording: Recording, progress: Callable[[int, int], None]) -> None:
     """What a recording holds: heat maps of its frames, and whatever truth and sensors it has."""
     rr, config = screen.rr, recording.config
     screen.fixed("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP)
@@ -199,8 +195,7 @@ def show_recording(screen: Screen, recording: Recording, progress: Callable[[int
     for first in range(0, len(recording), _BATCH):
         last = min(first + _BATCH, len(recording))
         _send_frames(screen, recording, first, last, maker)
-        if progress:
-            progress(last, len(recording))
+        progress(last, len(recording))
 
 
 def _send_camera(screen: Screen, recording: Recording) -> None:

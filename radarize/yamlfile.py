@@ -7,7 +7,8 @@ from typing import TypeVar
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
+from radarize.plain import complaint
 
 Settings = TypeVar("Settings", bound=BaseModel)
 
@@ -19,32 +20,31 @@ def read_yaml(path: str | Path, most: float = math.inf) -> object:
         InputError: the file cannot be read, or is malformed or too large.
     """
     try:
-        if (size := Path(path).stat().st_size) > most:
-            raise InputError(f"{path}: has {size} bytes, expected at most {most}")
-        return yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: cannot be read ({error}), expected text in UTF-8") from error
+        with explained(f"{path}: cannot be read", OSError, UnicodeDecodeError):
+            if (size := Path(path).stat().st_size) > most:
+                raise InputError(f"{path}: has {size} bytes, expected at most {most}")
+            text = Path(path).read_text(encoding="utf-8")
+        return yaml.safe_load(text)
     except (yaml.YAMLError, ValueError, RecursionError) as error:  # a date like 2026-99-99 is a ValueError
         raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
 
 
-def read_settings(path: str | Path, defaults: Settings) -> Settings:
+def read_settings(path: str | Path, defaults: Settings, expected: str) -> Settings:
     """Settings with what a YAML file says otherwise: sections and fields named as there.
+
+    Args:
+        expected: what such a file holds, in words.
 
     Raises:
         InputError: no such file, or a field that does not exist or has an impossible value.
     """
     changes = read_yaml(path) or {}
     if not isinstance(changes, dict):
-        raise InputError(f"{path}: holds a {type(changes).__name__}, expected sections as `radarize config` prints")
+        raise InputError(f"{path}: holds a {type(changes).__name__}, expected {expected}")
     try:
         return type(defaults).model_validate(_merged(defaults.model_dump(), changes))
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(map(str, first["loc"]))
-        raise InputError(f"{path}: {where} is {first['input']!r}, expected: {first['msg']}") from error
+        raise InputError(f"{path}: {complaint(error)}") from error
 
 
 def _merged(settings: dict, changes: dict) -> dict:

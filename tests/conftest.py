@@ -8,9 +8,6 @@ import pytest
 # A suite that a script starts in the background ignores Ctrl-C, and so would every program that it starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
-#: Ten minutes of typing what README and docs say: `make documents`, beside the suite, which must stay under fifteen.
-collect_ignore = [] if os.environ.get("DOCUMENTS") else ["documents"]
-
 
 @pytest.fixture(scope="session")
 def recordings() -> Path:

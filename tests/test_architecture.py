@@ -10,10 +10,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 #: Packages and modules of `radarize`, lowest first: each imports only what stands before it, or beside it.
 LAYERS = (
-    "errors replacing yamlfile jsonfile npyfile pose tum console stopwatch jobs",
+    "errors plain replacing yamlfile jsonfile npyfile pose tum console stopwatch jobs",
     "radar",
     "recording",
-    "heatmaps points contents",
+    "heatmaps points contents polar clouds walks",
     "features",
     "batch",
     "nets",
@@ -30,7 +30,7 @@ LAYERS = (
 )
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are
 #: compared by what the pipeline makes of them, too.
-SHARED = {*" ".join(LAYERS[:3]).split(), "heatmaps", "points", "features", "runfolder", "report", "exporters"}
+SHARED = {*" ".join(LAYERS[:3]).split(), "heatmaps", "points", "polar", "features", "runfolder", "report", "exporters"}
 
 
 @cache

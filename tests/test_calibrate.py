@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from benchmarks import transfer
 from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
@@ -14,6 +13,7 @@ from radarsim.physics.frontend_config import Band, FrontEndConfig, Leakage, Mism
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.synthesis import Synthesizer
 from radarsim.simulate import simulate
+from tests.importers import public
 from tests.physics.rigs import Rig, polar
 
 CONFIG = PRESETS["radarize"]
@@ -104,9 +104,9 @@ def test_unusable_recordings_are_refused_in_a_sentence(tmp_path):
 
 
 @pytest.fixture
-def captures(recordings, tmp_path):  # noqa: F811
+def captures(recordings, tmp_path):
     """The public captures as recordings."""
-    return transfer.captures(recordings, tmp_path)
+    return public.captures(recordings, tmp_path)
 
 
 def test_real_captures_give_boards_that_sound_like_them(captures, tmp_path):

@@ -105,8 +105,10 @@ def test_settings_from_a_file(tmp_path):
     config = SlamConfig.load(tmp_path / "s.yaml", "radar")
     assert config.grid.nodes == 20 and not config.loop.enabled and config.grid.resolution == 0.08
     for text, sentence in (
-        ("grid: {cells: 3}", "grid.cells"), ("loop: {every: 0}", "loop.every is 0"), ("[1]", "holds a list")
-    ):  # fmt: skip
+        ("grid: {cells: 3}", "grid.cells"),
+        ("loop: {every: 0}", "loop.every is 0"),
+        ("[1]", "holds a list, expected sections with fields, such as grid: {nodes: 10}"),
+    ):
         (tmp_path / "s.yaml").write_text(text)
         with pytest.raises(InputError, match=sentence):
             SlamConfig.load(tmp_path / "s.yaml")

@@ -95,8 +95,9 @@ def sensor(emulator: Emulator, where: Network, config: RadarConfig = SMALL) -> S
 
 @dataclass
 class Running:
-    """An emulator's process: its serial port, its UDP ports, and, when it has ended, what it said."""
+    """An emulator's process, its serial port and UDP ports, and, when it has ended, what it said."""
 
+    process: subprocess.Popen
     port: Path
     command_port: int
     data_port: int
@@ -106,13 +107,13 @@ class Running:
 @contextmanager
 def emulator(source: Path | str, folder: Path, *options: object) -> Iterator[Running]:
     """`radarsim emulate`, ended by an interrupt."""
-    ports = free_ports()
-    running = Running(folder / "tty", *ports)
+    port, ports = folder / "tty", free_ports()
     command = [
-        sys.executable, "-m", "radarsim.cli", "emulate", source, "--port-link", running.port,
+        sys.executable, "-m", "radarsim.cli", "emulate", source, "--port-link", port,
         "--command-port", ports[0], "--data-port", ports[1], *options,
     ]  # fmt: skip
     process = subprocess.Popen([*map(str, command)], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    running = Running(process, port, *ports)
     try:
         assert process.stdout.readline() == f"serial port {running.port}, 115200 baud\n"
         assert "DCA1000 127.0.0.2" in process.stdout.readline()

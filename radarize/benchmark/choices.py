@@ -1,4 +1,5 @@
-"""Which recordings helped to choose settings: figures on these flatter, and every page of results says so.
+"""What recordings figures are of, and which of them helped to choose settings: figures on these flatter, and every page
+of results says so.
 
 Networks are not among them: each file of weights says what it was trained on. Whoever chooses a setting by looking at
 recordings enters them here.
@@ -6,14 +7,38 @@ recordings enters them here.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+
+import numpy as np
+
+from radarize.recording import Recording
+from radarize.tum import planar
 
 
-class Walk(Protocol):
-    """A recording's scene and seed, by which it is known wherever it lies."""
+@dataclass(frozen=True)
+class Walk:
+    """A recording, or a part of one, that figures are of.
+
+    Attributes:
+        scene: that it went through.
+        seed: that it was drawn from; None of a real one.
+        metres: in the plane; None where no true poses tell.
+        simulated: or real.
+    """
 
     scene: str
     seed: int | None
+    metres: float | None
+    simulated: bool
+
+    @classmethod
+    def of(cls, recording: Recording) -> "Walk":
+        """As a recording says."""
+        about, metres = recording.attributes, None
+        if recording.has("truth/pose"):
+            places = planar(recording.read("truth/pose"))[:, :2]
+            metres = float(np.linalg.norm(np.diff(places[np.isfinite(places).all(axis=1)], axis=0), axis=1).sum())
+        simulated = str(about.get("source", "")).startswith("radarsim")
+        return cls(str(about.get("scene", "-")), int(about["seed"]) if "seed" in about else None, metres, simulated)
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from radarize.benchmark.results import Data, Walk
+from radarize.benchmark.choices import Walk
+from radarize.benchmark.results import Data
 from radarize.errors import InputError
 from radarize.jsonfile import read_json
 from radarize.radar.config import RadarConfig

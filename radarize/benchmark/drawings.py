@@ -12,24 +12,15 @@ from radarize.runfolder import RunFolder
 _MAPS = 4
 
 
-def draw_odometry(study: Study, page: Page) -> None:
-    """Trajectories and errors of odometry."""
-    _draw(study, page, "odometry", lambda pair: pair.odometry, "trajectories errors")
-
-
-def draw_slam(study: Study, page: Page) -> None:
-    """Trajectories, errors and maps of SLAM."""
-    _draw(study, page, "slam", str, "trajectories errors maps")
-
-
-def draw_maps(study: Study, page: Page) -> None:
-    """Maps and errors of SLAM."""
-    _draw(study, page, "slam", lambda pair: pair.scans, "maps errors")
-
-
-def _draw(study: Study, page: Page, which: str, name: Callable[[Pair], str], parts: str) -> None:
-    """Parts by name, of trajectories of a sort, with names of pairs; nothing without any run."""
-    runs = {name(pair): found for pair in study.pairs if (found := study.once(pair))}
+def draw(
+    study: Study,
+    page: Page,
+    which: str = "slam",
+    parts: str = "trajectories errors maps",
+    name: Callable[[Pair], str] = str,
+) -> None:
+    """Parts, of trajectories of a sort (``odometry``, ``slam``), with names of pairs; nothing without any run."""
+    runs = {name(pair): found for pair in study.pairs if (found := study.of(pair)["run"].to_list())}
     if not runs:
         return
     ours = study.chosen.partner

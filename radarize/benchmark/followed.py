@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float
 
 from radarize.evaluation.motion import turn_errors
@@ -73,3 +74,9 @@ def turned(found: Sequence[Followed], seconds: float) -> tuple[np.ndarray, np.nd
     """`Followed.turned` of several recordings, one after the other."""
     errors, claims = zip(*(one.turned(seconds) for one in found), strict=True)
     return np.concatenate(errors), np.concatenate(claims)
+
+
+def turn_nees(found: Sequence[Followed], seconds: float) -> float:
+    """Mean squared error of `turned` over its claims; NaN without any, infinite where nothing is claimed."""
+    errors, claims = map(pd.Series, turned(found, seconds))
+    return float((errors**2 / claims).mean())

@@ -1,9 +1,9 @@
 """Scans by every method, what the wrong ones come from, and the maps that SLAM draws of them."""
 
-from radarize.benchmark.dataset import groups
+import pandas as pd
+
 from radarize.benchmark.protocol import figures_of
-from radarize.benchmark.runs import Pair
-from radarize.benchmark.study import Chosen, Study
+from radarize.benchmark.study import Study
 from radarize.benchmark.table import Table
 from radarize.evaluation.stress import FIGURES, SOURCES
 
@@ -33,26 +33,17 @@ NOTES = (
 )
 
 
-def pairs(chosen: Chosen) -> list[Pair]:
-    """Every scan; odometry is the same."""
-    return [Pair(chosen.partner.odometry, scans) for scans in chosen.scans]
-
-
 def tables(study: Study) -> list[Table]:
     """Figures by platform, by building and of all."""
-    rows, notes = [], [f"Means over recordings; odometry: {study.chosen.partner.odometry}.", *NOTES]
-    runs = {pair: study.of(pair) for pair in study.pairs}
-    paths, factors = zip(*COLUMNS.values(), strict=True)
-    figures = {
-        pair: figures_of(found, dict(zip(COLUMNS, paths, strict=True))) * factors for pair, found in runs.items()
-    }
-    for name, members in groups(study.cases).items():
-        for pair, found in runs.items():
-            here = found["recording"].isin([case.name for case in members])
-            rows.append({"scans": pair.scans, "on": name, "recordings": int(here.sum()), **figures[pair][here].mean()})
-    for pair, found in runs.items():
-        shares = figures_of(found, {name: f"sources.{name}" for name in SOURCES}).mean()
+    notes = [f"Means over recordings; odometry: {study.chosen.partner.odometry}.", *NOTES]
+    paths, factors = ({name: each[k] for name, each in COLUMNS.items()} for k in (0, 1))
+    rows = [
+        {"scans": pair.scans, **group, **(figures_of(runs, paths).mean() * pd.Series(factors))}
+        for pair, group, runs in study.by_group()
+    ]
+    for pair in study.pairs:
+        shares = figures_of(study.of(pair), {name: FIGURES[name].path for name in SOURCES}).mean()
         if shares.notna().any():
-            parts = ", ".join(f"{FIGURES[name][0]} {100 * share:.1f}" for name, share in shares.items())
+            parts = ", ".join(f"{FIGURES[name].words} {100 * share:.1f}" for name, share in shares.items())
             notes.append(f"{pair.scans}: wrong returns, % of all, come from {parts}.")
     return [Table("Scans and maps", rows, notes)]

@@ -6,26 +6,28 @@ entries in `radarize.methods`.
 
 from functools import partial
 
-from radarize.benchmark import mapping, odometry, runtime, slam, uncertainty, varied
-from radarize.benchmark.drawings import draw_maps, draw_odometry, draw_slam
-from radarize.benchmark.study import Benchmark
+from radarize.benchmark import mapping, odometry, runtime, slam, varied
+from radarize.benchmark.drawings import draw
+from radarize.benchmark.study import Benchmark, Chosen
+
+_PATHS = partial(draw, which="odometry", parts="trajectories errors", name=lambda pair: pair.odometry)
 
 BENCHMARKS: dict[str, Benchmark] = {
     "odometry": Benchmark(
         "Odometry",
         "Trajectories by odometry alone, tested on random splits (the paper's table 2).",
-        odometry.pairs,
+        Chosen.by_odometry,
         odometry.tables,
         "random",
-        draw=draw_odometry,
+        draw=_PATHS,
     ),
     "odometry-platforms": Benchmark(
         "Odometry on unseen platforms",
         "Tested on platforms that, with --train, no training saw (the paper's table 3).",
-        odometry.pairs,
+        Chosen.by_odometry,
         partial(odometry.tables, paper=odometry.PAPER_PLATFORMS),
         "platform",
-        draw=draw_odometry,
+        draw=_PATHS,
     ),
     "slam": Benchmark(
         "SLAM",
@@ -33,21 +35,21 @@ BENCHMARKS: dict[str, Benchmark] = {
         slam.pairs,
         slam.tables,
         "random",
-        draw=draw_slam,
+        draw=draw,
     ),
     "buildings": Benchmark(
         "SLAM in unseen buildings",
         "Tested in buildings that, with --train, no training saw (the paper's table 5).",
-        slam.building_pairs,
+        Chosen.by_odometry,
         slam.building_tables,
         "building",
-        draw=draw_slam,
+        draw=draw,
     ),
     "uncertainty": Benchmark(
         "Claimed uncertainty",
         "Squared errors of velocities and turns over the variances that odometry claims; 1 if it knows itself.",
-        odometry.pairs,
-        uncertainty.tables,
+        Chosen.by_odometry,
+        odometry.claims_tables,
         "random",
     ),
     "runtime": Benchmark(
@@ -60,10 +62,10 @@ BENCHMARKS: dict[str, Benchmark] = {
     "mapping": Benchmark(
         "Scans and maps",
         "Scans against true surfaces, what wrong ones come from, and maps against the floor plan.",
-        mapping.pairs,
+        Chosen.by_scans,
         mapping.tables,
         "random",
-        draw=draw_maps,
+        draw=partial(draw, parts="maps errors", name=lambda pair: pair.scans),
     ),
     "multipath": Benchmark(
         "Multipath",

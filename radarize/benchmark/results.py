@@ -14,44 +14,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-import numpy as np
 from pydantic import TypeAdapter
 
 from radarize import __version__
-from radarize.benchmark.choices import helped
+from radarize.benchmark.choices import Walk, helped
 from radarize.benchmark.table import Table
-from radarize.errors import InputError
+from radarize.errors import explained
 from radarize.nets.weights import read
 from radarize.recording import Recording
 from radarize.replacing import write_whole
-from radarize.tum import planar
-
-
-@dataclass(frozen=True)
-class Walk:
-    """A recording, or a part of one, that figures are of.
-
-    Attributes:
-        scene: that it went through.
-        seed: that it was drawn from; None of a real one.
-        metres: in the plane; None where no true poses tell.
-        simulated: or real.
-    """
-
-    scene: str
-    seed: int | None
-    metres: float | None
-    simulated: bool
-
-    @classmethod
-    def of(cls, recording: Recording) -> "Walk":
-        """As a recording says."""
-        about, metres = recording.attributes, None
-        if recording.has("truth/pose"):
-            places = planar(recording.read("truth/pose"))[:, :2]
-            metres = float(np.linalg.norm(np.diff(places[np.isfinite(places).all(axis=1)], axis=0), axis=1).sum())
-        simulated = str(about.get("source", "")).startswith("radarsim")
-        return cls(str(about.get("scene", "-")), int(about["seed"]) if "seed" in about else None, metres, simulated)
 
 
 @dataclass(frozen=True)
@@ -232,10 +203,8 @@ class Results:
         Raises:
             InputError: unreadable, or of another layout.
         """
-        try:
+        with explained(f"{path}: is no page of results as this version writes them", OSError, ValueError):
             return TypeAdapter(cls).validate_json(path.read_bytes())
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: is no page of results as this version writes them ({error})") from error
 
     def write(self, folder: Path, name: str) -> Path:
         """Write NAME.json and NAME.md, and return the latter's path.

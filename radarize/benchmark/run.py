@@ -6,12 +6,14 @@ from pathlib import Path
 from matplotlib import pyplot
 
 from radarize.benchmark.dataset import DataSet
-from radarize.benchmark.page import write_index, write_page
 from radarize.benchmark.registry import BENCHMARKS
 from radarize.benchmark.results import Results, machine
 from radarize.benchmark.study import Options, Study, carry_out
+from radarize.benchmark.table import cell
 from radarize.errors import InputError
+from radarize.jsonfile import read_json
 from radarize.replacing import replacing
+from radarize.report.page import Link, Page
 
 #: All that the data is fit for.
 ALL = "all"
@@ -74,3 +76,46 @@ def _publish(name: str, study: Study) -> Results:
     results.write(study.output, name)
     write_page(study, results, study.output / f"{name}.html")
     return results
+
+
+def write_page(study: Study, results: Results, path: Path) -> Path:
+    """Tables that sort on click, then the benchmark's drawings.
+
+    Raises:
+        InputError: it cannot be written, or a run's file is damaged.
+    """
+    page = Page(results.title, study.benchmark.about)
+    for table in results.tables:
+        page.section(table.title)
+        if table.rows:
+            rows = [tuple(map(cell, row)) for row in table.frame.itertuples(index=False)]
+            page.table(tuple(table.frame), rows, table.numbers(), sortable=True)
+        for note in table.notes:
+            page.text(note)
+    study.benchmark.draw(study, page)
+    page.section("Data, networks, machine")
+    for note in results.notes:
+        page.text(note)
+    for name, words in results.facts.items():
+        page.text(f"{name}: {words}.")
+    return page.write(path)
+
+
+def write_index(folder: Path) -> Path:
+    """A page that leads to those of a folder.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    page = Page("Benchmarks", f"Comparisons in {folder.resolve().name}")
+    rows = []
+    for path in sorted(folder.glob("*.html")):
+        try:
+            about = read_json(path.with_suffix(".json"))
+        except InputError:
+            continue
+        if "tables" in about:
+            made = about.get("machine", {})
+            rows.append((Link(about["title"], path.name), made.get("commit", "-"), made.get("processor", "-")))
+    page.table(("benchmark", "commit", "processor"), rows)
+    return page.write(folder / "index.html")

@@ -86,19 +86,8 @@ class Run(_Step):
         """With the recording's other runs: what methods have in common is made once."""
         return self.case, self.networks
 
-    def do(self, folder: Path, report: Report) -> dict[str, object]:
-        """Returns: see `figures`.
-
-        Raises:
-            InputError: it cannot be run.
-        """
-        found = self.do_each({folder: self}, report)[folder]
-        if isinstance(found, str):
-            raise InputError(found)
-        return found
-
     def do_each(self, places: "dict[Path, Run]", report: Report) -> dict[Path, dict[str, object] | str]:
-        """Of one recording and the same networks; see `do`."""
+        """Of one recording and the same networks; see `figures`."""
         pairs = {folder: (run.pair.odometry, run.pair.scans) for folder, run in places.items()}
         share = 0.7  # of the time, until trajectories are there
 
@@ -106,10 +95,7 @@ class Run(_Step):
             report(share * done / total)
 
         found: dict[Path, dict[str, object] | str] = {}
-        try:
-            failed = run_each(self.case.path, pairs, weights=self.networks.folder, progress=running)
-        except InputError as error:
-            failed = dict.fromkeys(places, error)
+        failed = run_each(self.case.path, pairs, weights=self.networks.folder, progress=running)
         for folder in places:
             try:
                 found[folder] = str(failed[folder]) if folder in failed else figures(folder, self.case.path)
@@ -120,11 +106,7 @@ class Run(_Step):
 
 
 def figures(run: Path, recording: Path) -> dict[str, object]:
-    """All figures of a run; None for numbers that do not exist.
-
-    Args:
-        run: folder of the run.
-        recording: that it was made of.
+    """All figures of a run of a recording; None for numbers that do not exist.
 
     Returns:
         What `evaluate` returns, and ``nearest``: `TrajectoryErrors.summary` of ``odometry``, ``slam`` and ``open``
@@ -168,43 +150,22 @@ class Timing(_Step):
         return min(self.case.frames, TIMED)
 
     def do(self, folder: Path, report: Report) -> dict[str, object]:
-        """Returns: ``stages``: ms per frame of each, ``whole``: of all of it, and ``frames``."""
+        """Returns: ``stages``: ms per frame by name, ``whole``: ms per frame, reading included; ``frames``."""
         with Recording(self.case.path) as source:
-            return measure(source, self.pair, self.networks, self.frames, report)
+            inputs = Inputs(source.config, weights=self.networks.weights, recording=source)
 
+            def run(frames: int, report: Report) -> tuple[Pipeline, float]:
+                pipeline = Workshop(inputs).pipeline(self.pair.odometry, self.pair.scans)
+                intake, start = Intake(inputs.signal), time.perf_counter()
+                for first in range(0, frames, BATCH):
+                    stop = min(first + BATCH, frames)
+                    samples = source.adc(first, stop), source.times[first:stop], source.valid(first, stop)
+                    pipeline.push(intake.take(*samples))
+                    report(stop / frames)
+                pipeline.finish()
+                return pipeline, time.perf_counter() - start
 
-def measure(
-    source: Recording, pair: Pair, networks: Networks, frames: int, report: Report = lambda share: None
-) -> dict[str, object]:
-    """Time the pipeline.
-
-    Args:
-        source: recording.
-        pair, networks: methods and their weights.
-        frames: how many of its frames.
-        report: takes the share that is done.
-
-    Returns:
-        ``stages``: ms per frame by name, ``whole``: ms per frame, reading included; ``frames``.
-    """
-
-    inputs = Inputs(source.config, weights=networks.weights, recording=source)
-
-    def pipeline() -> tuple[Pipeline, Intake]:
-        return Workshop(inputs).pipeline(pair.odometry, pair.scans), Intake(inputs.signal)
-
-    warm, intake = pipeline()
-    warm.push(intake.take(source.adc(0, BATCH), source.times[:BATCH]))  # compiles
-    timed, intake = pipeline()
-    start = time.perf_counter()
-    for first in range(0, frames, BATCH):
-        stop = min(first + BATCH, frames)
-        timed.push(intake.take(source.adc(first, stop), source.times[first:stop], source.valid(first, stop)))
-        report(stop / frames)
-    timed.finish()
-    whole = 1e3 * (time.perf_counter() - start) / frames
-    return {
-        "stages": {name: 1e3 * seconds / frames for name, seconds in timed.seconds.items()},
-        "whole": whole,
-        "frames": frames,
-    }
+            run(min(BATCH, self.frames), lambda share: None)  # compiles
+            timed, whole = run(self.frames, report)
+        spent = {name: 1e3 * seconds / self.frames for name, seconds in timed.seconds.items()}
+        return {"stages": spent, "whole": 1e3 * whole / self.frames, "frames": self.frames}

@@ -31,16 +31,12 @@ NOTES = [
 
 def pairs(chosen: Chosen) -> list[Pair]:
     """Methods of choice, those without networks, and each method with the methods of choice beside it."""
-    classical = Pair(**CLASSICAL)
-    return [
-        *(pair for pair in (chosen.partner, classical) if pair.odometry in chosen.odometry),
-        *(Pair(odometry, chosen.partner.scans) for odometry in chosen.odometry),
-        *(Pair(chosen.partner.odometry, scans) for scans in chosen.scans),
-    ]
+    first = [pair for pair in (chosen.partner, Pair(**CLASSICAL)) if pair.odometry in chosen.odometry]
+    return [*first, *chosen.by_odometry(), *chosen.by_scans()]
 
 
 def stages(found: dict) -> dict[str, float]:
-    """The paper's stages, and what ours are beside them, of `radarize.benchmark.runs.measure`."""
+    """The paper's stages, and what ours are beside them, of `radarize.benchmark.runs.Timing`."""
     spent = dict(found["stages"])
     took = {name: sum(spent.pop(part, 0.0) for part in parts) for name, parts in STAGES.items()}
     slowest = max(took["translation"], took["rotation"], took["map"], *spent.values())

@@ -23,22 +23,13 @@ BUILDINGS = {
 def pairs(chosen: Chosen) -> list[Pair]:
     """The paper's combinations, every odometry with the scans of choice, and all scans with the odometry of choice."""
     paper = [pair for pair in COMBINATIONS if pair.odometry in chosen.odometry and pair.scans in chosen.scans]
-    return [
-        *paper,
-        *(Pair(odometry, chosen.partner.scans) for odometry in chosen.odometry),
-        *(Pair(chosen.partner.odometry, scans) for scans in chosen.scans),
-    ]
+    return [*paper, *chosen.by_odometry(), *chosen.by_scans()]
 
 
 def tables(study: Study) -> list[Table]:
     """SLAM's trajectories by each protocol."""
     label = {pair: {"odometry": pair.odometry, "scans": pair.scans} for pair in study.pairs}
     return trajectory_tables(study, "slam", label, COMBINATIONS, "SLAM")
-
-
-def building_pairs(chosen: Chosen) -> list[Pair]:
-    """Every odometry with the scans of choice."""
-    return [Pair(odometry, chosen.partner.scans) for odometry in chosen.odometry]
 
 
 def building_tables(study: Study) -> list[Table]:

@@ -39,7 +39,7 @@ class Step(Protocol):
         ...
 
     def do(self, folder: Path, report: Report) -> dict[str, object]:
-        """Do it, in its folder; `report` takes the share that is done.
+        """Do it, in its folder, if it is done by itself; `report` takes the share that is done.
 
         Raises:
             InputError: it cannot be done.
@@ -51,6 +51,9 @@ class Step(Protocol):
 
         Returns:
             What each found, or why it cannot be done.
+
+        Raises:
+            InputError: none of them can be.
         """
         ...
 
@@ -125,14 +128,11 @@ def _units(steps: Iterable[Step]) -> dict[str, list[Step]]:
 
 def _do(unit: list[Step], output: Path, report: Report) -> list[dict[str, object] | str]:
     places = {output / step.place: step for step in unit}
-    if len(unit) > 1:
-        results = unit[0].do_each(places, report)
-    else:
-        ((folder, step),) = places.items()
-        try:
-            results = {folder: step.do(folder, report)}
-        except InputError as error:
-            results = {folder: str(error)}
+    try:
+        together = unit[0].together is not None
+        results = unit[0].do_each(places, report) if together else {k: step.do(k, report) for k, step in places.items()}
+    except InputError as error:
+        results = dict.fromkeys(places, str(error))
     return [_keep(step, folder, results[folder]) for folder, step in places.items()]
 
 

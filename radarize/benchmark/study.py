@@ -1,13 +1,13 @@
 """A comparison of methods: what it is (`Benchmark`), and how it goes on a data set (`Study`)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pandas as pd
 from matplotlib.figure import Figure
 
-from radarize.benchmark.dataset import Case, DataSet
+from radarize.benchmark.dataset import Case, DataSet, groups
 from radarize.benchmark.networks import Networks, Training
 from radarize.benchmark.protocol import PROTOCOLS, Protocol
 from radarize.benchmark.results import Network, Results, command
@@ -72,6 +72,14 @@ class Chosen:
     odometry: tuple[str, ...]
     scans: tuple[str, ...]
     partner: Pair
+
+    def by_odometry(self) -> list[Pair]:
+        """Every odometry; the scans are the same."""
+        return [Pair(odometry, self.partner.scans) for odometry in self.odometry]
+
+    def by_scans(self) -> list[Pair]:
+        """Every scan; odometry is the same."""
+        return [Pair(self.partner.odometry, scans) for scans in self.scans]
 
     @classmethod
     def of(cls, options: Options, data: DataSet) -> "Chosen":
@@ -219,9 +227,14 @@ class Study:
         )
         return about.join(pd.json_normalize([self.results[run] for _, run in runs]))
 
-    def once(self, pair: Pair) -> list[Run]:
-        """Runs of a pair that ended well, each once, in the order of recordings."""
-        return self.of(pair)["run"].to_list()
+    def by_group(self) -> Iterator[tuple[Pair, dict[str, object], pd.DataFrame]]:
+        """By platform, by building and of all: a pair, what a table's row says of the group, and its rows of `of`."""
+        found = {pair: self.of(pair) for pair in self.pairs}
+        for name, members in groups(self.cases).items():
+            for pair, runs in found.items():
+                here = runs[runs["recording"].isin([case.name for case in members])]
+                if len(here):
+                    yield pair, {"on": name, "recordings": len(here)}, here
 
     def publish(self) -> Results:
         """Tables, and all that tells what they are worth."""

@@ -7,24 +7,14 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from radarize.benchmark.dataset import DataSet
+from radarize.benchmark.protocol import figures_of
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.study import Chosen, Study
 from radarize.benchmark.table import Table
-from radarize.evaluation.stress import FIGURES, SOURCES
+from radarize.evaluation.stress import FIGURES
 from radarize.methods.registry import CLASSICAL, ODOMETRY, SCANS
 from radarize.report.curves import curves
 from radarize.report.page import Page
-
-#: Where figures of `radarize.evaluation.stress` stand in `Study.of`.
-PLACES = {
-    **{name: f"sources.{name}" for name in SOURCES},
-    "missed": "missed",
-    "map_f1": "map.f1",
-    "odometry": "odometry.ate.position.mean",
-    "slam": "slam.ate.position.mean",
-}
-#: Figures by their titles in tables, with units.
-TITLES = {name: f"{words}, {unit}" for name, (words, unit, _) in FIGURES.items()}
 
 
 @dataclass(frozen=True)
@@ -62,7 +52,7 @@ class Panels:
             label = pd.DataFrame(about, columns=[self.panel, self.over], dtype=object)
             names = {"odometry_by": pair.odometry, "scans": pair.scans, "methods": str(pair)}
             label = label.assign(recording=runs["recording"], **names)
-            figures = runs.reindex(columns=list(PLACES.values())).set_axis(list(PLACES), axis=1).astype(float)
+            figures = figures_of(runs, {name: figure.path for name, figure in FIGURES.items()})
             parts.append(pd.concat([label, figures], axis=1)[label[[self.panel, self.over]].notna().all(axis=1)])
         found = pd.concat(parts)
         found[self.panel] = found[self.panel].astype(str)
@@ -77,12 +67,11 @@ class Panels:
 
     def picture(self, tables: Sequence[Table]) -> Figure | None:
         """Curves of the last table; None without any. Values that are no numbers have none."""
-        names = {title: name for name, title in TITLES.items()}
-        frame = tables[-1].frame.rename(columns=names)
+        frame = tables[-1].frame.rename(columns={figure.title: name for name, figure in FIGURES.items()})
         frame = frame[frame[self.over].map(lambda value: isinstance(value, int | float))]
         shown = [name for name in self.names if name in frame and frame[name].notna().any()]
         for name in shown:
-            frame[name] = frame[name].astype(float) / FIGURES[name][2]
+            frame[name] = frame[name].astype(float) / FIGURES[name].factor
         return curves(frame.to_dict("records"), self.over, self.panel, self.line, shown) if shown else None
 
     def draw(self, study: Study, page: Page) -> None:
@@ -104,8 +93,8 @@ MATCHING = "scan-matching"
 
 def in_words(rows: pd.DataFrame) -> pd.DataFrame:
     """Figures that there are by their titles, in their units."""
-    known = [name for name in FIGURES if name in rows and rows[name].notna().any()]
-    return pd.DataFrame({TITLES[name]: FIGURES[name][2] * rows[name] for name in known}, index=rows.index)
+    known = {name: figure for name, figure in FIGURES.items() if rows[name].notna().any()}
+    return pd.DataFrame({each.title: each.factor * rows[name] for name, each in known.items()}, index=rows.index)
 
 
 def classical_pairs(chosen: Chosen) -> list[Pair]:
@@ -124,10 +113,8 @@ def ablation_tables(study: Study) -> list[Table]:
 
 def stress_pairs(chosen: Chosen) -> list[Pair]:
     """Every scan with the odometry of choice, and with odometry that is made of nothing else."""
-    return [
-        *(Pair(chosen.partner.odometry, scans) for scans in chosen.scans),
-        *(Pair(MATCHING, scans) for scans in chosen.scans if MATCHING in chosen.odometry),
-    ]
+    matching = [Pair(MATCHING, scans) for scans in chosen.scans if MATCHING in chosen.odometry]
+    return [*chosen.by_scans(), *matching]
 
 
 def stress_tables(study: Study) -> list[Table]:
@@ -138,7 +125,7 @@ def stress_tables(study: Study) -> list[Table]:
     for title, chosen in levels.items():
         means = in_words(chosen).groupby(chosen["scans"], sort=False).mean()
         means.insert(0, "levels", title)
-        ranking.append(means.sort_values([title for title in means if title == TITLES["ghosts"]] or "levels"))
+        ranking.append(means.sort_values([title for title in means if title == FIGURES["ghosts"].title] or "levels"))
     note = (
         f"Means over places; odometry: {study.chosen.partner.odometry}, which needs no scans, and by matching these "
         "scans alone. Truth by provenance: a wrong return is more than 10 cm off the first surface on its bearing, and "
@@ -158,4 +145,4 @@ def stress_rows(study: Study) -> pd.DataFrame:
     rows = STRESS.rows(study)
     own = rows[rows["odometry_by"] == study.chosen.partner.odometry]
     matching = rows[rows["odometry_by"] == MATCHING].set_index(["recording", "scans"])["odometry"]
-    return own.join(matching.rename("matching"), on=["recording", "scans"])
+    return own.drop(columns="matching").join(matching.rename("matching"), on=["recording", "scans"])

@@ -75,9 +75,6 @@ class Network:
 class Board:
     """A DCA1000; use as a context manager.
 
-    Args:
-        network: addresses and ports.
-
     Raises:
         InputError: the command port cannot be bound.
     """
@@ -126,8 +123,6 @@ class Board:
         """Send a command; returns the status of its reply.
 
         Args:
-            command: what to do.
-            body: its settings.
             answer: the status is no success or failure but what was asked for.
 
         Raises:

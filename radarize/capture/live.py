@@ -26,10 +26,8 @@ class Live:
     Args:
         inputs: what its methods are made from; see `prepare`.
         methods: odometry and scans by name.
-        page: to show it on.
 
     Attributes:
-        pipeline: the pipeline.
         losses: of the frames that came.
         blindness: of the odometry.
         busy: s spent on the frames so far, showing them included.
@@ -50,7 +48,7 @@ class Live:
         *,
         frames: int | None = None,
         writer: RecordingWriter | None = None,
-        progress: Callable[[int, int], None] | None = None,
+        progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
         """Follow the stream until the user stops it, there are enough frames, or it ends; then finish the map.
 
@@ -79,11 +77,14 @@ class Live:
             with stage("page"):
                 self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
             self.busy += time.monotonic() - start
-            if progress:
-                progress(int(came["number"][-1]) + 1, frames or 0)
+            progress(int(came["number"][-1]) + 1, frames or 0)
         self.pipeline.finish()
         self.page.send("map", self.view.map())
-        self.page.send("end", {"troubles": stream.troubles()})
+        self.page.send("end", {"troubles": self._troubles(stream)})
+
+    def _troubles(self, stream: Stream) -> list[str]:
+        """What is wrong so far, and where the odometry was blind."""
+        return [*stream.troubles(), *self.blindness.warnings()]
 
     def _show(self, stream: Stream, adc: np.ndarray, valid: np.ndarray, stamp: float) -> None:
         now = time.monotonic()
@@ -98,7 +99,7 @@ class Live:
             "lost_share": self.losses.lost_chirps / max(self.losses.chirps, 1),
             "waiting": max(counts.frames - counts.dropped - self.losses.frames, 0),
             "slots": stream.ring.slots,
-            "troubles": stream.troubles(),
+            "troubles": self._troubles(stream),
         }
         self.page.send("frame", self.view.frame(adc, valid, stamp) | figures)
         drawn = time.monotonic()

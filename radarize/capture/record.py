@@ -19,7 +19,7 @@ def record(
     stopping: Event,
     *,
     frames: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """Write a stream's frames to a recording until the user stops it, there are enough, or nothing comes any more.
 
@@ -34,9 +34,6 @@ def record(
         frames: end after so many.
         progress: called with frames done and wanted (0: until stopped).
 
-    Returns:
-        `output`.
-
     Raises:
         InputError: nothing came, or the file cannot be written; frames written before are kept in its ``.part``.
     """
@@ -46,8 +43,7 @@ def record(
     with RecordingWriter(output, stream.config, cfg_text=stream.text, attributes=stream.facts) as writer:
         for batch in chain([first], batches):
             writer.append(batch["adc"], batch["time"], batch["valid"])
-            if progress:
-                progress(int(batch["number"][-1]) + 1, frames or 0)
+            progress(int(batch["number"][-1]) + 1, frames or 0)
         warnings = stream.troubles() + writer.losses.warnings()
         writer.annotate(warnings="; ".join(warnings), first_packet_time=stream.counts.first)
     return output

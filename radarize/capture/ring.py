@@ -17,7 +17,6 @@ class FrameRing:
     is dropped whole.
 
     Args:
-        config: radar configuration.
         slots: frames that may wait.
 
     Attributes:

@@ -21,7 +21,6 @@ class Sensor(Stream):
     """A radar that streams from entering the context on, and is stopped on leaving it.
 
     Args:
-        config: radar configuration.
         text: it was read from.
         name: what errors call it.
         port: the radar's serial command port.

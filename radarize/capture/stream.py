@@ -79,7 +79,6 @@ class Stream:
     """Frames that a source puts out in a process of its own; use as a context manager.
 
     Args:
-        config: radar configuration.
         source: see `Source`; called with an `Outlet` and `arguments`.
         arguments: picklable.
         slots: frames that may wait before whole ones are dropped.

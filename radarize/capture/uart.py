@@ -79,14 +79,7 @@ class Uart:
         self.send("sensorStop")
 
     def send(self, command: str, patience: float = _PATIENCE) -> str:
-        """Send a command and wait for its answer.
-
-        Args:
-            command: one line.
-            patience: s.
-
-        Returns:
-            What the radar said, without echo and prompt.
+        """Send a command, one line, and wait for its answer (s): what the radar said, without echo and prompt.
 
         Raises:
             InputError: it refused, said something unreadable, or nothing.

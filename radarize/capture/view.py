@@ -21,11 +21,7 @@ _COLORS = (255 * matplotlib.colormaps["magma"](np.linspace(0, 1, 256))).astype(n
 
 
 class Fan:
-    """Range-azimuth maps from above: forward is up, left is left.
-
-    Args:
-        heatmaps: that make the maps.
-    """
+    """Range-azimuth maps from above: forward is up, left is left."""
 
     def __init__(self, heatmaps: Heatmaps):
         reach, edge = heatmaps.ranges[-1], abs(heatmaps.azimuths).max()
@@ -64,12 +60,7 @@ def png(pixels: UInt8[np.ndarray, "row column ..."]) -> str:
 
 
 class View:
-    """Pictures and figures of a pipeline, as plain data for a page.
-
-    Args:
-        pipeline: to look at.
-        signal: makes heat maps of the frames.
-    """
+    """Pictures and figures of a pipeline, as plain data for a page."""
 
     def __init__(self, pipeline: Pipeline, signal: Signal):
         self._pipeline, self._heatmaps = pipeline, signal.heatmaps

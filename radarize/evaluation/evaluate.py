@@ -7,7 +7,6 @@ import numpy as np
 from evo.core.trajectory import PoseTrajectory3D
 
 from radarize.errors import InputError
-from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.motion import velocity_errors
@@ -22,7 +21,6 @@ def trajectory_errors(
     """Errors of the run's trajectories, by ``odometry`` and ``slam``.
 
     Args:
-        run: folder of a run.
         reference: TUM file of the truth; by default the run's ``reference.tum``.
         association: see `radarize.evaluation.trajectory.matched`.
 
@@ -63,14 +61,13 @@ def evaluate(
     """Compare a run with the truth. Nothing is written, see `RunFolder.write_metrics`.
 
     Args:
-        run: a run, or its folder.
         reference: TUM file of the truth; by default the run's ``reference.tum``.
         errors: of its trajectories (`trajectory_errors`), where they are at hand.
 
     Returns:
         ``slam`` and ``odometry``: `TrajectoryErrors.summary`. Where the run knows the truth about them, ``map``:
         `map_errors`, ``scans``: `scan_errors`, ``velocity``: `velocity_errors`. Numbers that do not exist are None.
-        Where the run tells it, ``blind``: `BlindSpans`.
+        Where the run tells it, ``blind``: `radarize.odometry.blindness.BlindSpans`.
 
     Raises:
         InputError: not a run, no truth, or nothing that matches.
@@ -93,6 +90,6 @@ def evaluate(
         metrics["map"] = map_errors(grid, scans["truth/floor_plan"], best.turn, best.shift, seen)
         if true:
             metrics["map"]["free_iou"] = free_space_iou(grid, best.turn, best.shift, *true)
-    if blind := BlindSpans.of(run):
-        metrics["blind"] = blind.model_dump()
+    if run.blind:
+        metrics["blind"] = run.blind.model_dump()
     return without_nan(metrics)

@@ -41,7 +41,7 @@ class TrajectoryErrors:
 
     Attributes:
         position, rotation: absolute errors after alignment, m and rad (ATE).
-        relative_position, relative_rotation: by ``"frame"``, ``"second"`` and ``"metre"``, m and rad (RE).
+        relative: ``position`` and ``rotation`` by ``frame``, ``second`` and ``metre``, m and rad (RE).
         distance: length of the reference, m; in the plane, so that a walker's bobbing does not count.
         duration: s.
         share: mean absolute position error as a share of the distance.
@@ -54,8 +54,7 @@ class TrajectoryErrors:
 
     position: Statistics
     rotation: Statistics
-    relative_position: dict[str, Statistics]
-    relative_rotation: dict[str, Statistics]
+    relative: dict[str, dict[str, Statistics]]
     distance: float
     duration: float
     share: float
@@ -70,13 +69,9 @@ class TrajectoryErrors:
 
     def summary(self) -> dict[str, object]:
         """Figures for metrics.json; None where there is nothing to average."""
-        relative = {
-            name: {"position": asdict(position), "rotation": asdict(self.relative_rotation[name])}
-            for name, position in self.relative_position.items()
-        }
         figures = {
             "ate": {"position": asdict(self.position), "rotation": asdict(self.rotation)},
-            "re": relative,
+            "re": {span: {what: asdict(each) for what, each in both.items()} for span, both in self.relative.items()},
             "distance": self.distance,
             "duration": self.duration,
             "ate_share": self.share,
@@ -108,10 +103,7 @@ def evaluate_trajectory(
     estimate, reference = matched(estimate, reference, association, names)
     if in_plane:
         estimate, reference = planar(estimate), planar(reference)
-    relative_position, relative_rotation = {}, {}
-    for name, pairs in _pairs(reference).items():
-        position, rotation = _relative_errors(estimate, reference, pairs)
-        relative_position[name], relative_rotation[name] = Statistics.of(position), Statistics.of(rotation)
+    relative = {span: _relative_errors(estimate, reference, pairs) for span, pairs in _pairs(reference).items()}
     # Relative errors do not depend on the alignment, absolute ones do.
     last = RPE.rpe_base(reference.poses_se3[0], reference.poses_se3[-1], estimate.poses_se3[0], estimate.poses_se3[-1])
     turn, shift = alignment(estimate, reference, in_plane)
@@ -122,8 +114,7 @@ def evaluate_trajectory(
     return TrajectoryErrors(
         position=Statistics.of(position_errors),
         rotation=Statistics.of(rotation_errors),
-        relative_position=relative_position,
-        relative_rotation=relative_rotation,
+        relative=relative,
         distance=distance,
         duration=float(reference.timestamps[-1] - reference.timestamps[0]),
         share=float(position_errors.mean() / distance) if distance else np.nan,
@@ -165,19 +156,11 @@ def _apart(values: np.ndarray, delta: float) -> np.ndarray:
 
 def _relative_errors(
     estimate: PoseTrajectory3D, reference: PoseTrajectory3D, pairs: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    if not len(pairs):
-        return np.zeros(0), np.zeros(0)
+) -> dict[str, Statistics]:
     q, p = reference.poses_se3, estimate.poses_se3
-    errors = np.array([RPE.rpe_base(q[i], q[j], p[i], p[j]) for i, j in pairs])
-    return np.linalg.norm(errors[:, :3, 3], axis=1), Rotation.from_matrix(errors[:, :3, :3]).magnitude()
-
-
-def at(found: object, *path: str) -> float | None:
-    """A figure by its place in nested ones; None where it is missing."""
-    for key in path:
-        found = found.get(key) if isinstance(found, dict) else None
-    return found  # type: ignore[return-value]
+    errors = np.array([RPE.rpe_base(q[i], q[j], p[i], p[j]) for i, j in pairs]).reshape(-1, 4, 4)
+    angles = Rotation.from_matrix(errors[:, :3, :3]).magnitude() if len(errors) else []
+    return {"position": Statistics.of(np.linalg.norm(errors[:, :3, 3], axis=1)), "rotation": Statistics.of(angles)}
 
 
 def without_nan(content: object) -> object:

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
+from radarize.evaluation.figures import Figure
 from radarize.evaluation.mapping import TOLERANCE
 from radarize.evaluation.scans import wrong_by_cause
 from radarize.recording import Recording
@@ -23,18 +24,18 @@ SOURCES = {
     "clutter": ("direct", "floor_ceiling"),
     "noise": ("leakage", "noise"),
 }
-#: Figures by name: words, unit, factor.
+#: Figures by name, of `radarize.benchmark.runs.figures`.
 FIGURES = {
-    "ghosts": ("ghosts", "% of returns", 100),
-    "behind": ("seen through a slab", "% of returns", 100),
-    "moving": ("ghosts and skirts of what moves", "% of returns", 100),
-    "clutter": ("direct echoes beside, above, below", "% of returns", 100),
-    "noise": ("noise and leakage", "% of returns", 100),
-    "missed": ("missed surfaces", "% of bearings", 100),
-    "map_f1": ("map F1", "%", 100),
-    "matching": ("ATE of scan matching", "m", 1),
-    "odometry": ("odometry ATE", "m", 1),
-    "slam": ("SLAM ATE", "m", 1),
+    "ghosts": Figure("ghosts", "sources.ghosts", "% of returns", 100),
+    "behind": Figure("seen through a slab", "sources.behind", "% of returns", 100),
+    "moving": Figure("ghosts and skirts of what moves", "sources.moving", "% of returns", 100),
+    "clutter": Figure("direct echoes beside, above, below", "sources.clutter", "% of returns", 100),
+    "noise": Figure("noise and leakage", "sources.noise", "% of returns", 100),
+    "missed": Figure("missed surfaces", "missed", "% of bearings", 100),
+    "map_f1": Figure("map F1", "map.f1", "%", 100),
+    "matching": Figure("ATE of scan matching", "matching", "m"),
+    "odometry": Figure("odometry ATE", "odometry.ate.position.mean", "m"),
+    "slam": Figure("SLAM ATE", "slam.ate.position.mean", "m"),
 }
 
 

@@ -8,7 +8,7 @@ from radarize.errors import InputError
 
 #: Formats by name: module of this package and function; loaded when asked for, since a bag needs the whole pipeline.
 FORMATS = {
-    "bin": ("bin", "export_bin"),
+    "bin": ("plain", "export_bin"),
     "ros2": ("ros2", "export_ros2"),
     "tum": ("plain", "export_tum"),
     "map": ("plain", "export_map"),
@@ -33,9 +33,6 @@ def export(
         output: file or, for ``ros2``, folder to write.
         run: folder of the run that `source`, a recording, was put through; its scans and odometry go into the bag.
         progress: called with frames done and in all.
-
-    Returns:
-        What was written.
 
     Raises:
         InputError: unknown format, the source lacks what is asked for, or the output cannot be written.

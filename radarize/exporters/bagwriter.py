@@ -12,7 +12,7 @@ from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, Qo
 from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores, get_typestore
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 
 _NEVER = QosTime(0, 0)
 #: Latched: who subscribes later gets it too, as /tf_static is meant to be.
@@ -54,27 +54,21 @@ class BagWriter:
         self.path = path
         if path.exists() and not (path.is_dir() and not any(path.iterdir())):
             raise InputError(f"{path}: is there already, expected the name of a new folder for the bag")
-        try:
+        with explained(f"{path}: cannot be written", OSError):
             path.parent.mkdir(parents=True, exist_ok=True)
             self._folder = tempfile.TemporaryDirectory(dir=path.parent, prefix=f"{path.name}.part")
             self._writer = Writer(Path(self._folder.name) / path.name, version=8)
             self._writer.open()
-        except OSError as error:
-            raise InputError(f"{path}: cannot be written ({error.strerror})") from error
         self._connections: dict[str, object] = {}
 
     def __enter__(self) -> "BagWriter":
         return self
 
     def __exit__(self, kind: type | None, error: BaseException | None, trace: object) -> None:
-        try:
+        with self._folder, explained(f"{self.path}: cannot be written", OSError):
             self._writer.close()
             if kind is None:
                 os.replace(Path(self._folder.name) / self.path.name, self.path)
-        except OSError as failure:
-            raise InputError(f"{self.path}: cannot be written ({failure.strerror})") from failure
-        finally:
-            self._folder.cleanup()
 
     def write(self, topic: str, time: float, content: object) -> None:
         """Append a message, received at `time`, s."""

@@ -42,13 +42,8 @@ def mirrored_columns(label: Float[Tensor, "item row bearing"], unknown: int) -> 
 
 
 def other_radar(maps: Maps, generator: Generator, doppler: bool) -> Maps:
-    """The same scene by a radar of other gains, noise and channels, which loses chirps; each of it for half the items.
-
-    Args:
-        maps: of dB.
-        generator: of random numbers.
-        doppler: whether rows are Doppler bins, not range bins.
-    """
+    """The same scene (dB) by a radar of other gains, noise and channels, which loses chirps where rows are Doppler, not
+    range bins; each of it for half the items."""
     power = 10 ** (maps / 10)
     for effect in (noise, mismatch, lost_chirps if doppler else range_gain):
         power = effect(power, generator, chosen(maps, generator))

@@ -1,15 +1,14 @@
 """On which cells a map lies, and whether two radars' maps lie on the same."""
 
-from pydantic import BaseModel, ConfigDict
-
 from radarize.features.maps import Maker, MapMaker
+from radarize.plain import Frozen
 from radarize.radar.config import RadarConfig
 
 #: Steps of range or speed that differ by less read as the same grid.
 TOLERANCE = 0.01
 
 
-class Grid(BaseModel):
+class Grid(Frozen):
     """Cells of a map: a network that knows one grid reads wrong speeds and ranges off another.
 
     Attributes:
@@ -19,8 +18,6 @@ class Grid(BaseModel):
         field: rad, from the first column to the last.
         frame_period: s.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     rows: int
     step: float

@@ -102,11 +102,7 @@ class Maker(ABC):
 
 
 class MapMaker(Maker):
-    """Makes the maps of one radar configuration, dB; without antennas of two heights, only those of the row.
-
-    Args:
-        config: radar configuration.
-    """
+    """Makes the maps of one radar configuration, dB; without antennas of two heights, only those of the row."""
 
     maps = MAPS
 

@@ -100,14 +100,14 @@ class Table:
                 unknown, or memory does not suffice.
         """
         lengths, periods, grids = zip(*(_open(path, maps, maker) for path in paths), strict=True)
-        for path, period, grid in zip(paths, periods, grids, strict=True):
-            if grid and (difference := grids[0].difference(grid)):
+        for path, period, own in zip(paths, periods, grids, strict=True):
+            if maps and (difference := grids[0][maps[0]].difference(own[maps[0]])):
                 raise InputError(f"{path}: has maps of {difference} as in {paths[0].name}, expected one radar's")
             if abs(period - periods[0]) > 1e-6:
                 raise InputError(
                     f"{path}: has frames every {period:g} s, expected {periods[0]:g} s as in {paths[0].name}"
                 )
-        shapes = _shapes(paths[0], maps, maker)
+        shapes = {name: (grid.rows, grid.azimuths) for name, grid in grids[0].items()}
         size = 2 * sum(lengths) * sum(rows * columns for rows, columns in shapes.values())
         if size > (free := psutil.virtual_memory().available):
             raise InputError(
@@ -137,7 +137,7 @@ class Table:
             {name: torch.from_numpy(values) for name, values in joined.items()},
             {reading.name: rows[reading.name] for reading in truth},
             list(lengths),
-            grids[0],
+            next(iter(grids[0].values()), None),
             periods[0],
             {reading.name: rows[reading.name] for reading in sensed},
         )
@@ -169,18 +169,12 @@ class Table:
         return torch.stack([values[frames] for values in self.maps.values()], dim=2).float()
 
 
-def _shapes(path: Path, maps: Sequence[str], maker: type[Maker]) -> dict[str, tuple[int, int]]:
-    with Recording(path) as recording:
-        axes = {name: maker.axes(recording.config, name) for name in maps}
-    return {name: (own.rows, len(own.azimuths)) for name, own in axes.items()}
-
-
-def _open(path: Path, maps: Sequence[str], maker: type[Maker]) -> tuple[int, float, Grid | None]:
-    """Frames that networks see, their period, and the grid of their maps, if they see any."""
+def _open(path: Path, maps: Sequence[str], maker: type[Maker]) -> tuple[int, float, dict[str, Grid]]:
+    """Frames that networks see, their period, and the grids of their maps."""
     with Recording(path) as recording:
         stride = maker.stride(recording.config)
-        grid = Grid.of(recording.config, maps[0], maker) if maps else None
-        return -(-len(recording) // stride), stride * recording.config.frame_period, grid
+        grids = {name: Grid.of(recording.config, name, maker) for name in maps}
+        return -(-len(recording) // stride), stride * recording.config.frame_period, grids
 
 
 def _read(

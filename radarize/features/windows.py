@@ -51,13 +51,8 @@ class Windows:
         stamps: Float[np.ndarray, "frame"],
         spacings: Sequence[int] = (1,),
     ) -> list[Shown]:
-        """Windows that end at the next frames, for each spacing (frames of the network's) between their frames.
-
-        Args:
-            made: `maps` of the next frames.
-            stamps: of them, s.
-            spacings: see above.
-        """
+        """Windows that end at the next frames, by their maps and stamps (s), for each spacing (frames of the network's)
+        between their frames."""
         new = torch.stack([torch.from_numpy(made[name]) for name in self.maps], dim=1).float()
         frames = new if self._past is None else torch.cat([self._past, new])
         stamps = np.concatenate([self._stamps, stamps])

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.importers import bin as bin_format
 from radarize.importers import cube as cube_format
 from radarize.importers import pcap as pcap_format
+from radarize.importers import pictures as picture_format
 from radarize.importers import studio as studio_format
 from radarize.importers.capture import Batch, Capture
 from radarize.importers.parameters import Given
@@ -32,14 +33,17 @@ _ASKED = 8
 _BAGS, _ARRAYS = (".bag", ".mcap", ".db3"), (".npy", ".npz", ".mat")
 _EXPECTED = (
     "a DCA1000 .bin, a .pcap, a folder of mmWave Studio files, a ROS bag (.bag, .mcap, .db3 or a folder), "
-    "or an array (.npy, .npz, .mat)"
+    "an array (.npy, .npz, .mat), or RadarHD's dataset_5"
 )
 #: What poses given by hand stand in for.
 _POSES = ("truth/time", "truth/pose", "truth/velocity")
 
 
 def import_recording(
-    source: Path, output: Path, given: Given | None = None, progress: Callable[[int, int], None] | None = None
+    source: Path,
+    output: Path,
+    given: Given | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """Write a recording (.h5) from a capture.
 
@@ -49,14 +53,11 @@ def import_recording(
 
     Args:
         source: a DCA1000 ``.bin``, whole or in parts (its ``.cfg`` of the same name, or mmWave Studio's JSON files, may
-            lie beside it), a ``.pcap`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, or an array of
-            samples (``.npy``, ``.npz``, ``.mat``).
+            lie beside it), a ``.pcap`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an array of
+            samples (``.npy``, ``.npz``, ``.mat``), or RadarHD's data set of pictures, of which ``given.walk`` is taken.
         output: recording to write.
         given: what the user says of it.
         progress: called with frames done and (estimated) frames in all.
-
-    Returns:
-        `output`.
 
     Raises:
         InputError: unknown format, nothing usable in the source, or a configuration that does not fit it.
@@ -67,6 +68,8 @@ def import_recording(
     if source.resolve() == output.resolve():
         raise InputError(f"{output}: is the source itself, expected another output file")
     products = _poses(given.poses) if given.poses else {}
+    if picture_format.asked(source, given.walk):
+        return picture_format.import_walk(source, given.walk, output, products, progress or (lambda done, total: None))
 
     capture = _open(source, output, given)
     batches = iter(capture.batches)
@@ -93,8 +96,7 @@ def import_recording(
             writer.append(frames, stamps, batch.valid, rows={name: batch.rows[name] for name in streams})
             start_time = stamps[0] if not done else start_time
             done, last = done + len(batch.valid), stamps[-1]
-            if progress:
-                progress(done, max(done, capture.expected_frames))
+            progress(done, max(done, capture.expected_frames))
         if products:
             end = last + radar.frame_period
             capture.warnings += _apart(products["truth/time"].data, start_time, end, given.poses)
@@ -132,10 +134,7 @@ def _open(source: Path, output: Path, given: Given) -> Capture:
     if given.latency is not None and kind != "bag":
         raise InputError(f"{source}: is no ROS bag, but latency is {given.latency:g} s, expected none")
     if kind == "studio":
-        studio = studio_format.find(source)
-        given = given.or_else(studio.config, studio.text)
-        config, _ = given.configure(str(studio.settings))
-        return bin_format.open_bin(studio.files, config, given.cfg_text, warnings=studio.warnings)
+        return studio_format.open_studio(source, given)
     beside = bin_format.whole_name(source).with_suffix(".cfg")
     if given.config is None and beside.is_file():
         given = given.or_else(*load_config(beside))
@@ -159,11 +158,8 @@ def _kind(source: Path) -> str:
         return "bag"
     if suffix in _ARRAYS:
         return "cube"
-    try:
-        with source.open("rb") as file:
-            magic = file.read(4)
-    except OSError as error:
-        raise InputError(f"{source}: cannot be read ({error.strerror})") from error
+    with explained(f"{source}: cannot be read", OSError), source.open("rb") as file:
+        magic = file.read(4)
     if magic in pcap_format.MAGIC or suffix in (".pcap", ".pcapng"):
         return "pcap"
     if suffix == ".bin":

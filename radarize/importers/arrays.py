@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from radarize.errors import InputError, reason
+from radarize.errors import InputError, explained
 from radarize.npyfile import npy_header
 
 #: Bytes of a compressed member unpacked at a time.
@@ -29,9 +29,12 @@ class ArrayFile(ABC):
     shape: tuple[int, ...]
     dtype: np.dtype
 
-    @abstractmethod
     def take(self, axis: int, start: int, stop: int) -> np.ndarray:
         """Entries start...stop-1 along an axis."""
+        return self._take(tuple(slice(start, stop) if k == axis else slice(None) for k in range(len(self.shape))))
+
+    @abstractmethod
+    def _take(self, where: tuple[slice, ...]) -> np.ndarray: ...
 
     def reshaped(self, shape: tuple[int, ...]) -> None:
         """Take the entries in their order for an array of another shape.
@@ -63,11 +66,10 @@ class MappedArray(ArrayFile):
         if size < expected:
             raise InputError(f"{name}: holds {size} bytes, expected {expected} for shape {self.shape} of {stored}")
 
-    def take(self, axis: int, start: int, stop: int) -> np.ndarray:
-        """Entries start...stop-1 along an axis."""
+    def _take(self, where: tuple[slice, ...]) -> np.ndarray:
         order = "F" if self._fortran else "C"
         mapped = np.memmap(self._path, self._stored, "r", self._offset, self.shape, order)
-        return _joined(np.array(mapped[(slice(None),) * axis + (slice(start, stop),)]), self.dtype)
+        return _joined(np.array(mapped[where]), self.dtype)
 
     def _reshape(self, shape: tuple[int, ...]) -> None:
         if self._fortran and len(self.shape) > 1:
@@ -95,9 +97,8 @@ class MemoryArray(ArrayFile):
         self.name, self.values, self.shape = name, values, values.shape
         self.dtype = _checked(values.dtype, name)
 
-    def take(self, axis: int, start: int, stop: int) -> np.ndarray:
-        """Entries start...stop-1 along an axis."""
-        return self.values[(slice(None),) * axis + (slice(start, stop),)]
+    def _take(self, where: tuple[slice, ...]) -> np.ndarray:
+        return self.values[where]
 
 
 class MatlabArray(ArrayFile):
@@ -107,13 +108,9 @@ class MatlabArray(ArrayFile):
         self.name, self._data, self.shape = name, data, data.shape[::-1]
         self.dtype = _checked(data.dtype, name)
 
-    def take(self, axis: int, start: int, stop: int) -> np.ndarray:
-        """Entries start...stop-1 along an axis."""
-        rows = (slice(None),) * (len(self.shape) - 1 - axis) + (slice(start, stop),)
-        try:
-            return _joined(self._data[rows], self.dtype).T
-        except Exception as error:  # as in `open_array`
-            raise InputError(f"{self.name}: is damaged ({reason(error)})") from error
+    def _take(self, where: tuple[slice, ...]) -> np.ndarray:
+        with explained(f"{self.name}: is damaged"):
+            return _joined(self._data[where[::-1]], self.dtype).T
 
 
 def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
@@ -127,7 +124,7 @@ def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
     Raises:
         InputError: not such a file, no such array, or one that does not hold numbers.
     """
-    try:
+    with explained(f"{path}: cannot be read"):
         if path.suffix.lower() == ".npz":
             return _open_npz(path, variable, folder)
         if path.suffix.lower() == ".mat":
@@ -135,10 +132,6 @@ def open_array(path: Path, variable: str | None, folder: Path) -> ArrayFile:
         with path.open("rb") as file:
             header = npy_header(file, str(path))
             return MappedArray(str(path), path, header, file.tell())
-    except InputError:
-        raise
-    except Exception as error:  # zipfile, zlib, HDF5 and scipy raise whatever they meet in a damaged file
-        raise InputError(f"{path}: cannot be read ({reason(error)})") from error
 
 
 def _open_npz(path: Path, variable: str | None, folder: Path) -> ArrayFile:

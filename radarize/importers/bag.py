@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.errors import InputError, reason
+from radarize.errors import InputError, explained
 from radarize.importers.bin import all_zero
 from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.importers.companions import ChipPoints, Companion, Depth, InertialSensor, TrackedPose
@@ -110,12 +110,10 @@ def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
 
 
 def _configure(path: Path, frame: object, given: Given) -> tuple[RadarConfig, tuple[str, ...]]:
-    try:
+    with explained(f"{path}: has frames without usable shape, rx, tx and data"):
         shape = tuple(int(length) for length in np.atleast_1d(frame.shape))
         rx, tx = _antennas(frame.rx), _antennas(frame.tx)
         whole = np.asarray(frame.data).dtype.kind in "iu" and min(shape, default=0) > 0
-    except (AttributeError, TypeError, ValueError, OverflowError) as error:
-        raise InputError(f"{path}: has frames without usable shape, rx, tx and data ({reason(error)})") from error
     loops, rest = divmod(math.prod(shape), max(1, shape[-1] * len(rx) * len(tx))) if whole else (0, 0)
     if rest or not loops:
         raise InputError(
@@ -139,11 +137,9 @@ def _antennas(field: object) -> tuple[int, ...]:
 
 def _calibrated(config: RadarConfig, frame: object, name: str, warnings: list[str]) -> RadarConfig:
     """The configuration with the frame's calibration, unless it has one of its own."""
-    try:
+    with explained(f"{name}: has frames without usable range_bias and rx_phase_bias"):
         pairs = np.asarray(getattr(frame, "rx_phase_bias", ()), float).reshape(-1)
         bias = float(getattr(frame, "range_bias", 0.0))
-    except (TypeError, ValueError) as error:
-        raise InputError(f"{name}: has frames without usable range_bias and rx_phase_bias ({reason(error)})") from error
     untouched = config.range_bias == 0 and set(config.channel_calibration) == {(1.0, 0.0)}
     if not untouched or not pairs.any():
         return config

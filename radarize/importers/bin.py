@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Int16
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import check_layout, decode
@@ -105,15 +105,12 @@ def _blocks(files: Sequence[Path], size: int) -> Iterator[bytes]:
     """Content of the files put end to end, in blocks of `size` bytes; the last one may be shorter."""
     block = b""
     for path in files:
-        try:
-            with path.open("rb") as file:
-                while data := file.read(size - len(block)):
-                    block += data
-                    if len(block) == size:
-                        yield block
-                        block = b""
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror})") from error
+        with explained(f"{path}: cannot be read", OSError), path.open("rb") as file:
+            while data := file.read(size - len(block)):
+                block += data
+                if len(block) == size:
+                    yield block
+                    block = b""
     yield block
 
 

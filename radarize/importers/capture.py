@@ -42,7 +42,6 @@ class Capture:
     """An opened source.
 
     Attributes:
-        config: radar configuration.
         cfg_text: text it was read from, if any.
         batches: there is at least one, or taking the first raises InputError.
         expected_frames: estimate for progress bars.

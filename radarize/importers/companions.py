@@ -13,7 +13,7 @@ from jaxtyping import Float, UInt16
 from PIL import Image
 from scipy.spatial.transform import Rotation, Slerp
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.points import COLUMNS
 from radarize.radar.config import RadarConfig
 from radarize.recording import Product, Stream
@@ -40,7 +40,6 @@ class Companion(ABC):
     """A topic beside the radar's, taken message by message and given out frame batch by frame batch.
 
     Args:
-        config: radar configuration.
         first: the topic's first message.
 
     Attributes:
@@ -222,13 +221,11 @@ def depth_picture(message: object) -> UInt16[np.ndarray, "row column"]:
         picture = np.ascontiguousarray(picture).view(kind)
         return picture.astype(np.uint16) if kind.kind == "u" else _millimetres(picture)
     data = bytes(message.data)
-    try:
+    with explained(f"depth picture ({message.format}) is no readable PNG"):
         with Image.open(io.BytesIO(data[_DEPTH_HEADER:]), formats=["PNG"]) as packed:
             if packed.width * packed.height > _MOST_PIXELS:
                 raise InputError(f"depth picture has {packed.width} x {packed.height} pixels, expected a camera's")
             picture = np.asarray(packed)
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise InputError(f"depth picture ({message.format}) is no readable PNG ({error})") from error
     if picture.ndim != 2:
         raise InputError(f"depth picture ({message.format}) has {picture.ndim} axes, expected one grey value a pixel")
     if message.format.strip().startswith("32FC1"):  # quantised inverse depth: a / (value - b)
@@ -309,17 +306,13 @@ def cloud_columns(message: object) -> Float[np.ndarray, "point column"]:
     data = np.asarray(message.data, np.uint8)
     if data.size < count * step:
         raise InputError(f"point cloud of {count} points has {data.size} bytes, expected {count * step}")
-    table = data[: count * step].reshape(count, step)
-    sources = {"x": "x", "y": "y", "z": "z", "velocity": "velocity", "snr": "intensity", "noise": "noise"}
-    columns = []
-    for name in COLUMNS:
-        field = fields.get(sources[name])
-        if field is None or field.datatype != 7 or field.offset + 4 > step:  # 7: float32
-            if name in "xyz":
-                raise InputError(f"point cloud has fields {', '.join(fields) or '(none)'}, expected float32 x, y, z")
-            columns.append(np.full(count, np.nan))
-            continue
-        kind = ">f4" if message.is_bigendian else "<f4"
-        column = np.ascontiguousarray(table[:, field.offset : field.offset + 4]).view(kind)[:, 0].astype(float)
-        columns.append(-column if name == "velocity" else column)
-    return np.column_stack(columns)
+    usable = {name: f.offset for name, f in fields.items() if f.datatype == 7 and f.offset + 4 <= step}  # 7: float32
+    if not {*"xyz"} <= usable.keys():
+        raise InputError(f"point cloud has fields {', '.join(fields) or '(none)'}, expected float32 x, y, z")
+    formats = [">f4" if message.is_bigendian else "<f4"] * len(usable)
+    kind = np.dtype({"names": [*usable], "formats": formats, "offsets": [*usable.values()], "itemsize": step})
+    table = np.ascontiguousarray(data[: count * step]).view(kind)
+    columns = {name: table[name].astype(float) for name in usable}
+    columns["snr"] = columns.get("intensity", unknown := np.full(count, np.nan))
+    columns["velocity"] = -columns.get("velocity", unknown)
+    return np.column_stack([columns.get(name, unknown) for name in COLUMNS])

@@ -16,7 +16,6 @@ class Stamps:
     """When frames begin: from their headers, or from their receipt.
 
     Args:
-        config: radar configuration.
         first: the first frame.
         received: when that was, s.
         latency: given by the user, s.
@@ -40,11 +39,7 @@ class Stamps:
 
 
 class Frames:
-    """Raw frames that wait for what comes along with them, and what was wrong with others.
-
-    Args:
-        config: radar configuration.
-    """
+    """Raw frames that wait for what comes along with them, and what was wrong with others."""
 
     def __init__(self, config: RadarConfig):
         self.config, self.words = config, config.frame_bytes // 2

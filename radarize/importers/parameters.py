@@ -41,6 +41,7 @@ class Given:
         variable: which array of an ``.npz`` or ``.mat``.
         latency: from a frame's start to its receipt in a ROS bag, s; by default what the headers say, else the burst's
             length.
+        walk: number of a walk in a data set of pictures.
     """
 
     config: RadarConfig | None = None
@@ -51,6 +52,7 @@ class Given:
     shape: str | None = None
     variable: str | None = None
     latency: float | None = None
+    walk: int | None = None
 
     def or_else(self, config: RadarConfig, cfg_text: str) -> "Given":
         """The same with a configuration, and its text, unless there is one."""

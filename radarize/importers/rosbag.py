@@ -7,6 +7,7 @@ ROS 2 bags before Iron. All other messages are ROS's own.
 import heapq
 import re
 from collections.abc import Collection, Iterator
+from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from rosbags.rosbag1.reader import Header, RecordType, read_bytes, read_uint32
 from rosbags.rosbag2 import Reader as Reader2
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
-from radarize.errors import InputError, reason
+from radarize.errors import explained
 
 #: What the Radarize data set's recorder publishes for every frame, where a bag does not say; header stamps stay unset.
 FRAME_TYPE = "xwr_raw_ros/msg/RadarFrameFull"
@@ -82,25 +83,20 @@ class Bag:
     def __init__(self, path: Path):
         self.path = path
         self._ros1 = path.suffix.lower() == ".bag"
-        try:
-            self._reader = StreamingReader(path) if self._ros1 else Reader2(path)
-            self._reader.open()
-        except Exception as error:  # the library raises whatever its parsers meet in a damaged file
-            raise self._damaged(error) from error
-        try:
-            self._types = self._definitions()
-        except Exception as error:
-            self._reader.close()
-            raise InputError(f"{path}: has message definitions that cannot be read ({reason(error)})") from error
+        with ExitStack() as stack:
+            with explained(f"{path}: is no readable ROS bag"):
+                self._reader = StreamingReader(path) if self._ros1 else Reader2(path)
+                self._reader.open()
+            stack.callback(self._reader.close)
+            with explained(f"{path}: has message definitions that cannot be read"):
+                self._types = self._definitions()
+            self._open = stack.pop_all()
 
     def __enter__(self) -> "Bag":
         return self
 
     def __exit__(self, *_) -> None:
-        self._reader.close()
-
-    def _damaged(self, error: Exception) -> InputError:
-        return InputError(f"{self.path}: is no readable ROS bag ({reason(error)})")
+        self._open.close()
 
     def _definitions(self):
         """Standard messages, and the radar's frames as the bag defines them."""
@@ -134,13 +130,9 @@ class Bag:
         """
         connections = [connection for connection in self._reader.connections if connection.topic in topics]
         decode = self._types.deserialize_ros1 if self._ros1 else self._types.deserialize_cdr
-        try:
+        with explained(f"{self.path}: is no readable ROS bag"):
             for connection, time, data in self._reader.messages(connections=connections):
                 yield connection.topic, time, decode(data, connection.msgtype)
-        except InputError:
-            raise
-        except Exception as error:
-            raise self._damaged(error) from error
 
 
 def is_frame(kind: str) -> bool:

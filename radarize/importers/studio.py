@@ -1,23 +1,12 @@
 """Captures of mmWave Studio: ``.bin`` with ``NAME.mmwave.json`` and ``NAME.setup.json`` beside it."""
 
-from dataclasses import dataclass
 from pathlib import Path, PureWindowsPath
 
 from radarize.errors import InputError
-from radarize.importers.bin import parts
-from radarize.radar.config import RadarConfig
+from radarize.importers.bin import open_bin, parts
+from radarize.importers.capture import Capture
+from radarize.importers.parameters import Given
 from radarize.radar.studio import load_json, load_studio
-
-
-@dataclass(frozen=True)
-class StudioCapture:
-    """Files and settings of a capture."""
-
-    files: tuple[Path, ...]
-    settings: Path
-    config: RadarConfig
-    text: str
-    warnings: tuple[str, ...]
 
 
 def beside(source: Path) -> bool:
@@ -25,11 +14,11 @@ def beside(source: Path) -> bool:
     return len(list(source.parent.glob("*.mmwave.json"))) == 1
 
 
-def find(source: Path) -> StudioCapture:
-    """Collect a capture from its folder, or from one of its ``.bin`` files.
+def open_studio(source: Path, given: Given) -> Capture:
+    """Open a capture by its folder, or by one of its ``.bin`` files.
 
     Raises:
-        InputError: settings or samples are missing or ambiguous.
+        InputError: settings or samples are missing or ambiguous; see `open_bin`.
     """
     folder = source if source.is_dir() else source.parent
     settings = _one(folder, "*.mmwave.json")
@@ -37,7 +26,8 @@ def find(source: Path) -> StudioCapture:
     if len(setups) > 1:
         raise InputError(f"{folder}: has {len(setups)} files *.setup.json, expected one")
     setup = load_json(setups[0]) if setups else {}
-    config, text = load_studio(settings, setups[0] if setups else None)
+    given = given.or_else(*load_studio(settings, setups[0] if setups else None))
+    config, _ = given.configure(str(settings))
     files, filled = _captured(setup, folder)
     if not source.is_dir():
         files = parts(source)
@@ -45,7 +35,7 @@ def find(source: Path) -> StudioCapture:
         captures = {parts(path) for path in folder.glob("*.bin")}
         files = captures.pop() if len(captures) == 1 else [_one(folder, "*.bin")]
     warnings = (f"{filled} bytes were lost on capture and filled with zeros",) if filled else ()
-    return StudioCapture(tuple(files), settings, config, text, warnings)
+    return open_bin(files, config, given.cfg_text, warnings=warnings)
 
 
 def _captured(setup: dict, folder: Path) -> tuple[list[Path], int]:

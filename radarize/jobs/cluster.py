@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from radarize.errors import InputError, first_line
+from radarize.errors import InputError, explained, first_line
 from radarize.jobs.job import Job, News, Report, attempt
 
 #: How often Ray begins a job again whose worker or node died.
@@ -92,10 +92,8 @@ def _connect(address: str):
         raise InputError("ray is not installed; type: pip install 'radarize[ray]'") from None
     _knock(address)
     if not ray.is_initialized():
-        try:
+        with explained(f"--ray {address}: no cluster answers", ConnectionError, ValueError, RuntimeError):
             ray.init(address=address, log_to_driver=False, logging_level="ERROR")
-        except (ConnectionError, ValueError, RuntimeError) as error:
-            raise InputError(f"--ray {address}: no cluster answers ({first_line(error)})") from error
     return ray
 
 
@@ -104,7 +102,5 @@ def _knock(address: str) -> None:
     host, _, port = address.removeprefix("ray://").rpartition(":")
     if not host:
         return  # auto
-    try:
+    with explained(f"--ray {address}: no cluster answers", OSError, ValueError):
         socket.create_connection((host, int(port)), timeout=5).close()
-    except (OSError, ValueError) as error:
-        raise InputError(f"--ray {address}: no cluster answers ({error})") from error

@@ -1,9 +1,11 @@
 """A job, what one hears of it, and how it is tried."""
 
+import os
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from radarize.errors import InputError, first_line
+from radarize.errors import DEBUG, InputError, first_line, of_system
 
 #: Takes how far a job is, in units of its own.
 Report = Callable[[float], None]
@@ -30,10 +32,14 @@ class News:
 
 
 def attempt(name: str, job: Job, report: Report) -> News:
-    """Do a job here; a failure is news, too."""
+    """Do a job here; a failure is news, too: an internal error, whose place --debug shows, if nobody expects it."""
     try:
         return News(name, ended=True, result=job(report))
     except InputError as error:
         return News(name, ended=True, error=str(error))
+    except OSError as error:
+        return News(name, ended=True, error=f"{name}: {of_system(error)}")
     except Exception as error:  # one broken job must not end the others
+        if DEBUG in os.environ:
+            traceback.print_exc()
         return News(name, ended=True, error=f"{name}: internal error, {type(error).__name__}: {first_line(error)}")

@@ -1,20 +1,20 @@
 """Range scans from heat maps: detection, then echo suppression, by one of several methods.
 
-A scan has one range per bearing, inf where nothing is seen. `make_scans` is the way in; `METHODS` names the ways to get
-there, each a function of `Maps` that returns fractional range bins. A network joins them by another entry.
+A scan has one range per bearing, inf where nothing is seen. `METHODS` names the ways to get there, each a function of
+`Maps` that returns fractional range bins.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from pydantic import BaseModel, ConfigDict, Field
 
 from radarize.batch import Batch
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.mapping import echoes
+from radarize.plain import Frozen, setting
 from radarize.points import Cfar, level_around
 from radarize.stopwatch import stage
 
@@ -22,42 +22,30 @@ from radarize.stopwatch import stage
 BEARINGS = np.radians(np.arange(-44.0, 44.0))
 
 
-class ScanConfig(BaseModel):
+class ScanConfig(Frozen):
     """Detection of echoes in range-azimuth maps."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    min_range: float = Field(0.3, ge=0, description="m, nearer cells hold transmitter leakage")
-    above_noise_db: float = Field(15.0, gt=0, description="dB, an echo stands so far above the noise")
-    below_ring_db: float = Field(
-        15.0,
-        gt=0,
-        description="dB, an echo lies at most so far below the strongest of all bearings at its range; what is weaker "
-        "is taken for that echo's sidelobe",
+    min_range: float = setting(0.3, "m, nearer cells hold transmitter leakage", ge=0)
+    above_noise_db: float = setting(15.0, "dB, an echo stands so far above the noise", gt=0)
+    below_ring_db: float = setting(
+        15.0, "dB, an echo lies at most so far below the strongest of all bearings at its range; what is weaker is "
+        "taken for that echo's sidelobe", gt=0
+    )  # fmt: skip
+    below_bearing_db: float = setting(
+        6.0, "dB, the same below the strongest of all ranges on its bearing; what is weaker and nearer is clutter "
+        "above or below the plane, or the skirt of a neighbour: in simulated offices 6 dB halves the echoes that come "
+        "too early and costs one in ten of the others", gt=0
+    )  # fmt: skip
+    noise_quantile: float = setting(
+        0.25, "the noise is this quantile of a frame's cells: most of a room's cells are behind its walls", gt=0, lt=1
     )
-    below_bearing_db: float = Field(
-        6.0,
-        gt=0,
-        description="dB, the same below the strongest of all ranges on its bearing; what is weaker and nearer is "
-        "clutter above or below the plane, or the skirt of a neighbour: in simulated offices 6 dB halves the echoes "
-        "that come too early and costs one in ten of the others",
+    cfar: Cfar = setting(
+        Cfar(window=8, guard=4, threshold=10.0), "what an echo stands above in range and in bearing, for scans by cfar"
     )
-    noise_quantile: float = Field(
-        0.25,
-        gt=0,
-        lt=1,
-        description="the noise is this quantile of a frame's cells: most of a room's cells are behind its walls",
-    )
-    cfar: Cfar = Field(
-        Cfar(window=8, guard=4, threshold=10.0),
-        description="what an echo stands above in range and in bearing, for scans by cfar",
-    )
-    elevation_power: float = Field(
-        2.0,
-        gt=0,
-        description="how strongly echoes from above and below are weighed down, for scans by elevation-aware: a cell's "
-        "power is multiplied with (elevation-aware / reference power)^this, at most 1",
-    )
+    elevation_power: float = setting(
+        2.0, "how strongly echoes from above and below are weighed down, for scans by elevation-aware: a cell's power "
+        "is multiplied with (elevation-aware / reference power)^this, at most 1", gt=0
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -77,6 +65,18 @@ class Maps:
     reference: Float[np.ndarray, "frame range bearing"]
     ranges: Float[np.ndarray, "range"]
     config: ScanConfig
+
+    @classmethod
+    def of(cls, heatmaps: Heatmaps, config: ScanConfig, powers: Sequence[np.ndarray]) -> "Maps":
+        """Of range-azimuth maps: `power` and, where they are known, the two others."""
+        power, *others = (_resample(each, heatmaps.azimuths) for each in powers)
+        level, reference = others or (None, power)
+        return cls(power, level, reference, heatmaps.ranges, config)
+
+    def scans(self, method: str) -> Float[np.ndarray, "frame bearing"]:
+        """Ranges on `BEARINGS`, m, inf where nothing is seen, by a key of `METHODS`."""
+        bins = METHODS[method](self)
+        return np.where(np.isfinite(bins), self.ranges[0] + bins * (self.ranges[1] - self.ranges[0]), np.inf)
 
 
 def detect(power: Float[np.ndarray, "frame range bearing"], maps: Maps) -> Bool[np.ndarray, "frame range bearing"]:
@@ -112,8 +112,6 @@ def first_echo(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
 
 def elevation_aware(maps: Maps) -> Float[np.ndarray, "frame bearing"]:
     """The first echo of every bearing after weighing down what comes from above and below."""
-    if maps.elevation_aware is None:
-        raise InputError("scans: method elevation-aware needs an elevation-aware map, found none; use first-echo")
     horizon = np.clip(maps.elevation_aware / np.maximum(maps.reference, 1e-30), 0, 1)
     power = maps.power * horizon**maps.config.elevation_power
     return echoes.first(detect(power, maps), power)
@@ -127,68 +125,11 @@ METHODS: dict[str, Callable[[Maps], np.ndarray]] = {
 }
 
 
-def make_scans(
-    range_azimuth: Float[np.ndarray, "frame range azimuth"],
-    ranges: Float[np.ndarray, "range"],
-    azimuths: Float[np.ndarray, "azimuth"],
-    elevation_aware: Float[np.ndarray, "frame range azimuth"] | None = None,
-    *,
-    reference: Float[np.ndarray, "frame range azimuth"] | None = None,
-    method: str = "elevation-aware",
-    config: ScanConfig | None = None,
-) -> Float[np.ndarray, "frame bearing"]:
-    """Scans on `BEARINGS` from power maps.
-
-    Args:
-        range_azimuth: power (linear) over all elevations. Capon's beamformer gives far better scans than Bartlett's:
-            in simulated offices four of five ranges are within 10 cm, against one of two.
-        ranges: of the bins, m, evenly spaced.
-        azimuths: of the columns, rad, ascending; bearings outside see nothing.
-        elevation_aware: power of the elevation-aware array on the same axes.
-        reference: power over all elevations by the beamformer of `elevation_aware`; None: `range_azimuth`.
-        method: a key of `METHODS`.
-        config: parameters of detection.
-
-    Returns:
-        Ranges, m, inf where nothing is seen.
-
-    Raises:
-        InputError: unknown method, or shapes that do not fit.
-    """
-    if method not in METHODS:
-        raise InputError(f"scans: method is {method!r}, expected one of {', '.join(METHODS)}")
-    ranges, azimuths = np.asarray(ranges, float), np.asarray(azimuths, float)
-    for name, power in (
-        ("range_azimuth", range_azimuth),
-        ("elevation_aware", elevation_aware),
-        ("reference", reference),
-    ):
-        if power is not None and np.shape(power)[1:] != (len(ranges), len(azimuths)):
-            raise InputError(
-                f"scans: {name} has shape {np.shape(power)}, expected (frame, {len(ranges)}, {len(azimuths)}) "
-                "from its range and azimuth axes"
-            )
-    if not len(range_azimuth):
-        return np.zeros((0, len(BEARINGS)))
-    power = _resample(range_azimuth, azimuths)
-    maps = Maps(
-        power,
-        None if elevation_aware is None else _resample(elevation_aware, azimuths),
-        power if reference is None else _resample(reference, azimuths),
-        ranges,
-        config or ScanConfig(),
-    )
-    bins = METHODS[method](maps)
-    return np.where(np.isfinite(bins), ranges[0] + bins * (ranges[1] - ranges[0]), np.inf)
-
-
 class HeatmapScans:
     """Scans of a stream's frames, from heat maps alone.
 
     Args:
-        heatmaps: make the maps.
         method: a key of `METHODS`.
-        config: parameters of detection.
 
     Raises:
         InputError: the array has no elevation-aware maps, and the method needs them.
@@ -203,17 +144,15 @@ class HeatmapScans:
 
     def scan(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `BEARINGS`, m, inf where nothing is seen."""
-        maps, spectrum, level, reference = self.heatmaps, batch.spectrum, None, None
+        maps, spectrum = self.heatmaps, batch.spectrum
         with stage("maps"):
-            # Scans want Capon's sharp beams; the horizon is told from two maps of one beamformer, Bartlett's.
-            sharp = maps.range_azimuth_of(spectrum, "capon").numpy()
+            # Scans want Capon's sharp beams, which in simulated offices have four of five ranges within 10 cm, against
+            # Bartlett's one of two; the horizon is told from two maps of one beamformer, Bartlett's.
+            powers = [maps.range_azimuth_of(spectrum, "capon").numpy()]
             if self.method == "elevation-aware":
-                level = maps.elevation_aware_of(spectrum).numpy()
-                reference = maps.range_azimuth_of(spectrum).numpy()
+                powers += [maps.elevation_aware_of(spectrum).numpy(), maps.range_azimuth_of(spectrum).numpy()]
         with stage("scans"):
-            return make_scans(
-                sharp, maps.ranges, maps.azimuths, level, reference=reference, method=self.method, config=self.config
-            )
+            return Maps.of(maps, self.config, powers).scans(self.method)
 
 
 def _resample(power: np.ndarray, azimuths: np.ndarray) -> np.ndarray:

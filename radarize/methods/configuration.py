@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from textwrap import wrap
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel
 
 from radarize.heatmaps import HeatmapConfig
 from radarize.mapping.scans import ScanConfig
@@ -14,26 +14,22 @@ from radarize.odometry.doppler import DopplerConfig
 from radarize.odometry.integration import VelocityConfig
 from radarize.odometry.rotation import RotationConfig
 from radarize.odometry.settings import FusionConfig, TurnConfig
+from radarize.plain import Frozen, setting
 from radarize.slam.config import SlamConfig
 from radarize.yamlfile import read_settings
 
 
-class Configuration(BaseModel):
+class Configuration(Frozen):
     """The pipeline's settings; each section belongs to one step, and is described where that step stands."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    heatmaps: HeatmapConfig = Field(HeatmapConfig(), description="spectra and beamformers of the classical methods")
-    scans: ScanConfig = Field(ScanConfig(), description="echoes in range-azimuth maps, of scans without networks")
-    doppler: DopplerConfig = Field(DopplerConfig(), description="velocity from single echoes")
-    rotation: RotationConfig = Field(RotationConfig(), description="turns by matching frames with a local map")
-    velocity: VelocityConfig = Field(VelocityConfig(), description="filter of velocities, whoever tells them")
-    fusion: FusionConfig = Field(FusionConfig(), description="velocities by network and Doppler together")
-    turns: TurnConfig = Field(TurnConfig(), description="turns by the network")
-    slam: SlamConfig = Field(
-        default_factory=lambda: SlamConfig.preset("radar"),
-        description="the back end",
-    )
+    heatmaps: HeatmapConfig = setting(HeatmapConfig(), "spectra and beamformers of the classical methods")
+    scans: ScanConfig = setting(ScanConfig(), "echoes in range-azimuth maps, of scans without networks")
+    doppler: DopplerConfig = setting(DopplerConfig(), "velocity from single echoes")
+    rotation: RotationConfig = setting(RotationConfig(), "turns by matching frames with a local map")
+    velocity: VelocityConfig = setting(VelocityConfig(), "filter of velocities, whoever tells them")
+    fusion: FusionConfig = setting(FusionConfig(), "velocities by network and Doppler together")
+    turns: TurnConfig = setting(TurnConfig(), "turns by the network")
+    slam: SlamConfig = setting(SlamConfig.preset("radar"), "the back end")
 
     @classmethod
     def load(cls, path: str | Path) -> "Configuration":
@@ -42,7 +38,7 @@ class Configuration(BaseModel):
         Raises:
             InputError: no such file, or a field that does not exist or has an impossible value.
         """
-        return read_settings(path, cls())
+        return read_settings(path, cls(), "sections as `radarize config` prints")
 
     def text(self) -> str:
         """As YAML, with what each field means beside it."""

@@ -5,7 +5,7 @@ the trainings of their networks. A method is a folder beside this file, loaded w
 from collections.abc import Callable
 
 from radarize.errors import InputError
-from radarize.methods import doppler, milliego, published, radarhd, radarize, ransac, rnin, scan_matching
+from radarize.methods import doppler, milliego, pictures, published, radarhd, radarize, ransac, rnin, scan_matching
 from radarize.methods.configuration import Configuration
 from radarize.methods.method import Inputs, Method, Weights, load
 from radarize.methods.task import Task
@@ -13,7 +13,7 @@ from radarize.nets.weights import check
 from radarize.pipeline import Follower, Pipeline, Scanner
 from radarize.radar.config import RadarConfig
 
-_FOLDERS = (radarize, doppler, ransac, scan_matching, milliego, rnin, radarhd, published)
+_FOLDERS = (radarize, doppler, ransac, scan_matching, milliego, rnin, radarhd, pictures, published)
 
 
 def _all(what: str) -> dict:
@@ -33,9 +33,6 @@ CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
 class Workshop:
     """Makes methods, and pipelines of them. Pipelines of one workshop share what they have in common: pushed the same
     batches, spectra, maps, scans and odometry are made once.
-
-    Args:
-        inputs: what all are made from.
     """
 
     def __init__(self, inputs: Inputs):
@@ -55,11 +52,7 @@ class Workshop:
         return self._scanners[name]
 
     def odometry(self, name: str, scans: str) -> Follower:
-        """Odometry by a key of `ODOMETRY`.
-
-        Args:
-            name: of it.
-            scans: what it is made from, if it is made from scans.
+        """Odometry by a key of `ODOMETRY`, made from `scans` if it is made from scans.
 
         Raises:
             InputError: unknown name, or see `Method`.

@@ -8,21 +8,22 @@ from typing import Any
 
 import torch
 from jaxtyping import Float
-from pydantic import BaseModel, ConfigDict, ValidationError
-from safetensors import SafetensorError, safe_open
+from pydantic import ValidationError
+from safetensors import safe_open
 from safetensors.torch import save as serialise
 from torch import Tensor, nn
 
 from radarize import __version__
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.features.grid import TOLERANCE, Grid
 from radarize.features.maps import Maker, MapMaker
 from radarize.features.windows import Windows
+from radarize.plain import Frozen
 from radarize.radar.config import RadarConfig
 from radarize.replacing import replacing
 
 
-class Header(BaseModel):
+class Header(Frozen):
     """What the file says of itself.
 
     Attributes:
@@ -36,8 +37,6 @@ class Header(BaseModel):
         metrics: on its validation data.
         version: of this package.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     kind: str
     setting: str = "corrected"
@@ -141,20 +140,19 @@ def load(path: Path, network: type[Network], config: RadarConfig | None = None) 
         InputError: no such file, no weights of this project, another network's, or trained for maps of another grid.
     """
     tensors, about = read(path)
-    header = _header(about, path)
+    with explained(misfit := f"{path}: its weights do not fit its header", ValidationError):
+        header = Header.model_validate(about)
     if (header.kind, header.setting) != (network.kind, network.setting):
         raise InputError(
             f"{path}: is a network for {header.kind!r} ({header.setting}), expected one for {network.kind!r} "
             f"({network.setting})"
         )
-    try:
+    with explained(misfit, ValueError, RuntimeError, OverflowError):
         with torch.device("meta"), warnings.catch_warnings():  # sizes that the header makes up take no memory
             warnings.simplefilter("ignore")  # nothing is copied
             build(network, header).load_state_dict(tensors)
         net = build(network, header)
         net.load_state_dict(tensors)
-    except (ValueError, RuntimeError, OverflowError) as error:
-        raise _misfit(path, error) from error
     if config is not None:
         _check(header, config, path, network.maker)
     return net.eval(), header
@@ -175,18 +173,8 @@ def header_of(path: Path) -> Header:
     Raises:
         InputError: no such file, or no weights of this project.
     """
-    return _header(read(path, tensors=False)[1], path)
-
-
-def _header(about: dict[str, Any], path: Path) -> Header:
-    try:
-        return Header.model_validate(about)
-    except ValidationError as error:
-        raise _misfit(path, error) from error
-
-
-def _misfit(path: Path, error: Exception) -> InputError:
-    return InputError(f"{path}: its weights do not fit its header ({str(error).splitlines()[0].rstrip(':')})")
+    with explained(f"{path}: its weights do not fit its header", ValidationError):
+        return Header.model_validate(read(path, tensors=False)[1])
 
 
 def _check(header: Header, config: RadarConfig, path: Path, maker: type[Maker]) -> None:
@@ -223,16 +211,15 @@ def read(path: Path, tensors: bool = True) -> tuple[dict[str, Float[Tensor, "...
     """
     if not Path(path).is_file():
         raise InputError(f"{path}: no such file, expected weights (.safetensors)")
-    try:
+    with explained(f"{path}: is no file of weights of this project"):
         with Path(path).open("rb") as file:
             if (size := int.from_bytes(file.read(8), "little")) > _HEADER:
                 raise ValueError(f"its header has {size} bytes, expected at most {_HEADER}")
         with safe_open(path, "pt") as file:
-            about = json.loads((file.metadata() or {})["radarize"])
+            if "radarize" not in (header := file.metadata() or {}):
+                raise ValueError("has no header of radarize")
+            about = json.loads(header["radarize"])
             return {name: file.get_tensor(name) for name in (file.keys() if tensors else ())}, about
-    except (OSError, SafetensorError, KeyError, ValueError, RecursionError) as error:
-        reason = "has no header of radarize" if isinstance(error, KeyError) else str(error)
-        raise InputError(f"{path}: is no file of weights of this project ({reason})") from error
 
 
 def example(net: nn.Module, header: Header) -> tuple[Tensor, ...]:

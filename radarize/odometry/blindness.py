@@ -5,10 +5,11 @@ trusted to the last that could not. Spans that sight parts for less than `BLINK`
 in the end is a blink, which the filters are made for, and is left out.
 """
 
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from jaxtyping import Int
+from pydantic import BaseModel, Field, PlainSerializer
 
 from radarize.odometry.integration import Track
 
@@ -17,25 +18,30 @@ BLINK = 0.3
 _CAUSES = ("no velocity", "no turn", "frames lost")
 
 
-@dataclass
-class Span:
-    """When odometry was blind.
+Finite = Annotated[float, Field(allow_inf_nan=False), PlainSerializer(lambda value: round(value, 4))]
+Amount = Annotated[Finite, Field(ge=0)]
 
-    Attributes:
-        start, stop: s, on the frames' clock.
-        way: m, as odometry guessed it.
-        causes: of `_CAUSES`.
-    """
 
-    start: float
-    stop: float
-    way: float
-    causes: set[str]
+class Span(BaseModel):
+    """From when to when odometry was blind, s; the way meanwhile as it guessed it, m; why."""
+
+    start_s: Finite
+    stop_s: Finite
+    way_m: Amount
+    why: str
 
     @property
-    def why(self) -> str:
-        """Its causes in words."""
-        return " and ".join(cause for cause in _CAUSES if cause in self.causes)
+    def lasts(self) -> float:
+        """s."""
+        return self.stop_s - self.start_s
+
+
+class BlindSpans(BaseModel):
+    """All spans, with their way, m, and its share of the whole way."""
+
+    share_of_way: Amount
+    way_m: Amount
+    spans: list[Span]
 
 
 class Blindness:
@@ -62,61 +68,43 @@ class Blindness:
             before, since = self._last
             # Frames that are left out on purpose come at a pace.
             lost = number - before > 1 and time - since >= BLINK
-            flags = zip(_CAUSES, (not velocity, not turn, lost), strict=True)
-            if causes := {cause for cause, is_so in flags if is_so}:
-                self._extend(Span(float(since), float(time), float(way), causes))
+            if not velocity or not turn or lost:
+                self._extend(float(since), float(time), float(way), (not velocity, not turn, lost))
             self._last = int(number), float(time)
 
     def lost(self, start: float, stop: float) -> None:
         """Say that there are no frames from `start` to `stop` (s), at either end of the stream."""
         if stop - start >= BLINK:
-            self._extend(Span(start, stop, 0.0, {"frames lost"}))
-            self._spans.sort(key=lambda span: span.start)
+            self._extend(start, stop, 0.0, (False, False, True))
+            self._spans.sort(key=lambda span: span.start_s)
 
-    def _extend(self, more: Span) -> None:
-        span = self._spans[-1] if self._spans else None
-        if span and 0 <= more.start - span.stop < BLINK:
-            span.stop, span.way = more.stop, span.way + more.way
-            span.causes |= more.causes
-            return
-        if span and span.stop - span.start < BLINK:
-            self._spans.pop()
-        self._spans.append(more)
+    def _extend(self, start: float, stop: float, way: float, flags: tuple[bool, ...]) -> None:
+        """Join the next span, `flags` of whose `_CAUSES` are true, with the last one, or begin a new one."""
+        causes = {cause for cause, is_so in zip(_CAUSES, flags, strict=True) if is_so}
+        span = self._spans.pop() if self._spans else None
+        if span and 0 <= start - span.stop_s < BLINK:
+            start, way, causes = span.start_s, span.way_m + way, causes | {*span.why.split(" and ")}
+        elif span and span.lasts >= BLINK:
+            self._spans.append(span)
+        why = " and ".join(cause for cause in _CAUSES if cause in causes)
+        self._spans.append(Span(start_s=start, stop_s=stop, way_m=way, why=why))
 
     @property
-    def spans(self) -> list[Span]:
+    def found(self) -> BlindSpans:
         """All so far, in order of time."""
-        return [span for span in self._spans if span.stop - span.start >= BLINK]
+        spans = [span for span in self._spans if span.lasts >= BLINK]
+        way = sum(span.way_m for span in spans)
+        return BlindSpans(share_of_way=way / self.way if self.way > 0 else 0.0, way_m=way, spans=spans)
 
-    def summary(self) -> dict[str, object]:
-        """For ``run.json``: share of the way that is guessed, that way in m, and the spans."""
-        way = sum(span.way for span in self.spans)
-        return {
-            "share_of_way": round(way / self.way, 4) if self.way > 0 else 0.0,
-            "way_m": round(way, 3),
-            "spans": [
-                {
-                    "start_s": round(span.start, 3),
-                    "stop_s": round(span.stop, 3),
-                    "way_m": round(span.way, 3),
-                    "why": span.why,
-                }
-                for span in self.spans
-            ],
-        }
-
-    @property
-    def warning(self) -> str | None:
-        """One sentence with times since the first frame; None if there is nothing to say."""
-        spans = self.spans
-        if not spans:
-            return None
-        longest = max(spans, key=lambda span: span.stop - span.start)
-        seconds = sum(span.stop - span.start for span in spans)
-        share = sum(span.way for span in spans) / self.way if self.way > 0 else 0.0
-        times = "once" if len(spans) == 1 else f"{len(spans)} times"
-        return (
-            f"odometry was blind {times}, for {seconds:.1f} s and {100 * share:.0f} % of the way; "
-            f"{'' if len(spans) == 1 else 'at the longest '}from {longest.start - self._first:.1f} to "
-            f"{longest.stop - self._first:.1f} s ({longest.why}); poses there are guessed"
-        )
+    def warnings(self) -> list[str]:
+        """One sentence with times since the first frame, or none if there is nothing to say."""
+        found = self.found
+        if not found.spans:
+            return []
+        longest, seconds = max(found.spans, key=lambda span: span.lasts), sum(span.lasts for span in found.spans)
+        often, at = ("once", "") if len(found.spans) == 1 else (f"{len(found.spans)} times", "at the longest ")
+        return [
+            f"odometry was blind {often}, for {seconds:.1f} s and {100 * found.share_of_way:.0f} % of the way; {at}"
+            f"from {longest.start_s - self._first:.1f} to {longest.stop_s - self._first:.1f} s ({longest.why}); "
+            "poses there are guessed"
+        ]

@@ -22,10 +22,10 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float, Int
 from numba import njit
-from pydantic import BaseModel, ConfigDict, Field
 
 from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
+from radarize.plain import Frozen, setting
 from radarize.radar.array import virtual_positions
 
 
@@ -46,51 +46,39 @@ class Velocities:
     seen: Bool[np.ndarray, "frame"]
 
 
-class DopplerConfig(BaseModel):
+class DopplerConfig(Frozen):
     """Velocity from the Doppler shifts of single echoes (`DopplerVelocity`)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    beams: int = Field(48, ge=8, description="azimuth beams of the cube, uniform in u_y")
-    echoes: int = Field(160, ge=4, description="strongest peaks kept per frame")
-    threshold: float = Field(20.0, gt=1, description="least peak power over the cube's median")
-    min_range: float = Field(0.25, ge=0, description="m; nearer peaks are leakage")
-    inlier: float = Field(0.15, gt=0, description="m/s, RANSAC's limit on the residual")
-    hypotheses: int = Field(200, ge=1, description="pairs of echoes that RANSAC tries")
-    speed_noise: float = Field(0.003, gt=0, description="m/s, standard deviation of a strong echo's speed")
-    power_noise: float = Field(
-        0.1,
-        gt=0,
-        description="m/s, the same of an echo no stronger than the median of the cube, falling with its amplitude",
+    beams: int = setting(48, "azimuth beams of the cube, uniform in u_y", ge=8)
+    echoes: int = setting(160, "strongest peaks kept per frame", ge=4)
+    threshold: float = setting(20.0, "least peak power over the cube's median", gt=1)
+    min_range: float = setting(0.25, "m; nearer peaks are leakage", ge=0)
+    inlier: float = setting(0.15, "m/s, RANSAC's limit on the residual", gt=0)
+    hypotheses: int = setting(200, "pairs of echoes that RANSAC tries", ge=1)
+    speed_noise: float = setting(0.003, "m/s, standard deviation of a strong echo's speed", gt=0)
+    power_noise: float = setting(
+        0.1, "m/s, the same of an echo no stronger than the median of the cube, falling with its amplitude", gt=0
     )
-    azimuth_noise: float = Field(0.005, gt=0, description="standard deviation of an echo's u_y")
-    elevation: float = Field(
-        0.4,
-        gt=0,
-        description="standard deviation of u_z over all echoes, by which readings are drawn to the horizon",
+    azimuth_noise: float = setting(0.005, "standard deviation of an echo's u_y", gt=0)
+    elevation: float = setting(
+        0.4, "standard deviation of u_z over all echoes, by which readings are drawn to the horizon", gt=0
     )
-    beam: float = Field(
-        0.25, gt=0, description="the most that u_z varies within one echo, which the beam limits; taken if not known"
+    beam: float = setting(
+        0.25, "the most that u_z varies within one echo, which the beam limits; taken if not known", gt=0
     )
-    climb: float = Field(0.15, gt=0, description="m/s, expected vertical speed (handheld bobbing); its mean is zero")
-    still: float = Field(
-        0.02,
-        ge=0,
-        description="m/s; below it and within the fit's own error, if most echoes are still, the sensor stands",
+    climb: float = setting(0.15, "m/s, expected vertical speed (handheld bobbing); its mean is zero", gt=0)
+    still: float = setting(
+        0.02, "m/s; below it and within the fit's own error, if most echoes are still, the sensor stands", ge=0
     )
-    independent: float = Field(
-        0.25,
-        gt=0,
-        description="of the covariance of the fit, what is left where errors that echoes share are told apart; chosen "
-        "with the next two on data set odometry-choice, six walks of 20 s (by hand, cart, robot; A and B of seed 201)",
+    independent: float = setting(
+        0.25, "of the covariance of the fit, what is left where errors that echoes share are told apart; chosen with "
+        "the next two on data set odometry-choice, six walks of 20 s (by hand, cart, robot; A and B of seed 201)", gt=0
+    )  # fmt: skip
+    scale_noise: float = setting(
+        0.003, "of the speed, standard deviation of what echoes share along it: their elevation", ge=0
     )
-    scale_noise: float = Field(
-        0.003, ge=0, description="of the speed, standard deviation of what echoes share along it: their elevation"
-    )
-    course_noise: float = Field(
-        0.0065, ge=0, description="rad, of what they share across it: azimuths that are off to one side"
-    )
-    floor: float = Field(0.0005, ge=0, description="m/s, least standard deviation of a velocity")
+    course_noise: float = setting(0.0065, "rad, of what they share across it: azimuths that are off to one side", ge=0)
+    floor: float = setting(0.0005, "m/s, least standard deviation of a velocity", ge=0)
 
 
 class DopplerVelocity:
@@ -103,7 +91,7 @@ class DopplerVelocity:
         lever: m, see `VelocityEstimator`.
     """
 
-    def __init__(self, heatmaps: Heatmaps, settings: DopplerConfig | None = None, seed: int = 0):
+    def __init__(self, heatmaps: Heatmaps, settings: DopplerConfig | None = None):
         self.settings = settings or DopplerConfig()
         self.config = heatmaps.config
         self.row, self.pairs = heatmaps.row, heatmaps.pairs
@@ -116,20 +104,14 @@ class DopplerVelocity:
         self.lever = float(virtual_positions(self.config).reshape(-1, 3)[self.row, 1].mean()) / 2
         self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
         # One table of random numbers for all frames: the same frame gives the same answer in any batch.
-        self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 2))
+        self._draws = np.random.default_rng(0).random((self.settings.hypotheses, 2))
 
     def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames."""
         spectrum = batch.spectrum
         power = self._heatmaps.beamformed(spectrum, self.row, self._steering).numpy()
-        cells = spectrum.numpy()
-        frames = len(cells)
-        velocity, covariance = np.zeros((frames, 2)), np.zeros((frames, 2, 2))
-        inliers = np.zeros(frames, int)
-        for frame in range(frames):
-            echoes = self._echoes(cells[frame], power[frame])
-            solution = self._solve(echoes)
-            velocity[frame], covariance[frame], inliers[frame] = solution
+        found = [self._solve(self._echoes(*frame)) for frame in zip(spectrum.numpy(), power, strict=True)]
+        velocity, covariance, inliers = map(np.array, zip(*found, strict=True))
         seen = (np.linalg.eigvalsh(covariance)[:, -1] < _DETERMINED**2) & (inliers >= _ECHOES)
         covariance[seen] = self.settings.independent * covariance[seen] + self._shared(velocity[seen])
         return Velocities(velocity, covariance, inliers, seen)

@@ -5,12 +5,12 @@ from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float
-from pydantic import BaseModel, ConfigDict, Field
 
 from radarize.batch import Batch
 from radarize.errors import InputError
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
+from radarize.plain import Frozen, setting
 from radarize.pose import compose, exponential
 from radarize.radar.config import RadarConfig
 from radarize.stopwatch import stage
@@ -70,28 +70,16 @@ class Track:
     turn_seen: Bool[np.ndarray, "frame"]
 
 
-class VelocityConfig(BaseModel):
+class VelocityConfig(Frozen):
     """Filter of velocities (`VelocityFilter`)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    wander: float = Field(
-        0.73, gt=0, description="m/s^1.5, by how much the velocity of a handheld radar wanders in a second"
-    )
-    fastest: float = Field(2.0, gt=0, description="m/s, standard deviation of a velocity not known at all")
-    gate: float = Field(
-        9.0,
-        gt=0,
-        description="squared Mahalanobis distance from which a measurement counts less (Huber-like)",
-    )
+    wander: float = setting(0.73, "m/s^1.5, by how much the velocity of a handheld radar wanders in a second", gt=0)
+    fastest: float = setting(2.0, "m/s, standard deviation of a velocity not known at all", gt=0)
+    gate: float = setting(9.0, "squared Mahalanobis distance from which a measurement counts less (Huber-like)", gt=0)
 
 
 class VelocityFilter:
-    """Causal Kalman filter of the planar velocity as a random walk; measurements far off their prediction count less.
-
-    Args:
-        settings: of the filter.
-    """
+    """Causal Kalman filter of the planar velocity as a random walk; what is far off its prediction counts less."""
 
     def __init__(self, settings: VelocityConfig | None = None):
         self.settings = settings or VelocityConfig()
@@ -120,13 +108,7 @@ class VelocityFilter:
 
 
 class Odometry:
-    """Radar odometry in a stream. Memory does not grow.
-
-    Args:
-        radar: configuration.
-        velocity, rotation: estimators.
-        settings: of the filter of velocities.
-    """
+    """Radar odometry in a stream. Memory does not grow."""
 
     def __init__(
         self,

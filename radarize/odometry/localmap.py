@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Float32
 from numba import njit
+from scipy.ndimage import shift as moved
 
 #: m, by how far the sensor may be off the grid's middle.
 _OFF_MIDDLE = 1.0
@@ -60,25 +61,15 @@ class LocalMap:
     def follow(self, position: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
         """Keep the sensor in the map's middle; its position after that. What leaves the map is forgotten."""
         cell = self._grid.cell
-        shift = np.rint(position / cell).astype(int)
-        if np.abs(shift).max() * cell <= _OFF_MIDDLE:
+        steps = np.rint(position / cell).astype(int)
+        if np.abs(steps).max() * cell <= _OFF_MIDDLE:
             return position
-        self._grid = Grid(_shifted(self._grid.mean, -shift), _shifted(self._grid.count, -shift), cell)
-        return position - shift * cell
+        self._grid = Grid(*(moved(each, -steps, order=0) for each in self._grid[:2]), cell)
+        return position - steps * cell
 
     def forget(self) -> None:
         """Begin anew."""
         self._grid.mean[:] = self._grid.count[:] = 0.0
-
-
-def _shifted(grid: np.ndarray, shift: np.ndarray) -> np.ndarray:
-    """Grid moved by whole cells, zeros coming in; further than its size, nothing is left."""
-    moved = np.zeros_like(grid)
-    if (np.abs(shift) < grid.shape).all():
-        source = tuple(slice(max(-step, 0), size - max(step, 0)) for step, size in zip(shift, grid.shape, strict=True))
-        target = tuple(slice(max(step, 0), size - max(-step, 0)) for step, size in zip(shift, grid.shape, strict=True))
-        moved[target] = grid[source]
-    return moved
 
 
 @njit(cache=True, fastmath=True)

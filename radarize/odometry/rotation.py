@@ -20,7 +20,6 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float, Float32
-from pydantic import BaseModel, ConfigDict, Field
 from torch.nn.functional import avg_pool1d
 
 from radarize.batch import Batch
@@ -28,6 +27,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.ties import wandered
+from radarize.plain import Frozen, setting
 
 #: Half widths of the high-pass over range bins and azimuth columns.
 _TEXTURE = (12, 12)
@@ -55,38 +55,32 @@ class Rotations:
     seen: Bool[np.ndarray, "frame"]
 
 
-class RotationConfig(BaseModel):
+class RotationConfig(Frozen):
     """Matching of frames with a local map (`MapRotation`)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    field: float = Field(0.85, gt=0, lt=1, description="largest |sin azimuth| used")
-    columns: int = Field(69, ge=8, description="azimuth columns, uniform in sin azimuth")
-    min_range: float = Field(0.2, ge=0, description="m; nearer bins are leakage")
-    limit: float = Field(300.0, gt=0, description="power over the noise floor at which a range-Doppler cell is limited")
-    contrast: float = Field(15.0, gt=0, description="dB over the surroundings at which a map cell is clipped")
-    cell: float = Field(0.05, gt=0, description="m, side of a map cell")
-    memory: float = Field(0.65, gt=0, description="s over which the map forgets")
-    fan: float = Field(np.radians(5.0), gt=0, description="rad, least half width of the yaws tried")
-    widest: float = Field(np.radians(75.0), gt=0, le=np.pi, description="rad, the most, however unsure the prediction")
-    step: float = Field(np.radians(0.5), gt=0, description="rad, spacing of the yaws tried; thrice that at first")
-    wander: float = Field(
-        np.radians(66.0), gt=0, description="rad/s^1.5, by how much the turning rate of a handheld radar wanders in 1 s"
+    field: float = setting(0.85, "largest |sin azimuth| used", gt=0, lt=1)
+    columns: int = setting(69, "azimuth columns, uniform in sin azimuth", ge=8)
+    min_range: float = setting(0.2, "m; nearer bins are leakage", ge=0)
+    limit: float = setting(300.0, "power over the noise floor at which a range-Doppler cell is limited", gt=0)
+    contrast: float = setting(15.0, "dB over the surroundings at which a map cell is clipped", gt=0)
+    cell: float = setting(0.05, "m, side of a map cell", gt=0)
+    memory: float = setting(0.65, "s over which the map forgets", gt=0)
+    fan: float = setting(np.radians(5.0), "rad, least half width of the yaws tried", gt=0)
+    widest: float = setting(np.radians(75.0), "rad, the most, however unsure the prediction", gt=0, le=np.pi)
+    step: float = setting(np.radians(0.5), "rad, spacing of the yaws tried; thrice that at first", gt=0)
+    wander: float = setting(
+        np.radians(66.0), "rad/s^1.5, by how much the turning rate of a handheld radar wanders in 1 s", gt=0
     )
-    fastest: float = Field(np.radians(60.0), gt=0, description="rad/s, standard deviation of a rate not known at all")
-    yaw_noise: float = Field(np.radians(0.3), gt=0, description="rad, standard deviation of a match of correlation 1")
-    guided_yaw_noise: float = Field(
-        np.radians(0.8),
-        gt=0,
-        description="rad, the same beside a network: a map that lags in a turn misleads many matches alike",
+    fastest: float = setting(np.radians(60.0), "rad/s, standard deviation of a rate not known at all", gt=0)
+    yaw_noise: float = setting(np.radians(0.3), "rad, standard deviation of a match of correlation 1", gt=0)
+    guided_yaw_noise: float = setting(
+        np.radians(0.8), "rad, the same beside a network: a map that lags in a turn misleads many matches alike", gt=0
     )
-    least_correlation: float = Field(0.15, ge=0, lt=1, description="a match below it is not believed")
-    unseen: float = Field(
-        np.radians(20.0),
-        ge=0,
-        description="rad/s^0.5, by how much yaw may wander where no match is believed, beside what the filter or the "
-        "network says",
-    )
+    least_correlation: float = setting(0.15, "a match below it is not believed", ge=0, lt=1)
+    unseen: float = setting(
+        np.radians(20.0), "rad/s^0.5, by how much yaw may wander where no match is believed, beside what the filter or "
+        "the network says", ge=0
+    )  # fmt: skip
 
 
 class MapRotation:
@@ -97,8 +91,6 @@ class MapRotation:
     by that. Yaws are searched as far as the filter is unsure of its own; where it knows nothing, the map starts anew.
 
     Args:
-        heatmaps: of the radar.
-        settings: of the matcher.
         prior: estimator of turns, to start the search from.
     """
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.radar.array import BOARDS, board_of
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
 
@@ -44,10 +44,8 @@ def read_text(path: Path) -> str:
     Raises:
         InputError: it cannot be read, or is not text.
     """
-    try:
+    with explained(f"{path}: cannot be read", OSError):
         data = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:

@@ -38,7 +38,6 @@ def decode(raw: Int16[np.ndarray, "word"], config: RadarConfig) -> Int16[np.ndar
 
     Args:
         raw: words of whole frames.
-        config: radar configuration.
 
     Raises:
         InputError: `raw` holds no whole number of frames, or `samples` is odd.
@@ -182,12 +181,8 @@ class FrameAssembler:
     the chirps it belongs to are marked.
 
     Args:
-        config: radar configuration.
         window: how far behind the newest byte a late packet is still accepted.
         max_jump: a byte count further than this past the newest one is taken for a damaged header.
-
-    Attributes:
-        counts: packets so far.
     """
 
     def __init__(self, config: RadarConfig, window: int = 1 << 20, max_jump: int = 1 << 28):

@@ -23,6 +23,11 @@ PRESETS: dict[str, RadarConfig] = {
         start_frequency=77e9, slope=80e12, idle_time=36e-6, adc_start_time=7e-6, ramp_end_time=50e-6, samples=96,
         sample_rate=2.285e6, loops=64, frame_period=33.333e-3, tx_order=(0, 2),
     ),
+    # RadarHD's (Prabhakara et al., ICRA 2023): its data set's pictures take one loop of it, 4.2 cm bins up to 10.8 m.
+    "radarhd": RadarConfig(
+        start_frequency=77e9, slope=63.343e12, idle_time=10e-6, adc_start_time=6e-6, ramp_end_time=63.14e-6,
+        samples=512, sample_rate=9.121e6, loops=64, frame_period=50e-3, tx_order=(0, 1, 2),
+    ),
 }  # fmt: skip
 
 

@@ -3,11 +3,11 @@
 Field names: mmWave Studio user's guide and the mmWaveLink ICD; numbers come as JSON numbers or as hexadecimal strings.
 """
 
-import json
 from decimal import Decimal
 from pathlib import Path
 
 from radarize.errors import InputError
+from radarize.jsonfile import parse_json
 from radarize.radar.array import BOARDS, board_of
 from radarize.radar.cfg import distinct_order, read_text
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
@@ -37,7 +37,7 @@ def load_json(path: Path) -> dict:
     Raises:
         InputError: unreadable, or not a JSON object.
     """
-    return _object(read_text(path), str(path))
+    return parse_json(read_text(path), str(path), Decimal)
 
 
 def parse_studio(text: str, name: str = "mmwave.json", device: str = "") -> RadarConfig:
@@ -51,7 +51,7 @@ def parse_studio(text: str, name: str = "mmwave.json", device: str = "") -> Rada
     Raises:
         InputError: naming the file and field.
     """
-    devices = _Node(name, "", _object(text, name)).items("mmWaveDevices")
+    devices = _Node(name, "", parse_json(text, name, Decimal)).items("mmWaveDevices")
     if len(devices) != 1:
         raise InputError(f"{name}: mmWaveDevices has {len(devices)} entries, expected one device")
     rf, capture = devices[0].node("rfConfig"), devices[0].node("rawDataCaptureConfig")
@@ -117,16 +117,6 @@ def _firing(rf: "_Node", frame: "_Node") -> tuple[tuple[int, ...], "_Node"]:
     if len(used) != 1 or not matching:
         raise frame.error("chirpEndIdx", end, f"chirps of one defined profile, found profiles {sorted(used)}")
     return tuple(order), matching[-1]
-
-
-def _object(text: str, name: str) -> dict:
-    try:
-        data = json.loads(text, parse_float=Decimal)
-    except (ValueError, RecursionError) as error:  # no JSON, a number of thousands of digits, or too deep
-        raise InputError(f"{name}: is not valid JSON ({error})") from error
-    if not isinstance(data, dict):
-        raise InputError(f"{name}: holds a JSON {type(data).__name__}, expected an object with radar settings")
-    return data
 
 
 class _Node:

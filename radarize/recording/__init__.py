@@ -14,11 +14,9 @@ Layout (one chunk per frame, readable while it grows):
 without a clock were written once.
 """
 
-from radarize.recording.additions import add
 from radarize.recording.interrupted import keeping
 from radarize.recording.losses import Losses
 from radarize.recording.reader import Recording
-from radarize.recording.streams import Product, Stream
-from radarize.recording.writer import RecordingWriter
+from radarize.recording.writer import Product, RecordingWriter, Stream, add
 
 __all__ = ["Losses", "Product", "Recording", "RecordingWriter", "Stream", "add", "keeping"]

@@ -1,31 +1,17 @@
-"""What damaged and hostile files come to: whatever HDF5 raises on the way, and data sets that declare more than is
-there."""
+"""What damaged and hostile files come to: data sets that declare more than is there."""
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
 
-from radarize.errors import InputError, reason
+from radarize.errors import InputError
 
 #: Packed best, deflate makes 1032 bytes of one (zlib's technical details); a chunk takes that many bytes at least.
 _DEFLATE, _PACKED_CHUNK = 1032, 16
 #: Bytes and chunks that a data set may declare before they are on disk: frames of a growing file that are not flushed
 #: yet. HDF5 itself takes some 3 kB for each chunk that it reads at once.
 _BYTES_AHEAD, _CHUNKS_AHEAD = 64 << 20, 8192
-
-
-@contextmanager
-def reading(message: str) -> Iterator[None]:
-    """Turn whatever comes of reading a file into an InputError of `message` and the reason."""
-    try:
-        yield
-    except InputError:
-        raise
-    except Exception as error:  # h5py raises whatever HDF5 meets in a damaged file
-        raise InputError(f"{message} ({reason(error)})") from error
 
 
 def dataset(

@@ -10,9 +10,9 @@ import h5py
 import numpy as np
 from jaxtyping import Bool, Float, Int16
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.radar.config import RadarConfig
-from radarize.recording.damage import dataset, reading
+from radarize.recording.damage import dataset
 from radarize.recording.growing import GrowingFile, is_growing
 
 
@@ -36,10 +36,10 @@ class Recording:
         if not self.path.is_file():
             raise InputError(f"{self.path}: no such file, expected a recording (.h5)")
         with ExitStack() as stack:
-            with reading(f"{self.path}: not a readable HDF5 recording"):
+            with explained(f"{self.path}: not a readable HDF5 recording"):
                 source = stack.enter_context(GrowingFile(self.path)) if is_growing(self.path) else self.path
                 self.file = stack.enter_context(h5py.File(source, "r"))
-            with reading(f"{self.path}: not a recording of this project"):
+            with explained(f"{self.path}: not a recording of this project"):
                 self._look()
             self._files = stack.pop_all()
 
@@ -84,7 +84,7 @@ class Recording:
         Raises:
             InputError: they are damaged.
         """
-        with reading(f"{self.path}: its attributes are damaged"):
+        with explained(f"{self.path}: its attributes are damaged"):
             return {k: v.item() if isinstance(v, np.generic) else v for k, v in self.file.attrs.items()}
 
     def adc(self, start: int, stop: int) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
@@ -95,14 +95,14 @@ class Recording:
         """
         if self._adc is None:
             raise InputError(f"{self.path}: has no raw samples, only heat maps, expected a recording with /radar/adc")
-        return self._read(self._adc, start, stop)
+        return self._frames(self._adc, start, stop)
 
     def valid(self, start: int, stop: int) -> Bool[np.ndarray, "frame loop tx"]:
         """Per chirp: False where samples were lost."""
-        return self._read(self._valid, start, stop)
+        return self._frames(self._valid, start, stop)
 
-    def _read(self, data: h5py.Dataset, start: int, stop: int) -> np.ndarray:
-        with reading(f"{self.path}: frames {start}...{stop - 1} of {data.name} are damaged"):
+    def _frames(self, data: h5py.Dataset, start: int, stop: int) -> np.ndarray:
+        with explained(f"{self.path}: frames {start}...{stop - 1} of {data.name} are damaged"):
             return data[start : min(stop, len(self))]
 
     def batches(self, size: int = 32) -> Iterator[tuple[slice, np.ndarray]]:
@@ -113,7 +113,7 @@ class Recording:
 
     def has(self, name: str) -> bool:
         """Whether a data set such as ``truth/pose`` is there."""
-        with reading(f"{self.path}: is damaged"):
+        with explained(f"{self.path}: is damaged"):
             return name in self.file
 
     def read(self, name: str) -> np.ndarray:
@@ -150,7 +150,7 @@ class Recording:
 
     def _clock(self, data: h5py.Dataset) -> str:
         """Name of the data set that says what a stream's rows belong to; empty where there is none."""
-        with reading(f"{self.path}: {data.name} is damaged"):
+        with explained(f"{self.path}: {data.name} is damaged"):
             clock = str(data.attrs.get("clock", ""))
             if clock and not data.ndim:
                 raise InputError(f"{self.path}: {data.name} is a single value with a clock, expected rows")
@@ -175,24 +175,24 @@ class Recording:
     def _dataset(self, name: str) -> h5py.Dataset:
         if not self.has(name):
             raise InputError(f"{self.path}: has no /{name}; there are {', '.join(self.names())}")
-        with reading(f"{self.path}: /{name} is damaged"):
+        with explained(f"{self.path}: /{name} is damaged"):
             return dataset(self.file, name, self.path)
 
     def _slice(self, data: h5py.Dataset, rows: slice | EllipsisType) -> np.ndarray:
-        with reading(f"{self.path}: {data.name} is damaged"):
+        with explained(f"{self.path}: {data.name} is damaged"):
             return data[rows]
 
     def names(self) -> list[str]:
         """Paths of all data sets."""
         found: list[str] = []
-        with reading(f"{self.path}: its data sets cannot be listed"):
+        with explained(f"{self.path}: its data sets cannot be listed"):
             self.file.visititems(lambda name, item: found.append(name) if isinstance(item, h5py.Dataset) else None)
         return found
 
     def describe(self, name: str) -> dict[str, object]:
         """Shape, type, unit and meaning of a data set."""
         data = self._dataset(name)
-        with reading(f"{self.path}: /{name} is damaged"):
+        with explained(f"{self.path}: /{name} is damaged"):
             notes = {key: str(data.attrs.get(key, "")) for key in ("unit", "about")}
             return {"shape": data.shape, "dtype": str(data.dtype), **notes}
 

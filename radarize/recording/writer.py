@@ -1,4 +1,4 @@
-"""Writing a recording frame by frame.
+"""Writing a recording frame by frame, and adding to a finished one.
 
 A recording is written to ``NAME.h5.part`` and renamed when it is closed. Frames are flushed about once a second of
 recorded time in HDF5's single-writer-multiple-reader mode, so a reader, or a survivor of a crash, sees every frame
@@ -10,6 +10,7 @@ import os
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
@@ -17,14 +18,47 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
-from radarize.errors import InputError, reason
+from radarize.errors import InputError, explained, reason
 from radarize.radar.config import RadarConfig
 from radarize.recording.losses import Losses
-from radarize.recording.streams import FORMAT, Product, Stream
+from radarize.replacing import replacing
 
 #: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
 #: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.
 _RESERVE = 512 << 10
+#: Of the layout.
+_FORMAT = 1
+
+
+@dataclass(frozen=True)
+class Stream:
+    """A data set that grows with the recording, one row per appended item.
+
+    Attributes:
+        shape: shape of one row.
+        dtype: numpy type.
+        unit: SI unit, or what the columns are.
+        about: one sentence for the reader.
+        clock: data set that says which instant (float, s) or frame (integer) each row belongs to; ``radar/time``: the
+            rows are the frames.
+        labels: what the values 0, 1, ... stand for, where they stand for something.
+    """
+
+    shape: tuple[int, ...]
+    dtype: str
+    unit: str
+    about: str
+    clock: str = "radar/time"
+    labels: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Product:
+    """A data set written once when the recording is opened (a floor plan, a label axis)."""
+
+    data: np.ndarray
+    unit: str
+    about: str
 
 
 class RecordingWriter:
@@ -32,7 +66,6 @@ class RecordingWriter:
 
     Args:
         path: file to write; its ``.part`` neighbour holds the frames until the writer is closed.
-        config: radar configuration.
         cfg_text: original configuration text, kept as it is.
         attributes: scene, seed, command and the like, stored as attributes of the file.
         streams: growing data sets by path, e.g. ``"truth/pose"``.
@@ -76,7 +109,7 @@ class RecordingWriter:
 
     def _create(self, cfg_text, attributes, streams, products) -> None:
         file = self._file
-        file.attrs.update({"format": FORMAT, "radarize_version": __version__, **_storable(attributes)})
+        file.attrs.update({"format": _FORMAT, "radarize_version": __version__, **_storable(attributes)})
         radar = file.create_group("radar")
         radar.attrs["config"] = self.config.model_dump_json()
         radar.attrs["cfg"] = cfg_text
@@ -86,8 +119,7 @@ class RecordingWriter:
         grow(file, "radar/valid", Stream((loops, tx), "?", "", "False where samples of the chirp were lost"))
         grow(file, "radar/time", Stream((), "f8", "s", "start of the frame's first chirp"))
         for name, product in products.items():
-            data = file.create_dataset(name, data=product.data)
-            data.attrs.update({"unit": product.unit, "about": product.about})
+            fix(file, name, product)
         for name, stream in streams.items():
             grow(file, name, stream)
         file.swmr_mode = True
@@ -194,6 +226,49 @@ class RecordingWriter:
         else:
             with suppress(InputError):  # the first error is the one to report
                 self.close(keep_part=True)
+
+
+def add(
+    path: Path,
+    streams: Mapping[str, Stream],
+    rows: Mapping[str, np.ndarray],
+    products: Mapping[str, Product] | None = None,
+    attributes: Mapping[str, object] | None = None,
+) -> Path:
+    """Add streams to a recording, which is replaced as a whole.
+
+    Args:
+        path: recording, which nobody writes.
+        streams: by path.
+        rows: of each stream, all.
+        products: data sets written once, by path.
+        attributes: of the file, to replace or add.
+
+    Raises:
+        InputError: it is there already, or the file cannot be written.
+    """
+    with replacing(path) as part:
+        shutil.copyfile(path, part)
+        with (
+            explained(f"{path}: cannot be added to", OSError, RuntimeError),
+            h5py.File(part, "r+", libver="latest") as file,
+        ):
+            for name in (*streams, *(products or {})):
+                if name in file:
+                    raise InputError(f"{path}: has /{name} already, expected a recording without")
+            for name, stream in streams.items():
+                data = grow(file, name, stream)
+                data.resize(len(rows[name]), axis=0)
+                data[:] = rows[name]
+            for name, product in (products or {}).items():
+                fix(file, name, product)
+            file.attrs.update(attributes or {})
+    return path
+
+
+def fix(file: h5py.File, name: str, product: Product) -> None:
+    """A data set that is written once."""
+    file.create_dataset(name, data=product.data).attrs.update({"unit": product.unit, "about": product.about})
 
 
 def grow(file: h5py.File, name: str, stream: Stream) -> h5py.Dataset:

@@ -50,9 +50,7 @@ def draw_errors(
     """Share of poses within an error, and errors of recordings.
 
     Args:
-        page: to draw on.
         errors: of position by method and recording, m: quantiles, as many of each recording, and the mean.
-        colors: of methods.
     """
     page.section(
         "Errors",

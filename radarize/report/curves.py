@@ -32,14 +32,14 @@ def curves(
     panels, lines = table[panel].unique(), table[line].unique()
     figure, axes = canvas(len(panels), len(names), width=2.4 * len(panels) + 1.2, height=2.1)
     for axis_row, name in zip(axes, names, strict=True):
-        words, unit, factor = FIGURES[name]
+        figure_of = FIGURES[name]
         for axis, (place, here) in zip(axis_row, table.groupby(panel, sort=False), strict=True):
             values = here[over].unique()
             number = all(isinstance(value, (int, float)) for value in values.tolist())
             at = {value: float(value) if number else k for k, value in enumerate(values)}
             for k, label in enumerate(lines):
                 means = here[here[line] == label].groupby(over)[name].mean().dropna().rename(at).sort_index()
-                axis.plot(means.index, factor * means, "o-", ms=3.5, lw=1.4, color=f"C{k}", label=label)
+                axis.plot(means.index, figure_of.factor * means, "o-", ms=3.5, lw=1.4, color=f"C{k}", label=label)
             axis.set_xticks(list(at.values()), [f"{value:.4g}" if isinstance(value, float) else value for value in at])
             axis.grid(alpha=0.25)
             axis.label_outer()
@@ -48,7 +48,7 @@ def curves(
         top = max(axis.dataLim.y1 for axis in axis_row)
         for axis in axis_row:
             axis.set_ylim(0, 1.06 * top if np.isfinite(top) and top > 0 else 1)
-        axis_row[0].set_ylabel(f"{words},\n{unit}")
+        axis_row[0].set_ylabel(f"{figure_of.words},\n{figure_of.unit}")
     for axis in axes[-1]:
         axis.set_xlabel(over)
     figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=len(lines), frameon=False)

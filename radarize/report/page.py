@@ -37,12 +37,7 @@ class Link(NamedTuple):
 
 
 class Page:
-    """Collects sections and writes them as one file that needs nothing else.
-
-    Args:
-        title: heading.
-        about: a line below it.
-    """
+    """Collects sections and writes them as one file that needs nothing else."""
 
     def __init__(self, title: str, about: str = ""):
         self._title, self._about = title, about

@@ -8,7 +8,7 @@ import plotly.graph_objects as go
 from jaxtyping import Float
 from plotly.subplots import make_subplots
 
-from radarize.evaluation.blindness import Span
+from radarize.odometry.blindness import Span
 from radarize.report.page import COLORS, INK
 
 

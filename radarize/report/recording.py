@@ -27,11 +27,7 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
     """Draw a recording.
 
     Args:
-        path: ``.h5`` file.
         output: page to write; by default beside the recording, ``.html`` in place of ``.h5``.
-
-    Returns:
-        The page's path.
 
     Raises:
         InputError: not a recording, an empty or damaged one.

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from radarize.errors import InputError
-from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.evaluate import evaluate, trajectories, trajectory_errors
 from radarize.evaluation.metrics import TrajectoryErrors
 from radarize.report import words
@@ -24,12 +23,8 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     """Draw a run, with its errors where it knows the truth. Nothing but the page is written.
 
     Args:
-        run: folder of a run.
         output: file to write; by default ``report.html`` in the folder.
         beside: other runs of the same recording, to compare with.
-
-    Returns:
-        The page's path.
 
     Raises:
         InputError: not a run, or a damaged one.
@@ -37,7 +32,7 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     folder, others = RunFolder(run), [RunFolder(other) for other in beside]
     errors = trajectory_errors(folder) if folder.has("reference.tum") else {}
     metrics = evaluate(folder, errors=errors) if errors else {}
-    blind = BlindSpans.of(folder)
+    blind = folder.blind
 
     page = Page(f"Run {folder.path.resolve().name}", _about(folder, errors))
     if errors:

@@ -3,28 +3,8 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from radarize.evaluation.blindness import BlindSpans
-from radarize.evaluation.metrics import at
-
-#: What stands where there is no figure.
-NONE = "-"
-
-
-class Figure(NamedTuple):
-    """A figure of `radarize.evaluation.evaluate`: words, where it stands, unit and factor, format, meaning."""
-
-    words: str
-    path: str
-    unit: str = ""
-    factor: float = 1
-    form: str = ".3g"
-    meaning: str = ""
-
-    def text(self, metrics: Mapping[str, object], unit: bool = True) -> str:
-        """Value and unit."""
-        value = at(metrics, *self.path.split("."))
-        return NONE if value is None else f"{self.factor * value:{self.form}} {self.unit * unit}".strip()
-
+from radarize.evaluation.figures import Figure
+from radarize.odometry.blindness import BlindSpans
 
 _TRAJECTORY = (
     Figure("ATE position, mean", "ate.position.mean", "m", 1, ".3f",
@@ -114,7 +94,7 @@ def everything(metrics: Mapping[str, object]) -> Iterator[Table | str]:
 
 def beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> Table:
     """Runs of one recording beside each other, by what they were made with."""
-    head = ("method", *(f"{figure.words}, {figure.unit}" for figure in _BESIDE))
+    head = ("method", *(figure.title for figure in _BESIDE))
     rows = [(name, *(figure.text(metrics, unit=False) for figure in _BESIDE)) for name, metrics in runs]
     return Table(head, rows, range(1, len(head)))
 

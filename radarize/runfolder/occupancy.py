@@ -6,7 +6,6 @@ the lower left corner.
 """
 
 import re
-import reprlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -16,9 +15,11 @@ import yaml
 from jaxtyping import Bool, Float, UInt8
 from pydantic import BaseModel, Field, ValidationError
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
+from radarize.plain import complaint
 from radarize.pose import transform
 from radarize.replacing import replacing
+from radarize.slam.grid import OccupancyGrid
 from radarize.yamlfile import read_yaml
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -49,10 +50,7 @@ class MapFile(BaseModel):
         try:
             return cls.model_validate(read_yaml(path, _DESCRIPTION))
         except ValidationError as error:
-            problem = error.errors()[0]
-            field = ".".join(str(part) for part in problem["loc"]) or "file"
-            value = reprlib.repr(problem["input"])
-            raise InputError(f"{path}: {field} is {value}: {problem['msg'].lower()}") from error
+            raise InputError(f"{path}: {complaint(error)}") from error
 
 
 @dataclass(frozen=True)
@@ -78,6 +76,12 @@ class OccupancyMap:
         if Path(about.image).name != about.image:
             raise InputError(f"{description}: image is {about.image!r}, expected the name of a file beside it")
         return cls(about, read_pgm(description.parent / about.image))
+
+    @classmethod
+    def of(cls, grid: OccupancyGrid) -> "OccupancyMap":
+        """A map of SLAM's, to be saved."""
+        origin = (*grid.origin.round(6).tolist(), 0.0)
+        return cls(MapFile(image="map.pgm", resolution=grid.resolution, origin=origin), grid.image())
 
     @property
     def resolution(self) -> float:
@@ -112,7 +116,7 @@ class OccupancyMap:
         return transform(np.array(self.origin), inside)
 
     def save(self, description: Path) -> Path:
-        """Write it as ``NAME.yaml`` and ``NAME.pgm``.
+        """Write it as ``NAME.yaml`` and ``NAME.pgm``, as ROS map_server reads them.
 
         Raises:
             InputError: a file cannot be written.
@@ -122,7 +126,7 @@ class OccupancyMap:
             part.write_bytes(b"P5\n%d %d\n255\n" % self.pixels.shape[::-1] + self.pixels.tobytes())
         with replacing(description) as part:
             fields = self.about.model_dump() | {"image": image.name, "origin": list(self.origin)}
-            part.write_text(yaml.safe_dump(fields, sort_keys=False))
+            part.write_text(yaml.safe_dump(fields, sort_keys=False, default_flow_style=None))
         return description
 
 
@@ -134,10 +138,8 @@ def read_pgm(path: Path) -> UInt8[np.ndarray, "row column"]:
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected a map's picture (.pgm)")
-    try:
+    with explained(f"{path}: cannot be read", OSError):
         content = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
     head = _PGM.match(content, 0, _HEADER)
     if not head:
         raise InputError(f"{path}: starts with {content[:20]!r}, expected an 8-bit binary PGM (P5)")

@@ -10,10 +10,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 from jaxtyping import Float
+from pydantic import ValidationError
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.jsonfile import read_json
-from radarize.recording.damage import dataset, reading
+from radarize.odometry.blindness import BlindSpans
+from radarize.plain import complaint
+from radarize.recording.damage import dataset
 from radarize.replacing import write_whole
 from radarize.runfolder.occupancy import OccupancyMap
 from radarize.tum import read_tum
@@ -61,12 +64,6 @@ _PACKED, _AHEAD = 20, 1 << 20
 class RunFolder:
     """A run folder for reading; every file is read when it is asked for, and once.
 
-    Args:
-        path: the folder.
-
-    Attributes:
-        path: the folder.
-
     Raises:
         InputError: it is no run folder, or not a whole one.
     """
@@ -96,6 +93,24 @@ class RunFolder:
         if not isinstance(found, dict):
             raise InputError(f"{self.path / 'run.json'}: methods is {str(found)[:60]!r}, expected an object")
         return {name: str(value) for name, value in found.items()}
+
+    @property
+    def blind(self) -> BlindSpans | None:
+        """Where odometry was blind, in s since the first pose; None where ``run.json`` does not say, as of old.
+
+        Raises:
+            InputError: it says something else.
+        """
+        if "blind" not in self.facts:
+            return None
+        try:
+            found = BlindSpans.model_validate(self.facts["blind"])
+        except ValidationError as error:
+            raise InputError(f"{self.path / 'run.json'}: blind.{complaint(error)}") from error
+        start = float(self.trajectory[0][0])
+        for span in found.spans:
+            span.start_s, span.stop_s = span.start_s - start, span.stop_s - start
+        return found
 
     @cached_property
     def trajectory(self) -> Poses:
@@ -196,7 +211,7 @@ class Scans(Mapping[str, np.ndarray]):
 
     @contextmanager
     def _open(self) -> Iterator[h5py.File]:
-        with reading(f"{self.path}: is no readable HDF5 file"), h5py.File(self.path, "r") as file:
+        with explained(f"{self.path}: is no readable HDF5 file"), h5py.File(self.path, "r") as file:
             yield file
 
     def _check(self, name: str, data: h5py.Dataset) -> None:

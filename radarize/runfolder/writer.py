@@ -15,13 +15,14 @@ import torch
 from jaxtyping import Shaped
 
 from radarize import __version__
-from radarize.errors import InputError, reason
+from radarize.errors import InputError, explained
 from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS
 from radarize.odometry.blindness import Blindness
 from radarize.pipeline import Result
 from radarize.recording import Recording
 from radarize.replacing import Replacement
+from radarize.runfolder.occupancy import OccupancyMap
 from radarize.runfolder.reader import FILES, Poses, Scans
 from radarize.slam.backend import Slam
 from radarize.tum import planar_poses, write_poses
@@ -44,9 +45,6 @@ class RunWriter:
                 writer.add(result)
             writer.describe(recording, heatmaps)
             writer.finish(pipeline.slam, facts)
-
-    Args:
-        folder: to write.
 
     Attributes:
         blindness: of the odometry so far.
@@ -107,8 +105,8 @@ class RunWriter:
             "recording_attributes": attributes,
             "frames": len(recording),
             "duration_s": float(times[-1] - times[0] + period),
-            "blind": self.blindness.summary(),
-            "warnings": [self.blindness.warning] if self.blindness.warning else [],
+            "blind": self.blindness.found.model_dump(),
+            "warnings": self.blindness.warnings(),
             "radar": recording.config.model_dump(mode="json"),
         }
         self.put("azimuths", BEARINGS, "rad")
@@ -164,7 +162,7 @@ class RunWriter:
             "python": machine.python_version(),
             "machine": f"{machine.system()} {machine.machine()}",
         }
-        slam.map().save(self._files.part / "map")
+        OccupancyMap.of(slam.map()).save(self._files.part / "map.yaml")
         with self._writing():
             (self._files.part / "run.json").write_text(json.dumps({**self._facts, **facts, **made}, indent=2))
             self._scans.close()
@@ -202,9 +200,7 @@ class RunWriter:
     @contextmanager
     def _writing(self, size: int = 0) -> Iterator[None]:
         """Turn what comes of writing into an InputError; refuses where the disk has no room for so many bytes."""
-        try:
+        with explained(f"{self.folder}: cannot be written", OSError, RuntimeError):
             if shutil.disk_usage(self._files.part).free < size + _RESERVE:
                 raise OSError(errno.ENOSPC, "no space left on the device")
             yield
-        except (OSError, RuntimeError) as error:
-            raise InputError(f"{self.folder}: cannot be written ({reason(error)})") from error

@@ -38,7 +38,7 @@ class Slam:
         slam.add_odometry(time, pose); slam.add_scan(time, azimuths, ranges); ...
         slam.finish()
         times, poses = slam.trajectory()
-        slam.map().save("map")
+        grid = slam.map()
 
     The same input gives the same bytes: searches for loops run in threads, but what they find is taken in a fixed
     number of nodes later (`radarize.slam.loops`).

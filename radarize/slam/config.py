@@ -6,124 +6,117 @@ Defaults are the preset ``lidar``; values without a source are ours.
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
-
 from radarize.errors import InputError
+from radarize.plain import Frozen, setting
 from radarize.yamlfile import read_settings
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class OdometryConfig(_Section):
+class OdometryConfig(Frozen):
     """Uncertainty of odometry that comes without covariances, as standard deviations of one step."""
 
-    translation: float = Field(0.02, gt=0, description="floor of a step, m")
-    rotation: float = Field(0.01, gt=0, description="floor of a step, rad")
-    translation_per_metre: float = Field(0.05, ge=0, description="m/m")
-    rotation_per_metre: float = Field(0.02, ge=0, description="rad/m")
-    rotation_per_radian: float = Field(0.03, ge=0, description="rad/rad")
-    scale: float = Field(
-        0.01, ge=0, description="error of length that all steps share, m/m; added to covariances that come with the "
-        "odometry, which know of each step alone"
+    translation: float = setting(0.02, "floor of a step, m", gt=0)
+    rotation: float = setting(0.01, "floor of a step, rad", gt=0)
+    translation_per_metre: float = setting(0.05, "m/m", ge=0)
+    rotation_per_metre: float = setting(0.02, "rad/m", ge=0)
+    rotation_per_radian: float = setting(0.03, "rad/rad", ge=0)
+    scale: float = setting(
+        0.01, "error of length that all steps share, m/m; added to covariances that come with the odometry, which know "
+        "of each step alone", ge=0
     )  # fmt: skip
-    missing_translation: float = Field(
-        0.3, gt=0, description="of a step without any odometry (constant velocity is assumed), m"
-    )
-    missing_rotation: float = Field(0.2, gt=0, description="of a step without any odometry, rad")
+    missing_translation: float = setting(0.3, "of a step without any odometry (constant velocity is assumed), m", gt=0)
+    missing_rotation: float = setting(0.2, "of a step without any odometry, rad", gt=0)
 
 
-class NodeConfig(_Section):
+class NodeConfig(Frozen):
     """How scans are gathered into the nodes of the graph.
 
     Scans join the open node until the sensor has moved by `distance` or `angle`, or `duration` has passed since its
     first one. This is the motion filter, and what makes enough points of scans that are too sparse alone.
     """
 
-    distance: float = Field(0.2, ge=0, description="a new node starts after so many m")
-    angle: float = Field(0.1, ge=0, description="or so many rad")
-    duration: float = Field(5.0, ge=0, description="or so many s")
-    scans: int = Field(1, gt=0, description="at most so many scans, evenly picked, are used of a node")
-    min_points: int = Field(20, gt=0, description="nodes with fewer are neither matched nor searched for loops")
+    distance: float = setting(0.2, "a new node starts after so many m", ge=0)
+    angle: float = setting(0.1, "or so many rad", ge=0)
+    duration: float = setting(5.0, "or so many s", ge=0)
+    scans: int = setting(1, "at most so many scans, evenly picked, are used of a node", gt=0)
+    min_points: int = setting(20, "nodes with fewer are neither matched nor searched for loops", gt=0)
 
 
-class GridConfig(_Section):
+class GridConfig(Frozen):
     """Probability grids of submaps and of the final map."""
 
-    resolution: float = Field(0.05, gt=0, description="cell size of submaps, m")
-    map_resolution: float = Field(0.05, gt=0, description="cell size of the final map, m")
-    hit: float = Field(0.7, gt=0.5, lt=1, description="probability that a cell is occupied given one echo from it")
-    miss: float = Field(0.45, gt=0, lt=0.5, description="the same given one ray through it")
-    lowest: float = Field(0.12, gt=0, lt=0.5, description="least probability, so that a map can change its mind")
-    highest: float = Field(0.97, gt=0.5, lt=1, description="largest probability, for the same reason")
-    min_range: float = Field(0.1, ge=0, description="nearer returns count as nothing seen, m")
-    max_range: float = Field(30.0, gt=0, description="farther ones too, m")
-    free_range: float = Field(5.0, ge=0, description="rays that saw nothing clear cells up to here, m; 0: none")
-    nodes: int = Field(10, ge=2, description="nodes of a submap; the next one starts when half of them are in")
+    resolution: float = setting(0.05, "cell size of submaps, m", gt=0)
+    map_resolution: float = setting(0.05, "cell size of the final map, m", gt=0, le=1)
+    hit: float = setting(0.7, "probability that a cell is occupied given one echo from it", gt=0.5, lt=1)
+    miss: float = setting(0.45, "the same given one ray through it", gt=0, lt=0.5)
+    lowest: float = setting(0.12, "least probability, so that a map can change its mind", gt=0, lt=0.5)
+    highest: float = setting(0.97, "largest probability, for the same reason", gt=0.5, lt=1)
+    min_range: float = setting(0.1, "nearer returns count as nothing seen, m", ge=0)
+    max_range: float = setting(30.0, "farther ones too, m", gt=0)
+    free_range: float = setting(5.0, "rays that saw nothing clear cells up to here, m; 0: none", ge=0)
+    nodes: int = setting(10, "nodes of a submap; the next one starts when half of them are in", ge=2)
 
 
-class MatcherConfig(_Section):
+class MatcherConfig(Frozen):
     """Scan-to-submap matching."""
 
-    enabled: bool = Field(True, description="else nodes follow odometry, and submaps serve the loop search only")
-    presearch_distance: float = Field(
-        0.3, ge=0, description="half-width of the correlative search before refinement, m; 0 switches it off"
+    enabled: bool = setting(True, "else nodes follow odometry, and submaps serve the loop search only")
+    presearch_distance: float = setting(
+        0.3, "half-width of the correlative search before refinement, m; 0 switches it off", ge=0
     )
-    presearch_angle: float = Field(0.17, ge=0, description="half-width of that search, rad")
-    presearch_sigma: float = Field(
-        2.0, gt=0, description="as sigma, for the weight of odometry in that search: far from a match the points, most "
-        "of them on the same few walls, are wrong together"
+    presearch_angle: float = setting(0.17, "half-width of that search, rad", ge=0)
+    presearch_sigma: float = setting(
+        2.0, "as sigma, for the weight of odometry in that search: far from a match the points, most of them on the "
+        "same few walls, are wrong together", gt=0
     )  # fmt: skip
-    sigma: float = Field(
-        0.7, gt=0, description="standard deviation of the residual 1 - p of one point, points taken as independent: "
-        "sets the weight of a match against odometry, and its covariance in the graph"
+    sigma: float = setting(
+        0.7, "standard deviation of the residual 1 - p of one point, points taken as independent: sets the weight of a "
+        "match against odometry, and its covariance in the graph", gt=0
     )  # fmt: skip
-    translation_floor: float = Field(0.01, gt=0, description="no match is believed better than this, m")
-    rotation_floor: float = Field(0.003, gt=0, description="nor than this, rad")
-    iterations: int = Field(20, gt=0, description="at most so many Gauss-Newton steps")
-    spacing: float = Field(0.05, gt=0, description="points are thinned to one per square of this size, m")
+    translation_floor: float = setting(0.01, "no match is believed better than this, m", gt=0)
+    rotation_floor: float = setting(0.003, "nor than this, rad", gt=0)
+    iterations: int = setting(20, "at most so many Gauss-Newton steps", gt=0)
+    spacing: float = setting(0.05, "points are thinned to one per square of this size, m", gt=0)
 
 
-class LoopConfig(_Section):
+class LoopConfig(Frozen):
     """Loop closure."""
 
-    enabled: bool = Field(True, description="search for loops at all")
-    radius: float = Field(10.0, gt=0, description="submaps with their centre this near to a node are searched, m")
-    distance: float = Field(3.0, gt=0, description="half-width of the search window, m")
-    angle: float = Field(0.5, gt=0, description="half-width of the search window, rad")
-    candidates: int = Field(4, gt=0, description="at most so many submaps are searched per node, nearest first")
-    every: int = Field(4, gt=0, description="only every so-many-th node is searched for")
-    nodes: int = Field(
-        1, gt=0, description="points of so many nodes, the latest ones, are searched for together: one view may be too "
-        "poor; at the end such windows overlap by half"
+    enabled: bool = setting(True, "search for loops at all")
+    radius: float = setting(10.0, "submaps with their centre this near to a node are searched, m", gt=0)
+    distance: float = setting(3.0, "half-width of the search window, m", gt=0)
+    angle: float = setting(0.5, "half-width of the search window, rad", gt=0)
+    candidates: int = setting(4, "at most so many submaps are searched per node, nearest first", gt=0)
+    every: int = setting(4, "only every so-many-th node is searched for", gt=0)
+    nodes: int = setting(
+        1, "points of so many nodes, the latest ones, are searched for together: one view may be too poor; at the end "
+        "such windows overlap by half", gt=0
     )  # fmt: skip
-    front: float = Field(
-        0.0, ge=0, description="so far in front of its points, m, a node must find the submap free, else a wall fits "
-        "to any other one, a corridor's left to its right; 0: not asked, where every view is rich enough"
+    front: float = setting(
+        0.0, "so far in front of its points, m, a node must find the submap free, else a wall fits to any other one, a "
+        "corridor's left to its right; 0: not asked, where every view is rich enough", ge=0
     )  # fmt: skip
-    min_score: float = Field(
-        0.6, gt=0, lt=1, description="mean probability that a closure needs at its points, and of being free in front"
+    min_score: float = setting(
+        0.6, "mean probability that a closure needs at its points, and of being free in front", gt=0, lt=1
     )
-    final_score: float = Field(
-        0.5, gt=0, lt=1, description="as min_score, for the search at the end: the graph then says how far to look, "
-        "and judges at once"
+    final_score: float = setting(
+        0.5, "as min_score, for the search at the end: the graph then says how far to look, and judges at once",
+        gt=0, lt=1
     )  # fmt: skip
-    levels: int = Field(5, ge=0, le=8, description="halvings of the resolution in the branch-and-bound search")
-    sigma: float = Field(
-        0.7, gt=0, description="as the matcher's, for closures: also how well another pose must fit to be as likely"
+    levels: int = setting(5, "halvings of the resolution in the branch-and-bound search", ge=0, le=8)
+    sigma: float = setting(
+        0.7, "as the matcher's, for closures: also how well another pose must fit to be as likely", gt=0
     )
-    translation_floor: float = Field(0.02, gt=0, description="no closure is believed better than this, m")
-    rotation_floor: float = Field(0.006, gt=0, description="nor than this, rad")
-    lag: int = Field(4, ge=0, description="what a search in the background finds is taken in so many nodes later")
-    support: int = Field(3, gt=0, description="closures that contradict the estimate are believed if so many agree")
-    update_every: int = Field(10, gt=0, description="nodes between updates of the graph where no loop has just closed")
-    inlier_probability: float = Field(
-        0.99, gt=0, lt=1, description="closures whose error is less likely than one minus this are rejected"
+    translation_floor: float = setting(0.02, "no closure is believed better than this, m", gt=0)
+    rotation_floor: float = setting(0.006, "nor than this, rad", gt=0)
+    lag: int = setting(4, "what a search in the background finds is taken in so many nodes later", ge=0)
+    support: int = setting(3, "closures that contradict the estimate are believed if so many agree", gt=0)
+    update_every: int = setting(10, "nodes between updates of the graph where no loop has just closed", gt=0)
+    inlier_probability: float = setting(
+        0.99, "closures whose error is less likely than one minus this are rejected", gt=0, lt=1
     )
 
 
-class SlamConfig(_Section):
+class SlamConfig(Frozen):
     """All parameters of `radarize.slam.backend.Slam`."""
 
     odometry: OdometryConfig = OdometryConfig()
@@ -154,7 +147,7 @@ class SlamConfig(_Section):
         Raises:
             InputError: no such preset or file, or a field that does not exist or has an impossible value.
         """
-        return read_settings(path, cls.preset(preset))
+        return read_settings(path, cls.preset(preset), "sections with fields, such as grid: {nodes: 10}")
 
 
 PRESETS: dict[str, SlamConfig] = {

@@ -5,9 +5,7 @@ adding log odds: one hit multiplies by hit / (1 - hit), one miss by miss / (1 - 
 either one hit or one miss, the hit first (Hess et al., Real-Time Loop Closure in 2D LIDAR SLAM, ICRA 2016, eq. 2-3).
 """
 
-import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import NamedTuple
 
 import numba
@@ -131,28 +129,6 @@ class OccupancyGrid:
         picture[self.probability >= 0.65] = 0
         picture[(self.probability > 0) & (self.probability <= 0.35)] = 254
         return picture[::-1]
-
-    def save(self, path: str | Path) -> None:
-        """Write `path` with suffix .pgm and .yaml, as ROS map_server reads them.
-
-        Raises:
-            InputError: the files cannot be written.
-        """
-        pgm, yaml = Path(path).with_suffix(".pgm"), Path(path).with_suffix(".yaml")
-        picture = self.image()
-        rows, columns = picture.shape
-        text = (
-            f"image: {pgm.name}\nmode: trinary\nresolution: {self.resolution:.6g}\n"
-            f"origin: [{self.origin[0]:.6f}, {self.origin[1]:.6f}, 0.0]\n"
-            "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
-        )
-        for target, data in ((pgm, b"P5\n%d %d\n255\n" % (columns, rows) + picture.tobytes()), (yaml, text.encode())):
-            part = target.with_name(target.name + ".part")
-            try:
-                part.write_bytes(data)
-                os.replace(part, target)
-            except OSError as error:
-                raise InputError(f"cannot write {target}: {error.strerror}") from error
 
 
 @numba.njit(cache=True, nogil=True)

@@ -67,11 +67,7 @@ class Closure:
 
 
 class LoopSearch:
-    """Answers questions in the background, in the order in which they were asked.
-
-    Args:
-        config: of the search.
-    """
+    """Answers questions in the background, in the order in which they were asked."""
 
     def __init__(self, config: LoopConfig):
         self.config = config

@@ -87,10 +87,7 @@ class PoseGraph:
         if self._isam is None:
             self._isam, self._known = gtsam.ISAM2(_incremental(self._factorization)), 0
             self._news = self._graph(self._believed())
-        values = gtsam.Values()
-        for k in range(self._known, len(self.poses)):
-            values.insert(k, gtsam.Pose2(*self.poses[k]))
-        self._isam.update(self._news, values)
+        self._isam.update(self._news, self._values(self._known))
         self._news, self._known = gtsam.NonlinearFactorGraph(), len(self.poses)
         self.poses[:] = gtsam.utilities.extractPose2(self._isam.calculateBestEstimate())
 
@@ -137,9 +134,9 @@ class PoseGraph:
             graph.add(factor)
         return graph
 
-    def _values(self) -> gtsam.Values:
+    def _values(self, first: int = 0) -> gtsam.Values:
         values = gtsam.Values()
-        for k, pose in enumerate(self.poses):
+        for k, pose in enumerate(self.poses[first:], first):
             values.insert(k, gtsam.Pose2(*pose))
         return values
 

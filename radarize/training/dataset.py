@@ -1,6 +1,5 @@
 """Recordings as a torch `Dataset`: windows of frames with their truth, read lazily, from any number of processes."""
 
-import json
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -9,8 +8,9 @@ import numpy as np
 import torch
 from torch.utils.data import Dataset
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.features.maps import MAPS, MapMaker, maps_of
+from radarize.jsonfile import read_json
 from radarize.pose import wrap
 from radarize.recording import Recording
 from radarize.tum import planar
@@ -98,7 +98,7 @@ class Frames(Dataset):
         item = {}
         names = tuple(field for field in self.fields if field in MAPS)
         if names:
-            item |= self._maps(recording, frames, names, maker)
+            item |= maps_of(recording, first, frames.stop, names, maker, self.spacing)
         for field in self.fields:
             if field in TRUTH:
                 path, columns = TRUTH[field]
@@ -111,10 +111,6 @@ class Frames(Dataset):
                 poses = recording.rows("truth/pose", first, frames.stop)[:: self.spacing]
                 item[field] = wrap(np.diff(planar(poses)[:, 2]))
         return {name: _tensor(item[name]) for name in self.fields}
-
-    def _maps(self, recording: Recording, frames: slice, names: tuple[str, ...], maker: MapMaker) -> dict:
-        parts = [maps_of(recording, k, k + 1, names, maker) for k in range(frames.start, frames.stop, frames.step)]
-        return {name: np.concatenate([part[name] for part in parts]) for name in names}
 
     def _recording(self, number: int) -> tuple[Recording, MapMaker]:
         """Opened at first use, by every process for itself: HDF5 files do not survive a fork."""
@@ -141,10 +137,8 @@ def recordings(folder: str | Path, split: str | None = None, part: str = "train"
             raise InputError(f"{folder}: holds no recordings, expected *.h5")
         return found
     index = folder / "dataset.json"
-    try:
-        splits = json.loads(index.read_text(encoding="utf-8"))["splits"]
-    except (OSError, ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{index}: is no readable data set ({type(error).__name__}), needed for a split") from error
+    with explained(f"{index}: is no readable data set, needed for a split"):
+        splits = read_json(index)["splits"]
     if split not in splits:
         raise InputError(f"{index}: has no split {split!r}, expected one of: {', '.join(splits) or 'there are none'}")
     if part not in splits[split]:

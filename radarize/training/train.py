@@ -1,13 +1,12 @@
 """`radarize train`: from a folder of recordings to a file of weights."""
 
-import csv
-import io
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 
 from radarize.errors import InputError
 from radarize.features.table import Table
@@ -65,9 +64,6 @@ def train(
         progress: called with (stage, done, in all).
         say: takes a line for every epoch.
 
-    Returns:
-        the weights' path.
-
     Raises:
         InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
             is no number.
@@ -93,7 +89,8 @@ def train(
             found = trainer.train_epoch(partial(progress, "training"))
             if lead:
                 trainer.save(checkpoint, about)
-                _write_log(trainer.history, log)
+                with replacing(log) as part:
+                    pd.DataFrame(trainer.history).to_csv(part, index=False)
                 say(_words(found))
         if lead:
             metrics = trainer.finish()
@@ -144,12 +141,3 @@ def _check(kind: str, settings: Settings, output: Path) -> None:
         raise InputError(f"seed is {settings.seed}, expected no negative number")
     if output.is_dir() or output.suffix != ".safetensors":
         raise InputError(f"output is {output}, expected a file NAME.safetensors")
-
-
-def _write_log(history: list[dict[str, float]], path: Path) -> None:
-    text = io.StringIO()
-    rows = csv.DictWriter(text, history[0])
-    rows.writeheader()
-    rows.writerows(history)
-    with replacing(path) as part:
-        part.write_text(text.getvalue())

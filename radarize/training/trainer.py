@@ -6,6 +6,7 @@ from its checkpoint as if nothing had happened: bit for bit on processors; GPUs 
 
 import math
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -30,12 +31,6 @@ _DROP, _LASTS = 0.75, 25
 
 class Trainer:
     """Trains one network.
-
-    Args:
-        task: what for.
-        settings: hyper-parameters.
-        training, validation: frames.
-        team: processes that train together.
 
     Attributes:
         net: the network.
@@ -198,22 +193,19 @@ class Trainer:
                 raise InputError(
                     f"{path}: is of a training with {name} {other!r}, expected {value!r}; drop --resume, or it"
                 )
-        groups: dict[str, dict] = {"net": {}, "best": {}, "adam": {}}
+        progress, best, moments = found["progress"], {}, defaultdict(dict)
+        parts = {"net": {}, "best": best}
         for name, values in tensors.items():
             group, _, rest = name.partition("/")
-            groups[group][rest] = values
-        moments: dict[int, dict[str, Tensor]] = {}
-        for name, values in groups["adam"].items():
-            number, _, moment = name.partition("/")
-            moments.setdefault(int(number), {})[moment] = values
-        progress = found["progress"]
-        self.net.load_state_dict(groups["net"])
+            if group == "adam":
+                number, _, moment = rest.partition("/")
+                moments[int(number)][moment] = values
+            else:
+                parts[group][rest] = values.to(self.team.device)
+        self.net.load_state_dict(parts["net"])
         self._optimiser.load_state_dict({"state": moments, "param_groups": progress["groups"]})
         self._schedule.load_state_dict(progress["schedule"])
-        self.best = (
-            progress["best_loss"],
-            {name: values.to(self.team.device) for name, values in groups["best"].items()},
-        )
+        self.best = progress["best_loss"], best
         self.history = progress["history"]
 
     def _order(self, epoch: int) -> tuple[Tensor, Tensor]:

@@ -10,6 +10,7 @@ from radarsim.sensors.causes import AdcByCause, CauseCounts
 from radarsim.sensors.depth import DepthCamera, DepthStrip
 from radarsim.sensors.ghosts import Ghosts
 from radarsim.sensors.imu import Imu
+from radarsim.sensors.lidar import Lidar
 from radarsim.sensors.points import ChipPoints
 from radarsim.sensors.pose import TruePose
 from radarsim.sensors.scan import Occupancy, PlanarScan
@@ -28,6 +29,7 @@ SENSORS = {
     "imu": Imu,
     "points": ChipPoints,
     "ghosts": Ghosts,
+    "lidar": Lidar,
 }
 #: What ``all`` stands for: either depth camera writes the same stream.
 _ALL = tuple(name for name in SENSORS if name != "depth-strip")

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results"
 #: Pages of a former layout, to be made again; then they leave this list.
 FORMER = {
-    "ablation", "buildings", "capture_speed", "corrections", "dataset_speed", "fuzzing", "live_speed", "mapping",
+    "ablation", "buildings", "capture_speed", "dataset_speed", "fuzzing", "live_speed", "mapping",
     "multipath", "odometry", "odometry-platforms", "runtime", "simulator_speed", "slam",
     "slam_backend", "transfer", "twin", "uncertainty",
 }  # fmt: skip

@@ -16,8 +16,7 @@ def disc(folder, radius):
     grid, ends = OccupancyGrid.empty(0.05), radius * np.stack([np.cos(AZIMUTHS), np.sin(AZIMUTHS)], axis=-1)
     for _ in range(6):
         grid.insert(np.zeros_like(ends), ends, np.ones(len(ends), bool), GridConfig())
-    grid.save(folder / "map")
-    return OccupancyMap.read(folder / "map.yaml")
+    return OccupancyMap.read(OccupancyMap.of(grid).save(folder / "map.yaml"))
 
 
 @pytest.mark.parametrize("radius, expected", [(2.0, 1.0), (1.5, 0.5625), (2.5, 0.64)])

@@ -64,8 +64,8 @@ def test_agrees_with_the_evo_commands(pair, tmp_path):
     ours = {
         ("ape", "trans_part"): errors.position,
         ("ape", "angle_rad"): errors.rotation,
-        ("rpe", "trans_part"): errors.relative_position["frame"],
-        ("rpe", "angle_rad"): errors.relative_rotation["frame"],
+        ("rpe", "trans_part"): errors.relative["frame"]["position"],
+        ("rpe", "angle_rad"): errors.relative["frame"]["rotation"],
     }
     for (command, relation), statistics in ours.items():
         theirs = evo(command, relation, *pair, tmp_path)
@@ -107,16 +107,16 @@ def test_relative_errors_of_wrong_scale_and_turn_rate():
     fast = poses.copy()
     fast[:, 0] *= 1.03
     errors = evaluate_trajectory(trajectory(times, fast), trajectory(times, poses))
-    assert errors.relative_position["metre"].mean == pytest.approx(0.03, rel=1e-6)
-    assert errors.relative_position["second"].mean == pytest.approx(0.03, rel=1e-6)
-    assert errors.relative_position["frame"].mean == pytest.approx(0.001, rel=1e-6)
+    assert errors.relative["metre"]["position"].mean == pytest.approx(0.03, rel=1e-6)
+    assert errors.relative["second"]["position"].mean == pytest.approx(0.03, rel=1e-6)
+    assert errors.relative["frame"]["position"].mean == pytest.approx(0.001, rel=1e-6)
     assert errors.drift == pytest.approx(0.03, rel=1e-6)
     # Heading that drifts by 0.02 rad/s.
     turning = poses.copy()
     turning[:, 3:] = Rotation.from_euler("z", 0.02 * times[:, None]).as_quat()
     errors = evaluate_trajectory(trajectory(times, turning), trajectory(times, poses))
-    assert errors.relative_rotation["second"].mean == pytest.approx(0.02, rel=1e-6)
-    assert errors.relative_rotation["frame"].mean == pytest.approx(0.02 / 30, rel=1e-6)
+    assert errors.relative["second"]["rotation"].mean == pytest.approx(0.02, rel=1e-6)
+    assert errors.relative["frame"]["rotation"].mean == pytest.approx(0.02 / 30, rel=1e-6)
     # Aligned by position, which is exact: the rotation error is the drift itself, 0...0.2 rad.
     assert errors.rotation.mean == pytest.approx(0.1, rel=1e-6)
 

@@ -23,7 +23,6 @@ from scipy.io import savemat
 import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
 from radarize.contents import contents
 from radarize.errors import InputError
-from radarize.evaluation.blindness import BlindSpans
 from radarize.evaluation.evaluate import evaluate
 from radarize.features.grid import Grid
 from radarize.importers import Given, import_recording
@@ -412,7 +411,7 @@ def use_run(folder: Path) -> None:
     """Read all of a run."""
     Log.read(folder)
     run = RunFolder(folder)
-    BlindSpans.of(run)
+    _ = run.blind
     for part in ("facts", "methods", "metrics", "trajectory", "odometry", "reference", "map"):
         getattr(run, part)
     if run.map is not None:

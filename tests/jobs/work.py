@@ -107,4 +107,3 @@ class Threads:
             "torch": torch.get_num_threads(),
             "blas": max(blas),
         }
-

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.methods.ransac.velocity import RansacSettings, RansacVelocity
+from radarize.methods.ransac.velocity import HYPOTHESES, RansacVelocity
 
 
 @pytest.fixture(scope="module")
@@ -55,4 +55,4 @@ def test_standing_and_not_knowing(estimator):
 
 def test_hypotheses_by_the_textbook():
     """Enough that one of them is right with probability 0.9999, if two in five points are wrong."""
-    assert (1 - 0.6**3) ** RansacSettings().hypotheses < 1e-4 < (1 - 0.6**3) ** (RansacSettings().hypotheses - 1)
+    assert (1 - 0.6**3) ** HYPOTHESES < 1e-4 < (1 - 0.6**3) ** (HYPOTHESES - 1)

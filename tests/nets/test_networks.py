@@ -8,9 +8,8 @@ from radarize.features.maps import AZIMUTHS
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
 from radarize.methods.radarize.segmentation import SegmentationNet
-from radarize.nets.correlation import Correlation
+from radarize.nets.correlation import Correlation, Moved
 from radarize.nets.gaussian import Gaussian
-from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
 from radarize.nets.unet import UNet
 

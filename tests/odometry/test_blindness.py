@@ -31,7 +31,7 @@ def found(*tracks, numbers=None):
 
 
 def test_a_span_goes_from_the_last_good_frame_to_the_last_bad_one():
-    summary = found(track(200, start=100, no_velocity=range(40, 60))).summary()
+    summary = found(track(200, start=100, no_velocity=range(40, 60))).found.model_dump()
     (span,) = summary["spans"]
     assert span["why"] == "no velocity"
     assert (span["start_s"], span["stop_s"]) == pytest.approx((100 + 39 * PERIOD, 100 + 59 * PERIOD))
@@ -41,11 +41,11 @@ def test_a_span_goes_from_the_last_good_frame_to_the_last_bad_one():
 
 def test_blinks_vanish_and_neighbours_join():
     blinks = [*range(10, 15), *range(30, 35)]  # 0.25 s each, 0.8 s apart
-    assert found(track(200, no_velocity=blinks)).summary() == {"share_of_way": 0.0, "way_m": 0.0, "spans": []}
-    assert found(track(200, no_velocity=blinks)).warning is None
-    (span,) = found(track(200, no_velocity=range(10, 15), no_turn=range(19, 24))).spans
+    assert found(track(200, no_velocity=blinks)).found.model_dump() == {"share_of_way": 0.0, "way_m": 0.0, "spans": []}
+    assert found(track(200, no_velocity=blinks)).warnings() == []
+    (span,) = found(track(200, no_velocity=range(10, 15), no_turn=range(19, 24))).found.spans
     assert span.why == "no velocity and no turn"
-    assert span.way == pytest.approx(10 * PERIOD)  # sight between them is not blind
+    assert span.way_m == pytest.approx(10 * PERIOD)  # sight between them is not blind
 
 
 def test_lost_frames_are_blind_and_frames_left_out_on_purpose_are_not():
@@ -53,15 +53,15 @@ def test_lost_frames_are_blind_and_frames_left_out_on_purpose_are_not():
     rows = np.r_[0:10, 25:40]
     gap = SimpleNamespace(**{name: values[rows] for name, values in vars(whole).items()})
     gap.step[10] *= 16
-    (span,) = found(gap, numbers=rows).spans
-    assert span.why == "frames lost" and span.way == pytest.approx(16 * PERIOD)
-    assert (span.start, span.stop) == pytest.approx((9 * PERIOD, 25 * PERIOD))
-    assert found(whole, numbers=2 * np.arange(40)).spans == []
+    (span,) = found(gap, numbers=rows).found.spans
+    assert span.why == "frames lost" and span.way_m == pytest.approx(16 * PERIOD)
+    assert (span.start_s, span.stop_s) == pytest.approx((9 * PERIOD, 25 * PERIOD))
+    assert found(whole, numbers=2 * np.arange(40)).found.spans == []
     at_the_end = found(whole)
     at_the_end.lost(39 * PERIOD, 5.0)
     at_the_end.lost(-1.0, 0.0)
-    assert [span.start for span in at_the_end.spans] == pytest.approx([-1.0, 39 * PERIOD])
-    assert {span.why for span in at_the_end.spans} == {"frames lost"}
+    assert [span.start_s for span in at_the_end.found.spans] == pytest.approx([-1.0, 39 * PERIOD])
+    assert {span.why for span in at_the_end.found.spans} == {"frames lost"}
 
 
 def test_batches_do_not_matter():
@@ -70,12 +70,12 @@ def test_batches_do_not_matter():
     for k in range(0, 120, 7):
         part = SimpleNamespace(**{name: values[k : k + 7] for name, values in vars(whole).items()})
         parts.add(np.arange(k, k + len(part.time)), part)
-    assert parts.summary() == found(whole).summary() and len(parts.spans) == 1
+    assert parts.found == found(whole).found and len(parts.found.spans) == 1
 
 
 def test_the_warning_counts_from_the_first_frame():
     blind = found(track(200, start=1.7e9, no_velocity=range(100, 130), no_turn=range(20, 28)))
-    assert blind.warning == (
+    assert blind.warnings() == [
         "odometry was blind 2 times, for 1.9 s and 19 % of the way; at the longest from 5.0 to 6.5 s (no velocity); "
         "poses there are guessed"
-    )
+    ]

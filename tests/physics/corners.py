@@ -59,3 +59,15 @@ def both_ways(mirrors, search):
 
 def direction(azimuth, elevation):
     return np.array([np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
+
+
+def seen_by_both(a, b, azimuth):
+    """Area that both plates of a dihedral share, off its axis by their width."""
+    return 2 * a * b * min(np.sin(azimuth), np.cos(azimuth))
+
+
+def seen_by_all(a, towards):
+    """Area that the three triangles of a trihedral share from a unit direction (Robertson, BSTJ 26, 1947)."""
+    low, middle, high = np.sort(towards)
+    total = low + middle + high
+    return a**2 * (total - 2 / total if low + middle >= high else 4 * low * middle / total)

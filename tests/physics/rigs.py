@@ -55,6 +55,14 @@ def isotropic(position, wavelength, rotation=None, range_=100.0):
     return Search(place, rotation[None], np.zeros(1), range_, wavelength, 0.0, *ISOTROPIC)
 
 
+def field(echoes, position, wavelength):
+    """Sum of all echoes at one antenna at a position, at one frequency."""
+    away = np.linalg.norm(echoes.points - position, axis=2).sum(axis=1)
+    mirrored = np.einsum("eij,j->ei", echoes.images[:, :, :3], position) + echoes.images[:, :, 3]
+    lengths = np.concatenate([away, np.linalg.norm(position - mirrored, axis=1)])
+    return complex(np.sum(echoes.amplitude * np.exp(2j * np.pi * lengths / wavelength)))
+
+
 def burst(config, echoes, motion, time=0.0):
     """Beat signal of echoes by the fast synthesis."""
     return Synthesizer(config)(echoes.lengths(config, motion, time), echoes.amplitude)

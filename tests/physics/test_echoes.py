@@ -15,7 +15,7 @@ from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
 from radarsim.scene.shapes import rectangle
-from tests.physics.rigs import Rig, burst
+from tests.physics.rigs import Rig, burst, field
 
 CONFIG = PRESETS["radarize"]
 HERE, AHEAD = np.zeros(3), np.eye(3)
@@ -115,21 +115,22 @@ def test_speckle_is_the_same_world_from_elsewhere(corner):
         assert correlation > 0.999
 
 
-def test_speckle_is_rayleigh():
-    """Many scatterers in a cell: amplitude over independent cells is Rayleigh (Kolmogorov-Smirnov)."""
+def speckle(places):
+    """Amplitudes of many scatterers in a cell, from places so far apart that the field decorrelates; RMS sqrt(2)."""
     rng = np.random.default_rng(5)
     place = np.stack([np.full(20000, 3.0), rng.uniform(-3, 3, 20000), rng.uniform(-1.0, 1.0, 20000)], axis=1)
     scatterers = Scatterers.points(place, np.ones(20000), rng.uniform(0, 2 * np.pi, 20000))
     finder = EchoFinder(None, scatterers, None, CONFIG, range=10.0)
-    samples = []
-    for y in np.arange(60) * 0.2:  # far enough apart that the field decorrelates
-        position = np.array([0.0, (y % 3) - 1.5, (y // 3) * 0.1 - 0.2])
-        echoes = finder(position, AHEAD)
-        path = 2 * np.linalg.norm(echoes.points[:, 0] - position, axis=1)
-        samples.append(np.sum(echoes.amplitude * np.exp(2j * np.pi * path / CONFIG.wavelength)))
-    amplitude = np.abs(samples)
-    scale = np.sqrt(np.mean(amplitude**2) / 2)
-    assert stats.kstest(amplitude, stats.rayleigh(scale=scale).cdf).pvalue > 0.01
+    fields = []
+    for y in np.arange(places) * 0.2:
+        position = np.array([0.0, (y % 3) - 1.5, (y // 3) * 0.1 - 0.4])
+        fields.append(field(finder(position, AHEAD), position, CONFIG.wavelength))
+    return np.abs(fields) / np.sqrt(np.mean(np.abs(fields) ** 2) / 2)
+
+
+def test_speckle_is_rayleigh():
+    """Kolmogorov-Smirnov."""
+    assert stats.kstest(speckle(60), stats.rayleigh.cdf).pvalue > 0.01
 
 
 def test_power_does_not_depend_on_the_number_of_scatterers(corner):

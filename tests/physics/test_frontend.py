@@ -37,14 +37,18 @@ def power_by_bin(counts):
 
 
 # --- thermal noise ---------------------------------------------------------------------------------------------------
+def noise_factor(gain):
+    """15.6 dB at 30 dB of receive gain, 15 dB at 48 dB, and Friis's line between."""
+    later = (10**1.56 - 10**1.5) / (10**-3.0 - 10**-4.8)  # noise factor of all that follows the gain
+    return 10**1.5 + later * (10 ** (-gain / 10) - 10**-4.8)
+
+
 @pytest.mark.parametrize("gain", [24.0, 30.0, 38.0, 48.0])
 def test_noise_by_receive_gain(gain):
-    """k T B F G with the noise figure of the gain: 15.6 dB at 30 dB, 15 dB at 48 dB, Friis's line between."""
+    """k T B F G with the noise figure of the gain."""
     config = CONFIG.model_copy(update={"rx_gain_db": gain})
     counts = FrontEnd(config, FrontEndConfig.ideal(noise=True)).receive(np.zeros(SHAPE, np.complex64), rng())
-    later = (10**1.56 - 10**1.5) / (10**-3.0 - 10**-4.8)  # noise factor of all that follows the gain
-    factor = 10**1.5 + later * (10 ** (-gain / 10) - 10**-4.8)
-    watts = 1.380649e-23 * 290 * CONFIG.sample_rate * factor * 10 ** (gain / 10)
+    watts = 1.380649e-23 * 290 * CONFIG.sample_rate * noise_factor(gain) * 10 ** (gain / 10)
     expected = watts / (1e-3 * 10**0.5) * 32767**2
     assert db(np.mean(np.abs(counts) ** 2) / expected) == pytest.approx(0, abs=0.05)
 

@@ -14,7 +14,16 @@ from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene.scene import Scene
-from tests.physics.corners import both_ways, chains, corner, cross_section, direction, looking
+from tests.physics.corners import (
+    both_ways,
+    chains,
+    corner,
+    cross_section,
+    direction,
+    looking,
+    seen_by_all,
+    seen_by_both,
+)
 from tests.physics.rigs import isotropic
 
 CONFIG = PRESETS["radarize"]
@@ -26,7 +35,7 @@ LAMBDA = CONFIG.wavelength
 def test_dihedral(off, a, b):
     """sigma = 8 pi a^2 b^2 / lambda^2 head on; off it, by the width that both plates share, 2 a min(sin, cos)."""
     azimuth = np.deg2rad(45 + off)
-    area = 2 * a * b * min(np.sin(azimuth), np.cos(azimuth))
+    area = seen_by_both(a, b, azimuth)
     found = cross_section(corner(2, a, b), direction(azimuth, 0))
     assert 10 * np.log10(found / (4 * np.pi * area**2 / LAMBDA**2)) == pytest.approx(0, abs=0.2)
     if off == 0:
@@ -47,9 +56,7 @@ def test_trihedral(off):
     a = 0.04
     azimuth, elevation = np.pi / 4 + np.deg2rad(off[0]), np.arcsin(1 / np.sqrt(3)) + np.deg2rad(off[1])
     towards = direction(azimuth, elevation)
-    low, middle, high = np.sort(towards)
-    total = low + middle + high
-    area = a**2 * (total - 2 / total if low + middle >= high else 4 * low * middle / total)
+    area = seen_by_all(a, towards)
     found = cross_section(corner(3, a, a, triangles=True), towards)
     assert 10 * np.log10(found / (4 * np.pi * area**2 / LAMBDA**2)) == pytest.approx(0, abs=0.3)
     if off == (0, 0):
@@ -98,6 +105,28 @@ def test_kirchhoff_integral(seed):
     assert apertures.kirchhoff(polygon, 5) == pytest.approx(truth, abs=3e-3)
 
 
+def images_of_a_room(search):
+    """Images of a radar in a box room, by walls and chains of them: isometries, amplitudes, orders."""
+    flat = Reflectors.of(Scene.load("physics/room"), CONFIG).flat
+    parts = plates.parts(flat, search, 0)
+    single = parts.isometry
+    walls = (
+        np.abs(np.linalg.det(single[:, :, :3]) + 1 + np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1)) < 1e-6
+    )
+    chain, isometry, amplitude = both_ways(flat, search)
+    order = np.concatenate([np.ones(walls.sum(), int), 2 + (chain[:, 1] != chain[:, 2])])
+    return np.concatenate([single[walls], isometry]), np.concatenate([parts.amplitude[walls], amplitude]), order
+
+
+def lattice(p):
+    """The same images by the lattice of rooms: order, by axis whether it is turned, and place."""
+    low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
+    for cell in product(range(-3, 4), repeat=3):
+        order, even = int(np.abs(cell).sum()), np.array(cell) % 2 == 0
+        if 1 <= order <= 3:
+            yield order, ~even, low + cell * (high - low) + np.where(even, p - low, high - p)
+
+
 def test_box_room_has_all_its_images(monkeypatch):
     """6 images of first, 18 of second and 38 of third order and no others, with delay, sign and strength.
 
@@ -108,41 +137,25 @@ def test_box_room_has_all_its_images(monkeypatch):
     for module, kernel in ((imagemethod, "_search"), (plates, "_parts")):
         monkeypatch.setattr(module, "gain_towards", lambda *_: 1.0)
         monkeypatch.setattr(module, kernel, getattr(module, kernel).py_func)
-    scene = Scene.load("physics/room")
-    low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
     p, pose = np.array([0.37, -0.21, 1.23]), Rotation.from_euler("ZYX", [0.3, 0.4, 0.5]).as_matrix()
-    flat, search = Reflectors.of(scene, CONFIG).flat, isotropic(p, LAMBDA, pose)
-    parts = plates.parts(flat, search, 0)
-    single = parts.isometry
-    walls = (
-        np.abs(np.linalg.det(single[:, :, :3]) + 1 + np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1)) < 1e-6
-    )
-    chain, isometry, amplitude = both_ways(flat, search)
-    order = np.concatenate([np.ones(walls.sum(), int), 2 + (chain[:, 1] != chain[:, 2])])
-    isometry = np.concatenate([single[walls], isometry])
-    amplitude = np.concatenate([parts.amplitude[walls], amplitude])
+    isometry, amplitude, order = images_of_a_room(isotropic(p, LAMBDA, pose))
     found = isometry[:, :, :3] @ p + isometry[:, :, 3]
 
     counted, known = {1: 0, 2: 0, 3: 0}, np.zeros(len(found), bool)
-    for cell in product(range(-3, 4), repeat=3):
-        length = int(np.abs(cell).sum())
-        if length not in counted:
-            continue
-        even = np.array(cell) % 2 == 0
-        image = low + cell * (high - low) + np.where(even, p - low, high - p)
-        turns = np.where(even, 1.0, -1.0)  # the product of reflections in a box is diagonal
+    for length, turned, image in lattice(p):
+        turns = np.where(turned, -1.0, 1.0)  # the product of reflections in a box is diagonal
         path = np.linalg.norm(image - p)
         out = (image - p) / path
         sent = pose[:, 2] - pose[:, 2] @ out * out
         arriving = turns * out
         taken = pose[:, 2] - pose[:, 2] @ arriving * arriving
-        turned = (-1) ** length * turns * sent / np.linalg.norm(sent)
-        expected = LAMBDA / (4 * np.pi * path) * turned @ taken / np.linalg.norm(taken)
+        field = (-1) ** length * turns * sent / np.linalg.norm(sent)
+        expected = LAMBDA / (4 * np.pi * path) * field @ taken / np.linalg.norm(taken)
         here = (np.linalg.norm(found - image, axis=1) < 1e-6) & (order == length)
-        assert here.any(), cell
+        assert here.any(), image
         counted[length] += 1
         known |= here
-        assert np.sum(amplitude[here]) == pytest.approx(expected, abs=0.023 * LAMBDA / (4 * np.pi * path)), cell
+        assert np.sum(amplitude[here]) == pytest.approx(expected, abs=0.023 * LAMBDA / (4 * np.pi * path)), image
     assert counted == {1: 6, 2: 18, 3: 38}
     assert known.all()
 

@@ -13,6 +13,7 @@ from radarsim.physics.scatterers import Scatterers
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
+from tests.physics.rigs import field
 
 CONFIG = PRESETS["radarize"]
 
@@ -33,9 +34,7 @@ def coherent_field(mesh, position):
     scene = Scene("scan", [SceneObject("wall", mesh, MATERIALS["concrete"])])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     echoes = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(position, np.eye(3))
-    image = np.einsum("pij,j->pi", echoes.images[:, :, :3], position) + echoes.images[:, :, 3]
-    phase = 2 * np.pi * np.linalg.norm(position - image, axis=1) / CONFIG.wavelength
-    return np.sum(echoes.amplitude * np.exp(1j * phase))
+    return field(echoes, position, CONFIG.wavelength)
 
 
 @pytest.mark.parametrize("position", [(0, 0, 0), (0.3, 0.4, -0.2), (0, 0.97, 0.3)])

@@ -15,7 +15,7 @@ SPEED = 1.2
 
 
 def ridge(rig):
-    """Doppler-azimuth map, noise included, of a ring of clutter around the rig."""
+    """Doppler-azimuth map, noise included, of a ring of clutter around the rig; and the ridge's speed by column."""
     rng = np.random.default_rng(7)
     n = 4000
     azimuth, range_ = rng.uniform(-np.pi / 2, np.pi / 2, n), rng.uniform(1.5, 4.0, n)
@@ -28,7 +28,10 @@ def ridge(rig):
     adc = front.digitize(burst(CONFIG, echoes, rig), rng)
     maps = Heatmaps(CONFIG)
     power = maps.doppler_azimuth(adc[None])[0].numpy()
-    return maps, power
+    # the centre of power around the strongest bin of each column
+    bins = np.clip(power.argmax(axis=0) + np.arange(-1, 2)[:, None], 0, len(maps.velocities) - 1)
+    weight = np.take_along_axis(power, bins, axis=0)
+    return maps, power, (maps.velocities[bins] * weight).sum(axis=0) / weight.sum(axis=0)
 
 
 @pytest.mark.parametrize(
@@ -48,14 +51,9 @@ def ridge(rig):
 def test_ridge(velocity, rate, lever):
     rig = Rig(velocity=velocity, yaw_rate=rate, yaw=-rate * CONFIG.burst_center, lever=(lever, 0, 0))
     sensor_velocity = np.array(velocity[:2]) + [0, rate * lever]
-    maps, power = ridge(rig)
+    maps, _, found = ridge(rig)
     columns = np.abs(maps.azimuths) < np.deg2rad(50)
     theory = sensor_velocity[0] * np.cos(maps.azimuths) + sensor_velocity[1] * np.sin(maps.azimuths)
-    # the centre of power around the strongest bin of each column
-    peak = power.argmax(axis=0)
-    bins = np.clip(peak + np.arange(-1, 2)[:, None], 0, len(maps.velocities) - 1)
-    weight = np.take_along_axis(power, bins, axis=0)
-    found = (maps.velocities[bins] * weight).sum(axis=0) / weight.sum(axis=0)
     error = (found - theory)[columns]
     # a beam of 15 deg sees a span of speeds where the ridge is steep, and speckle picks one of them
     assert abs(np.median(error)) < 0.03

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
-from radarize.evaluation.blindness import BlindSpans
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, RecordingWriter, Stream
 from radarize.report.drawings import canvas, draw_doppler, draw_fan
@@ -170,9 +169,9 @@ def test_blind_spans_are_counted_from_the_first_pose(tmp_path):
     clock, run = 1.7e9, write_run(tmp_path / "run")
     poses = np.loadtxt(run / "trajectory.tum")
     np.savetxt(run / "trajectory.tum", poses + [clock, *[0] * 7], fmt="%.9f")
-    assert BlindSpans.of(RunFolder(run)) is None
+    assert RunFolder(run).blind is None
     spans = [span | {"start_s": span["start_s"] + clock, "stop_s": span["stop_s"] + clock} for span in BLIND["spans"]]
-    assert BlindSpans.of(RunFolder(tell(run, blind=BLIND | {"spans": spans}))).model_dump() == BLIND
+    assert RunFolder(tell(run, blind=BLIND | {"spans": spans})).blind.model_dump() == BLIND
 
 
 def test_blindness_is_told_without_truth_too(tmp_path):

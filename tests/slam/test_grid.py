@@ -6,6 +6,7 @@ import yaml
 from matplotlib import pyplot
 
 from radarize.errors import InputError
+from radarize.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid, cross
 
@@ -94,7 +95,7 @@ def test_map_files_put_y_up_and_know_the_unknown(tmp_path):
     for _ in range(5):
         grid.insert(np.zeros((1, 2)), np.array([[2.0, 1.0]]), np.ones(1, bool), CONFIG)
     grid = grid.crop(margin=3)
-    grid.save(tmp_path / "map")
+    OccupancyMap.of(grid).save(tmp_path / "map.yaml")
     picture = pyplot.imread(tmp_path / "map.pgm")  # Pillow reads it
     about = yaml.safe_load((tmp_path / "map.yaml").read_text())
     assert about["image"] == "map.pgm" and about["negate"] == 0 and about["resolution"] == 0.1
@@ -112,7 +113,9 @@ def test_map_files_put_y_up_and_know_the_unknown(tmp_path):
 
 
 def test_an_empty_map_can_be_saved_and_a_bad_place_is_named(tmp_path):
-    OccupancyGrid.empty(0.05).crop(margin=4).save(tmp_path / "map.pgm")
+    empty = OccupancyMap.of(OccupancyGrid.empty(0.05).crop(margin=4))
+    empty.save(tmp_path / "map.yaml")
     assert (pyplot.imread(tmp_path / "map.pgm") == 205).all()
-    with pytest.raises(InputError, match="cannot write"):
-        OccupancyGrid.empty(0.05).save(tmp_path / "missing" / "map")
+    (tmp_path / "file").write_text("no folder")
+    with pytest.raises(InputError, match="file/map.pgm: cannot be written"):
+        empty.save(tmp_path / "file" / "map.yaml")

@@ -1,6 +1,12 @@
-"""A synthetic planar world of walls, scanned by exact ray casting."""
+"""A synthetic planar world of walls, scanned by exact ray casting; and a graph of poses on a lap of known truth."""
 
 import numpy as np
+
+from radarize.pose import between, compose
+from radarize.slam.posegraph import PoseGraph
+
+#: Of a step of a lap, m and rad.
+SIGMA = np.array([0.02, 0.02, 0.01])
 
 
 def box(x0, y0, x1, y1):
@@ -68,3 +74,25 @@ def ate(truth, estimate):
     """Mean distance after the best rigid alignment, m."""
     turn, shift = align(truth, estimate)
     return float(np.hypot(*(estimate[:, :2] @ turn.T + shift - truth[:, :2]).T).mean())
+
+
+def lap(false, seed=7):
+    """201 nodes on two laps of a square of 25 m sides, noisy odometry, ten true and some false closures."""
+    rng = np.random.default_rng(seed)
+    truth = [np.zeros(3)]
+    for k in range(200):
+        truth.append(compose(truth[-1], np.array([1.0, 0, np.pi / 2 if k % 25 == 24 else 0.0])))
+    truth = np.array(truth)
+    graph = PoseGraph()
+    graph.add_node(truth[0])
+    for k in range(200):
+        step = between(truth[k], truth[k + 1]) + rng.normal(0, SIGMA)
+        graph.add_node(compose(graph.poses[-1], step))
+        graph.add_motion(k, k + 1, step, np.diag(SIGMA**2))
+    for k in range(10):
+        i = 5 + 9 * k
+        graph.add_closure(i, i + 100, between(truth[i], truth[i + 100]) + rng.normal(0, 0.03, 3), np.eye(3) * 0.03**2)
+    for i, j in [(10, 60), (30, 180), (55, 85), (3, 140), (20, 70)][:false]:
+        graph.add_closure(i, j, np.array([0.3, -0.2, 0.1]), np.eye(3) * 0.03**2)
+    odometry = ate(truth, np.array(graph.poses))
+    return graph, truth, odometry

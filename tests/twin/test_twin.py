@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from benchmarks import transfer
-from benchmarks.twin import altered, shaken
 from radarize.errors import InputError
 from radarize.radar.presets import PRESETS, load_config
 from radarize.recording import Recording, RecordingWriter
@@ -23,6 +21,8 @@ from radarsim.simulate import simulate
 from radarsim.twin.comparison import compare
 from radarsim.twin.report import report_twin
 from radarsim.twin.twin import make_twin
+from tests.importers.public import captures
+from tests.twin.poses import altered, shaken
 
 
 def room(name: str, x: float, y: float, things: list[dict]) -> Scene:
@@ -268,7 +268,7 @@ def test_what_is_missing_is_said_in_a_sentence(real, tmp_path):
 
 def test_real_captures(recordings, tmp_path):
     """Frames of undescribed rooms: without a pose there is a sentence; with one, the fitted board has their noise."""
-    for name, path in transfer.captures(recordings, tmp_path).items():
+    for name, path in captures(recordings, tmp_path).items():
         with pytest.raises(InputError, match="has no poses"):
             make_twin(path, PLACE, tmp_path / "x.h5")
         made = make_twin(path, PLACE, tmp_path / f"{name}.twin.h5", at=Mounting.of((-2, 0, 1), (0, 0, 0)), fit=True)

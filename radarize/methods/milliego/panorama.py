@@ -20,11 +20,7 @@ _BATCH = 32
 def panoramas(
     points: Float[np.ndarray, "point 6"], frame: Int[np.ndarray, "point"], frames: int
 ) -> Float[np.ndarray, "frame row column"]:
-    """Depth images of point clouds: 0 where there is no point, the nearest one wins.
-
-    Args:
-        points, frame: see `PointClouds`.
-        frames: in all.
+    """Depth images of point clouds, see `PointClouds`: 0 where there is no point, the nearest one wins.
 
     Returns:
         depth over 5 m, at most 1; rows from top to bottom, columns from right to left.

@@ -47,9 +47,6 @@ LEVEL = {f"published_elevation_aware_{n}": f"log power near the horizon, {n} fra
 class PublishedMaps(Maker):
     """Makes the artefact's maps of one radar configuration, 0...1.
 
-    Args:
-        config: radar configuration.
-
     Raises:
         InputError: the radar has not twelve virtual channels.
     """
@@ -166,9 +163,6 @@ def capon(
 
 class PublishedStream:
     """Maps of a stream's frames, of 30 a second every second one; odometry and scans share them.
-
-    Args:
-        radar: configuration.
 
     Raises:
         InputError: see `PublishedMaps`.

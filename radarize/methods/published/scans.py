@@ -16,12 +16,7 @@ _COLUMNS = np.abs(BEARINGS[:, None] - labels.BEARINGS).argmin(axis=1)
 
 
 class PublishedScans:
-    """Scans of those frames that the artefact uses; the others see nothing.
-
-    Args:
-        stream: makes the maps.
-        segmentation: trained network.
-    """
+    """Scans of those frames that the artefact uses; the others see nothing."""
 
     def __init__(self, stream: PublishedStream, segmentation: torch.nn.Module):
         self._stream, self._net = stream, segmentation

@@ -20,10 +20,6 @@ from radarize.stopwatch import stage
 class RadarHdScans:
     """Scans of a stream's frames.
 
-    Args:
-        radar: configuration.
-        weights: file.
-
     Raises:
         InputError: no such weights, or they are for another radar.
     """

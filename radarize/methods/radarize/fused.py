@@ -16,10 +16,6 @@ class FusedVelocity:
     Where they contradict each other by more than both admit, at least one is wrong without knowing: then both are
     believed less.
 
-    Args:
-        learned, doppler: the two.
-        settings: of the fusion.
-
     Attributes:
         lever: m, see `VelocityEstimator`: that of least squares, which has most of the say.
     """

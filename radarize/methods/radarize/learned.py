@@ -22,10 +22,6 @@ _ANY_VELOCITY = 2.0
 class LearnedVelocity:
     """Velocity estimator by `TranslationNet`.
 
-    Args:
-        radar: configuration.
-        weights: file.
-
     Raises:
         InputError: no such weights, or they are for another radar.
     """
@@ -54,11 +50,6 @@ class LearnedRotation:
 
     The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
     one Gaussian state (`Ties`), which goes on at its rate where frames are lost.
-
-    Args:
-        radar: configuration.
-        weights: file.
-        settings: of the filter.
     """
 
     def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):

@@ -13,10 +13,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from radarize.features.maps import AZIMUTHS, Maps
-from radarize.nets.correlation import Correlation
+from radarize.nets.correlation import Correlation, Moved
 from radarize.nets.gaussian import Gaussian
 from radarize.nets.maps import coordinates, level
-from radarize.nets.parallax import Moved
 from radarize.nets.resnet import ResNet18
 from radarize.nets.weights import Network
 
@@ -51,9 +50,7 @@ class TranslationNet(MotionNet):
     reads what is missing; it sees the same picture whatever the speed, and needs the fewer examples.
 
     Args:
-        frames: of a window.
-        maps: names of a frame's maps, see `radarize.features.maps.MAPS`.
-        width: of the ResNets.
+        frames, maps, width: see `MotionNet`.
         step: m/s from row to row.
     """
 

@@ -13,7 +13,7 @@ from radarize.nets.weights import load
 from radarize.radar.config import RadarConfig
 from radarize.stopwatch import stage
 
-#: Least probability that a returned range is right.
+#: Least probability that a range is right within `NEAR` cells: higher leaves fewer ghosts and fewer bearings.
 LEAST = 0.7
 #: Cells to either side that count as right: 9 cm of the preset's.
 NEAR = 2
@@ -23,10 +23,6 @@ class Segmentation:
     """Scans of a stream's frames.
 
     Args:
-        radar: configuration.
-        weights: file.
-        least: least probability that a range is right within `NEAR` cells: higher leaves fewer ghosts and fewer
-            bearings.
         first: take the first surface; False: the likeliest occupied cell of each bearing, wherever it is, for
             comparison.
 
@@ -34,10 +30,10 @@ class Segmentation:
         InputError: no such weights, or they are for another radar.
     """
 
-    def __init__(self, radar: RadarConfig, weights: Path, least: float = LEAST, first: bool = True):
+    def __init__(self, radar: RadarConfig, weights: Path, first: bool = True):
         self._net, header = load(weights, SegmentationNet, radar)
         self._windows, self._ranges = header.windows(radar), radar.ranges - radar.range_bias
-        self.least, self.first = least, first
+        self.first = first
 
     @torch.inference_mode()
     def occupancy(self, batch: Batch) -> Float[np.ndarray, "frame range bearing"]:
@@ -50,9 +46,9 @@ class Segmentation:
         with stage("scans"):
             occupancy = self.occupancy(batch)
             if self.first:
-                bins = first_surface(occupancy, self.least)
+                bins = first_surface(occupancy, LEAST)
             else:
-                bins = echoes.strongest(occupancy >= self.least, occupancy)
+                bins = echoes.strongest(occupancy >= LEAST, occupancy)
         return np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
 
 

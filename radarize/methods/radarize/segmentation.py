@@ -21,13 +21,8 @@ def _resampling() -> Tensor:
 
 
 class SegmentationNet(Network):
-    """U-Net on range-azimuth maps, azimuth and elevation-aware, whose answers lie on the grid of the occupancy labels.
-
-    Args:
-        frames: of a window; the newest one is labelled.
-        maps: names of a frame's maps.
-        width: of the U-Net.
-    """
+    """U-Net on range-azimuth maps, azimuth and elevation-aware, whose answers for the newest frame lie on the grid of
+    the occupancy labels."""
 
     kind, outputs = "segmentation", ("probability",)
 

@@ -5,7 +5,6 @@ static world close at u . v, u being their direction and v the sensor's velocity
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -20,44 +19,23 @@ from radarize.odometry.rotation import MapRotation
 _UNKNOWN = 1.0
 
 
-@dataclass(frozen=True)
-class RansacSettings:
-    """Settings of `RansacVelocity`, as published.
-
-    Attributes:
-        inlier: m/s, by how much a point's speed may differ.
-        outliers: share of points that may be wrong.
-        success: probability that one hypothesis, at least, is made of right points alone.
-        still: m/s; if the median of all speeds is less, the sensor stands (zero-velocity test).
-        noise: m/s, the least standard deviation of a point's speed.
-    """
-
-    inlier: float = 0.15
-    outliers: float = 0.4
-    success: float = 0.9999
-    still: float = 0.05
-    noise: float = 0.02
-
-    @property
-    def hypotheses(self) -> int:
-        """Triples of points that are tried."""
-        return math.ceil(math.log(1 - self.success) / math.log(1 - (1 - self.outliers) ** 3))
+#: As published: m/s, by how much a point's speed may differ; share of points that may be wrong; probability that one
+#: hypothesis, at least, is made of right points alone.
+_INLIER, _OUTLIERS, _SUCCESS = 0.15, 0.4, 0.9999
+#: m/s: if the median of all speeds is less, the sensor stands (zero-velocity test); least deviation of a speed.
+_STILL, _NOISE = 0.05, 0.02
+#: Triples of points that are tried.
+HYPOTHESES = math.ceil(math.log(1 - _SUCCESS) / math.log(1 - (1 - _OUTLIERS) ** 3))
 
 
 class RansacVelocity:
-    """Velocity estimator; stateless between frames.
-
-    Args:
-        settings: of RANSAC.
-        seed: of the triples, one table for all frames.
-    """
+    """Velocity estimator; stateless between frames, whose triples come from one table."""
 
     #: m, see `VelocityEstimator`; as published.
     lever = 0.0
 
-    def __init__(self, settings: RansacSettings | None = None, seed: int = 0):
-        self.settings = settings or RansacSettings()
-        self._draws = np.random.default_rng(seed).random((self.settings.hypotheses, 3))
+    def __init__(self):
+        self._draws = np.random.default_rng(0).random((HYPOTHESES, 3))
 
     def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames.
@@ -75,26 +53,26 @@ class RansacVelocity:
         self, points: Float[np.ndarray, "point 6"]
     ) -> tuple[Float[np.ndarray, "2"], Float[np.ndarray, "2 2"], int]:
         """Velocity of one frame (forward, left), m/s, its covariance, and the points that agree."""
-        settings, unknown = self.settings, (np.zeros(2), _UNKNOWN * np.eye(2), 0)
+        unknown = np.zeros(2), _UNKNOWN * np.eye(2), 0
         if len(points) < 3:
             return unknown
         direction = points[:, :3] / np.linalg.norm(points[:, :3], axis=1, keepdims=True)
         speed = points[:, 3]
-        if np.median(np.abs(speed)) < settings.still:
-            return np.zeros(2), settings.noise**2 * np.eye(2), len(points)
+        if np.median(np.abs(speed)) < _STILL:
+            return np.zeros(2), _NOISE**2 * np.eye(2), len(points)
         triples = (self._draws * len(points)).astype(int)
         regular = np.abs(np.linalg.det(direction[triples])) > 1e-4
         if not regular.any():
             return unknown
         guesses = np.linalg.solve(direction[triples[regular]], speed[triples[regular]][..., None])[..., 0]
-        agree = np.abs(speed - guesses @ direction.T) < settings.inlier
+        agree = np.abs(speed - guesses @ direction.T) < _INLIER
         agree = agree[agree.sum(axis=1).argmax()]
         normal = direction[agree].T @ direction[agree]
         if agree.sum() < 4 or np.linalg.cond(normal) > 1e6:
             return unknown
         velocity = np.linalg.solve(normal, direction[agree].T @ speed[agree])
         residual = speed[agree] - direction[agree] @ velocity
-        variance = max((residual**2).sum() / (agree.sum() - 3), settings.noise**2)
+        variance = max((residual**2).sum() / (agree.sum() - 3), _NOISE**2)
         return velocity[:2], (variance * np.linalg.inv(normal))[:2, :2], int(agree.sum())
 
 

@@ -21,6 +21,9 @@ from radarize.stopwatch import stage
 _WANDER = np.array([1.0, 1.0, 2.0])
 #: m/s and rad/s: standard deviations of a motion that nothing is known of.
 _ANY_RATE = np.array([1.0, 1.0, 1.0])
+#: Scans in the grid, each added once the sensor has moved by as much as the settings make a node of; and as of `match`:
+#: a scan's errors are much the same in the next, so each counts little.
+_KEYS, _SIGMA = 12, 3.0
 
 
 class ScanMatching:
@@ -29,20 +32,11 @@ class ScanMatching:
     Args:
         scanner: makes the scans.
         settings: of node, grid and matcher.
-        keys: scans in the grid, each added once the sensor has moved by as much as the settings make a node of.
-        sigma: of the matcher, see `match`; a scan's errors are much the same in the next, so each counts little.
     """
 
-    def __init__(
-        self,
-        scanner: Scanner,
-        settings: SlamConfig | None = None,
-        keys: int = 12,
-        sigma: float = 3.0,
-    ):
-        self.scanner, self.sigma = scanner, sigma
-        self.settings = settings or SlamConfig.preset("lidar")
-        self._keys: deque[tuple[np.ndarray, Node]] = deque(maxlen=keys)
+    def __init__(self, scanner: Scanner, settings: SlamConfig | None = None):
+        self.scanner, self.settings = scanner, settings or SlamConfig.preset("lidar")
+        self._keys: deque[tuple[np.ndarray, Node]] = deque(maxlen=_KEYS)
         self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
         self._time: float | None = None
         self._pose = np.zeros(3)
@@ -86,7 +80,7 @@ class ScanMatching:
     def _correct(self, node: Node) -> None:
         """Fit the pose to the grid; the rate follows as much as its error goes along with the pose's."""
         prior = self._spread[:3, :3]
-        found = match(self._grid, node.points, self._pose, sigma=self.sigma, prior=self._pose, covariance=prior)
+        found = match(self._grid, node.points, self._pose, sigma=_SIGMA, prior=self._pose, covariance=prior)
         fitted = np.linalg.inv(np.linalg.inv(prior) + found.information)
         along = self._spread[3:, :3] @ np.linalg.inv(prior)
         self._rate = self._rate + along @ between(self._pose, found.pose)

@@ -1,0 +1,28 @@
+"""How far two clouds of points are apart (Prabhakara et al., ICRA 2023, section VI)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import cKDTree
+
+
+@dataclass(frozen=True)
+class Apart:
+    """Two clouds.
+
+    Attributes:
+        chamfer: m, half the sum of both mean distances to the nearest point of the other.
+        hausdorff: m, the larger of both medians of these.
+    """
+
+    chamfer: float
+    hausdorff: float
+
+    @classmethod
+    def of(cls, found: Float[np.ndarray, "point 2"], true: Float[np.ndarray, "point 2"]) -> "Apart":
+        """Not-a-number where one has no points."""
+        if not len(found) or not len(true):
+            return cls(np.nan, np.nan)
+        there, back = cKDTree(true).query(found)[0], cKDTree(found).query(true)[0]
+        return cls((there.mean() + back.mean()) / 2, max(np.median(there), np.median(back)))

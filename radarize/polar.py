@@ -1,0 +1,131 @@
+"""Polar pictures as RadarHD's data set has them: what an array of eight antennas hears, and what a lidar sees.
+
+Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023, and the program that made its data set.
+A picture has 256 rows of range up to 10.8 m, and columns of azimuth from -90 to 90 deg, positive to the left: 64 of the
+radar's, 512 of the lidar's. Measures of their paper are taken on a Cartesian grid (`cartesian`).
+"""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, Int16, UInt8
+from scipy.fft import fft
+
+from radarize.errors import InputError
+from radarize.radar.config import RadarConfig
+
+ROWS, COLUMNS, BEAMS = 256, 64, 512
+#: m, of rows; rad, of the radar's and of the lidar's columns.
+REACH = 10.8
+RANGES = np.linspace(0, REACH, ROWS)
+AZIMUTHS, BEAM_AZIMUTHS = (np.radians(np.linspace(-90, 90, columns)) for columns in (COLUMNS, BEAMS))
+#: Kept is what has at least this share of the largest magnitude beyond the first bins, where transmitters leak.
+THRESHOLD, LEAKAGE = 0.05, 6
+#: m, half of the square that points may lie in; rad, of what the radar's pictures keep to either side.
+_SQUARE, _FIELD = 10.0, np.radians(70)
+#: Cells of the measures' grid: x of 0...`REACH`, y of -`REACH`...`REACH`.
+GRID = (256, 512)
+
+
+class _Cells(NamedTuple):
+    """Cells of range and sine of azimuth that lie in a picture, and the picture's pixels that they go to."""
+
+    cell: Int[np.ndarray, "cell"]
+    pixel: Int[np.ndarray, "cell"]
+
+
+@cache
+def _cells(samples: int, farthest: float) -> _Cells:
+    """Of so many range bins, up to `farthest` (m)."""
+    sine = np.linspace(1, -1, COLUMNS)[:, None]
+    ranges = np.linspace(0, farthest, samples)
+    x, y = ranges * np.sqrt(1 - sine**2), ranges * sine
+    distance, azimuth = np.sqrt(x**2 + y**2), np.arctan2(y, x)
+    inside = (x > 0) & (x <= _SQUARE) & (np.abs(y) <= _SQUARE) & (distance <= REACH) & (np.abs(azimuth) <= _FIELD)
+    inside[:, :LEAKAGE] = False
+    row = np.searchsorted(RANGES, distance[inside])
+    column = np.searchsorted(np.degrees(AZIMUTHS), np.degrees(azimuth[inside]))
+    return _Cells(np.flatnonzero(inside), row * COLUMNS + column)
+
+
+def magnitudes(
+    adc: Int16[np.ndarray, "frame loop tx rx sample 2"], config: RadarConfig
+) -> Float[np.ndarray, "frame sine range"]:
+    """Of the first loop's eight antennas in a row, without windows, over sine of azimuth (left first) and range.
+
+    Raises:
+        InputError: a radar without TX1 and TX3 of four receivers.
+    """
+    if not {0, 2} <= set(config.tx) or len(config.rx) != 4:
+        raise InputError(f"radar: tx {config.tx} and rx {config.rx}, expected TX1 and TX3 with four receivers")
+    loop = adc[:, 0][:, [config.tx.index(0), config.tx.index(2)]].astype(float)
+    row = (loop[..., 0] + 1j * loop[..., 1]).reshape(len(adc), 8, -1)
+    return np.abs(np.fft.fftshift(fft(fft(row, axis=2), COLUMNS, axis=1), axes=1))
+
+
+def pictures(
+    adc: Int16[np.ndarray, "frame loop tx rx sample 2"], config: RadarConfig, threshold: float = THRESHOLD
+) -> UInt8[np.ndarray, "frame range azimuth"]:
+    """Pictures of frames: decibels from the least (0) to the largest (255) that is kept; 0 where nothing is.
+
+    Args:
+        adc: raw I/Q.
+        config: radar configuration.
+        threshold: share of the largest magnitude from which cells are kept.
+
+    Raises:
+        InputError: see `magnitudes`.
+    """
+    found = np.zeros((len(adc), ROWS * COLUMNS), np.uint8)
+    # Its bins end at the unambiguous range of complex samples.
+    cells = _cells(config.samples, round(config.samples * config.range_resolution, 2))
+    for picture, magnitude in zip(found, magnitudes(adc, config), strict=True):
+        kept = magnitude.ravel()[cells.cell] >= threshold * magnitude[:, LEAKAGE:].max()
+        level = 10 * np.log10(np.maximum(magnitude.ravel()[cells.cell[kept]], 1e-30))
+        if level.size and np.ptp(level) > 0:
+            share = (level - level.min()) / np.ptp(level)
+            np.maximum.at(picture, cells.pixel[kept], (share * 255).astype(np.uint8))
+    return found.reshape(-1, ROWS, COLUMNS)
+
+
+def levels(
+    adc: Int16[np.ndarray, "frame loop tx rx sample 2"], config: RadarConfig
+) -> Float[np.ndarray, "frame range azimuth"]:
+    """What pictures are made of before anything is dropped: dB below the largest magnitude, -inf where no cell lies."""
+    found = np.full((len(adc), ROWS * COLUMNS), -np.inf)
+    cells = _cells(config.samples, round(config.samples * config.range_resolution, 2))
+    for picture, magnitude in zip(found, magnitudes(adc, config), strict=True):
+        share = magnitude.ravel()[cells.cell] / max(magnitude[:, LEAKAGE:].max(), 1e-30)
+        np.maximum.at(picture, cells.pixel, 20 * np.log10(np.maximum(share, 1e-9)))
+    return found.reshape(-1, ROWS, COLUMNS)
+
+
+def lidar_pixels(
+    points: Float[np.ndarray, "point 3"],
+) -> Int[np.ndarray, "pixel 2"]:
+    """Rows and columns of a lidar's picture that hold points (x forward, y left, z up, m) of its own height."""
+    x, y, z = points.T
+    inside = (x > 0) & (x <= _SQUARE) & (np.abs(y) <= _SQUARE) & (np.abs(z) <= 0.3)
+    distance = np.linalg.norm(points, axis=1)
+    inside &= distance <= REACH
+    row = np.searchsorted(RANGES, distance[inside])
+    column = np.searchsorted(np.degrees(BEAM_AZIMUTHS), np.degrees(np.arctan2(y, x)[inside]))
+    return np.unique(np.stack([row, column], axis=1), axis=0)
+
+
+def cartesian(picture: Bool[np.ndarray, "range azimuth"]) -> Float[np.ndarray, "point 2"]:
+    """Points (x forward, y left, m) of a picture with any number of columns, through the grid of the measures."""
+    rows, columns = np.nonzero(picture)
+    azimuth = np.linspace(-np.pi / 2, np.pi / 2, picture.shape[1])[columns]
+    ranges = np.linspace(0, REACH, picture.shape[0])[rows]
+    return gridded(np.stack([ranges * np.cos(azimuth), ranges * np.sin(azimuth)], axis=1))
+
+
+def gridded(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "cell 2"]:
+    """Cells of the measures' grid that hold points, as points (m)."""
+    axes = np.linspace(0, REACH, GRID[0]), np.linspace(-REACH, REACH, GRID[1])
+    inside = (points[:, 0] >= 0) & (points[:, 0] <= REACH) & (np.abs(points[:, 1]) <= REACH)
+    places = [np.searchsorted(axis, values) for axis, values in zip(axes, points[inside].T, strict=True)]
+    cells = np.unique(np.stack(places, axis=1), axis=0)
+    return np.stack([axis[cells[:, k]] for k, axis in enumerate(axes)], axis=1)

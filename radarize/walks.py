@@ -1,0 +1,162 @@
+"""Real walks of RadarHD's repository, as a user's clone has them: pictures of a radar and of a lidar beside it.
+
+Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023. The repository has no licence: measure
+with its walks and cite the paper; nothing of them is part of this project.
+
+    dataset_5/train|test/radar/R_WALK_FRAME.png      256 x 64, see `radarize.polar`
+    dataset_5/train|test/lidar/L_WALK_FRAME.png      256 x 512
+"""
+
+import io
+import lzma
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt8
+from PIL import Image
+
+from radarize import polar
+from radarize.errors import InputError
+
+#: s, from frame to frame.
+PERIOD = 0.05
+#: The authors' measures begin here: their network sees the frames before.
+FIRST = 40
+
+
+@dataclass(frozen=True)
+class Walk:
+    """A walk of a clone.
+
+    Attributes:
+        folder: ``train`` or ``test`` of the data set.
+        number: of the walk.
+        frames: how many there are.
+    """
+
+    folder: Path
+    number: int
+    frames: int
+
+    @classmethod
+    def find(cls, data: Path, number: int) -> "Walk":
+        """In a clone's data set.
+
+        Raises:
+            InputError: there is none, or pictures are missing.
+        """
+        for part in ("train", "test"):
+            folder = Path(data) / part
+            names = {int(path.stem.split("_")[2]) for path in folder.glob(f"radar/R_{number}_*.png")}
+            if names:
+                if missing := sorted(set(range(max(names) + 1)) - names):
+                    raise InputError(
+                        f"{folder / 'radar' / f'R_{number}_{missing[0]}.png'}: is missing, expected a picture"
+                    )
+                return cls(folder, number, len(names))
+        raise InputError(f"{data}: has no walk {number}, expected train|test/radar/R_{number}_0.png and so on")
+
+    @classmethod
+    def tests(cls, data: Path) -> "list[Walk]":
+        """All walks that test.
+
+        Raises:
+            InputError: there are none, or pictures are missing.
+        """
+        numbers = {path.stem.split("_")[1] for path in Path(data).glob("test/radar/R_*_*.png")}
+        if not numbers:
+            raise InputError(
+                f"{data}: holds no test/radar/R_WALK_FRAME.png, expected the data set of RadarHD's repository"
+            )
+        return [cls.find(data, int(number)) for number in sorted(numbers, key=int)]
+
+    def radar(self, frame: int) -> UInt8[np.ndarray, "range azimuth"]:
+        """The radar's picture.
+
+        Raises:
+            InputError: missing, damaged, or of another size.
+        """
+        return _picture(self.folder / "radar" / f"R_{self.number}_{frame}.png", (polar.ROWS, polar.COLUMNS))
+
+    def lidar(self, frame: int) -> Bool[np.ndarray, "range azimuth"]:
+        """Where the lidar has points.
+
+        Raises:
+            InputError: missing, damaged, or of another size.
+        """
+        return _picture(self.folder / "lidar" / f"L_{self.number}_{frame}.png", (polar.ROWS, polar.BEAMS)) > 0
+
+    def batches(self, size: int = 16) -> Iterator[tuple[slice, UInt8[np.ndarray, "frame range azimuth"]]]:
+        """The radar's pictures in batches, with their frames."""
+        for start in range(0, self.frames, size):
+            stop = min(start + size, self.frames)
+            yield slice(start, stop), np.stack([self.radar(frame) for frame in range(start, stop)])
+
+
+def _picture(path: Path, shape: tuple[int, int]) -> np.ndarray:
+    rows, columns = shape
+    try:
+        with Image.open(path, formats=("PNG",)) as image:
+            if image.size != (columns, rows):  # before it is unpacked
+                raise InputError(f"{path}: is {image.size[1]} x {image.size[0]}, expected {rows} x {columns} pixels")
+            return np.asarray(image.convert("L"))
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: is missing, expected a picture") from error
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+        raise InputError(f"{path}: is damaged ({error}), expected a PNG picture") from error
+
+
+@dataclass(frozen=True)
+class Predictions:
+    """What another program says of walks.
+
+    Attributes:
+        folder: of ``WALK.npz`` or ``WALK.npz.xz`` (``prediction``, packed bits of frames on the grid of
+            `radarize.polar.GRID`, and ``frame``, their numbers), or of pictures ``...WALK_FRAME.png`` as the lidar's.
+    """
+
+    folder: Path
+
+    def points(self, walk: Walk) -> dict[int, Float[np.ndarray, "point 2"]]:
+        """Points (x forward, y left, m) of the frames that it knows; no frames of walks that it does not.
+
+        Raises:
+            InputError: a damaged file.
+        """
+        for path in (self.folder / f"{walk.number}.npz", self.folder / f"{walk.number}.npz.xz"):
+            if path.is_file():
+                frames, bits = _packed(path)
+                return {
+                    int(frame): _on_grid(np.unpackbits(each, axis=-1)) for frame, each in zip(frames, bits, strict=True)
+                }
+        pictures = {}
+        for path in self.folder.glob(f"*{walk.number}_*.png"):
+            words = path.stem.removesuffix("_pred").split("_")
+            if len(words) >= 2 and words[-2] == str(walk.number) and words[-1].isdigit():
+                pictures[int(words[-1])] = polar.cartesian(_picture(path, (polar.ROWS, polar.BEAMS)) > 127)
+        return pictures
+
+
+def _packed(path: Path) -> tuple[Int[np.ndarray, "frame"], UInt8[np.ndarray, "frame x byte"]]:
+    most = 1 << 30
+    try:
+        with (lzma.open if path.suffix == ".xz" else open)(path, "rb") as file:
+            content = file.read(most + 1)
+        if len(content) > most:
+            raise ValueError(f"more than {most} bytes")
+        with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
+            frames, bits = arrays["frame"], arrays["prediction"]
+        if bits.dtype != np.uint8 or bits.shape != (len(frames), polar.GRID[0], polar.GRID[1] // 8):
+            raise ValueError(f"prediction is {bits.dtype} of shape {bits.shape}")
+    except (OSError, ValueError, KeyError, EOFError, lzma.LZMAError) as error:
+        raise InputError(
+            f"{path}: is damaged ({error}), expected packed bits `prediction` and numbers `frame`"
+        ) from error
+    return frames, bits
+
+
+def _on_grid(cells: UInt8[np.ndarray, "x y"]) -> Float[np.ndarray, "point 2"]:
+    axes = np.linspace(0, polar.REACH, polar.GRID[0]), np.linspace(-polar.REACH, polar.REACH, polar.GRID[1])
+    return np.stack([axis[index] for axis, index in zip(axes, np.nonzero(cells), strict=True)], axis=1)

@@ -1,0 +1,47 @@
+"""A lidar beside the radar, as pictures of its points at its own height (`radarize.polar`)."""
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize import polar
+from radarize.recording import Stream
+from radarsim.sensors.sensor import Frames, Rig, Sensor
+
+#: rad: of the beams over and under the horizon that can meet something within the slab, as of a lidar of 64 beams
+#: over 33 deg.
+ELEVATIONS = np.radians(np.linspace(-16.5, 16.5, 33))
+#: m: half of the slab.
+SLAB = 0.3
+
+
+class Lidar(Sensor):
+    """Points of the first surfaces around the horizon, levelled: 512 beams over half a circle, 10.8 m, +-0.3 m."""
+
+    def __init__(self, rig: Rig, rng: np.random.Generator):
+        self._rig = rig
+        about = "cells of range (0...10.8 m) and azimuth (-90...90 deg, 512, packed) that hold points of a lidar"
+        self.streams = {"truth/lidar": Stream((polar.ROWS, polar.BEAMS // 8), "u1", "", about)}
+        bearing, elevation = np.meshgrid(polar.BEAM_AZIMUTHS, ELEVATIONS)
+        beams = [np.cos(bearing) * np.cos(elevation), np.sin(bearing) * np.cos(elevation), np.sin(elevation)]
+        self._beams = np.stack([each.ravel() for each in beams], axis=1)
+
+    def observe(self, frames: Frames) -> dict[str, np.ndarray]:
+        """The pictures."""
+        motion, times = self._rig.motion, frames.times + self._rig.config.burst_center
+        forward = motion.rotation(times).apply([1.0, 0.0, 0.0])
+        yaw = np.arctan2(forward[:, 1], forward[:, 0])
+        return {
+            "truth/lidar": np.stack(
+                [self._picture(*each) for each in zip(times, motion.position(times), yaw, strict=True)]
+            )
+        }
+
+    def _picture(self, time: float, position: Float[np.ndarray, "3"], yaw: float) -> np.ndarray:
+        cos, sin = np.cos(yaw), np.sin(yaw)
+        ways = self._beams @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
+        distance = self._rig.sight.distance(position[None], ways[None], np.array([time]), through_glass=True)[0]
+        hit = np.isfinite(distance)
+        points = self._beams[hit] * distance[hit, None]
+        picture = np.zeros((polar.ROWS, polar.BEAMS), bool)
+        picture[tuple(polar.lidar_pixels(points[np.abs(points[:, 2]) <= SLAB]).T)] = True
+        return np.packbits(picture, axis=1)

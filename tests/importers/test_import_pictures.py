@@ -1,0 +1,96 @@
+"""Walks of RadarHD's repository, as a user's clone lays them out."""
+
+import os
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from radarize import polar
+from radarize.cli import app
+from radarize.errors import InputError
+from radarize.importers import Given, import_recording
+from radarize.recording import Recording
+from radarize.tum import write_tum
+from radarize.walks import Walk
+
+
+@pytest.fixture
+def clone(tmp_path) -> Path:
+    """A data set with a walk of twenty made-up frames: an echo that comes nearer, a wall at 3 m."""
+    folder = tmp_path / "dataset_5" / "test"
+    for kind in ("radar", "lidar"):
+        (folder / kind).mkdir(parents=True)
+    for k in range(20):
+        radar, lidar = np.zeros((256, 64), np.uint8), np.zeros((256, 512), np.uint8)
+        radar[100 - k, 30:40], lidar[71, 100:400] = 255, 255
+        Image.fromarray(radar).save(folder / f"radar/R_7_{k}.png")
+        Image.fromarray(lidar).save(folder / f"lidar/L_7_{k}.png")
+    return tmp_path / "dataset_5"
+
+
+def test_a_walk_becomes_a_recording(clone, tmp_path):
+    write_tum(tmp_path / "poses.tum", 0.05 * np.arange(20), np.tile([0.1, 0, 0, 0, 0, 0, 1.0], (20, 1)))
+    arguments = [
+        "import",
+        str(clone),
+        "--walk",
+        "7",
+        "-o",
+        str(tmp_path / "7.h5"),
+        "--poses",
+        str(tmp_path / "poses.tum"),
+    ]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.exception
+    with Recording(tmp_path / "7.h5") as recording:
+        assert len(recording) == 20 and recording.config.samples == 512
+        pictures = recording.rows("maps/picture", 0, 20)
+        assert [int(p[:, 35].argmax()) for p in pictures] == [100 - k for k in range(20)]
+        scan, bearings = recording.read("truth/scan"), recording.read("truth/scan_azimuths")
+        assert np.isfinite(scan[0]).sum() == 300 and scan[0, 200] == pytest.approx(71 * 10.8 / 255)
+        assert bearings[0] == pytest.approx(-np.pi / 2) and bearings[-1] > 0  # left is positive
+        assert np.array_equal(np.unpackbits(recording.read("truth/lidar")[0], axis=1).nonzero()[0], np.full(300, 71))
+        assert recording.has("truth/pose")
+        with pytest.raises(InputError, match="no raw samples"):
+            recording.adc(0, 1)
+
+
+def test_a_real_walk(recordings, tmp_path):
+    """The first frames of walk 227."""
+    output = import_recording(recordings / "radarhd" / "pictures", tmp_path / "227.h5", Given(walk=227))
+    with Recording(output) as recording:
+        assert len(recording) == 60 and "no poses" in recording.attributes["warnings"]
+        picture = recording.rows("maps/picture", 0, 60).astype(float)
+        scan = recording.read("truth/scan")
+    assert 0.02 < (picture > 0).mean() < 0.2 and picture.max() == 255
+    assert 0.3 < (picture[:, 6:] > 0).any(axis=1).mean() and not picture[:, :6].any()  # within 70 deg, beyond leakage
+    assert 0.3 < np.isfinite(scan).mean() and 0.5 < np.median(scan[np.isfinite(scan)]) < 6
+
+
+@pytest.mark.parametrize("spoil, words", [
+    (lambda f: (f / "radar/R_7_3.png").unlink(), r"R_7_3\.png: is missing"),
+    (lambda f: (f / "lidar/L_7_4.png").unlink(), r"L_7_4\.png: is missing"),
+    (lambda f: os.truncate(f / "radar/R_7_5.png", 60), r"R_7_5\.png: is damaged"),
+    (lambda f: (f / "radar/R_7_6.png").write_text("none"), r"R_7_6\.png: is damaged"),
+    (lambda f: shutil.copy(f / "lidar/L_7_6.png", f / "radar/R_7_6.png"), r"is 256 x 512, expected 256 x 64"),
+])  # fmt: skip
+def test_missing_and_damaged_pictures(clone, tmp_path, spoil, words):
+    spoil(clone / "test")
+    with pytest.raises(InputError, match=words):
+        import_recording(clone, tmp_path / "7.h5", Given(walk=7))
+
+
+def test_which_walk(clone, tmp_path):
+    for source, walk, words in (
+        (clone, None, "--walk is missing"),
+        (clone, 8, "has no walk 8"),
+        (tmp_path, 7, "dataset_5"),
+    ):
+        with pytest.raises(InputError, match=words):
+            import_recording(source, tmp_path / "x.h5", Given(walk=walk))
+    assert [walk.number for walk in Walk.tests(clone)] == [7]
+    assert polar.cartesian(Walk.find(clone, 7).lidar(0)).shape[1] == 2

@@ -54,14 +54,13 @@ def unit(a):
 
 
 @njit(inline="always")
-def gain_towards(direction, rotation, azimuth_table, elevation_table):
+def gain_towards(direction, rotation, pattern):
     """Amplitude gain of the antenna towards a direction in the world."""
     return amplitude_gain(
         rotation[0, 0] * direction[0] + rotation[1, 0] * direction[1] + rotation[2, 0] * direction[2],
         rotation[0, 1] * direction[0] + rotation[1, 1] * direction[1] + rotation[2, 1] * direction[2],
         rotation[0, 2] * direction[0] + rotation[1, 2] * direction[1] + rotation[2, 2] * direction[2],
-        azimuth_table,
-        elevation_table,
+        pattern,
     )
 
 

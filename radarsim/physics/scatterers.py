@@ -7,16 +7,17 @@ coherent while the sensor moves over it, as on a real wall. `Surface` draws thos
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from radarsim.physics.lobes import LAMBERT
+from radarsim.physics.scatteringpattern import LAMBERT
+from radarsim.physics.table import Table
 
 #: Of a sampled surface every n-th scatterer is seen over mirrors, and of those every n-th over two of them.
 BOUNCE_STRIDE = 4
 
 
 @dataclass(frozen=True)
-class Scatterers:
+class Scatterers(Table):
     """Point scatterers in the world.
 
     Attributes:
@@ -37,15 +38,12 @@ class Scatterers:
     normal: Float[np.ndarray, "scatterer 3"]
     sigma: Float[np.ndarray, "scatterer"]
     phase: Float[np.ndarray, "scatterer"]
-    two_sided: np.ndarray
-    horizontal: np.ndarray
+    two_sided: Bool[np.ndarray, "scatterer"]
+    horizontal: Bool[np.ndarray, "scatterer"]
     bounces: Float[np.ndarray, "scatterer"]
     bounces_twice: Float[np.ndarray, "scatterer"]
     lobe: Float[np.ndarray, "scatterer 4"]
     rank: Float[np.ndarray, "scatterer"]
-
-    def __len__(self) -> int:
-        return len(self.position)
 
     @classmethod
     def points(

@@ -1,6 +1,6 @@
 """Independent float64 references. `beat`: the beat signal of world points sample by sample, from the motion itself.
 
-`transfer_matrix`: layers.
+`transfer_matrix`: layers. `kirchhoff_mirror`: what a mirror of any size passes on.
 """
 
 import numpy as np
@@ -71,3 +71,19 @@ def direct_sum(config: RadarConfig, lengths: np.ndarray, amplitudes: np.ndarray)
                 cycles = config.center_frequency / SPEED_OF_LIGHT * length[:, None] + beat[:, None] * n
                 out[loop, k, r] = amplitudes @ np.exp(2j * np.pi * cycles)
     return out
+
+
+def kirchhoff_mirror(half, place, wavelength, across=1601):
+    """Amplitude (1/m) of the way from the origin over a mirror about (1.5, 1, 0), facing -y, to a place, summed.
+
+    (1 / (j lambda)) int cos exp(jk (r1 + r2)) / (r1 r2) dA, Kirchhoff's approximation with the mean of both cosines,
+    relative to the image's phase.
+    """
+    x, z = (((np.arange(across) + 0.5) / across * 2 - 1) * h for h in half)
+    x = x[:, None] + 1.5
+    there = np.sqrt(x**2 + 1 + z**2)
+    back = np.sqrt((x - place[0]) ** 2 + (1 - place[1]) ** 2 + (z - place[2]) ** 2)
+    cosine = (1 / there + (1 - place[1]) / back) / 2
+    image = np.linalg.norm(place * [1, -1, 1] + [0, 2, 0])
+    field = np.sum(cosine * np.exp(2j * np.pi * (there + back - image) / wavelength) / (there * back))
+    return field * np.prod(2 * np.array(half) / across) / (1j * wavelength)

@@ -76,7 +76,7 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], search: Search, frame: 
     """
     pairs = pairs[np.lexsort(pairs.T)]
     orders = _Orders(np.searchsorted(pairs[:, 1], np.arange(len(flat) + 1)), np.ascontiguousarray(pairs[:, 0]))
-    size = 256
+    size = 1024
     while True:
         found = Chains(
             np.empty((size, 3), np.int64), np.empty((size, 3, 4)), np.empty(size, complex), np.empty((size, 3, 3))

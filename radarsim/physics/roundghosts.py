@@ -115,7 +115,7 @@ def _spread(bodies: RoundBodies, b, n, there, back, r1, r2):
     round_ = bodies.half[b] == 0
     along = np.where(round_[:, None], _units(aside), bodies.axis[b])
     around = np.cross(n, along)
-    cosine, curvature = _dot(n, -there), 1 / r1 + 1 / r2
+    cosine, curvature = np.maximum(_dot(n, -there), 1e-3), 1 / r1 + 1 / r2
     t1, t2 = _dot(there, around), _dot(there, along)
     h11, h22, h12 = curvature * (1 - t1 * t1), curvature * (1 - t2 * t2), -curvature * t1 * t2
     before = h11 * h22 - h12 * h12

@@ -16,7 +16,7 @@ demo: setup
 	@.venv/bin/radarize report $(RUN) --beside $(RUN)/learned --beside $(RUN)/doppler
 
 test: setup
-	@.venv/bin/python -m pytest $(TESTS)
+	@.venv/bin/python -m pytest -n 2 --dist loadfile $(TESTS)
 
 documents: setup
 	@DOCUMENTS=1 .venv/bin/python -m pytest tests/documents

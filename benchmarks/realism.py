@@ -74,10 +74,10 @@ def row(about: str, found: list[tuple[float, float, float]]) -> dict[str, object
 
 #: What is added to the rooms, step by step.
 STEPS = {
-    "bare rooms": {"clutter": 0.0, "unevenness": 0.0},
-    "uneven walls": {"clutter": 0.0},
-    "clutter": {"unevenness": 0.0},
-    "both": {},
+    "bare rooms": {},
+    "uneven walls": {"unevenness": 1.0},
+    "clutter": {"clutter": 1.0},
+    "both": {"clutter": 1.0, "unevenness": 1.0},
 }
 PARSER = command_line(
     __doc__,

@@ -5,6 +5,7 @@ A picture has 256 rows of range up to 10.8 m, and columns of azimuth from -90 to
 radar's, 512 of the lidar's. Measures of their paper are taken on a Cartesian grid (`cartesian`).
 """
 
+from collections.abc import Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from scipy.fft import fft
 
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
+from radarize.recording import Stream
 
 ROWS, COLUMNS, BEAMS = 256, 64, 512
 #: m, of rows; rad, of the radar's and of the lidar's columns.
@@ -24,8 +26,13 @@ AZIMUTHS, BEAM_AZIMUTHS = (np.radians(np.linspace(-90, 90, columns)) for columns
 THRESHOLD, LEAKAGE = 0.05, 6
 #: m, half of the square that points may lie in; rad, of what the radar's pictures keep to either side.
 _SQUARE, _FIELD = 10.0, np.radians(70)
-#: Cells of the measures' grid: x of 0...`REACH`, y of -`REACH`...`REACH`.
-GRID = (256, 512)
+#: Edges of the measures' grid, m: x ahead, y to the left.
+GRID = np.linspace(0, REACH, 256), np.linspace(-REACH, REACH, 512)
+#: A lidar's pictures in a recording.
+LIDAR = Stream(
+    (ROWS, BEAMS // 8), "u1", "",
+    "cells of range (0...10.8 m) and azimuth (-90...90 deg, 512, packed) that hold points of a lidar",
+)  # fmt: skip
 
 
 class _Cells(NamedTuple):
@@ -36,10 +43,10 @@ class _Cells(NamedTuple):
 
 
 @cache
-def _cells(samples: int, farthest: float) -> _Cells:
-    """Of so many range bins, up to `farthest` (m)."""
+def _cells(config: RadarConfig) -> _Cells:
+    """Of a radar's range bins, which end at the unambiguous range of complex samples, to the centimetre."""
     sine = np.linspace(1, -1, COLUMNS)[:, None]
-    ranges = np.linspace(0, farthest, samples)
+    ranges = np.linspace(0, round(config.max_range, 2), config.samples)
     x, y = ranges * np.sqrt(1 - sine**2), ranges * sine
     distance, azimuth = np.sqrt(x**2 + y**2), np.arctan2(y, x)
     inside = (x > 0) & (x <= _SQUARE) & (np.abs(y) <= _SQUARE) & (distance <= REACH) & (np.abs(azimuth) <= _FIELD)
@@ -78,8 +85,7 @@ def pictures(
         InputError: see `magnitudes`.
     """
     found = np.zeros((len(adc), ROWS * COLUMNS), np.uint8)
-    # Its bins end at the unambiguous range of complex samples.
-    cells = _cells(config.samples, round(config.samples * config.range_resolution, 2))
+    cells = _cells(config)
     for picture, magnitude in zip(found, magnitudes(adc, config), strict=True):
         kept = magnitude.ravel()[cells.cell] >= threshold * magnitude[:, LEAKAGE:].max()
         level = 10 * np.log10(np.maximum(magnitude.ravel()[cells.cell[kept]], 1e-30))
@@ -94,7 +100,7 @@ def levels(
 ) -> Float[np.ndarray, "frame range azimuth"]:
     """What pictures are made of before anything is dropped: dB below the largest magnitude, -inf where no cell lies."""
     found = np.full((len(adc), ROWS * COLUMNS), -np.inf)
-    cells = _cells(config.samples, round(config.samples * config.range_resolution, 2))
+    cells = _cells(config)
     for picture, magnitude in zip(found, magnitudes(adc, config), strict=True):
         share = magnitude.ravel()[cells.cell] / max(magnitude[:, LEAKAGE:].max(), 1e-30)
         np.maximum.at(picture, cells.pixel, 20 * np.log10(np.maximum(share, 1e-9)))
@@ -118,14 +124,18 @@ def cartesian(picture: Bool[np.ndarray, "range azimuth"]) -> Float[np.ndarray, "
     """Points (x forward, y left, m) of a picture with any number of columns, through the grid of the measures."""
     rows, columns = np.nonzero(picture)
     azimuth = np.linspace(-np.pi / 2, np.pi / 2, picture.shape[1])[columns]
-    ranges = np.linspace(0, REACH, picture.shape[0])[rows]
+    ranges = RANGES[rows]
     return gridded(np.stack([ranges * np.cos(azimuth), ranges * np.sin(azimuth)], axis=1))
 
 
 def gridded(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "cell 2"]:
     """Cells of the measures' grid that hold points, as points (m)."""
-    axes = np.linspace(0, REACH, GRID[0]), np.linspace(-REACH, REACH, GRID[1])
     inside = (points[:, 0] >= 0) & (points[:, 0] <= REACH) & (np.abs(points[:, 1]) <= REACH)
-    places = [np.searchsorted(axis, values) for axis, values in zip(axes, points[inside].T, strict=True)]
+    places = [np.searchsorted(axis, values) for axis, values in zip(GRID, points[inside].T, strict=True)]
     cells = np.unique(np.stack(places, axis=1), axis=0)
-    return np.stack([axis[cells[:, k]] for k, axis in enumerate(axes)], axis=1)
+    return on_grid(cells.T)
+
+
+def on_grid(cells: Sequence[Int[np.ndarray, "cell"]]) -> Float[np.ndarray, "cell 2"]:
+    """Points (m) of the rows and columns of cells of the measures' grid."""
+    return np.stack([axis[index] for axis, index in zip(GRID, cells, strict=True)], axis=1)

@@ -19,9 +19,10 @@ from PIL import Image
 
 from radarize import polar
 from radarize.errors import InputError
+from radarize.radar.presets import PRESETS
 
 #: s, from frame to frame.
-PERIOD = 0.05
+PERIOD = PRESETS["radarhd"].frame_period
 #: The authors' measures begin here: their network sees the frames before.
 FIRST = 40
 
@@ -128,9 +129,8 @@ class Predictions:
         for path in (self.folder / f"{walk.number}.npz", self.folder / f"{walk.number}.npz.xz"):
             if path.is_file():
                 frames, bits = _packed(path)
-                return {
-                    int(frame): _on_grid(np.unpackbits(each, axis=-1)) for frame, each in zip(frames, bits, strict=True)
-                }
+                unpacked = (np.unpackbits(each, axis=-1) for each in bits)
+                return {int(k): polar.on_grid(np.nonzero(each)) for k, each in zip(frames, unpacked, strict=True)}
         pictures = {}
         for path in self.folder.glob(f"*{walk.number}_*.png"):
             words = path.stem.removesuffix("_pred").split("_")
@@ -148,15 +148,10 @@ def _packed(path: Path) -> tuple[Int[np.ndarray, "frame"], UInt8[np.ndarray, "fr
             raise ValueError(f"more than {most} bytes")
         with np.load(io.BytesIO(content), allow_pickle=False) as arrays:
             frames, bits = arrays["frame"], arrays["prediction"]
-        if bits.dtype != np.uint8 or bits.shape != (len(frames), polar.GRID[0], polar.GRID[1] // 8):
+        if bits.dtype != np.uint8 or bits.shape != (len(frames), len(polar.GRID[0]), len(polar.GRID[1]) // 8):
             raise ValueError(f"prediction is {bits.dtype} of shape {bits.shape}")
     except (OSError, ValueError, KeyError, EOFError, lzma.LZMAError) as error:
         raise InputError(
             f"{path}: is damaged ({error}), expected packed bits `prediction` and numbers `frame`"
         ) from error
     return frames, bits
-
-
-def _on_grid(cells: UInt8[np.ndarray, "x y"]) -> Float[np.ndarray, "point 2"]:
-    axes = np.linspace(0, polar.REACH, polar.GRID[0]), np.linspace(-polar.REACH, polar.REACH, polar.GRID[1])
-    return np.stack([axis[index] for axis, index in zip(axes, np.nonzero(cells), strict=True)], axis=1)

@@ -17,7 +17,7 @@ from radarize.features.windows import Windows
 from radarize.methods.method import Weights
 from radarize.methods.pictures.network import PictureNet
 from radarize.methods.pictures.points import points
-from radarize.nets.weights import load
+from radarize.nets.weights import Header, load
 from radarize.points import Cfar, level_around
 from radarize.radar.presets import PRESETS
 from radarize.walks import FIRST, PERIOD, Predictions, Walk
@@ -32,7 +32,7 @@ NOTES = (
     "14 %), which the roughening of its training spans.",
 )
 
-Points = Float[np.ndarray, "point 2"]
+Cells = Bool[np.ndarray, "range column"]
 
 
 @dataclass(frozen=True)
@@ -43,14 +43,12 @@ class Options:
         walks: numbers; all that test if none.
         predictions: of other programs by name.
         weights: folder of the network's weights; the shipped ones if None.
-        every: of the frames, which are judged.
         command: that the results name.
     """
 
     walks: Sequence[int] = ()
     predictions: dict[str, Path] = field(default_factory=dict)
     weights: Path | None = None
-    every: int = 1
     command: str = field(default_factory=lambda: command("radarize"))
 
 
@@ -74,52 +72,43 @@ def real(
     """
     machine()  # as things are now
     walks = [Walk.find(data, number) for number in options.walks] or Walk.tests(data)
+    weights = Weights(options.weights).of("pictures")
+    network = load(weights, PictureNet, PRESETS["radarhd"]) if weights.is_file() else None
     total, done, rows, errors = sum(walk.frames for walk in walks), 0, [], {}
     for walk in walks:
         found: dict[str, list[Apart]] = {}
         others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
-        for frame, by_method in _methods(walk, options.weights):
+        for frame, cells in _methods(walk, network):
             done += 1
             progress(done, total)
-            if frame < FIRST or frame % options.every:
+            if frame < FIRST:
                 continue
             true = polar.cartesian(walk.lidar(frame))
-            by_method |= {name: lambda one=known[frame]: one for name, known in others.items() if frame in known}
-            for name, make in by_method.items():
-                found.setdefault(name, []).append(Apart.of(make(), true))
+            clouds = {name: polar.cartesian(each) for name, each in cells.items()}
+            clouds |= {name: known[frame] for name, known in others.items() if frame in known}
+            for name, each in clouds.items():
+                found.setdefault(name, []).append(Apart.of(each, true))
         for name, apart in found.items():
             errors[walk.number, name] = apart
             rows.append({"walk": walk.number, "part": walk.folder.name, "method": name, **_row(apart)})
-    weights = Weights(options.weights).of("pictures")
     data_of = Data("RadarHD's walks", tuple(Facts(f"radarhd {walk.number}", None, None, False) for walk in walks))
     tables = [Table("Points of real walks", rows, list(NOTES)), Table("Between methods", _paired(errors))]
-    results = Results(
-        "In the real world", tables, data_of, (Network.of(weights),) if weights.is_file() else (), options.command
-    )
+    results = Results("In the real world", tables, data_of, (Network.of(weights),) if network else (), options.command)
     results.write(Path(output), "real")
     return results
 
 
-def _methods(walk: Walk, weights: Path | None) -> Iterator[tuple[int, dict[str, Callable[[], Points]]]]:
-    """What each method makes of a walk's frames, frame by frame."""
-    config = PRESETS["radarhd"]
-    file = Weights(weights).of("pictures")
-    net, windows = None, None
-    if file.is_file():
-        net, header = load(file, PictureNet, config)
-        windows = header.windows(config)
+def _methods(walk: Walk, network: tuple[PictureNet, Header] | None) -> Iterator[tuple[int, dict[str, Cells]]]:
+    """Where each method sees something in a walk's frames, frame by frame."""
+    windows = network[1].windows(PRESETS["radarhd"]) if network else None
     for frames, pictures in walk.batches():
-        likely = _network(net, windows, pictures, PERIOD * np.arange(frames.start, frames.stop)) if net else None
+        stamps = PERIOD * np.arange(frames.start, frames.stop)
+        likely = _network(network[0], windows, pictures, stamps) if network else None
         for k, picture in enumerate(pictures):
-            stands = picture > np.maximum(level_around(picture.astype(float), _CFAR, 0, False) + _CFAR.threshold, 0)
-            made = {
-                "picture": lambda one=picture: polar.cartesian(one > 0),
-                "cfar": lambda one=stands: polar.cartesian(one),
-                "first-echo": lambda one=stands: polar.cartesian(_first(one)),
-            }
-            if likely is not None:
-                made["network"] = lambda one=likely[k]: polar.cartesian(one)
-            yield frames.start + k, made
+            stands = picture > level_around(picture.astype(float), _CFAR, 0, False) + _CFAR.threshold
+            first = stands & (np.cumsum(stands, axis=0) == 1)
+            cells = {"picture": picture > 0, "cfar": stands, "first-echo": first}
+            yield frames.start + k, cells | ({"network": likely[k]} if network else {})
 
 
 @torch.inference_mode()
@@ -128,10 +117,6 @@ def _network(
 ) -> Bool[np.ndarray, "frame range column"]:
     shown = windows.push({"picture": pictures.astype(np.float16)}, stamps)[0]
     return points(net.estimate(shown.maps), net.least).numpy()
-
-
-def _first(cells: Bool[np.ndarray, "range azimuth"]) -> Bool[np.ndarray, "range azimuth"]:
-    return cells & (np.cumsum(cells, axis=0) == 1)
 
 
 def _row(found: Sequence[Apart]) -> dict[str, float]:

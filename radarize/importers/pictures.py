@@ -35,11 +35,8 @@ def import_walk(
     streams = {
         "maps/picture": Stream((polar.ROWS, polar.COLUMNS), "u1", "", "RadarHD's picture of one loop, 0...255"),
         "truth/scan": Stream((polar.BEAMS,), "f4", "m", "range of the lidar's first point, inf where it has none"),
-        "truth/lidar": Stream(
-            (polar.ROWS, polar.BEAMS // 8), "u1", "",
-            "cells of range (0...10.8 m) and azimuth (-90...90 deg, 512, packed) that hold points of a lidar",
-        ),
-    }  # fmt: skip
+        "truth/lidar": polar.LIDAR,
+    }
     bearings = Product(polar.BEAM_AZIMUTHS, "rad", "bearings of /truth/scan, positive to the left")
     about = {"source": f"RadarHD walk {number} ({walk.folder.name})"}
     if "truth/pose" not in products:

@@ -29,17 +29,20 @@ _TOLERANCE = 1e-9
 _SWEEP_TOLERANCE = 1e6
 
 
-def check_limits(config: RadarConfig) -> None:
+def check_limits(config: RadarConfig, demo: bool = False) -> None:
     """Refuse what the chip cannot do.
+
+    Args:
+        demo: under the SDK demo, which keeps a frame in memory; mmWave Studio streams larger ones.
 
     Raises:
         InputError: naming the first field outside its limit, its value and the limit.
     """
-    for message in _violations(config):
+    for message in _violations(config, MAX_CUBE if demo else float("inf")):
         raise InputError(f"radar configuration: {message}")
 
 
-def _violations(config: RadarConfig) -> Iterator[str]:
+def _violations(config: RadarConfig, largest: float) -> Iterator[str]:
     chip = config.board[:7]
     start, sweep = config.start_frequency, config.slope * config.ramp_end_time
     slack = _SWEEP_TOLERANCE
@@ -79,10 +82,10 @@ def _violations(config: RadarConfig) -> Iterator[str]:
             f"loops x transmitters x ramp_end_time keeps the RF on for {duty:.1%} of frame_period, "
             f"expected less than {MAX_RF_DUTY:.0%}"
         )
-    if config.frame_bytes > MAX_CUBE:
+    if config.frame_bytes > largest:
         yield (
             f"loops x transmitters x receivers x samples make a frame of {config.frame_bytes} bytes, "
-            f"expected at most {MAX_CUBE}"
+            f"expected at most {largest}"
         )
     if config.samples % 2:
         yield f"samples is {config.samples}, expected an even number: LVDS carries complex samples in pairs"

@@ -164,7 +164,7 @@ class CommandLine:
     def _read(self) -> tuple[RadarConfig, int]:
         """The configuration, and how many frames to send."""
         config = parse_cfg("\n".join(" ".join(line) for line in self._lines), "commands so far")
-        check_limits(config)
+        check_limits(config, demo=True)
         last = {line[0]: line[1:] for line in self._lines}
         if last["lvdsStreamCfg"][FIELDS["lvdsStreamCfg"].index("dataFmt")] != "1":
             raise InputError("lvdsStreamCfg dataFmt is not 1 (ADC samples), so nothing would go to the DCA1000")

@@ -30,7 +30,7 @@ class Scatterers(Table):
         bounces: weight of its power in paths over one mirror. Ghosts are many and weak, so of a sampled surface only
             every fourth scatterer has them, with four times the power.
         bounces_twice: the same for paths over two mirrors or more: every sixteenth, with sixteen times the power.
-        lobe: its scattering pattern, see `lobes.weights`.
+        lobe: its scattering pattern, see `scatteringpattern.weights`.
         rank: 0...1, which decides from how far it is used, see `detail`; negative: from everywhere.
     """
 

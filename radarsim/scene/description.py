@@ -22,8 +22,8 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
-``clutter`` and ``unevenness`` say how far the place is from its drawing (see `scene.Life`): 1 as usual, 0 not at all.
-Left out, they are 1 for a building and 0 for objects alone.
+``clutter`` and ``unevenness`` say how far the place is from its drawing (see `scene.Life`): 1 as in rooms that are
+lived in; left out, 0: not at all.
 """
 
 import re
@@ -170,15 +170,13 @@ class Description(_Strict):
     building: Annotated[Office | Building, Field(discriminator="kind")] | None = None
     moving: list[Mover] = []
     levels: list[Level] = []
-    clutter: Share | None = None
-    unevenness: Share | None = None
+    clutter: Share = 0.0
+    unevenness: Share = 0.0
 
     @property
     def life(self) -> Life:
         """What tells the place from its drawing."""
-        usual = float(self.building is not None)
-        clutter, unevenness = (usual if given is None else given for given in (self.clutter, self.unevenness))
-        return Life(clutter, unevenness)
+        return Life(self.clutter, self.unevenness)
 
 
 def split_level(name: str | Path) -> tuple[str, int]:

@@ -4,7 +4,6 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize import polar
-from radarize.recording import Stream
 from radarsim.motion import turned
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
@@ -12,8 +11,6 @@ from radarsim.sensors.sensor import Sensor
 #: rad: of the beams over and under the horizon that can meet something within the slab, as of a lidar of 64 beams
 #: over 33 deg.
 ELEVATIONS = np.radians(np.linspace(-16.5, 16.5, 33))
-#: m: half of the slab.
-SLAB = 0.3
 
 
 class Lidar(Sensor):
@@ -21,8 +18,7 @@ class Lidar(Sensor):
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
-        about = "cells of range (0...10.8 m) and azimuth (-90...90 deg, 512, packed) that hold points of a lidar"
-        self.streams = {"truth/lidar": Stream((polar.ROWS, polar.BEAMS // 8), "u1", "", about)}
+        self.streams = {"truth/lidar": polar.LIDAR}
         bearing, elevation = np.meshgrid(polar.BEAM_AZIMUTHS, ELEVATIONS)
         beams = [np.cos(bearing) * np.cos(elevation), np.sin(bearing) * np.cos(elevation), np.sin(elevation)]
         self._beams = np.stack([each.ravel() for each in beams], axis=1)
@@ -43,7 +39,6 @@ class Lidar(Sensor):
         ways = self._beams @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
         distance = self.scenario.sight.distance(position[None], ways[None], np.array([time]), through_glass=True)[0]
         hit = np.isfinite(distance)
-        points = self._beams[hit] * distance[hit, None]
         picture = np.zeros((polar.ROWS, polar.BEAMS), bool)
-        picture[tuple(polar.lidar_pixels(points[np.abs(points[:, 2]) <= SLAB]).T)] = True
+        picture[tuple(polar.lidar_pixels(self._beams[hit] * distance[hit, None]).T)] = True
         return np.packbits(picture, axis=1)

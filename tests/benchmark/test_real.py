@@ -31,11 +31,10 @@ def clone(tmp_path):
 
 def predictions(folder, row: int):
     """Of frames from the 40th on: the wall at a row, on the Cartesian grid."""
-    cells = np.zeros((FRAMES - 40, *polar.GRID), np.uint8)
+    cells = np.zeros((FRAMES - 40, *map(len, polar.GRID)), np.uint8)
     picture = np.zeros((256, 512), bool)
     picture[row, 160:352] = True
-    axes = np.linspace(0, polar.REACH, 256), np.linspace(-polar.REACH, polar.REACH, 512)
-    at = [np.searchsorted(axis, each - 1e-9) for axis, each in zip(axes, polar.cartesian(picture).T, strict=True)]
+    at = [np.searchsorted(axis, each - 1e-9) for axis, each in zip(polar.GRID, polar.cartesian(picture).T, strict=True)]
     cells[:, at[0], at[1]] = 1
     folder.mkdir()
     with lzma.open(folder / "7.npz.xz", "wb") as file:

@@ -1,5 +1,6 @@
 """Points from polar pictures: roughening, labels, loss and points against plain loops, and a training that learns."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -25,9 +26,16 @@ def levels(rows: list[int], items: int = 4, frames: int = 5) -> torch.Tensor:
     return found
 
 
+def plain(levels: torch.Tensor) -> torch.Tensor:
+    """Pictures by the authors' threshold, with nothing drawn but the middle of the bias."""
+    threshold = torch.full((len(levels), 1, 1, 1), 20 * math.log10(polar.THRESHOLD))
+    found = roughening.picture(levels[:, :, 0].float(), threshold)
+    return roughening.shifted(found, torch.full((len(levels),), sum(roughening.BIAS) // 2))[:, :, None]
+
+
 def test_plain_pictures_are_the_authors():
     """Kept within 26 dB and scaled per frame, read farther by the rig's bias."""
-    found = roughening.plain(levels([20, 60, 100, 200]))
+    found = plain(levels([20, 60, 100, 200]))
     for picture, row in zip(found[:, -1, 0], (20, 60, 100, 200), strict=True):
         assert set(picture.nonzero()[:, 0].tolist()) == {row + sum(roughening.BIAS) // 2} and picture.max() == 255
 
@@ -80,7 +88,7 @@ def test_it_learns_where_the_wall_is(one_thread):
     task = find_task("pictures")
     settings = replace(task.defaults, width=4, rate=1e-2)
     rows = torch.tensor([40, 80, 120, 160])
-    pictures = roughening.plain(levels(rows.tolist()))
+    pictures = plain(levels(rows.tolist()))
     label = torch.zeros((4, polar.ROWS, COLUMNS))
     label[torch.arange(4), rows] = 1.0
     net = task.net(settings, None).train()

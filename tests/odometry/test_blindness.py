@@ -70,7 +70,7 @@ def test_batches_do_not_matter():
     for k in range(0, 120, 7):
         part = SimpleNamespace(**{name: values[k : k + 7] for name, values in vars(whole).items()})
         parts.add(np.arange(k, k + len(part.time)), part)
-    assert parts.found == found(whole).found and len(parts.found.spans) == 1
+    assert parts.found.model_dump() == found(whole).found.model_dump() and len(parts.found.spans) == 1
 
 
 def test_the_warning_counts_from_the_first_frame():

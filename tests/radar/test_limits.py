@@ -49,8 +49,15 @@ def test_the_60_ghz_chip_has_its_own_band():
 )
 def test_each_limit_is_named(change, message):
     with pytest.raises(InputError) as error:
-        check_limits(BASE.model_copy(update=change))
+        check_limits(BASE.model_copy(update=change), demo=True)
     assert message in str(error.value)
+
+
+def test_the_demo_alone_keeps_a_frame_in_memory():
+    """RadarHD's frames of 1.5 MiB were streamed under mmWave Studio."""
+    check_limits(PRESETS["radarhd"])
+    with pytest.raises(InputError, match="frame of 1572864 bytes, expected at most 1048576"):
+        check_limits(PRESETS["radarhd"], demo=True)
 
 
 def test_lvds_is_the_bottleneck_of_fast_chirps():

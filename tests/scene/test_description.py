@@ -167,11 +167,11 @@ def test_mistakes_in_levels(tmp_path, level, text, complaint):
     ("text", "life"),
     [
         (f"objects: [{WALL}]", Life(0, 0)),
-        ("building: {kind: office}", Life(1, 1)),
-        ("building: {kind: B, seed: 3}\nclutter: 0", Life(0, 1)),
+        ("building: {kind: office}", Life(0, 0)),
+        ("building: {kind: B, seed: 3}\nclutter: 1", Life(1, 0)),
         (f"objects: [{WALL}]\nclutter: 0.5\nunevenness: 2", Life(0.5, 2)),
     ],
 )
 def test_how_lived_in_a_place_is(tmp_path, text, life):
-    """As usual for a building, not at all for objects alone, unless the file says so."""
+    """Not at all, unless the file says so."""
     assert load(tmp_path, text).life == life

@@ -63,13 +63,6 @@ def rough(levels: Maps, generator: Generator) -> Maps:
     return shifted(found, shifts)[:, :, None]
 
 
-def plain(levels: Maps) -> Maps:
-    """Pictures by the authors' threshold, without anything drawn but the middle of `BIAS`."""
-    threshold = torch.full((len(levels), 1, 1, 1), 20 * math.log10(polar.THRESHOLD))
-    found = picture(levels[:, :, 0].float(), threshold)
-    return shifted(found, torch.full((len(levels),), sum(BIAS) // 2))[:, :, None]
-
-
 def picture(
     level: Float[Tensor, "item frame row column"], threshold: Float[Tensor, "item 1 1 1"]
 ) -> Float[Tensor, "item frame row column"]:

@@ -276,10 +276,7 @@ def _write(path: Path, parts: list[Part], source: Path) -> None:
             item = {"name": name, "shape": "mesh", "file": f"{folder.name}/{file}.ply", "material": part.material}
             objects.append(item | ({"solid": True} if part.solid else {}))
         text = f"# imported from {source.name}\n" + yaml.safe_dump(
-            {"name": path.stem, "clutter": 1.0, "unevenness": 1.0, "objects": objects},
-            sort_keys=False,
-            width=120,
-            default_flow_style=None,
+            {"name": path.stem, "objects": objects}, sort_keys=False, width=120, default_flow_style=None
         )
         shutil.rmtree(folder, ignore_errors=True)
         os.replace(fresh, folder)

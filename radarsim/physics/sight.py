@@ -17,6 +17,9 @@ from radarsim.scene.scene import Scene
 SPACING, FEWEST, MOST = 0.02, 4, 240
 #: Apertures pass some light by their edges: this far from them a ray may lie, m.
 MARGIN = 0.1
+#: A reflector stands before another from this height over its plane on, m: the faces of an outer edge do not see one
+#: another, however near light passes the edge.
+BEFORE = 1e-3
 
 
 class Mirrors(NamedTuple):
@@ -120,7 +123,8 @@ def _radius(corners, center):
 
 @njit(cache=True)
 def _follow(flat, radius, search, frame, a, found):
-    """Seen from the radar's image in the first, the second must overlap the first, as a window."""
+    """Either must stand before the other, and seen from the radar's image in the first, the second must overlap it, as
+    a window."""
     p, ca, na = vec(search.position[frame]), vec(flat.center[a]), vec(flat.normal[a])
     ua, va = vec(flat.u[a]), vec(flat.v[a])
     height = dot(minus(p, ca), na)
@@ -139,6 +143,13 @@ def _follow(flat, radius, search, frame, a, found):
         if facing > -0.01 and (facing < 0.01 or not flat.two_sided[b]):
             continue
         if length(way) + length(minus(cb, p)) - 2 * radius[b] > 2 * search.range:
+            continue
+        nb, highest, farthest = vec(flat.normal[b]), -1e9, -1e9
+        for k in range(4):
+            highest = max(highest, side * dot(minus(vec(flat.corners[b, k]), ca), na))
+            over = dot(minus(vec(flat.corners[a, k]), cb), nb)
+            farthest = max(farthest, over if facing < 0 else -over)
+        if highest < BEFORE or farthest < BEFORE:
             continue
         low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9
         for k in range(4):

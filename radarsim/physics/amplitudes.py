@@ -54,6 +54,18 @@ def unit(a):
 
 
 @njit(inline="always")
+def mirrored(p, center, normal):
+    """A point mirrored in a plane."""
+    return along(p, -2 * dot(minus(p, center), normal), normal)
+
+
+@njit(inline="always")
+def write(a, out):
+    """Into the first three places of an array."""
+    out[0], out[1], out[2] = a
+
+
+@njit(inline="always")
 def gain_towards(direction, rotation, pattern):
     """Amplitude gain of the antenna towards a direction in the world."""
     return amplitude_gain(

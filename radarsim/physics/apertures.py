@@ -3,6 +3,9 @@
 import numpy as np
 from numba import njit
 
+from radarsim.physics.amplitudes import dot, minus
+from radarsim.physics.amplitudes import vector as vec
+
 #: Edges this far off the path, in units of the Fresnel integral, begin to fade from the sum, and those are left out:
 #: what they diffract comes on a path of its own, longer by s^2 lambda / 4.
 FADE, FAR = 3.0, 5.0
@@ -114,3 +117,42 @@ def _from_middle(u):
     edge = (g + 1j * f) * (0.5 - 0.5j) * np.exp(0.5j * np.pi * x * x)
     weight = min((STRIP_FAR - x) / (STRIP_FAR - STRIP_FADE), 1.0)
     return np.sign(u) * (0.5 - weight * weight * (3 - 2 * weight) * edge)
+
+
+@njit(inline="always")
+def misses(stop, way, square, aperture):
+    """Whether a path leaves nothing worth while: `passes` without a root, for a quick look."""
+    center, normal, u, v, half_u, half_v = aperture
+    offset, aside, cosine = minus(stop, center), dot(way, u), dot(way, normal)
+    x, y = max(abs(dot(offset, u)) - half_u, 0.0), max(abs(dot(offset, v)) - half_v, 0.0)
+    across = max(1 - aside * aside, 1e-6)
+    farthest = STRIP_FAR * STRIP_FAR * square
+    return x * x * across >= farthest or y * y * cosine * cosine >= farthest * across
+
+
+@njit(inline="always")
+def passes(stop, way, square, aperture):
+    """What the aperture of a mirror passes of a path in a direction over a stop on it.
+
+    Args:
+        stop: m.
+        way: unit direction of travel.
+        square: of the Fresnel unit across the path, m^2. In the mirror's plane it is longer along the plane of
+            incidence: by 1 / across along u, by across / cosine along v, which keeps its area and neglects its slant.
+        aperture: of the mirror, see `aperture`.
+    """
+    center, normal, u, v, half_u, half_v = aperture
+    offset = minus(stop, center)
+    aside, cosine = dot(way, u), abs(dot(way, normal))
+    across, size = np.sqrt(max(1 - aside * aside, 1e-6)), np.sqrt(square) + 1e-12
+    along_u, along_v = across / size, cosine / (across * size)
+    x, y, half_x, half_y = dot(offset, u) * along_u, dot(offset, v) * along_v, half_u * along_u, half_v * along_v
+    return strip(-half_x - x, half_x - x) * strip(-half_y - y, half_y - y)
+
+
+@njit(inline="always")
+def aperture(flat, m):
+    """The rectangle that stands for a flat reflector: center, normal, u, v, half sides."""
+    return (
+        vec(flat.center[m]), vec(flat.normal[m]), vec(flat.u[m]), vec(flat.v[m]), flat.half[m, 0], flat.half[m, 1]
+    )  # fmt: skip

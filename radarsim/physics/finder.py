@@ -13,7 +13,6 @@ from radarsim.physics import images, roundghosts, sight
 from radarsim.physics.antenna import Antenna, gain_pattern
 from radarsim.physics.candidates import Candidates
 from radarsim.physics.echoes import Echoes, Provenance
-from radarsim.physics.grid import z_order
 from radarsim.physics.images import LEAST_LOSS, Images
 from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.obstacles import CLEARANCE, Obstacles
@@ -137,8 +136,6 @@ class EchoFinder:
         once, twice = targets.weights[candidates.scatterer, 1:].T > 0
         # Hidden scatterers are seen over mirrors out and back, which is of second order: fewer of them do.
         rows = np.flatnonzero(np.where(free, once, twice))
-        near = z_order(targets.scatterers.position[candidates.scatterer[rows]], 0.3)
-        rows = rows[np.lexsort((near, candidates.frame[rows]))]
         distance = candidates.distance[rows]
         # No longer than leaves room for the way back, nor so weak that the way back cannot make up for it.
         longest = np.where(free[rows], 2 * search.range - distance, search.range)

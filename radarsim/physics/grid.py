@@ -41,13 +41,3 @@ def _cells(first, last):
         for j in range(first[1], last[1] + 1)
         for k in range(first[2], last[2] + 1)
     ]
-
-
-def z_order(points: Float[np.ndarray, "n 3"], cell: float) -> Int[np.ndarray, "n"]:
-    """Numbers in whose order neighbours in a list are neighbours in space (Morton 1966), for cells of a size, m."""
-    code = np.zeros(len(points), np.int64)
-    at = np.clip((points - points.min(axis=0, initial=np.inf)) / cell, 0, 2**10 - 1).astype(np.int64)
-    for bit in range(10):
-        for axis in range(3):
-            code |= ((at[:, axis] >> bit) & 1) << (3 * bit + axis)
-    return code

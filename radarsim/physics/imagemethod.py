@@ -23,7 +23,18 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
-from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length, minus, reflected, unit, upright
+from radarsim.physics.amplitudes import (
+    along,
+    cross,
+    dot,
+    gain_towards,
+    length,
+    minus,
+    mirrored,
+    reflected,
+    unit,
+    upright,
+)
 from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.apertures import CORNERS, FAR, depth, kirchhoff, overlap
 from radarsim.physics.reflectors import Flat
@@ -104,14 +115,15 @@ def _search(search, frame, flat, orders, found):
         firsts = orders.firsts[orders.start[b] : orders.start[b + 1]]
         for i in range(len(firsts)):
             a = firsts[i]
-            image_b = _image(_image(p, flat.center[a], flat.normal[a]), flat.center[b], flat.normal[b])
+            image_b = mirrored(p, vec(flat.center[a]), vec(flat.normal[a]))
+            image_b = mirrored(image_b, vec(flat.center[b]), vec(flat.normal[b]))
             for j in range(i - 1, len(firsts)):
                 order = 2 if j < i else 3
                 c = b if order == 2 else firsts[j]
                 if order == 2 and (b < a or not _after(orders, b, a)):  # the way back is not searched for
                     continue
                 # The sensor's image in the last mirror: seen from there, the way leads straight to the sensor.
-                image = image_b if order == 2 else _image(image_b, flat.center[c], flat.normal[c])
+                image = image_b if order == 2 else mirrored(image_b, vec(flat.center[c]), vec(flat.normal[c]))
                 back = minus(p, image)
                 path = length(back)
                 if path > 2 * search.range or path < 0.05:
@@ -147,12 +159,6 @@ def _after(orders, a, b):
     some = orders.firsts[orders.start[b] : orders.start[b + 1]]
     at = np.searchsorted(some, a)
     return at < len(some) and some[at] == a
-
-
-@njit(inline="always")
-def _image(p, center, normal):
-    n = vec(normal)
-    return along(p, -2 * dot(minus(p, vec(center)), n), n)
 
 
 @njit(inline="always")
@@ -231,7 +237,7 @@ def _chain(way, p, path, back, search, frame, flat, room):
             count += 1
         after = along(now, -2 * slope, n)
         field = reflected(field, now, after, n, flat.reflection[m])
-        start = _image(start, flat.center[m], normal[m])
+        start = mirrored(start, c, n)
         f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
         now = after
     taken = upright(up, now)

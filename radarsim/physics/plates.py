@@ -27,7 +27,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
-from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length, minus
+from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length, minus, write
 from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
@@ -128,7 +128,7 @@ def _parts(flat, search, frame, found):
                         if count < len(facet):
                             facet[count], amplitude[count] = f, own * scale
                             _turn(n, out, False, point, isometry[count])
-                            _write(along(along(point, -0.01, out), 0.002, n), aim[count])
+                            write(along(along(point, -0.01, out), 0.002, n), aim[count])
                         count += 1
         for k in range(sides):
             if value[k] == 0:
@@ -140,7 +140,7 @@ def _parts(flat, search, frame, found):
                     facet[count], amplitude[count] = f, value[k] * scale
                     _turn(n, n, True, point, isometry[count])
                     before, after = vec(outward[(k - 1) % sides]), vec(outward[k])
-                    _write(along(along(along(point, -0.01, before), -0.01, after), 0.002, n), aim[count])
+                    write(along(along(along(point, -0.01, before), -0.01, after), 0.002, n), aim[count])
                 count += 1
         if inside:
             scale = mirror * gain_towards(minus(foot, p), rotation, search) ** 2
@@ -148,7 +148,7 @@ def _parts(flat, search, frame, found):
                 if count < len(facet):
                     facet[count], amplitude[count] = f, scale
                     _turn(n, (0.0, 0.0, 0.0), False, foot, isometry[count])
-                    _write(along(foot, 0.002, n), aim[count])
+                    write(along(foot, 0.002, n), aim[count])
                 count += 1
     for i in range(min(count, len(facet))):
         head_on = flat.reflection[facet[i], 0, -1]
@@ -194,8 +194,3 @@ def _turn(n, out, all_axes, point, isometry):
             isometry[i, j] = m
             shift -= m * point[j]
         isometry[i, 3] = shift
-
-
-@njit(inline="always")
-def _write(a, out):
-    out[0], out[1], out[2] = a

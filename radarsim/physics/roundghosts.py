@@ -15,9 +15,23 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Complex, Float, Int, UInt8
+from numba import njit
 
-from radarsim.physics.amplitudes import gain_towards, reflected, unit, upright
-from radarsim.physics.apertures import STRIP_FAR, strip
+from radarsim.physics.amplitudes import (
+    along,
+    cross,
+    dot,
+    gain_towards,
+    length,
+    minus,
+    mirrored,
+    reflected,
+    unit,
+    upright,
+    write,
+)
+from radarsim.physics.amplitudes import vector as vec
+from radarsim.physics.apertures import STRIP_FAR, aperture, passes, strip
 from radarsim.physics.curved import RoundBodies
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.obstacles import Obstacles
@@ -52,145 +66,171 @@ class RoundGhosts(Table):
         return np.where(self.bounces == 1, Provenance.GHOST_1, Provenance.GHOST_2).astype(np.uint8)
 
 
-def seen(search: Search, flat: Flat, mirrors: list[Mirrors], bodies: RoundBodies, obstacles: Obstacles) -> list:
+def seen(
+    search: Search, flat: Flat, mirrors: list[Mirrors], bodies: RoundBodies, obstacles: Obstacles
+) -> list[RoundGhosts]:
     """Ghosts in each frame that nothing hides; slabs are opaque to them."""
     found = [find(search, k, flat, some.seen, bodies) for k, some in enumerate(mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
-    clear, never = np.ones(len(every), bool), np.zeros(len(every), bool)
-    for way in range(2):
-        factor, _ = obstacles.way(search, frame, every.stops[:, way], np.full(len(every), 2), never)
-        clear &= factor != 0
-    return [every[clear & (frame == k)] for k in range(search.frames)]
-
-
-def _dot(a, b):
-    return np.einsum("...d,...d->...", a, b)
-
-
-def _units(a):
-    return a / np.maximum(np.linalg.norm(a, axis=-1, keepdims=True), 1e-12)
-
-
-def _ways(search: Search, frame: int, flat: Flat, seen, bodies: RoundBodies):
-    """Bodies, mirrors (-1: none) and images of the radar of all ways that may lead to a body."""
-    p, reach = search.position[frame], search.range
-    size = bodies.radius + bodies.half
-    near = np.flatnonzero(np.linalg.norm(bodies.center - p, axis=1) - size < reach)
-    center, normal = flat.center[seen], flat.normal[seen]
-    height = _dot(p - center, normal)
-    image = p - 2 * height[:, None] * normal
-    level = _dot(bodies.center[near, None] - center, normal) * np.sign(height)
-    share = np.abs(height) / (np.abs(height) + np.maximum(level, 1e-3))
-    at = image + share[..., None] * (bodies.center[near, None] - image) - center
-    spare = size[near, None] * share + STRIP_FAR * np.sqrt(search.wavelength * reach / 8) + 0.1
-    ok = (level > 0.01) & (np.abs(height) > 0.01)
-    for axis, half in ((flat.u[seen], flat.half[seen, 0]), (flat.v[seen], flat.half[seen, 1])):
-        ok &= np.abs(_dot(at, axis)) < half + spare
-    body, way = np.nonzero(ok)
-    return (
-        np.append(near, near[body]),
-        np.append(np.full(len(near), -1), seen[way]),
-        np.concatenate([np.tile(p, (len(near), 1)), image[way]]),
+    n = 2 * len(every)
+    factor, _ = obstacles.way(
+        search, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), np.zeros(n, bool)
     )
-
-
-def _between(bodies: RoundBodies, b, one, two):
-    """The point of each body between two places, its normal there, and how far it lies along the axis."""
-    axis, radius = bodies.axis[b], bodies.radius[b, None]
-    a, c = one - bodies.center[b], two - bodies.center[b]
-    z_a, z_c = _dot(a, axis), _dot(c, axis)
-    a, c = a - z_a[:, None] * axis, c - z_c[:, None] * axis
-    n = _units(_units(a) + _units(c))
-    for _ in range(STEPS):
-        n = _units(_units(a - radius * n) + _units(c - radius * n))
-    near, far = np.linalg.norm(a - radius * n, axis=1), np.linalg.norm(c - radius * n, axis=1)
-    z = z_a + (z_c - z_a) * near / (near + far)
-    return bodies.center[b] + radius * n + z[:, None] * axis, n, z
-
-
-def _spread(bodies: RoundBodies, b, n, there, back, r1, r2):
-    """sqrt(det H_0 / det H) / (r_1 + r_2), and the curvature of the path along the axis once the other is summed."""
-    flat_on = np.abs(n[:, 2]) < 0.9
-    aside = np.cross(n, np.where(flat_on[:, None], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]))
-    round_ = bodies.half[b] == 0
-    along = np.where(round_[:, None], _units(aside), bodies.axis[b])
-    around = np.cross(n, along)
-    cosine, curvature = np.maximum(_dot(n, -there), 1e-3), 1 / r1 + 1 / r2
-    t1, t2 = _dot(there, around), _dot(there, along)
-    h11, h22, h12 = curvature * (1 - t1 * t1), curvature * (1 - t2 * t2), -curvature * t1 * t2
-    before = h11 * h22 - h12 * h12
-    bend = 2 * cosine / bodies.radius[b]
-    h11, h22 = h11 + bend, h22 + np.where(round_, bend, 0)
-    return np.sqrt(before / (h11 * h22 - h12 * h12)) / (r1 + r2), h22 - h12 * h12 / h11
+    clear = (factor != 0).reshape(-1, 2).all(axis=1)
+    return [every[clear & (frame == k)] for k in range(search.frames)]
 
 
 def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bodies: RoundBodies) -> RoundGhosts:
     """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
-    p, rotation = search.position[frame], search.rotation[frame]
-    body, mirror, image = _ways(search, frame, flat, seen, bodies)
-    one, two = np.nonzero((body[:, None] == body) & ((mirror[:, None] >= 0) | (mirror >= 0)))
-    b = body[one]
-    place, n, z = _between(bodies, b, image[one], image[two])
-    there, back = place - image[one], place - image[two]
-    r1, r2 = np.linalg.norm(there, axis=1), np.linalg.norm(back, axis=1)
-    there, back = there / r1[:, None], back / r2[:, None]
-    size, bend = _spread(bodies, b, n, there, back, r1, r2)
-    size *= search.wavelength / (4 * np.pi)
-    lit = (_dot(n, there) < -1e-3) & (_dot(n, back) < -1e-3) & (r1 + r2 < 2 * search.range)
-    lit &= size * search.peak_gain**2 > search.threshold
-    unit_z = np.sqrt(search.wavelength / (2 * bend))
-    lit &= (bodies.half[b] == 0) | (np.abs(z) < bodies.half[b] + STRIP_FAR * unit_z)
-    found = []
-    for k in np.flatnonzero(lit):
-        ways = []
-        value = complex(size[k])
-        if bodies.half[b[k]] > 0:
-            value *= strip((-bodies.half[b[k]] - z[k]) / unit_z[k], (bodies.half[b[k]] - z[k]) / unit_z[k])
-        for end, far in ((one[k], r1[k]), (two[k], r2[k])):
-            stop, seen_at, share = _over(search, flat, mirror[end], image[end], place[k], far)
-            value *= share * gain_towards(tuple(stop - p), rotation, search)
-            ways.append((stop, seen_at))
-        if abs(value) <= search.threshold:
+    size = 256
+    while True:
+        found = RoundGhosts(
+            np.empty((size, 2, 3)), np.empty((size, 2, 2, 3)), np.empty(size, np.int64), np.empty(size, complex)
+        )
+        count = _find(search, frame, flat.columns, seen, bodies.columns, found.columns)
+        if count <= size:
+            return found[:count]
+        size = count
+
+
+@njit(cache=True)
+def _find(search, frame, flat, seen, bodies, found):
+    """Returns how many there are, of which as many as fit are written."""
+    p, count = vec(search.position[frame]), 0
+    mirrors, images = np.empty(len(seen) + 1, np.int64), np.empty((len(seen) + 1, 3))
+    for b in range(len(bodies.radius)):
+        ways = _ways(search, p, flat, seen, bodies, b, (mirrors, images))
+        for i in range(ways):
+            for j in range(max(i, 1), ways):
+                place, n, size = _strength(search, bodies, b, vec(images[i]), vec(images[j]))
+                if abs(size) * search.peak_gain**2 <= search.threshold:
+                    continue
+                out = _over(search, frame, flat, mirrors[i], vec(images[i]), place)
+                back = _over(search, frame, flat, mirrors[j], vec(images[j]), place)
+                value = size * out[2] * back[2]
+                if abs(value) <= search.threshold:
+                    continue
+                ends = (mirrors[i], out[0]), (mirrors[j], back[0])
+                value *= _polarisation(search, frame, flat, ends, place, n, bodies.reflection[b])
+                if abs(value) <= search.threshold:
+                    continue
+                clear = along(place, 2e-3, n)
+                for swapped in range(1 if i == j else 2):
+                    if count < len(found.amplitude):
+                        found.amplitude[count] = value
+                        found.bounces[count] = (mirrors[i] >= 0) + (mirrors[j] >= 0)
+                        for end in range(2):
+                            way, m = (out, mirrors[i]) if end == swapped else (back, mirrors[j])
+                            write(way[1], found.points[count, end])
+                            write(way[0] if m >= 0 else clear, found.stops[count, end, 0])
+                            write(clear, found.stops[count, end, 1])
+                    count += 1
+    return count
+
+
+@njit(inline="always")
+def _ways(search, p, flat, seen, bodies, b, ways):
+    """Mirrors (-1: none, the first) and images of the radar of all ways that may lead to a body; returns how many."""
+    mirrors, images = ways
+    center, size = vec(bodies.center[b]), bodies.radius[b] + bodies.half[b]
+    if length(minus(center, p)) - size > search.range:
+        return 0
+    mirrors[0], count = -1, 1
+    write(p, images[0])
+    for m in seen:
+        c, n = vec(flat.center[m]), vec(flat.normal[m])
+        height = dot(minus(p, c), n)
+        level = dot(minus(center, c), n) * (1.0 if height > 0 else -1.0)
+        if abs(height) < 0.01 or level < 0.01:
             continue
-        bounces = [(mirror[end], way[0]) for end, way in zip((one[k], two[k]), ways, strict=True)]
-        course = [p, *(stop for m, stop in bounces[:1] if m >= 0), place[k], *(s for m, s in bounces[1:] if m >= 0), p]
-        met = [(flat.normal[m], flat.reflection[m]) for m, _ in bounces if m >= 0]
-        met.insert(int(bounces[0][0] >= 0), (n[k], bodies.reflection[b[k]]))
-        value *= _polarisation(tuple(rotation[:, 2]), course, met)
-        if abs(value) > search.threshold:
-            clear = place[k] + 2e-3 * n[k]
-            ends = zip((one[k], two[k]), ways, strict=True)
-            stops = [[way[0] if mirror[end] >= 0 else clear, clear] for end, way in ends]
-            found.append(([way[1] for way in ways], stops, int(mirror[one[k]] >= 0) + int(mirror[two[k]] >= 0), value))
-    if not found:
-        return RoundGhosts(np.zeros((0, 2, 3)), np.zeros((0, 2, 2, 3)), np.zeros(0, int), np.zeros(0, complex))
-    return RoundGhosts(*(np.array(column) for column in zip(*found, strict=True)))
+        source = along(p, -2 * height, n)
+        share = abs(height) / (abs(height) + level)
+        at = minus(along(source, share, minus(center, source)), c)
+        spare = size * share + STRIP_FAR * np.sqrt(search.wavelength * search.range / 8) + 0.1
+        if (
+            abs(dot(at, vec(flat.u[m]))) < flat.half[m, 0] + spare
+            and abs(dot(at, vec(flat.v[m]))) < flat.half[m, 1] + spare
+        ):
+            mirrors[count] = m
+            write(source, images[count])
+            count += 1
+    return count
 
 
-def _over(search: Search, flat: Flat, m: int, image, place, far: float):
-    """Where the way to a place leaves for, where the place is seen, and what the mirror's aperture passes."""
+@njit(inline="always")
+def _strength(search, bodies, b, one, two):
+    """The point of a body between two places, its normal there, and the amplitude that an isotropic antenna gets from
+    one place to the other."""
+    radius, half, axis, none = bodies.radius[b], bodies.half[b], vec(bodies.axis[b]), (0.0, 0.0, 0.0)
+    a, c = minus(one, vec(bodies.center[b])), minus(two, vec(bodies.center[b]))
+    z_a, z_c = dot(a, axis), dot(c, axis)
+    a, c = along(a, -z_a, axis), along(c, -z_c, axis)
+    n = unit(along(unit(a), 1.0, unit(c)))
+    for _ in range(STEPS):
+        n = unit(along(unit(along(a, -radius, n)), 1.0, unit(along(c, -radius, n))))
+    near, far = length(along(a, -radius, n)), length(along(c, -radius, n))
+    z = z_a + (z_c - z_a) * near / (near + far)
+    place = along(along(vec(bodies.center[b]), radius, n), z, axis)
+    there, back = minus(place, one), minus(place, two)
+    r1, r2 = length(there), length(back)
+    there, back = unit(there), unit(back)
+    cosine = -dot(n, there)
+    if cosine < 1e-3 or dot(n, back) > -1e-3 or r1 + r2 > 2 * search.range:
+        return none, none, 0j
+    # Hessians of the path over the tangent plane, of a plane there and of the body
+    side = axis if half > 0 else unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.9 else (1.0, 0.0, 0.0)))
+    curvature, bend = 1 / r1 + 1 / r2, 2 * cosine / radius
+    t1, t2 = dot(there, cross(n, side)), dot(there, side)
+    h11, h22, h12 = curvature * (1 - t1 * t1), curvature * (1 - t2 * t2), -curvature * t1 * t2
+    plane = h11 * h22 - h12 * h12
+    h11, h22 = h11 + bend, h22 + (0.0 if half > 0 else bend)
+    size = search.wavelength / (4 * np.pi * (r1 + r2)) * np.sqrt(plane / (h11 * h22 - h12 * h12)) + 0j
+    if half > 0:
+        zone = np.sqrt(search.wavelength / (2 * (h22 - h12 * h12 / h11)))
+        if abs(z) >= half + STRIP_FAR * zone:
+            return none, none, 0j
+        size *= strip((-half - z) / zone, (half - z) / zone)
+    return place, n, size
+
+
+@njit(inline="always")
+def _over(search, frame, flat, m, source, place):
+    """Where a way to a place leaves for, where the place is seen, and gain times what the mirror's aperture passes."""
+    p, rotation = vec(search.position[frame]), search.rotation[frame]
     if m < 0:
-        return place, place, 1.0
-    center, normal = flat.center[m], flat.normal[m]
-    h, level = abs(_dot(image - center, normal)), abs(_dot(place - center, normal))
-    share = h / (h + level)
-    way = (place - image) / far
-    stop = image + share * far * way
-    aside, cosine = _dot(way, flat.u[m]), abs(_dot(way, normal))
-    across = np.sqrt(max(1 - aside**2, 1e-6))
-    size = np.sqrt(0.5 * search.wavelength * far * share * (1 - share)) + 1e-12
-    passed = 1.0
-    units = size / across, size * across / max(cosine, 1e-3)
-    for axis, half, unit_ in zip((flat.u[m], flat.v[m]), flat.half[m], units, strict=True):
-        at = _dot(stop - center, axis)
-        passed *= strip((-half - at) / unit_, (half - at) / unit_)
-    return stop, place - 2 * _dot(place - center, normal) * normal, passed
+        return place, place, gain_towards(minus(place, p), rotation, search) + 0j
+    center, normal = vec(flat.center[m]), vec(flat.normal[m])
+    h, level = abs(dot(minus(source, center), normal)), abs(dot(minus(place, center), normal))
+    share, far = h / (h + level), length(minus(place, source))
+    stop = along(source, share, minus(place, source))
+    square = 0.5 * search.wavelength * far * share * (1 - share)
+    value = passes(stop, unit(minus(place, source)), square, aperture(flat, m))
+    return stop, mirrored(place, center, normal), value * gain_towards(minus(stop, p), rotation, search)
 
 
-def _polarisation(up, course, surfaces) -> complex:
-    """Product of the reflection coefficients over surfaces (normal, table), an upright field sent and taken."""
-    steps = [unit(tuple(after - before)) for before, after in zip(course, course[1:], strict=False)]
-    field = tuple(complex(x) for x in upright(up, steps[0]))
-    for now, after, (normal, table) in zip(steps, steps[1:], surfaces, strict=False):
-        field = reflected(field, now, after, tuple(normal), table)
-    return sum(f * t for f, t in zip(field, upright(up, steps[-1]), strict=True))
+@njit(inline="always")
+def _polarisation(search, frame, flat, ends, place, n, reflection):
+    """Product of the reflection coefficients, an upright field sent and taken.
+
+    Args:
+        ends: mirror and stop, out and back.
+        place, n, reflection: of the body.
+    """
+    p, rotation = vec(search.position[frame]), search.rotation[frame]
+    up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
+    (m, stop), (last, end) = ends
+    now = unit(minus(stop, p))
+    sent = upright(up, now)
+    field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
+    if m >= 0:
+        after = unit(minus(place, stop))
+        field = reflected(field, now, after, vec(flat.normal[m]), flat.reflection[m])
+        now = after
+    after = unit(minus(end if last >= 0 else p, place))
+    field = reflected(field, now, after, n, reflection)
+    now = after
+    if last >= 0:
+        after = unit(minus(p, end))
+        field = reflected(field, now, after, vec(flat.normal[last]), flat.reflection[last])
+        now = after
+    return dot(field, upright(up, now))

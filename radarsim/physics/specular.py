@@ -6,41 +6,49 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit, prange
 
-from radarsim.physics.amplitudes import along, dot, facing, gain_towards, length, minus, reflected, unit, upright
+from radarsim.physics.amplitudes import (
+    along,
+    dot,
+    facing,
+    gain_towards,
+    length,
+    minus,
+    mirrored,
+    reflected,
+    unit,
+    upright,
+)
 from radarsim.physics.amplitudes import vector as vec
-from radarsim.physics.apertures import STRIP_FAR, strip
+from radarsim.physics.apertures import STRIP_FAR, aperture, misses, passes
 from radarsim.physics.candidates import Candidates
 from radarsim.physics.paths import OneWay
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
 from radarsim.physics.targets import Targets
 
-#: Candidates that are looked at together; neighbours in the table are neighbours in space.
-BALL = 8
+#: No two rectangular apertures pass more than this: Fresnel's integral over a slit is below 1.17.
+_MOST = 1.17**4
 
 
 class _Chains(NamedTuple):
-    """Mirrors in order from the sensor on, the second one -1 where there is none; the aims they may lead to, the first
-    of the balls around them, and room for what is found."""
+    """Mirrors in order from the sensor on, the second one -1 where there is none; the aims they may lead to, from one
+    on to before another; and room for what is found."""
 
     mirrors: Int[np.ndarray, "chain 2"]
     frame: Int[np.ndarray, "chain"]
     aims: Int[np.ndarray, "chain 2"]
-    balls: Int[np.ndarray, "chain"]
     slots: Int[np.ndarray, "chain+1"]
 
 
 class _Aims(NamedTuple):
     """Candidates: where they are, and bounds on a path's length (m) and on its amplitude times the root of the cosine
-    at the scatterer (1/m). Balls around every `BALL` of those that were added together, for a quick look."""
+    at the scatterer (1/m)."""
 
     candidate: Int[np.ndarray, "aim"]
-    place: Float[np.ndarray, "aim 3"]
+    place: Float[np.ndarray, "3 aim"]
     scatterer: Int[np.ndarray, "aim"]
     longest: Float[np.ndarray, "aim"]
     weakest: Float[np.ndarray, "aim"]
-    ball: Float[np.ndarray, "ball 3"]
-    radius: Float[np.ndarray, "ball"]
 
 
 class _Hits(NamedTuple):
@@ -59,7 +67,6 @@ class SpecularCandidates:
 
     def __init__(self):
         self._chains, self._frame, self._aims, self._rows, self._longest, self._weakest = [], [], [], [], [], []
-        self._spans = []
         self._size = 0
 
     def add(
@@ -76,7 +83,6 @@ class SpecularCandidates:
         """
         aims = self._size, self._size + len(rows)
         self._size += len(rows)
-        self._spans.append(aims)
         self._chains.append(chains)
         self._frame.append(np.full(len(chains), frame))
         self._aims.append(np.broadcast_to(aims, (len(chains), 2)))
@@ -96,17 +102,12 @@ class SpecularCandidates:
         mirrors, frame, span = (np.concatenate(x) for x in (self._chains, self._frame, self._aims))
         rows, longest, weakest = (np.concatenate(x) for x in (self._rows, self._longest, self._weakest))
         scatterer = candidates.scatterer[rows]
-        place = np.take(targets.scatterers.position, scatterer, axis=0)
-        first = np.concatenate([np.arange(a, b, BALL) for a, b in self._spans])
-        count = np.diff(first, append=len(rows))
-        ball = np.add.reduceat(place, first) / count[:, None] if len(first) else place
-        gap = np.linalg.norm(place - np.repeat(ball, count, axis=0), axis=1)
-        radius = np.maximum.reduceat(gap, first) if len(first) else gap
+        place = np.ascontiguousarray(np.take(targets.scatterers.position, scatterer, axis=0).T)
         slots = np.concatenate([[0], np.cumsum(span[:, 1] - span[:, 0])])
-        chains = _Chains(mirrors, frame, span, np.searchsorted(first, span[:, 0]), slots)
+        chains = _Chains(mirrors, frame, span, slots)
         size = chains.slots[-1]
         hits = _Hits(np.zeros(len(mirrors), np.int64), np.empty(size, np.int32), np.empty(size, complex))
-        aims = _Aims(rows, place, scatterer, longest, weakest, ball, radius)
+        aims = _Aims(rows, place, scatterer, longest, weakest)
         _strengths(search, flat.columns, chains, aims, targets.scatterers.columns, hits)
         n = hits.count.sum()
         found = OneWay(
@@ -119,64 +120,44 @@ class SpecularCandidates:
 
 
 @njit(inline="always")
-def _image(p, center, normal):
-    """A point mirrored in a plane."""
-    return along(p, -2 * dot(minus(p, center), normal), normal)
-
-
-@njit(inline="always")
 def _crossing(a, b, center, normal):
     """Where the line from a to b crosses a plane."""
     ha, hb = dot(minus(a, center), normal), dot(minus(b, center), normal)
     return along(a, ha / (ha - hb), minus(b, a))
 
 
-@njit(inline="always")
-def _share(stop, way, square, mirror):
-    """What a mirror's aperture passes of a path in a direction over a stop on it.
+@njit(cache=True, error_model="numpy")
+def _reach(search, image, h, window, aims, begin, end):
+    """Which aims light may reach from an image through its mirror, at height h over the image.
 
-    Args:
-        stop: m.
-        way: unit direction of travel.
-        square: of the Fresnel unit across the path, m^2. In the mirror's plane it is longer along the plane of
-            incidence: by 1 / across along u, by across / cosine along v, which keeps its area and neglects its slant.
-        mirror: center, normal, u, v, half sides.
+    A quick look at all of them, in arrays: it leaves out what `misses` does, what is too far, and what is too weak.
     """
-    center, normal, u, v, half_u, half_v = mirror
-    offset = minus(stop, center)
-    aside, cosine = dot(way, u), abs(dot(way, normal))
-    across, size = np.sqrt(max(1 - aside * aside, 1e-6)), np.sqrt(square) + 1e-12
-    x, y = dot(offset, u) * across / size, dot(offset, v) * cosine / (across * size)
-    half_x, half_y = half_u * across / size, half_v * cosine / (across * size)
-    if abs(x) >= half_x + STRIP_FAR or abs(y) >= half_y + STRIP_FAR:
-        return 0j
-    return strip(-half_x - x, half_x - x) * strip(-half_y - y, half_y - y)
-
-
-@njit(inline="always")
-def _mirror(flat, m):
-    """What `_share` needs of one."""
-    return (
-        vec(flat.center[m]), vec(flat.normal[m]), vec(flat.u[m]), vec(flat.v[m]), flat.half[m, 0], flat.half[m, 1]
-    )  # fmt: skip
-
-
-@njit(inline="always")
-def _misses(image, h, center, radius, wavelength, mirror):
-    """Whether no path from an image through its mirror, at height h over the image, can lead into a ball."""
-    middle, normal, u, v, half_u, half_v = mirror
-    way = minus(center, image)
-    level = dot(minus(center, middle), normal) * (1.0 if h > 0 else -1.0)
-    if level < -radius:
-        return True
-    if level <= radius:
-        return False
-    height = abs(h)
-    steep = (height + level - radius) / (length(way) + radius)  # least cosine
-    spread = radius * height / (height + level - radius) / steep
-    spread += STRIP_FAR * np.sqrt(0.5 * wavelength * height / steep) / steep
-    stop = minus(along(image, height / (height + level), way), middle)
-    return abs(dot(stop, u)) > half_u + spread or abs(dot(stop, v)) > half_v + spread
+    center, normal, u, v, half_u, half_v = window
+    x, y, z = aims.place[0][begin:end], aims.place[1][begin:end], aims.place[2][begin:end]
+    longest, weakest, lit = aims.longest[begin:end], aims.weakest[begin:end], np.empty(end - begin, np.bool_)
+    side, height = (1.0, h) if h > 0 else (-1.0, -h)
+    ox, oy, oz = image
+    begin_u, begin_v = dot(minus(image, center), u), dot(minus(image, center), v)
+    zone = STRIP_FAR * STRIP_FAR * 0.5 * search.wavelength
+    most = _MOST * search.peak_gain
+    for i in range(len(lit)):
+        dx, dy, dz = x[i] - ox, y[i] - oy, z[i] - oz
+        square = dx * dx + dy * dy + dz * dz
+        full = np.sqrt(square)
+        rise = side * (dx * normal[0] + dy * normal[1] + dz * normal[2])
+        part = height / rise
+        aside = dx * u[0] + dy * u[1] + dz * u[2]
+        off_u = abs(begin_u + part * aside) - half_u
+        off_v = abs(begin_v + part * (dx * v[0] + dy * v[1] + dz * v[2])) - half_v
+        across, farthest = square - aside * aside, zone * full * part * (1 - part)
+        lit[i] = (
+            (rise > height + 0.01)
+            & (full < longest[i])
+            & (weakest[i] * full < most)
+            & ((off_u <= 0) | (off_u * off_u * across < farthest * square))
+            & ((off_v <= 0) | (off_v * off_v * rise * rise < farthest * across))
+        )
+    return begin + np.flatnonzero(lit)
 
 
 @njit(parallel=True, cache=True)
@@ -195,72 +176,65 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
     one, two = chains.mirrors[k]
     last = one if two < 0 else two
     c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
-    source = _image(p, c1, n1)  # the sensor as seen in the last mirror but one
+    source = mirrored(p, c1, n1)  # the sensor as seen in the last mirror but one
     image = source
     cl, nl = vec(flat.center[last]), vec(flat.normal[last])
     if two >= 0:
-        image = _image(source, cl, nl)
+        image = mirrored(source, cl, nl)
     h = -dot(minus(image, cl), nl)  # the source's height over the last mirror; its image is as far behind
     if abs(h) < 0.01 or (h < 0 and not flat.two_sided[last]):
         return
-    mirror = _mirror(flat, last)
-    before = _mirror(flat, one)
+    window = aperture(flat, last)
+    before, h1 = aperture(flat, one), dot(minus(p, c1), n1)
     n = chains.slots[k]
     begin, end = chains.aims[k]
-    for ball in range(chains.balls[k], chains.balls[k] + (end - begin + BALL - 1) // BALL):
-        if _misses(image, h, vec(aims.ball[ball]), aims.radius[ball], search.wavelength, mirror):
+    for i in _reach(search, image, h, window, aims, begin, end):
+        s = (aims.place[0, i], aims.place[1, i], aims.place[2, i])
+        way = minus(s, image)
+        full = length(way)
+        hs = dot(minus(s, cl), nl)
+        part = h / (h + hs)  # of the way at which the last mirror lies
+        stop = along(image, part, way)
+        way = (way[0] / full, way[1] / full, way[2] / full)
+        square = 0.5 * search.wavelength * full * part * (1 - part)
+        bounce, earlier, wide = stop, way, square
+        if two >= 0:
+            hb = dot(minus(stop, c1), n1)
+            if hb * h1 <= 0 or abs(hb) < 0.005:
+                continue
+            part *= h1 / (h1 + hb)
+            bounce, earlier = _crossing(source, stop, c1, n1), unit(minus(stop, source))
+            wide = 0.5 * search.wavelength * full * part * (1 - part)
+            if misses(bounce, earlier, wide, before):
+                continue
+        j = aims.scatterer[i]
+        cosine = facing(scatterers.normal[j], (-way[0], -way[1], -way[2]), scatterers.two_sided[j])
+        if cosine <= 0:
             continue
-        start = begin + (ball - chains.balls[k]) * BALL
-        for i in range(start, min(start + BALL, end)):
-            s = vec(aims.place[i])
-            hs = dot(minus(s, cl), nl)
-            if hs * h < 0 or abs(hs) < 0.01:
-                continue
-            way = minus(s, image)
-            full = length(way)
-            if full > aims.longest[i] or full < 1e-2:
-                continue
-            part = h / (h + hs)  # of the way at which the last mirror lies
-            stop = along(image, part, way)
-            square = 0.5 * search.wavelength * full
-            way = (way[0] / full, way[1] / full, way[2] / full)
-            j = aims.scatterer[i]
-            cosine = facing(scatterers.normal[j], (-way[0], -way[1], -way[2]), scatterers.two_sided[j])
-            if cosine <= 0:
-                continue
-            passed = _share(stop, way, square * part * (1 - part), mirror)
-            if passed == 0:
-                continue
-            bounce = stop
-            if two >= 0:
-                hb = dot(minus(stop, c1), n1)
-                hp = dot(minus(p, c1), n1)
-                if hb * hp <= 0 or abs(hb) < 0.005:
-                    continue
-                part *= hp / (hp + hb)
-                bounce = _crossing(source, stop, c1, n1)
-                passed *= _share(bounce, unit(minus(stop, source)), square * part * (1 - part), before)
-                if passed == 0:
-                    continue
-            leaving = minus(bounce, p)
-            size = gain_towards(leaving, rotation, search) / full
-            least = aims.weakest[i] / np.sqrt(cosine)
-            if abs(passed) * size <= least:
-                continue
-            now = unit(leaving)
-            sent = upright(up, now)
-            field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
-            if two >= 0:
-                after = unit(minus(stop, bounce))
-                field = reflected(field, now, after, n1, flat.reflection[one])
-                now = after
-            after = unit(minus(s, stop))
-            field = reflected(field, now, after, nl, flat.reflection[last])
-            value = size * passed * dot(field, upright(up, after))
-            if abs(value) > least:
-                hits.aim[n] = i
-                hits.amplitude[n] = value
-                n += 1
+        leaving = minus(bounce, p)
+        size = gain_towards(leaving, rotation, search) / full
+        least = aims.weakest[i] / np.sqrt(cosine)
+        if _MOST * size <= least:
+            continue
+        passed = passes(stop, way, square, window)
+        if two >= 0:
+            passed *= passes(bounce, earlier, wide, before)
+        if abs(passed) * size <= least:
+            continue
+        now = unit(leaving)
+        sent = upright(up, now)
+        field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
+        if two >= 0:
+            after = unit(minus(stop, bounce))
+            field = reflected(field, now, after, n1, flat.reflection[one])
+            now = after
+        after = unit(minus(s, stop))
+        field = reflected(field, now, after, nl, flat.reflection[last])
+        value = size * passed * dot(field, upright(up, after))
+        if abs(value) > least:
+            hits.aim[n] = i
+            hits.amplitude[n] = value
+            n += 1
     hits.count[k] = n - chains.slots[k]
 
 
@@ -278,19 +252,19 @@ def _course(search, flat, chains, aims, hits, where, found, stops):
     k, first = where
     p, one, two = vec(search.position[chains.frame[k]]), chains.mirrors[k, 0], chains.mirrors[k, 1]
     c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
-    source = _image(p, c1, n1)
+    source = mirrored(p, c1, n1)
     for i in range(hits.count[k]):
         e, j = first + i, chains.slots[k] + i
         found.candidate[e], found.amplitude[e] = aims.candidate[hits.aim[j]], hits.amplitude[j]
-        s = vec(aims.place[hits.aim[j]])
+        s = vec(aims.place[:, hits.aim[j]])
         if two < 0:
             begin = _crossing(source, s, c1, n1)
-            end, seen = begin, _image(s, c1, n1)
+            end, seen = begin, mirrored(s, c1, n1)
         else:
             c2, n2 = vec(flat.center[two]), vec(flat.normal[two])
-            end = _crossing(_image(source, c2, n2), s, c2, n2)
+            end = _crossing(mirrored(source, c2, n2), s, c2, n2)
             begin = _crossing(source, end, c1, n1)
-            seen = _image(_image(s, c2, n2), c1, n1)
+            seen = mirrored(mirrored(s, c2, n2), c1, n1)
         for d in range(3):
             stops[e, 0, d] = begin[d]
             stops[e, 1, d] = end[d] if two >= 0 else s[d]

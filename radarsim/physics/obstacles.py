@@ -65,13 +65,10 @@ class Obstacles:
             stops: m; the last of a way may be followed by others that do not count.
             stretches: how many of each way's stops count.
         """
+        begins = np.concatenate([search.position[frame, None], stops[:, :-1]], axis=1)
+        way, stop = np.nonzero(np.arange(stops.shape[1]) < stretches[:, None])
+        passed, extra = self.passage(search, frame[way], begins[way, stop], stops[way, stop], allowed[way])
         factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
-        left, begin = np.arange(len(frame)), search.position[frame]
-        for k in range(stretches.max(initial=0)):
-            left = left[stretches[left] > k]
-            passed, extra = self.passage(search, frame[left], begin[left], stops[left, k], allowed[left])
-            factor[left] *= passed
-            delay[left] += extra
-            left = left[passed != 0]
-            begin = stops[:, k]
+        np.multiply.at(factor, way, passed)
+        np.add.at(delay, way, extra)
         return factor, delay

@@ -447,8 +447,7 @@ def main() -> None:
         "Each plot sets a closed form, or an independent sum, against what the simulator makes of it, with the "
         f"`radarize` preset (centre {CONFIG.center_frequency / 1e9:.2f} GHz). Text, figures and plots are written by "
         "`python -m benchmarks.physics_gallery`; the same laws are tests in `tests/physics`.\n"
-        "\n## Words\n\n| here | is | source |\n|---|---|---|\n"
-        + "".join(f"| {' | '.join(row)} |\n" for row in WORDS)
+        "\n## Words\n\n| here | is | source |\n|---|---|---|\n" + "".join(f"| {' | '.join(row)} |\n" for row in WORDS)
     )
     for title, (draw, x, y) in LAWS.items():
         figure, axis = plt.subplots(figsize=(5.4, 3.2))

@@ -8,10 +8,11 @@ same instants, compared with those of other instants and of another walk.
 
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import yaml
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
 from benchmarks.realism import CONFIG, shares
 from benchmarks.results import Data, command_line, publish
@@ -21,20 +22,37 @@ from radarize.console import progress
 from radarize.tum import planar_poses, write_tum
 from radarize.walkposes import BEARINGS, lidar_poses, scan, true_poses
 from radarize.walks import PERIOD, Walk
+from radarize.yamlfile import read_yaml
 from radarsim.motion import motion_from_tum
 from radarsim.scenario import Scenario
 from radarsim.scene.importers import import_scene
 from radarsim.scene.scene import Scene
 from radarsim.simulate import TOGETHER
 
-#: What is assumed: of the scene's import, of its life, and of the sensor's height, m.
-ASSUMED: dict[str, tuple[dict[str, object], dict[str, float], float]] = {
-    "walls alone": ({}, {}, 1.0),
-    "clutter and unevenness": ({}, {"clutter": 1.0, "unevenness": 1.0}, 1.0),
-    "clutter x 3": ({}, {"clutter": 3.0, "unevenness": 1.0}, 1.0),
-    "walls of concrete": ({"default": "concrete"}, {"clutter": 1.0, "unevenness": 1.0}, 1.0),
-    "rooms of 4 m": ({"height": 4.0}, {"clutter": 1.0, "unevenness": 1.0}, 1.0),
-    "sensor at 0.5 m": ({}, {"clutter": 1.0, "unevenness": 1.0}, 0.5),
+
+class Assumed(NamedTuple):
+    """What the lidar does not tell.
+
+    Attributes:
+        life: see `radarsim.scene.scene.Life`.
+        walls: their material.
+        room: floor to ceiling, m.
+        sensor: its height, m.
+    """
+
+    life: dict[str, float] = {"clutter": 1.0, "unevenness": 1.0}  # noqa: RUF012
+    walls: str = "plasterboard"
+    room: float = 2.7
+    sensor: float = 1.0
+
+
+ASSUMED = {
+    "walls alone": Assumed(life={}),
+    "clutter and unevenness": Assumed(),
+    "clutter x 3": Assumed(life={"clutter": 3.0, "unevenness": 1.0}),
+    "walls of concrete": Assumed(walls="concrete"),
+    "rooms of 4 m": Assumed(room=4.0),
+    "sensor at 0.5 m": Assumed(sensor=0.5),
 }
 #: Rows by which the twin's pictures may have to be moved: the real radar reads up to 0.34 m too far.
 _BIAS = range(9)
@@ -44,7 +62,7 @@ _MARGIN = 20
 Pictures = UInt8[np.ndarray, "frame range azimuth"]
 
 
-def scene(walk: Walk, poses: Float[np.ndarray, "frame 3"], settings: dict[str, object], folder: Path) -> Path:
+def scene(walk: Walk, poses: Float[np.ndarray, "frame 3"], assumed: Assumed, folder: Path) -> Path:
     """The scene that the walk's lidar saw."""
     ranges = np.stack([scan(polar.cartesian(walk.lidar(frame))) for frame in range(walk.frames)])
     log = folder / f"{walk.number}.scans.npz"
@@ -52,11 +70,16 @@ def scene(walk: Walk, poses: Float[np.ndarray, "frame 3"], settings: dict[str, o
     far = np.where(np.isfinite(ranges), ranges, 2 * polar.REACH)
     np.savez(log, ranges=far, angle_min=BEARINGS[0], angle_increment=step, range_max=polar.REACH)
     write_tum(folder / f"{walk.number}.truth.tum", PERIOD * np.arange(walk.frames), planar_poses(poses))
-    return import_scene(log, folder / f"{walk.number}.yaml", **settings).path
+    path = import_scene(log, folder / f"{walk.number}.yaml", height=assumed.room).path
+    found = read_yaml(path)
+    for part in found["objects"]:
+        part["material"] = assumed.walls if part["name"] == "walls" else part["material"]
+    path.write_text(yaml.safe_dump(found | assumed.life, sort_keys=False))
+    return path
 
 
 def simulated(
-    path: Path, poses: Float[np.ndarray, "frame 3"], height: float, frames: np.ndarray, seed: int
+    path: Path, poses: Float[np.ndarray, "frame 3"], height: float, frames: Int[np.ndarray, "frame"], seed: int
 ) -> Pictures:
     """Pictures of some frames of the same drive."""
     drive = planar_poses(poses)
@@ -112,11 +135,10 @@ def main() -> None:
     with progress("twins") as report, tempfile.TemporaryDirectory() as folder:
         for number, walk in enumerate(walks):
             poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
-            for done, (about, (settings, life, height)) in enumerate(ASSUMED.items()):
+            for done, (about, assumed) in enumerate(ASSUMED.items()):
                 report(number * len(ASSUMED) + done, len(walks) * len(ASSUMED))
-                path = scene(walk, poses, settings, Path(folder))
-                path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | life, sort_keys=False))
-                twin = simulated(path, poses, height, frames[number], options.seed)
+                path = scene(walk, poses, assumed, Path(folder))
+                twin = simulated(path, poses, assumed.sensor, frames[number], options.seed)
                 other = real[(number + 1) % len(walks)]
                 rows.append({"walk": walk.number, "assumed": about, **compared(twin, real[number], other)})
     publish(
@@ -126,7 +148,7 @@ def main() -> None:
         data=Data("RadarHD's training walks", tuple(Facts(f"radarhd {w.number}", None, None, False) for w in walks)),
         networks=(),
         notes=[
-            "Correlation of pictures (`radarize.polar`, four antennas) of the twin with real ones of the same instants, "
+            "Correlation of the twin's pictures (`radarize.polar`, four antennas) with real ones of the same instants, "
             "of the same walk backwards, and of another walk; the twin's are moved by as much as fits best (bias).",
             "The lidar's plane is all that is known of a room: nothing above or below it, no glass, no material.",
         ],

@@ -2,8 +2,8 @@
 
 What is typed is what the pages say (`pages.py`), but for `TYPED_INSTEAD`: everything shorter, and hardware virtual.
 The other pages follow README, with what it left behind. A command that is new on a page runs here by itself, or fails.
-The suite types README, with the kernels that the checkout has compiled: in a fresh one, those of set-up. The other pages
-take minutes more: `make documents` types them, too, all of it where no kernel has been compiled yet.
+The suite types README, with the kernels that the checkout has compiled: in a fresh one, those of set-up. The other
+pages take minutes more: `make documents` types them, too, all of it where no kernel has been compiled yet.
 """
 
 import json

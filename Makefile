@@ -1,7 +1,9 @@
 # make demo: sets this machine up and runs the main job end to end      make test: sets up and passes the tests
 # make bounds: tests of compiled loops, which then look whether they index within bounds
-# make documents: types every command of docs, too, as `make test` does of README, where nothing is compiled yet
+# make documents: types every command of docs, too, as `make test` does of README, and where nothing is compiled yet
 RUN := runs/demo
+# A file's tests share what it makes; files begin in the order of tests/conftest.py.
+PYTEST := .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 .PHONY: setup demo test bounds documents lint clean
 
@@ -17,10 +19,10 @@ demo: setup
 	@.venv/bin/radarize report $(RUN) --beside $(RUN)/learned --beside $(RUN)/doppler
 
 test: setup
-	@.venv/bin/python -m pytest -n 2 --dist loadfile $(TESTS)
+	@$(PYTEST) $(TESTS)
 
 bounds: setup
-	@NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/bounds .venv/bin/python -m pytest -n 2 --dist loadfile \
+	@NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/bounds $(PYTEST) \
 		$(or $(TESTS),tests/slam tests/odometry tests/physics tests/fuzzing)
 
 documents: setup

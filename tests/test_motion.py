@@ -15,7 +15,7 @@ from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
 
-SEEDS = range(5)
+SEEDS = range(3)
 DURATION = 40.0
 
 

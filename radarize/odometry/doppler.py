@@ -143,7 +143,9 @@ class DopplerVelocity:
         # Without elevation pairs no echo tells of the climb.
         climb = s.climb if self.pairs is not None else 1e-3
         noise = np.array([s.speed_noise, s.power_noise, s.azimuth_noise, s.elevation, climb])
-        velocity, covariance, inliers = _fit(echoes[:, 1:], self._draws, noise, s.inlier, 2 * self.config.max_velocity)
+        # Of a single echo, too, in the layout that the loop is compiled for.
+        seen = np.ascontiguousarray(echoes[:, 1:])
+        velocity, covariance, inliers = _fit(seen, self._draws, noise, s.inlier, 2 * self.config.max_velocity)
         if inliers and np.hypot(*velocity) < s.still and np.median(np.abs(echoes[:, 1])) < 2 * s.still:
             if velocity @ np.linalg.solve(covariance, velocity) < _SIGMAS**2:
                 velocity = np.zeros(2)

@@ -85,7 +85,7 @@ class SpecularCandidates:
         self._size += len(rows)
         self._chains.append(chains)
         self._frame.append(np.full(len(chains), frame))
-        self._aims.append(np.broadcast_to(aims, (len(chains), 2)))
+        self._aims.append(np.tile(aims, (len(chains), 1)))
         for column, values in ((self._rows, rows), (self._longest, longest), (self._weakest, weakest)):
             column.append(values)
 

@@ -73,12 +73,13 @@ def test_variants_of_a_recording_share_its_walk(tmp_path):
     """The crate of level 1 would push a walk of its own aside, and heights are on one and the same."""
     (tmp_path / "hall.yaml").write_text(HALL)
     group = {"building": "hall", "platform": "cart", "count": 1, "duration": 2, "waypoints": [[1, 2.4], [5, 2.4]]}
+    slow = {"radar": {"frame_period": 0.1}}
     variants = {
-        "mild": {},
-        "severe": {"level": 1, "attributes": {"severity": 1}},
-        "coarse": {"radar": {"samples": 48, "frame_period": 0.1}, "frontend": {"noise": False}},
-        "low": {"mounting": [0.2, 0, -0.5, 0, 0, 0]},
-        "high": {"mounting": [0.2, 0, 0.1, 0, 0, 0]},
+        "mild": slow,
+        "severe": slow | {"level": 1, "attributes": {"severity": 1}},
+        "coarse": {"radar": {"samples": 48, "frame_period": 0.3}, "frontend": {"noise": False}},
+        "low": slow | {"mounting": [0.2, 0, -0.5, 0, 0, 0]},
+        "high": slow | {"mounting": [0.2, 0, 0.1, 0, 0, 0]},
     }
     (tmp_path / "spec.yaml").write_text(
         yaml.safe_dump(PLAIN | {"buildings": {"hall": "hall.yaml"}, "recordings": [group], "storage": "raw"}
@@ -100,7 +101,7 @@ def test_variants_of_a_recording_share_its_walk(tmp_path):
     np.testing.assert_allclose(poses["coarse"], poses["mild"][::3][: len(poses["coarse"])], atol=2e-3)
     np.testing.assert_allclose(poses["high"][:, :2], poses["low"][:, :2], atol=0.02)
     np.testing.assert_allclose(poses["high"][:, 2] - poses["low"][:, 2], 0.6, atol=0.01)
-    assert np.ptp(poses["mild"][:, 0]) > 0.1
+    assert np.ptp(poses["mild"][:, 0]) > 0.05
     assert (seen["severe"][1] != seen["mild"][1]).any()
     assert seen["coarse"][2].samples == 48 and 'noise":false' in seen["coarse"][3]["front_end"]
     facts = seen["severe"][3]

@@ -39,8 +39,8 @@ def test_xwr_captures_what_was_recorded(tmp_path):
     assert np.array_equal(samples, adc[:24])
 
 
-def test_our_own_capture_loses_nothing_in_10_s(tmp_path):
-    """The preset `radarize`, 30 frames/s, both command lines in processes of their own."""
+def test_our_own_capture_loses_nothing(tmp_path):
+    """The preset `radarize`, 30 frames/s for four seconds, both command lines in processes of their own."""
     preset = PRESETS["radarize"]
     adc = record(tmp_path / "r.h5", preset, 30)
     with emulator(tmp_path / "r.h5", tmp_path, "--loop") as running:
@@ -48,20 +48,20 @@ def test_our_own_capture_loses_nothing_in_10_s(tmp_path):
             [
                 sys.executable, "-m", "radarize.cli", "capture", "--config", "radarize", "--port", running.port,
                 "--host", COMPUTER, "--dca", BOARD, "--command-port", str(running.command_port),
-                "--data-port", str(running.data_port), "--frames", "300", "-o", tmp_path / "out.h5",
+                "--data-port", str(running.data_port), "--frames", "120", "-o", tmp_path / "out.h5",
             ],
             capture_output=True, text=True, timeout=300,
         )  # fmt: skip
     assert captured.returncode == 0, captured.stderr
     with Recording(tmp_path / "out.h5") as recording:
-        assert recording.config == preset and recording.valid(0, 300).all()  # no packet lost
+        assert recording.config == preset and recording.valid(0, 120).all()  # no packet lost
         numbers = np.round(recording.times / preset.frame_period).astype(int)
         for first in range(0, len(recording), 30):
             assert np.array_equal(recording.adc(first, first + 30), adc[numbers[first : first + 30] % 30])
         dropped = recording.attributes["warnings"]
         if dropped and os.getloadavg()[0] > 2 * len(os.sched_getaffinity(0)):
             pytest.skip(f"this machine is too busy to write 30 frames/s: {dropped}")
-        assert len(recording) == 300 and dropped == ""
+        assert len(recording) == 120 and dropped == ""
 
 
 @pytest.mark.parametrize(

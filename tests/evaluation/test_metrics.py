@@ -1,10 +1,8 @@
 """Trajectory errors against evo's own commands and closed forms."""
 
 import json
-import os
-import subprocess
-import sys
 import zipfile
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -37,13 +35,12 @@ def transformed(poses, angle, shift):
 
 
 def evo(command: str, relation: str, reference: Path, estimate: Path, home: Path) -> dict[str, float]:
-    """Statistics of `evo_ape` (after alignment) or `evo_rpe` (from pose to pose), run as a user does."""
+    """Statistics of `evo_ape` (after alignment) or `evo_rpe` (from pose to pose)."""
     archive = home / f"{command}-{relation}.zip"
-    options = ["-r", relation, "--t_max_diff", "0.01", "--save_results", archive]
+    options = ["-r", relation, "--t_max_diff", "0.01", "--save_results", str(archive)]
     options += ["-a"] if command == "ape" else ["--delta", "1", "--delta_unit", "f"]
-    program = Path(sys.executable).parent / f"evo_{command}"
-    environment = {**os.environ, "HOME": str(home), "MPLBACKEND": "agg"}
-    subprocess.run([program, "tum", reference, estimate, *options], env=environment, check=True, capture_output=True)
+    program, parser = (import_module(f"evo.cli.{command}{part}") for part in ("", "_parser"))
+    program.run(parser.parser().parse_args(["tum", str(reference), str(estimate), *options]))
     with zipfile.ZipFile(archive) as content:
         return json.loads(content.read("stats.json"))
 

@@ -10,7 +10,7 @@ from tests.fuzzing.worlds import WORLDS
 READERS = OF_RECORDINGS | WORLDS
 
 #: Inputs by reader, as far as they fit into a few seconds in all.
-EXAMPLES = {name: 60 if name.startswith("ROS") or name in WORLDS else 150 for name in READERS}
+EXAMPLES = {name: 30 if name.startswith("ROS") or name in WORLDS else 75 for name in READERS}
 
 
 @pytest.mark.filterwarnings("ignore")  # numpy and scipy about numbers that make no sense

@@ -67,7 +67,7 @@ def hazards(weights: Path, recording: Path) -> tuple[float, float]:
 
 @pytest.mark.parametrize("kind", TASKS)
 def test_networks_learn(kind, tmp_path):
-    data = data_set(tmp_path / "data", LAWS[kind], count=12, frames=60)
+    data = data_set(tmp_path / "data", LAWS[kind], count=8, frames=60)
     weights = train(kind, data, tmp_path / "net.safetensors", settings=QUICK[kind])
     found = judged(kind, weights, write(tmp_path / "other.h5", LAWS[kind], seed=9))
     if kind == "segmentation":
@@ -87,8 +87,8 @@ def test_networks_learn(kind, tmp_path):
 
 def test_uncertainty_follows_what_is_seen(tmp_path):
     """Of maps that show nothing but noise, the network claims what is known without them."""
-    for k in range(5):
-        write(tmp_path / "data" / f"{k}.h5", "velocity", 120, k, blank=0.4)
+    for k in range(4):
+        write(tmp_path / "data" / f"{k}.h5", "velocity", 100, k, blank=0.4)
     settings = replace(QUICK["translation"], epochs=12)
     weights = train("translation", tmp_path / "data", tmp_path / "net.safetensors", settings=settings)
     net, header = load(weights, TASKS["translation"].network)

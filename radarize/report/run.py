@@ -37,6 +37,8 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     page = Page(f"Run {folder.path.resolve().name}", _about(folder, errors))
     if errors:
         _result(page, metrics)
+    for sentence in folder.warnings:
+        page.text(f"Warning: {sentence}.")
     if blind:
         sentence, spans = words.blindness(blind)
         page.text(sentence)

@@ -96,6 +96,18 @@ class RunFolder:
         return {name: str(value) for name, value in found.items()}
 
     @property
+    def warnings(self) -> list[str]:
+        """What ``run.json`` warns of.
+
+        Raises:
+            InputError: it is damaged.
+        """
+        found = self.facts.get("warnings", [])
+        if not isinstance(found, list):
+            raise InputError(f"{self.path / 'run.json'}: warnings is {str(found)[:60]!r}, expected a list")
+        return [str(words) for words in found]
+
+    @property
     def blind(self) -> BlindSpans | None:
         """Where odometry was blind, in s since the first pose; None where ``run.json`` does not say, as of old.
 

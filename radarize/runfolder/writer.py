@@ -153,6 +153,7 @@ class RunWriter:
         times, poses = slam.trajectory()
         self.write_poses("trajectory", (times, planar_poses(poses)))
         made = {
+            "warnings": [*self._facts.get("warnings", ()), *slam.warnings()],
             "nodes": len(slam.nodes),
             "submaps": len(slam.submaps),
             "skipped": slam.skipped,

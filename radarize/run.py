@@ -95,6 +95,7 @@ def run_each(
         writer.describe(source, inputs.signal.heatmaps)
         told = {
             "frames_lost": intake.lost,
+            "chirps_disturbed": intake.disturbed,
             "methods": dict(zip(("odometry", "scans"), pairs[folder], strict=True)) | dict(facts or {}),
             "configuration": inputs.configuration.model_dump(),
         }

@@ -187,7 +187,7 @@ def live(
         most = _frames_within(duration, frames, radar.frame_period)
         live.run(stream, stopping, frames=most, writer=writer, progress=report)
         warnings = stream.troubles() + live.losses.warnings()
-    _warn([*warnings, *live.blindness.warnings()])
+    _warn([*warnings, *live.health.warnings(), *live.pipeline.slam.warnings()])
     print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
 
 

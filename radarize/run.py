@@ -84,7 +84,7 @@ def run_each(
 
     def make(folder: Path) -> None:
         pipelines[folder] = workshop.pipeline(*pairs[folder])
-        writers[folder] = stack.enter_context(RunWriter(folder))
+        writers[folder] = stack.enter_context(RunWriter(folder, source.config))
 
     def end(folder: Path) -> None:
         if intake.lost == intake.taken:

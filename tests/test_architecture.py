@@ -22,7 +22,7 @@ LAYERS = (
     "nets",
     "odometry mapping",
     "slam",
-    "pipeline runfolder",
+    "pipeline health runfolder",
     "methods",
     "run log walkposes training",
     "evaluation",

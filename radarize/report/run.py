@@ -44,6 +44,8 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
         page.text(sentence)
         if spans.rows:
             page.table(*spans, sortable=True)
+    if health := folder.health:
+        page.table(*words.health(health), sortable=True)
     if errors and others:
         page.section("Beside other methods", "The same recording; odometry and SLAM against the truth.")
         rows = [(methods(folder), metrics), *((methods(other), evaluate(other)) for other in others)]

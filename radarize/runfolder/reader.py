@@ -10,11 +10,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 from jaxtyping import Float
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from radarize.errors import InputError, explained
 from radarize.files import regular
 from radarize.hdf5 import dataset, open_hdf5
+from radarize.health import Condition
 from radarize.jsonfile import read_json
 from radarize.odometry.blindness import BlindSpans
 from radarize.plain import complaint
@@ -123,6 +124,22 @@ class RunFolder:
         start = float(self.trajectory[0][0])
         for span in found.spans:
             span.start_s, span.stop_s = span.start_s - start, span.stop_s - start
+        return found
+
+    @property
+    def health(self) -> list[Condition]:
+        """Where odometry had a hard time, in s since the first pose; empty where ``run.json`` does not say.
+
+        Raises:
+            InputError: it says something else.
+        """
+        try:
+            found = TypeAdapter(list[Condition]).validate_python(self.facts.get("health", []))
+        except ValidationError as error:
+            raise InputError(f"{self.path / 'run.json'}: health.{complaint(error)}") from error
+        start = float(self.trajectory[0][0])
+        for each in found:
+            each.start_s, each.stop_s = each.start_s - start, each.stop_s - start
         return found
 
     @cached_property

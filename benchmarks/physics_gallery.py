@@ -21,28 +21,27 @@ from scipy.special import gamma
 from radarize.heatmaps import Heatmaps
 from radarize.radar.array import virtual_positions
 from radarize.radar.presets import PRESETS
-from radarsim.physics.antenna import ISOTROPIC, gain_tables
+from radarsim.physics.antenna import ISOTROPIC, gain_pattern
 from radarsim.physics.clutter import CROSS_SECTION, EXPONENT, ON_WALLS, Clutter
 from radarsim.physics.coefficients import TABLE, reflection, transmission
-from radarsim.physics.curved import Curved
 from radarsim.physics.echoes import Provenance
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
+from radarsim.physics.search import Search
 from radarsim.physics.surface import Surface
 from radarsim.physics.unevenness import SCALES, Heights
-from radarsim.physics.view import View
 from radarsim.scene import shapes
-from radarsim.scene.materials import material
+from radarsim.scene.materials import MATERIALS, material
 from radarsim.scene.scene import Life, Scene, SceneObject
-from tests.physics.brute_force import transfer_matrix
+from tests.physics.brute_force import kirchhoff_mirror, transfer_matrix
 from tests.physics.corners import corner, cross_section, direction, seen_by_all, seen_by_both
 from tests.physics.rigs import Rig, burst, field, locate, polar
-from tests.physics.test_chains import images_of_a_room, lattice
 from tests.physics.test_echoes import speckle as speckles
 from tests.physics.test_frontend import db, law, noise_factor, skirt
+from tests.physics.test_imagemethod import images_of_a_room, lattice
 from tests.physics.test_laws import slot_phases, tone_ranges
 from tests.physics.test_multipath import DOOR, there_and_back
 from tests.physics.test_plates import physical_optics
@@ -58,6 +57,20 @@ LEVEL = "received / transmitted, dB"
 FOUND = {"color": "tab:red", "marker": "o", "ms": 3.5, "ls": "", "label": "simulated"}
 
 
+WORDS = (
+    ("one-way, two-way path", "from the radar to a scatterer; out on one and back on another", "radar equation"),
+    ("flat, round reflector", "a flat part of a scene with its aperture; a sphere or cylinder", "Knott, RCS"),
+    ("specular candidate", "a mirror, or two, over which a scatterer may be seen", "image theory, Balanis"),
+    ("image method, chain", "the radar seen in two or three mirrors one after another", "Allen, Berkley, JASA 1979"),
+    ("Fresnel unit, aperture", "sqrt(lambda d (L - d) / 2L); what an opening passes", "Born, Wolf, ch. 8"),
+    ("flash", "the echo of a reflector that faces the radar", "Gordon, IEEE TAP 1975"),
+    ("scattering pattern", "how a rough surface shares out its diffuse echo", "Degli-Esposti, IEEE TAP 2007"),
+    ("transmission, slab", "what a pane, door or board lets through, and how late", "ITU-R P.2040"),
+    ("moving target", "what moves by itself", "Skolnik, Radar Handbook"),
+    ("sideband", "phase noise beside an echo", "Richards, Fundamentals of Radar Signal Processing"),
+)
+
+
 def compare(axis: Axes, x, theory, found) -> float:
     """Draw both over x; the largest difference."""
     axis.plot(x, theory, **THEORY)
@@ -70,9 +83,9 @@ def target(*place: float) -> EchoFinder:
     return EchoFinder(None, Scatterers.points(np.array(place), np.ones(1)), None, CONFIG, antenna=ISOTROPIC)
 
 
-def walls_of(scene: Scene, curved: Curved | None = None) -> EchoFinder:
+def walls_of(scene: Scene) -> EchoFinder:
     """Finds the surfaces of a scene alone."""
-    return EchoFinder(scene, NOWHERE, Facets.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC, curved=curved)
+    return EchoFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)
 
 
 def clutter(rng: np.random.Generator, count: int) -> Scatterers:
@@ -139,7 +152,7 @@ def round_and_corners(axis) -> str:
     width or area that all plates share (Robertson, BSTJ 26, 1947)."""
     off, a, worst = np.arange(-20, 21, 2.0), 0.04, 0.0
     ball = Scene("ball", [SceneObject("ball", shapes.sphere((0, 0, 0), 0.1), material("metal"))])
-    finder = walls_of(ball, curved=Curved.of(ball, CONFIG))
+    finder = walls_of(ball)
     curves = {"trihedral, 4 cm": [], "dihedral, 4 cm": [], "sphere, 10 cm": []}
     for angle in np.deg2rad(off):
         towards = direction(np.pi / 4 + angle, np.arcsin(1 / np.sqrt(3)))
@@ -162,7 +175,9 @@ def box_room(axis) -> str:
     """Images of the radar by order in a metal box room, walls, edges and corners: 6, 18 and 38."""
     p = np.array([0.37, -0.21, 1.23])
     # A level of -1 keeps those too that leave ahead and come back from behind, between opposite walls: unheard.
-    isometry, _, orders = images_of_a_room(View(p, AHEAD, 14.0, LAMBDA, -1.0, gain_tables(ISOTROPIC)))
+    isometry, _, orders = images_of_a_room(
+        Search(p[None], AHEAD[None], np.zeros(1), 14.0, LAMBDA, -1.0, *gain_pattern(ISOTROPIC))
+    )
     places, counts = isometry[:, :, :3] @ p + isometry[:, :, 3], []
     for order in (1, 2, 3):
         theory = np.sort([np.linalg.norm(image - p) for length, _, image in lattice(p) if length == order])
@@ -171,6 +186,26 @@ def box_room(axis) -> str:
         axis.plot(theory, np.arange(len(theory)), **THEORY | {"label": "theory" if order == 1 else None})
         axis.plot(found, np.arange(len(found)), "o", ms=3.5, label=f"order {order}: {len(found)} of {len(theory)}")
     return f"Found {', '.join(counts)} of 6, 18, 38."
+
+
+def small_mirrors(axis) -> str:
+    """A ghost over a square metal mirror of any size, against Kirchhoff's integral over the mirror."""
+    place, sides = np.array([3.0, 0.0, 0.0]), np.geomspace(0.02, 1.0, 15)
+    straight, theory, found = LAMBDA / (4 * np.pi) ** 1.5 / np.linalg.norm(place), [], []
+    for side in sides:
+        board = SceneObject("board", shapes.rectangle((1.5, 1.0, 0), (side, side), (0, -1, 0)), MATERIALS["metal"])
+        scene = Scene("mirror", [board])
+        finder = EchoFinder(
+            scene, Scatterers.points(place, np.ones(1)), Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC
+        )
+        found.append(2 * db(abs(finder(HERE, AHEAD).of(Provenance.GHOST_1).amplitude[0])))
+        theory.append(2 * db(straight * abs(kirchhoff_mirror((side / 2, side / 2), place, LAMBDA))))
+    worst = compare(axis, sides, np.array(theory), np.array(found))
+    return (
+        f"Worst of {len(sides)} sizes: {worst:.1f} dB (edges farther off than two Fresnel units fade from the sum). "
+        "Every flat part of a squared wavelength or more echoes and mirrors so; scatterers are seen over two mirrors "
+        "in turn only where both have 0.05 m^2."
+    )
 
 
 def slab(axis) -> str:
@@ -196,7 +231,7 @@ def slab(axis) -> str:
 def phantom(axis) -> str:
     """Behind a metal door a target appears a second time, mirrored: the range-azimuth map of all echoes together."""
     scene, place = Scene("door", [DOOR]), np.array([0.6, 0.55, 0.0])
-    finder = EchoFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Facets.of(scene, CONFIG), CONFIG)
+    finder = EchoFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Reflectors.of(scene, CONFIG), CONFIG)
     maps, signal = Heatmaps(CONFIG), burst(CONFIG, finder(HERE, AHEAD), Rig())
     signal *= 20000 / np.abs(signal).max()
     power = maps.range_azimuth(np.rint(np.stack([signal.real, signal.imag], axis=-1)).astype(np.int16)[None])[0].numpy()
@@ -288,7 +323,7 @@ def decorrelation(axis) -> str:
     """Speckle belongs to the world: what a moved radar finds anew is the field of the same frozen scatterers."""
     shifts = np.geomspace(1e-4, 0.1, 16)
     own, frozen, kept = [], [], []
-    finders = [EchoFinder(None, clutter(np.random.default_rng(k), 3000), None, CONFIG, reach=9.0) for k in range(40)]
+    finders = [EchoFinder(None, clutter(np.random.default_rng(k), 3000), None, CONFIG, range=9.0) for k in range(40)]
     first = [f(HERE, AHEAD) for f in finders]
     start = np.array([field(e, HERE, LAMBDA) for e in first])
     for shift in shifts:
@@ -313,7 +348,7 @@ def convergence(axis) -> str:
     for count in counts:
         power = []
         for seed in range(draws):
-            finder = EchoFinder(None, clutter(np.random.default_rng((count, seed)), count), None, once, reach=9.0)
+            finder = EchoFinder(None, clutter(np.random.default_rng((count, seed)), count), None, once, range=9.0)
             spectrum = np.fft.fft(burst(once, finder(HERE, AHEAD), Rig()), axis=-1)
             power.append(np.mean(np.abs(spectrum[..., 67:85]) ** 2))  # 3 to 3.8 m
         levels.append(db(np.mean(power)))
@@ -328,7 +363,7 @@ def reciprocity(axis) -> str:
     scene = Scene.load("office")
     surface = Surface(scene, np.random.default_rng(1), density=60.0)
     position = np.array([8.0, 6.0, 1.2])
-    echoes = EchoFinder(scene, surface, Facets.of(scene, CONFIG), CONFIG, 1e-7)(position, AHEAD)
+    echoes = EchoFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 1e-7)(position, AHEAD)
     (there, back), names, levels = there_and_back(echoes, position), [], []
     for cause in sorted(map(Provenance, set(echoes.provenance))):
         some = echoes.provenance == cause
@@ -385,6 +420,7 @@ LAWS = {
     "Point target": (point_target, "range, m", LEVEL),
     "Wall": (wall_flash, "distance of a concrete wall, m", LEVEL),
     "Plate": (plate, "angle off the normal, deg", LEVEL),
+    "Small mirrors": (small_mirrors, "side, m", LEVEL),
     "Sphere and corners": (round_and_corners, "angle off the axis, deg", "radar cross section, dBsm"),
     "Box room": (box_room, "path, m", "images up to it"),
     "Slab": (slab, "angle of incidence, deg", "TE coefficient, dB"),
@@ -411,6 +447,7 @@ def main() -> None:
         "Each plot sets a closed form, or an independent sum, against what the simulator makes of it, with the "
         f"`radarize` preset (centre {CONFIG.center_frequency / 1e9:.2f} GHz). Text, figures and plots are written by "
         "`python -m benchmarks.physics_gallery`; the same laws are tests in `tests/physics`.\n"
+        "\n## Words\n\n| here | is | source |\n|---|---|---|\n" + "".join(f"| {' | '.join(row)} |\n" for row in WORDS)
     )
     for title, (draw, x, y) in LAWS.items():
         figure, axis = plt.subplots(figsize=(5.4, 3.2))

@@ -139,8 +139,8 @@ def main() -> None:
         data=Data("RadarHD's walks and walks by cart with their chirps", tuple(walks), options.seed),
         networks=(),
         notes=[
-            f"Cells of at least {100 * polar.THRESHOLD:g} % of the frame's largest magnitude, in RadarHD's picture chain "
-            "(one loop, no windows, 256 ranges by 64 azimuths); means over walks, and the least and the "
+            f"Cells of at least {100 * polar.THRESHOLD:g} % of the frame's largest magnitude, in RadarHD's picture "
+            "chain (one loop, no windows, 256 ranges by 64 azimuths); means over walks, and the least and the "
             "most of any walk.",
             f"Rows of strong echoes in the training walks fit the beam of four antennas within {beams[4]:.1f} dB, "
             f"of eight within {beams[8]:.1f} dB: the published pictures are of one transmitter.",

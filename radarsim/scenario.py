@@ -15,14 +15,13 @@ from radarize.radar.config import RadarConfig
 from radarsim.draws import draws
 from radarsim.motion import Motion
 from radarsim.physics.clutter import Clutter, Cluttered
-from radarsim.physics.crowd import Crowd
-from radarsim.physics.curved import Curved
 from radarsim.physics.echoes import Echoes
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.pathsolver import PathSolverFinder
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
 from radarsim.physics.unevenness import Heights
@@ -108,9 +107,9 @@ class Scenario:
         reach = None if band is None else band.high * self.config.max_range  # where the IF filter closes
         scatterers = Cluttered(Surface(self.scene, self.draws("surface")), Clutter(self.scene, self.draws("clutter")))
         return EchoFinder(
-            self.scene, scatterers, Facets.of(self.scene, self.config), self.config, weakest, reach, antenna,
-            curved=Curved.of(self.scene, self.config), crowd=Crowd(self.scene.movers, self.draws("movers")),
-            heights=Heights.of(self.scene, self.draws("unevenness")),
+            self.scene, scatterers, Reflectors.of(self.scene, self.config), self.config, weakest, reach, antenna,
+            MovingTargets(self.scene.movers, self.draws("movers")),
+            Heights.of(self.scene, self.draws("unevenness")),
         )  # fmt: skip
 
     @cached_property

@@ -22,7 +22,7 @@ from radarsim.statistics import Statistics, crossings
 from radarsim.walk import Walk
 
 #: Frames that are made together, which is quicker: ray tests and loops over scatterers go well in large numbers.
-TOGETHER = 8
+TOGETHER = 16
 
 
 def simulate(

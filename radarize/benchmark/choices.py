@@ -79,7 +79,12 @@ ODOMETRY = {
     "B201_0": (6188719661804238459, 5385831122607816562, 3985246152463333794),
 }
 
+#: RadarHD's training walks, one by one and all together.
+PICTURES = {f"radarhd {number}": (None,) for number in range(112, 141)} | {"RadarHD, train": (None,)}
+del PICTURES["radarhd 117"], PICTURES["radarhd 132"]  # they test
+
 CHOICES = (
+    Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),
     Choice("what odometry claims of its errors, and its fusion with the network", ODOMETRY),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),

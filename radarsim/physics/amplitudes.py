@@ -54,14 +54,25 @@ def unit(a):
 
 
 @njit(inline="always")
-def gain_towards(direction, rotation, azimuth_table, elevation_table):
+def mirrored(p, center, normal):
+    """A point mirrored in a plane."""
+    return along(p, -2 * dot(minus(p, center), normal), normal)
+
+
+@njit(inline="always")
+def write(a, out):
+    """Into the first three places of an array."""
+    out[0], out[1], out[2] = a
+
+
+@njit(inline="always")
+def gain_towards(direction, rotation, pattern):
     """Amplitude gain of the antenna towards a direction in the world."""
     return amplitude_gain(
         rotation[0, 0] * direction[0] + rotation[1, 0] * direction[1] + rotation[2, 0] * direction[2],
         rotation[0, 1] * direction[0] + rotation[1, 1] * direction[1] + rotation[2, 1] * direction[2],
         rotation[0, 2] * direction[0] + rotation[1, 2] * direction[1] + rotation[2, 2] * direction[2],
-        azimuth_table,
-        elevation_table,
+        pattern,
     )
 
 

@@ -1,5 +1,7 @@
 """The antenna element's gain pattern, the same for every transmitter and receiver."""
 
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Float
 from numba import njit
@@ -54,26 +56,42 @@ ISOTROPIC = Antenna(
 )
 
 
-def gain_tables(antenna: Antenna | None = None) -> tuple[Float[np.ndarray, "181"], Float[np.ndarray, "181"]]:
-    """Amplitude gain (square root of power gain) against |azimuth| and against |elevation| in steps of half a degree.
+class GainPattern(NamedTuple):
+    """Amplitude gain (square root of power gain) of an element, as compiled kernels take it.
 
-    The element's amplitude gain is the product of both; the peak gain is in the first. Default: the IWR1843BOOST's.
+    Attributes:
+        azimuth_gain, elevation_gain: against the absolute angle in steps of half a degree; the element's gain is their
+            product.
+        peak_gain: the largest there is in any direction.
     """
+
+    azimuth_gain: Float[np.ndarray, "181"]
+    elevation_gain: Float[np.ndarray, "181"]
+    peak_gain: float
+
+
+def gain_pattern(antenna: Antenna | None = None) -> GainPattern:
+    """Tables of an antenna's gain; default: the IWR1843BOOST's."""
     antenna = antenna or Antenna()
     degrees = np.linspace(0, 90, 181)
-    azimuth = antenna.peak_dbi - np.interp(degrees, antenna.azimuth.degrees, antenna.azimuth.loss_db)
-    elevation = -np.interp(degrees, antenna.elevation.degrees, antenna.elevation.loss_db)
-    return 10 ** (azimuth / 20), 10 ** (elevation / 20)
+    azimuth, elevation = (
+        10 ** ((level - np.interp(degrees, cut.degrees, cut.loss_db)) / 20)
+        for level, cut in ((antenna.peak_dbi, antenna.azimuth), (0.0, antenna.elevation))
+    )
+    return GainPattern(azimuth, elevation, float(azimuth.max() * elevation.max()))
 
 
 @njit(inline="always")
-def amplitude_gain(x, y, z, azimuth_table, elevation_table):
-    """Amplitude gain towards the sensor-frame direction (x, y, z), not necessarily normalised; 0 behind the board."""
+def amplitude_gain(x, y, z, pattern):
+    """Amplitude gain towards the sensor-frame direction (x, y, z), not necessarily normalised; 0 behind the board.
+
+    `pattern` is a `GainPattern`, or a `Search`, which holds its fields.
+    """
     if x <= 0.0:
         return 0.0
     azimuth = abs(np.arctan2(y, x)) * (360.0 / np.pi)
     elevation = abs(np.arctan2(z, np.hypot(x, y))) * (360.0 / np.pi)
     i, j = min(int(azimuth), 179), min(int(elevation), 179)
-    a = azimuth_table[i] + (azimuth - i) * (azimuth_table[i + 1] - azimuth_table[i])
-    b = elevation_table[j] + (elevation - j) * (elevation_table[j + 1] - elevation_table[j])
+    a = pattern.azimuth_gain[i] + (azimuth - i) * (pattern.azimuth_gain[i + 1] - pattern.azimuth_gain[i])
+    b = pattern.elevation_gain[j] + (elevation - j) * (pattern.elevation_gain[j + 1] - pattern.elevation_gain[j])
     return a * b

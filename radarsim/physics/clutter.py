@@ -11,7 +11,7 @@ A point keeps its place, cross section and phase for good, so it is coherent und
 seen through panes as any other scatterer is.
 """
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from math import gamma, log
 
 import numpy as np
@@ -68,7 +68,7 @@ class Clutter:
     def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> Scatterers:
         """Those within `reach` (m) of any of the positions."""
         index, _ = self._grid.near(positions, reach)
-        return Scatterers(*(getattr(self._points, field.name)[index] for field in fields(Scatterers)))
+        return self._points[index]
 
 
 @dataclass(frozen=True)

@@ -26,19 +26,14 @@ from jaxtyping import Complex, Float
 from numba import njit
 from scipy.special import fresnel
 
-from radarize.radar.config import RadarConfig
 from radarsim.physics.antenna import amplitude_gain
-from radarsim.physics.bodies import recognise
-from radarsim.physics.coefficients import as_slab, reflection
-from radarsim.physics.view import View
-from radarsim.scene.scene import Scene
-
-#: Above the antenna's gain both ways, as an amplitude: for a first sieve.
-PEAK_GAIN = 12.0
+from radarsim.physics.coefficients import TABLE
+from radarsim.physics.search import Search
+from radarsim.physics.table import Table
 
 
 @dataclass(frozen=True)
-class Curved:
+class RoundBodies(Table):
     """Round bodies.
 
     Attributes:
@@ -46,37 +41,28 @@ class Curved:
         axis: unit vector along a cylinder; zero for a sphere.
         radius: m.
         half: half the length of a cylinder, m; zero for a sphere.
-        reflection: coefficient at normal incidence, roughness included, as in the beat signal.
+        reflection: as of flat reflectors (`reflectors.Flat`).
     """
 
     center: Float[np.ndarray, "body 3"]
     axis: Float[np.ndarray, "body 3"]
     radius: Float[np.ndarray, "body"]
     half: Float[np.ndarray, "body"]
-    reflection: Complex[np.ndarray, "body"]
-
-    def __len__(self) -> int:
-        return len(self.center)
+    reflection: Complex[np.ndarray, "body 2 cosine"]
 
     @classmethod
-    def of(cls, scene: Scene, config: RadarConfig) -> "Curved":
-        """The spheres and cylinders of a scene."""
-        rows = []
-        for item in scene.objects:
-            bodies, _ = recognise(item.mesh)
-            if bodies:
-                head_on = reflection(as_slab(item)[0], config)[0, -1]
-                rows += [(b.center, b.axis, b.radius, b.half, head_on) for b in bodies]
+    def of(cls, rows: list[tuple]) -> "RoundBodies":
+        """A table of rows."""
         if not rows:
-            return cls(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0, complex))
+            none = np.zeros((0, 3))
+            return cls(none, none, np.zeros(0), np.zeros(0), np.zeros((0, 2, TABLE), complex))
         return cls(*(np.array(column) for column in zip(*rows, strict=True)))
 
-    def parts(
-        self,
-        view: View,
+    def flashes(
+        self, search: Search, frame: int
     ) -> tuple[Float[np.ndarray, "part 3"], Float[np.ndarray, "part 3 4"], Complex[np.ndarray, "part"]]:
         """Flashes and ends as the radar sees them: point to aim a ray at (m), isometry of the receiver, amplitude."""
-        position, reach, wavelength, weakest = view.position, view.reach, view.wavelength, view.weakest
+        position, reach, wavelength = search.position[frame], search.range, search.wavelength
         offset = position - self.center
         z = np.einsum("bd,bd->b", offset, self.axis)
         radial = offset - z[:, None] * self.axis
@@ -93,12 +79,12 @@ class Curved:
         size[sphere] = [1.0, 0.0, 0.0]
         spread = radius / (radius + h)
         size *= (wavelength / (8 * np.pi * h) * np.where(sphere, spread, np.sqrt(spread)))[:, None]
-        size *= self.reflection[near, None]
-        b, part = np.nonzero((np.abs(size) * PEAK_GAIN > weakest) & (slant < reach))
+        size *= self.reflection[near, 0, -1, None]
+        b, part = np.nonzero((np.abs(size) * search.peak_gain**2 > search.threshold) & (slant < reach))
         along = np.stack([np.where(sphere, 0, z), -half, half], axis=1)[b, part]
         point = line[b] + along[:, None] * axis[b]
-        amplitude = size[b, part] * _gains((point - position) @ view.rotation, *view.tables) ** 2
-        keep = np.abs(amplitude) > weakest
+        amplitude = size[b, part] * _gains((point - position) @ search.rotation[frame], search) ** 2
+        keep = np.abs(amplitude) > search.threshold
         b, part, point, amplitude = b[keep], part[keep], point[keep], amplitude[keep]
         turned = axis[b] * (part == 0)[:, None]
         matrix = 2 * np.einsum("pd,pe->pde", turned, turned) - np.eye(3)
@@ -122,8 +108,8 @@ def _side_terms(across, slant, h, wavelength) -> Complex[np.ndarray, "facet side
 
 
 @njit(cache=True)
-def _gains(directions, azimuth_table, elevation_table):
+def _gains(directions, pattern):
     out = np.empty(len(directions))
     for i in range(len(directions)):
-        out[i] = amplitude_gain(directions[i, 0], directions[i, 1], directions[i, 2], azimuth_table, elevation_table)
+        out[i] = amplitude_gain(directions[i, 0], directions[i, 1], directions[i, 2], pattern)
     return out

@@ -12,21 +12,17 @@ scatterer comes and goes smoothly over a doubling of range: nothing pops, and sp
 import numpy as np
 from numba import njit
 
-from radarsim.physics.antenna import Antenna
-
 #: Distance up to which about all scatterers in the middle of the beam are used, m.
 FULL_DETAIL = 0.9
-_PEAK = 10 ** (Antenna().peak_dbi / 20)
-
-
-#: Where the antenna does not look at all, mirrors may show a scatterer all the same: least gain that is reckoned with.
-_LEAST = 0.05 * _PEAK
+#: Where the antenna does not look at all, mirrors may show a scatterer all the same: least share of the peak gain that
+#: is reckoned with.
+LEAST_GAIN = 0.05
 
 
 @njit(inline="always")
 def share(gain, distance):
-    """Share of scatterers used at a distance (m) in a direction of amplitude gain, straight from the sensor."""
-    return FULL_DETAIL / distance * np.sqrt(min(max(gain, _LEAST), _PEAK) / _PEAK)
+    """Share of scatterers used at a distance (m) in a direction of amplitude gain (peak 1), straight."""
+    return FULL_DETAIL / distance * np.sqrt(min(max(gain, LEAST_GAIN), 1.0))
 
 
 @njit(inline="always")

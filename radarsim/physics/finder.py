@@ -1,4 +1,4 @@
-"""Finds the echoes of a frame: scatterers in sight, legs over mirrors and through slabs, plates, chains of mirrors.
+"""Finds the echoes of a frame: scatterers in sight, paths over mirrors and through slabs, flashes, chains of mirrors.
 
 Start reading at `EchoFinder.batch`.
 """
@@ -6,31 +6,32 @@ Start reading at `EchoFinder.batch`.
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from radarize.radar.config import RadarConfig
-from radarsim.physics.antenna import Antenna, gain_tables
-from radarsim.physics.batch import Batch
-from radarsim.physics.bounces import Ways
+from radarsim.physics import images, roundghosts, sight
+from radarsim.physics.antenna import Antenna, gain_pattern
 from radarsim.physics.candidates import Candidates
-from radarsim.physics.crowd import Crowd
-from radarsim.physics.curved import Curved
 from radarsim.physics.echoes import Echoes, Provenance
-from radarsim.physics.facets import Facets
 from radarsim.physics.images import LEAST_LOSS, Images
-from radarsim.physics.legs import Legs, Pairs
-from radarsim.physics.mirrors import Mirrors
+from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.obstacles import CLEARANCE, Obstacles
+from radarsim.physics.paths import OneWay, TwoWay
+from radarsim.physics.reflectors import Flat, Reflectors
 from radarsim.physics.scatterers import Scatterers
-from radarsim.physics.slabs import Slabs
+from radarsim.physics.search import Search
+from radarsim.physics.sight import Mirrors
+from radarsim.physics.specular import SpecularCandidates
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import NODES, BurstClock
+from radarsim.physics.targets import Targets
+from radarsim.physics.transmission import Transmission
 from radarsim.physics.unevenness import Heights
-from radarsim.physics.view import View
 from radarsim.scene.scene import Scene
 
-#: Above the antenna's gain one way, as an amplitude.
-PEAK_GAIN = 3.4
+#: Paths to scatterers over two mirrors are looked for over those of this area and more, m^2: at 2 m a Fresnel zone
+#: takes 0.02. There are many more pairs with smaller ones, which show little of the world.
+LEAST_TWICE = 0.05
 
 
 class EchoFinder:
@@ -39,13 +40,12 @@ class EchoFinder:
     Args:
         scene: ray tests run on its geometry; None where nothing can stand in the way.
         surface: the diffuse surface, or a given set of scatterers.
-        facets: mirrors and plates.
+        reflectors: flat and round mirrors.
         config: radar configuration.
-        weakest: echoes below this amplitude are left out.
-        reach: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
+        threshold: echoes below this amplitude are left out.
+        range: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
         antenna: the elements' pattern; default: the IWR1843BOOST's.
-        curved: round bodies.
-        crowd: what moves by itself.
+        moving: what moves by itself.
         heights: how uneven walls are; default: flat.
     """
 
@@ -53,21 +53,19 @@ class EchoFinder:
         self,
         scene: Scene | None,
         surface: Surface | Scatterers,
-        facets: Facets | None,
+        reflectors: Reflectors | None,
         config: RadarConfig,
-        weakest: float = 0.0,
-        reach: float | None = None,
+        threshold: float = 0.0,
+        range: float | None = None,
         antenna: Antenna | None = None,
-        curved: Curved | None = None,
-        crowd: Crowd | None = None,
+        moving: MovingTargets | None = None,
         heights: Heights | None = None,
     ):
-        self.scene, self.surface, self.facets, self.config = scene, surface, facets, config
-        self.weakest, self.curved, self.crowd, self.heights = weakest, curved, crowd, heights
-        self.reach = 1.05 * config.max_range if reach is None else reach
-        self.mirrors = None if facets is None else Mirrors.of(facets, scene, self.reach)
-        self.obstacles = Obstacles(scene, None if scene is None else Slabs(scene, config, CLEARANCE), crowd)
-        self._tables = gain_tables(antenna)
+        self.scene, self.surface, self.reflectors, self.config = scene, surface, reflectors, config
+        self.threshold, self.moving, self.heights = threshold, moving, heights
+        self.range = 1.05 * config.max_range if range is None else range
+        self.obstacles = Obstacles(scene, None if scene is None else Transmission(scene, config, CLEARANCE), moving)
+        self._pattern = gain_pattern(antenna)
 
     def __call__(
         self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"], time: float = 0.0
@@ -86,128 +84,138 @@ class EchoFinder:
         Args:
             positions, rotations, times: of the sensor in the middle of each burst; m, sensor to world, s.
         """
-        positions, rotations = np.asarray(positions, float), np.asarray(rotations, float)
-        batch = Batch.of(positions, rotations, times, self.surface, self.crowd, self.reach)
-        candidates = Candidates.of(batch, self.reach, self.config.wavelength, self.weakest, self._tables)
-        near = self._mirrors_in_sight(batch)
-        straight = self._straight(batch, candidates)
-        legs = Legs.joined([straight, self._over_mirrors(batch, candidates, straight, near)])
-        pairs = Pairs.of(batch, candidates, legs, self.reach, self.weakest)
-        images = None
-        if self.mirrors is not None:
-            limits = self.reach, self.config.wavelength, self.weakest, self._tables
-            views = [View(p, r, *limits) for p, r in zip(positions, rotations, strict=True)]
-            images = Images.of(batch, self.facets, self.curved, self.mirrors, near, self.obstacles, views, self.heights)
-        return self._echoes(batch, candidates, legs, pairs, images)
+        poses = (np.ascontiguousarray(each, float) for each in (positions, rotations, times))
+        search = Search(*poses, self.range, self.config.wavelength, self.threshold, *self._pattern)
+        targets = Targets.of(search, self.surface, self.moving)
+        candidates = Candidates.of(search, targets)
+        flat, mirrors = self._mirrors(search)
+        straight = self._straight(search, targets, candidates)
+        over_mirrors = self._over_mirrors(search, targets, candidates, straight, flat, mirrors)
+        one_way = OneWay.joined([straight, over_mirrors])
+        two_way = TwoWay.of(search, targets, candidates, one_way)
+        found = Images.none()
+        if self.reflectors is not None:
+            found = Images.joined([
+                images.flashes(search, flat, self.reflectors.round, self.obstacles, self.heights),
+                images.by_chains(search, flat, mirrors, self.obstacles),
+            ])  # fmt: skip
+        echoes = self._echoes(search, targets, candidates, one_way, two_way, found)
+        if self.reflectors is None or not len(self.reflectors.round):
+            return echoes
+        ghosts = roundghosts.seen(search, flat, mirrors, self.reflectors.round, self.obstacles)
+        return [
+            replace(
+                e, points=np.concatenate([g.points, e.points]), amplitude=np.concatenate([g.amplitude, e.amplitude]),
+                provenance=np.concatenate([g.cause, e.provenance]),
+            )
+            for e, g in zip(echoes, ghosts, strict=True)
+        ]  # fmt: skip
 
-    def _straight(self, batch: Batch, candidates: Candidates) -> Legs:
-        """Straight legs worth an echo, through slabs last."""
-        legs = Legs.straight(batch, candidates, np.flatnonzero(candidates.echo > self.weakest))
-        allowed = candidates.echo[legs.candidate] > LEAST_LOSS * self.weakest
-        allowed &= batch.weights[candidates.scatterer[legs.candidate], 1] > 0
-        legs = self._unhindered(batch, candidates, legs, legs.virtual[:, None], allowed)
-        return Legs.joined([legs[~legs.slab], legs[legs.slab]])
+    def _mirrors(self, search: Search) -> tuple[Flat, list[Mirrors]]:
+        """Flat reflectors in range of any frame, and those that play a part in each."""
+        if self.reflectors is None:
+            return Flat.none(), [Mirrors.none()] * search.frames
+        flat = self.reflectors.near(search.position, search.range)
+        return flat, sight.mirrors(search, flat, self.scene)
 
-    def _mirrors_in_sight(self, batch: Batch) -> list[np.ndarray]:
-        """Per frame, the mirrors of which something can be seen, and the small plates of corners within reach."""
-        if self.mirrors is None:
-            return [np.zeros(0, int)] * len(batch)
-        poses = zip(batch.position, batch.rotation, strict=True)
-        found = [self.mirrors.near(p, r[:, 0], self.reach) for p, r in poses]
-        if self.scene is None:
-            return found
-        index, frame = np.concatenate(found), np.repeat(np.arange(len(found)), [len(f) for f in found])
-        seen = ~self.mirrors.large[index]
-        large = np.flatnonzero(~seen)
-        points = self.mirrors.spread(index[large], batch.position[frame[large]], self.reach)
-        origins = np.repeat(batch.position[frame[large]], points.shape[1], axis=0)
-        clear = ~self.scene.occluded(origins, points.reshape(-1, 3), margin=CLEARANCE)
-        seen[large] = clear.reshape(points.shape[:2]).any(axis=1)
-        return [index[(frame == k) & seen] for k in range(len(batch))]
+    def _straight(self, search: Search, targets: Targets, candidates: Candidates) -> OneWay:
+        """Straight paths worth an echo, through slabs last."""
+        paths = OneWay.straight(search, targets, candidates, np.flatnonzero(candidates.echo > search.threshold))
+        allowed = candidates.echo[paths.candidate] > LEAST_LOSS * search.threshold
+        allowed &= targets.weights[candidates.scatterer[paths.candidate], 1] > 0
+        paths = self._unhindered(search, candidates, paths, paths.virtual[:, None], allowed)
+        return OneWay.joined([paths[~paths.slab], paths[paths.slab]])
 
-    def _over_mirrors(self, batch: Batch, candidates: Candidates, straight: Legs, near: list[np.ndarray]) -> Legs:
-        """Legs over one mirror and over two."""
-        ways, free = Ways(), np.zeros(len(candidates), bool)
+    def _over_mirrors(
+        self, search: Search, targets: Targets, candidates: Candidates, straight: OneWay, flat: Flat,
+        mirrors: list[Mirrors],
+    ) -> OneWay:  # fmt: skip
+        """Paths over one mirror and over two."""
+        specular, free = SpecularCandidates(), np.zeros(len(candidates), bool)
         free[straight.candidate[~straight.slab]] = True
-        once, twice = batch.weights[candidates.scatterer, 1:].T > 0
+        once, twice = targets.weights[candidates.scatterer, 1:].T > 0
         # Hidden scatterers are seen over mirrors out and back, which is of second order: fewer of them do.
         rows = np.flatnonzero(np.where(free, once, twice))
         distance = candidates.distance[rows]
-        # No longer than leaves room for the other leg, nor so weak that the other leg cannot make up for it.
-        longest = np.where(free[rows], 2 * self.reach - distance, self.reach)
-        weakest = self.weakest * distance / (PEAK_GAIN * candidates.most[rows])
-        # How a virtual point moves is known of one mirror (`Legs.turn`): movers have no legs over two.
-        double = (free & twice & (candidates.scatterer < batch.still))[rows]
-        edges = np.searchsorted(candidates.frame[rows], np.arange(len(batch) + 1))
-        for frame, found in enumerate(near):
-            large = found[self.mirrors.large[found]] if len(found) else found
-            if len(large):
-                one = np.arange(edges[frame], edges[frame + 1])
-                single = np.stack([large, np.full(len(large), -1)], axis=1)
-                pairs = self.mirrors.pairs(large, batch.position[frame])
-                for chains, some in ((single, one), (pairs, one[double[one]])):
-                    ways.add(frame, chains, rows[some], longest[some], weakest[some])
-        legs, stops = ways.legs(batch, candidates, self.mirrors, self.config.wavelength, self._tables)
-        strength = _strongest_echoes(candidates, straight, legs)
-        worth = strength > self.weakest
-        legs, stops, strength = legs[worth], stops[worth], strength[worth]
-        allowed = twice[legs.candidate] & (legs.bounces == 1) & (strength > LEAST_LOSS * self.weakest)
-        return self._unhindered(batch, candidates, legs, stops, allowed)
+        # No longer than leaves room for the way back, nor so weak that the way back cannot make up for it.
+        longest = np.where(free[rows], 2 * search.range - distance, search.range)
+        weakest = search.threshold * distance / (search.peak_gain * candidates.most[rows])
+        # How a virtual point moves is known of one mirror (`OneWay.turn`): moving targets have no paths over two.
+        double = (free & twice & (candidates.scatterer < targets.still))[rows]
+        edges = np.searchsorted(candidates.frame[rows], np.arange(search.frames + 1))
+        for frame, (seen, pairs) in enumerate(mirrors):
+            one = np.arange(edges[frame], edges[frame + 1])
+            single = np.stack([seen, np.full(len(seen), -1)], axis=1)
+            large = pairs[(flat.half[pairs].prod(axis=2) > LEAST_TWICE / 4).all(axis=1)]
+            for chains, some in ((single, one), (large, one[double[one]])):
+                specular.add(frame, chains, rows[some], longest[some], weakest[some])
+        paths, stops = specular.paths(search, targets, candidates, flat)
+        strength = _strongest_echoes(candidates, straight, paths)
+        worth = strength > search.threshold
+        paths, stops, strength = paths[worth], stops[worth], strength[worth]
+        allowed = twice[paths.candidate] & (paths.bounces == 1) & (strength > LEAST_LOSS * search.threshold)
+        return self._unhindered(search, candidates, paths, stops, allowed)
 
-    def _unhindered(self, batch: Batch, candidates: Candidates, legs: Legs, stops, allowed) -> Legs:
-        """Those legs that get through from stop to stop, weakened and delayed where they pass slabs."""
-        frame = candidates.frame[legs.candidate]
-        factor, delay = self.obstacles.way(batch, frame, stops, 1 + legs.bounces, allowed)
+    def _unhindered(self, search: Search, candidates: Candidates, paths: OneWay, stops, allowed) -> OneWay:
+        """Those paths that get through from stop to stop, weakened and delayed where they pass slabs."""
+        frame = candidates.frame[paths.candidate]
+        factor, delay = self.obstacles.way(search, frame, stops, 1 + paths.bounces, allowed)
         through = np.flatnonzero(factor)
-        legs, factor, delay = legs[through], factor[through], delay[through]
-        legs = replace(legs, amplitude=legs.amplitude * factor, slab=factor != 1)
-        late = np.flatnonzero(legs.slab)  # a delay moves the virtual point away
-        offset = legs.virtual[late] - batch.position[candidates.frame[legs.candidate[late]]]
-        legs.virtual[late] += offset * (delay[late] / np.linalg.norm(offset, axis=1))[:, None]
-        return legs
+        paths, factor, delay = paths[through], factor[through], delay[through]
+        paths = replace(paths, amplitude=paths.amplitude * factor, slab=factor != 1)
+        late = np.flatnonzero(paths.slab)  # a delay moves the virtual point away
+        offset = paths.virtual[late] - search.position[candidates.frame[paths.candidate[late]]]
+        paths.virtual[late] += offset * (delay[late] / np.linalg.norm(offset, axis=1))[:, None]
+        return paths
 
     def _echoes(
-        self, batch: Batch, candidates: Candidates, legs: Legs, pairs: Pairs, images: Images | None
+        self, search: Search, targets: Targets, candidates: Candidates, one_way: OneWay, two_way: TwoWay, found: Images
     ) -> list[Echoes]:
-        """Pairs of legs and images, by frame."""
-        first = legs.candidate[pairs.legs[:, 0]]
-        points, moving = np.take(legs.virtual, pairs.legs, axis=0), pairs.cause == Provenance.MOVING
-        moves = self._moves(batch, candidates, legs, pairs.legs[moving])
-        frames = np.arange(len(batch) + 1)
+        """Two-way paths and images, by frame."""
+        first = one_way.candidate[two_way.ways[:, 0]]
+        points, moving = np.take(one_way.virtual, two_way.ways, axis=0), two_way.cause == Provenance.MOVING
+        moves = self._moves(search, targets, candidates, one_way, two_way.ways[moving])
+        frames = np.arange(search.frames + 1)
         edges = np.searchsorted(candidates.frame[first], frames)
         moved = np.concatenate([[0], np.cumsum(moving)])[edges]
-        if images is None:
-            images = Images(np.zeros(0, int), np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, np.uint8))
-        flashes = np.searchsorted(images.frame, frames)
+        found = found[np.argsort(found.frame, kind="stable")]
+        mirrored = np.searchsorted(found.frame, frames)
         return [
             Echoes(
-                points[i:j], images.isometry[k:m],
-                np.concatenate([pairs.amplitude[i:j], images.amplitude[k:m]]),
-                np.concatenate([pairs.cause[i:j], images.cause[k:m]]), moves[a:b],
+                points[i:j], found.isometry[k:m],
+                np.concatenate([two_way.amplitude[i:j], found.amplitude[k:m]]),
+                np.concatenate([two_way.cause[i:j], found.cause[k:m]]), moves[a:b],
             )
-            for i, j, k, m, a, b in zip(edges, edges[1:], flashes, flashes[1:], moved, moved[1:], strict=False)
+            for i, j, k, m, a, b in zip(edges, edges[1:], mirrored, mirrored[1:], moved, moved[1:], strict=False)
         ]  # fmt: skip
 
-    def _moves(self, batch: Batch, candidates: Candidates, legs: Legs, ends) -> Float[np.ndarray, "moving 2 3 3"]:
+    def _moves(
+        self,
+        search: Search,
+        targets: Targets,
+        candidates: Candidates,
+        one_way: OneWay,
+        ends: Int[np.ndarray, "moving 2"],
+    ) -> Float[np.ndarray, "moving 2 3 3"]:
         """How far the virtual points of movers' echoes are from where they are in the middle, at the burst's nodes."""
-        first = legs.candidate[ends[:, 0]]
+        first = one_way.candidate[ends[:, 0]]
         owner = candidates.frame[first]
-        carried = (candidates.scatterer[first] - batch.still) % max(len(self.crowd or ()), 1)
+        carried = (candidates.scatterer[first] - targets.still) % max(len(self.moving or ()), 1)
         offsets = BurstClock.of(self.config).half * NODES
         out = np.empty((len(ends), 2, 3, 3))
         for frame in np.unique(owner):
             rows = np.flatnonzero(owner == frame)
-            places = self.crowd.positions(batch.time[frame] + np.append(offsets, 0.0))[:, carried[rows]]
+            places = self.moving.positions(search.time[frame] + np.append(offsets, 0.0))[:, carried[rows]]
             moved = (places[:3] - places[3]).transpose(1, 0, 2)  # echo, node, axis
             for way in (0, 1):
-                turn = legs[ends[rows, way]].turn(places[3])
+                turn = one_way[ends[rows, way]].turn(places[3])
                 out[rows, way] = np.einsum("eij,enj->eni", turn, moved)
         return out
 
 
-def _strongest_echoes(candidates: Candidates, straight: Legs, legs: Legs) -> Float[np.ndarray, "leg"]:
-    """Amplitude that no echo which each leg over mirrors can be part of exceeds."""
-    size, best = np.abs(legs.amplitude), np.zeros(len(candidates))
+def _strongest_echoes(candidates: Candidates, straight: OneWay, paths: OneWay) -> Float[np.ndarray, "path"]:
+    """Amplitude that no echo which each path over mirrors can be part of exceeds."""
+    size, best = np.abs(paths.amplitude), np.zeros(len(candidates))
     best[straight.candidate] = np.abs(straight.amplitude)
-    np.maximum.at(best, legs.candidate, size)
-    return candidates.most[legs.candidate] * size * best[legs.candidate]
+    np.maximum.at(best, paths.candidate, size)
+    return candidates.most[paths.candidate] * size * best[paths.candidate]

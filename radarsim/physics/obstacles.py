@@ -3,9 +3,9 @@
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
-from radarsim.physics.batch import Batch
-from radarsim.physics.crowd import Crowd
-from radarsim.physics.slabs import Slabs
+from radarsim.physics.movingtargets import MovingTargets
+from radarsim.physics.search import Search
+from radarsim.physics.transmission import Transmission
 from radarsim.scene.scene import Scene
 
 #: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
@@ -17,40 +17,30 @@ class Obstacles:
 
     Args:
         scene: None where nothing can stand in the way.
-        slabs: what passes through its thin objects.
-        crowd: what moves by itself.
+        transmission: what passes through its thin objects.
+        moving: what moves by itself.
     """
 
-    def __init__(self, scene: Scene | None, slabs: Slabs | None, crowd: Crowd | None):
-        self.scene, self.slabs, self.crowd = scene, slabs, crowd
+    def __init__(self, scene: Scene | None, transmission: Transmission | None, moving: MovingTargets | None):
+        self.scene, self.transmission, self.moving = scene, transmission, moving
 
-    def between(
-        self, batch: Batch, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
-        end: Float[np.ndarray, "ray 3"],
-    ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
-        """Whether anything lies between points (m), in frames of a batch; slabs are as opaque as the rest."""
-        hidden = np.zeros(len(frame), bool)
-        if self.scene is not None and len(frame):
-            hidden |= self.scene.occluded(begin, end, margin=CLEARANCE)
-        return hidden | self._shadowed(batch, frame, begin, end)
-
-    def _shadowed(self, batch: Batch, frame, begin, end) -> Bool[np.ndarray, "ray"]:
+    def _shadowed(self, search: Search, frame, begin, end) -> Bool[np.ndarray, "ray"]:
         """Whether a mover stands in the way."""
         hidden = np.zeros(len(frame), bool)
-        if self.crowd is not None and len(self.crowd):
+        if self.moving is not None and len(self.moving):
             for k in np.unique(frame):
                 now = frame == k
-                hidden[now] = self.crowd.occluded(begin[now], end[now], batch.time[k])
+                hidden[now] = self.moving.occluded(begin[now], end[now], search.time[k])
         return hidden
 
     def passage(
-        self, batch: Batch, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
+        self, search: Search, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
         end: Float[np.ndarray, "ray 3"], allowed: Bool[np.ndarray, "ray"],
     ) -> tuple[Complex[np.ndarray, "ray"], Float[np.ndarray, "ray"]]:  # fmt: skip
         """What is left of waves between points, as an amplitude, and their delay (m).
 
         Args:
-            batch, frame: which rays are for which frame.
+            search, frame: which rays are for which frame.
             begin, end: m.
             allowed: slabs are looked for in the way of these, and are opaque to the others.
         """
@@ -60,13 +50,13 @@ class Obstacles:
             factor[blocked] = 0
             through = np.flatnonzero(blocked & allowed)
             if len(through):
-                up = batch.rotation[frame[through], :, 2]
-                factor[through], delay[through] = self.slabs.passage(begin[through], end[through], up)
-        factor[self._shadowed(batch, frame, begin, end)] = 0
+                up = search.rotation[frame[through], :, 2]
+                factor[through], delay[through] = self.transmission.passage(begin[through], end[through], up)
+        factor[self._shadowed(search, frame, begin, end)] = 0
         return factor, delay
 
     def way(
-        self, batch: Batch, frame: Int[np.ndarray, "way"], stops: Float[np.ndarray, "way stop 3"],
+        self, search: Search, frame: Int[np.ndarray, "way"], stops: Float[np.ndarray, "way stop 3"],
         stretches: Int[np.ndarray, "way"], allowed: Bool[np.ndarray, "way"],
     ) -> tuple[Complex[np.ndarray, "way"], Float[np.ndarray, "way"]]:  # fmt: skip
         """The same for ways of several stretches from the sensor over stops.
@@ -75,13 +65,10 @@ class Obstacles:
             stops: m; the last of a way may be followed by others that do not count.
             stretches: how many of each way's stops count.
         """
+        begins = np.concatenate([search.position[frame, None], stops[:, :-1]], axis=1)
+        way, stop = np.nonzero(np.arange(stops.shape[1]) < stretches[:, None])
+        passed, extra = self.passage(search, frame[way], begins[way, stop], stops[way, stop], allowed[way])
         factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
-        left, begin = np.arange(len(frame)), batch.position[frame]
-        for k in range(stretches.max(initial=0)):
-            left = left[stretches[left] > k]
-            passed, extra = self.passage(batch, frame[left], begin[left], stops[left, k], allowed[left])
-            factor[left] *= passed
-            delay[left] += extra
-            left = left[passed != 0]
-            begin = stops[:, k]
+        np.multiply.at(factor, way, passed)
+        np.add.at(delay, way, extra)
         return factor, delay

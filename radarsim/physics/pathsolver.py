@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
-from radarsim.physics.antenna import Antenna, amplitude_gain, gain_tables
+from radarsim.physics.antenna import Antenna, amplitude_gain, gain_pattern
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.synthesis import BurstClock, parabola
 from radarsim.scene.scene import Scene
@@ -82,7 +82,7 @@ class PathSolverFinder:
         self, scene: Scene, config: RadarConfig, weakest: float = 0.0, antenna: Antenna | None = None, seed: int = 0
     ):
         self.scene, self.config, self.weakest, self.seed = scene, config, weakest, seed
-        self._tables = gain_tables(antenna)
+        self._pattern = gain_pattern(antenna)
         world = scene.sionna  # before the import: it looks for LLVM
         import sionna.rt as rt
 
@@ -119,7 +119,7 @@ class PathSolverFinder:
         delay, bounces = found.tau.numpy().ravel(), (found.interactions.numpy() != 0).sum(axis=0).ravel()
         departure = _unit(found.theta_t.numpy().ravel(), found.phi_t.numpy().ravel())
         arrival = _unit(found.theta_r.numpy().ravel(), found.phi_r.numpy().ravel())
-        gain = [np.array([amplitude_gain(*d, *self._tables) for d in u @ rotation]) for u in (departure, arrival)]
+        gain = [np.array([amplitude_gain(*d, self._pattern) for d in u @ rotation]) for u in (departure, arrival)]
         # Sionna's carrier turns forward in time, a beat signal the other way: conjugate.
         amplitude = (real - 1j * imaginary).astype(complex)
         amplitude *= gain[0] * gain[1] if len(amplitude) else 1

@@ -21,14 +21,17 @@ about edges, inversions in corners. So Doppler, angle and range of edges and cor
 adjoining coplanar plates cancel along their seam.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
-from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length, minus
+from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length, minus, write
 from radarsim.physics.amplitudes import vector as vec
-from radarsim.physics.facets import Facets
-from radarsim.physics.view import View
+from radarsim.physics.reflectors import Flat
+from radarsim.physics.search import Search
+from radarsim.physics.table import Table
 
 #: The foot moves this far inwards, m: on a seam it is inside both plates, which adds up.
 NUDGE = 1e-8
@@ -36,44 +39,46 @@ NUDGE = 1e-8
 _FEW, _MANY = ((np.polynomial.legendre.leggauss(n) + np.array([[1.0], [0.0]])) / 2 for n in (8, 28))
 
 
-def parts(
-    facets: Facets, view: View
-) -> tuple[
-    Int[np.ndarray, "part"],
-    Float[np.ndarray, "part 3"],
-    Float[np.ndarray, "part 3 4"],
-    Complex[np.ndarray, "part"],
-]:
-    """Flashes, edges and corners of all facets as the radar sees them.
+@dataclass(frozen=True)
+class Parts(Table):
+    """Flashes, edges and corners of facets as the radar sees them.
 
-    Returns:
-        facet of each part, a point for a ray to it to aim at (m), isometry of the receiver, amplitude.
+    Attributes:
+        facet: index.
+        aim: a point for a ray to it to aim at, m.
+        isometry: of the receiver.
+        amplitude: square root of received over transmitted power, with phase.
     """
+
+    facet: Int[np.ndarray, "part"]
+    aim: Float[np.ndarray, "part 3"]
+    isometry: Float[np.ndarray, "part 3 4"]
+    amplitude: Complex[np.ndarray, "part"]
+
+
+def parts(flat: Flat, search: Search, frame: int) -> Parts:
+    """Those of all facets above the threshold in one frame."""
     size = 1024
     while True:
-        facet, aim, isometry = np.empty(size, np.int64), np.empty((size, 3)), np.empty((size, 3, 4))
-        amplitude = np.empty(size, complex)
-        count = _parts(
-            facets.corners, facets.normal, facets.two_sided, facets.reflection[:, 0, -1], view.position, view.rotation,
-            view.reach, view.wavelength, view.weakest, *view.tables, facet, aim, isometry, amplitude,
-        )  # fmt: skip
+        found = Parts(np.empty(size, np.int64), np.empty((size, 3)), np.empty((size, 3, 4)), np.empty(size, complex))
+        count = _parts(flat.columns, search, frame, found.columns)
         if count <= size:
-            return facet[:count], aim[:count], isometry[:count], amplitude[:count]
+            return found[:count]
         size = count
 
 
 @njit(cache=True)
-def _parts(
-    corners, normals, two_sided, reflection, position, rotation, reach, wavelength, weakest, azimuth_table,
-    elevation_table, facet, aim, isometry, amplitude,
-):  # fmt: skip
+def _parts(flat, search, frame, found):
     """Returns how many parts there are, of which as many as fit are written."""
-    p, sides, count = vec(position), corners.shape[1], 0
+    corners, facet, amplitude, isometry, aim = flat.corners, found.facet, found.amplitude, found.isometry, found.aim
+    p, rotation, reach = vec(search.position[frame]), search.rotation[frame], search.range
+    wavelength, weakest = search.wavelength, search.threshold
+    sides, count = corners.shape[1], 0
     outward, value = np.empty((sides, 3)), np.empty(sides, np.complex128)
     for f in range(len(corners)):
-        n = vec(normals[f])
+        n = vec(flat.normal[f])
         h = dot(minus(p, vec(corners[f, 0])), n)
-        if abs(h) < 0.01 or abs(h) > reach or (h < 0 and not two_sided[f]):
+        if abs(h) < 0.01 or abs(h) > reach or (h < 0 and not flat.two_sided[f]):
             continue
         if h < 0:
             n, h = (-n[0], -n[1], -n[2]), -h
@@ -83,7 +88,7 @@ def _parts(
         foot = along(p, -h, n)
         inwards = minus(middle, foot)
         foot = along(foot, NUDGE / (length(inwards) + NUDGE), inwards)
-        mirror = wavelength / (8 * np.pi * h) * abs(reflection[f])
+        mirror = wavelength / (8 * np.pi * h) * abs(flat.reflection[f, 0, -1])
         inside = True
         value[:] = 0
         for k in range(sides):
@@ -109,13 +114,13 @@ def _parts(
                 if rho >= reach:
                     continue
                 towards = minus(vec(corners[f, end]), p)
-                scale = mirror * gain_towards(towards, rotation, azimuth_table, elevation_table) ** 2
+                scale = mirror * gain_towards(towards, rotation, search) ** 2
                 least = h * h * abs(s) / (rho * (s * s + x * x) * abs(x) + 1e-12) * wavelength / (8 * np.pi**2)
                 if min(least, 0.25) * scale > 0.1 * weakest:
                     value[end] -= sign * np.sign(x) * _beyond(h, s, slant, abs(x), wavelength)
             if low < 0 < high and slant < reach:
                 point = along(foot, s, out)
-                scale = mirror * gain_towards(minus(point, p), rotation, azimuth_table, elevation_table) ** 2
+                scale = mirror * gain_towards(minus(point, p), rotation, search) ** 2
                 least = h * h * np.sqrt(wavelength * slant / 2) / (slant * slant * abs(s)) / (2 * np.pi)
                 if min(least, 0.5) * scale > weakest:
                     own = -2 * _beyond(h, s, slant, 0.0, wavelength)
@@ -123,30 +128,31 @@ def _parts(
                         if count < len(facet):
                             facet[count], amplitude[count] = f, own * scale
                             _turn(n, out, False, point, isometry[count])
-                            _write(along(along(point, -0.01, out), 0.002, n), aim[count])
+                            write(along(along(point, -0.01, out), 0.002, n), aim[count])
                         count += 1
         for k in range(sides):
             if value[k] == 0:
                 continue
             point = vec(corners[f, k])
-            scale = mirror * gain_towards(minus(point, p), rotation, azimuth_table, elevation_table) ** 2
+            scale = mirror * gain_towards(minus(point, p), rotation, search) ** 2
             if abs(value[k]) * scale > weakest:
                 if count < len(facet):
                     facet[count], amplitude[count] = f, value[k] * scale
                     _turn(n, n, True, point, isometry[count])
                     before, after = vec(outward[(k - 1) % sides]), vec(outward[k])
-                    _write(along(along(along(point, -0.01, before), -0.01, after), 0.002, n), aim[count])
+                    write(along(along(along(point, -0.01, before), -0.01, after), 0.002, n), aim[count])
                 count += 1
         if inside:
-            scale = mirror * gain_towards(minus(foot, p), rotation, azimuth_table, elevation_table) ** 2
+            scale = mirror * gain_towards(minus(foot, p), rotation, search) ** 2
             if scale > weakest:
                 if count < len(facet):
                     facet[count], amplitude[count] = f, scale
                     _turn(n, (0.0, 0.0, 0.0), False, foot, isometry[count])
-                    _write(along(foot, 0.002, n), aim[count])
+                    write(along(foot, 0.002, n), aim[count])
                 count += 1
     for i in range(min(count, len(facet))):
-        amplitude[i] *= reflection[facet[i]] / abs(reflection[facet[i]])
+        head_on = flat.reflection[facet[i], 0, -1]
+        amplitude[i] *= head_on / abs(head_on)
     return count
 
 
@@ -188,8 +194,3 @@ def _turn(n, out, all_axes, point, isometry):
             isometry[i, j] = m
             shift -= m * point[j]
         isometry[i, 3] = shift
-
-
-@njit(inline="always")
-def _write(a, out):
-    out[0], out[1], out[2] = a

@@ -4,20 +4,20 @@ Each has its place, normal, cross section and random phase in the world. So spec
 coherent while the sensor moves over it, as on a real wall. `Surface` draws those of a scene.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
-from radarsim.physics.lobes import LAMBERT
+from radarsim.physics.scatteringpattern import LAMBERT
+from radarsim.physics.table import Table
 
 #: Of a sampled surface every n-th scatterer is seen over mirrors, and of those every n-th over two of them.
 BOUNCE_STRIDE = 4
 
 
 @dataclass(frozen=True)
-class Scatterers:
+class Scatterers(Table):
     """Point scatterers in the world.
 
     Attributes:
@@ -30,7 +30,7 @@ class Scatterers:
         bounces: weight of its power in paths over one mirror. Ghosts are many and weak, so of a sampled surface only
             every fourth scatterer has them, with four times the power.
         bounces_twice: the same for paths over two mirrors or more: every sixteenth, with sixteen times the power.
-        lobe: its scattering pattern, see `lobes.weights`.
+        lobe: its scattering pattern, see `scatteringpattern.weights`.
         rank: 0...1, which decides from how far it is used, see `detail`; negative: from everywhere.
     """
 
@@ -38,20 +38,12 @@ class Scatterers:
     normal: Float[np.ndarray, "scatterer 3"]
     sigma: Float[np.ndarray, "scatterer"]
     phase: Float[np.ndarray, "scatterer"]
-    two_sided: np.ndarray
-    horizontal: np.ndarray
+    two_sided: Bool[np.ndarray, "scatterer"]
+    horizontal: Bool[np.ndarray, "scatterer"]
     bounces: Float[np.ndarray, "scatterer"]
     bounces_twice: Float[np.ndarray, "scatterer"]
     lobe: Float[np.ndarray, "scatterer 4"]
     rank: Float[np.ndarray, "scatterer"]
-
-    def __len__(self) -> int:
-        return len(self.position)
-
-    @classmethod
-    def joined(cls, parts: "Sequence[Scatterers]") -> "Scatterers":
-        """Several, one after the other."""
-        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
 
     @classmethod
     def points(

@@ -15,8 +15,8 @@ from numba import njit, prange
 
 from radarsim.physics.detail import FULL_DETAIL
 from radarsim.physics.grid import Grid
-from radarsim.physics.lobes import weights
 from radarsim.physics.scatterers import BOUNCE_STRIDE, Scatterers
+from radarsim.physics.scatteringpattern import weights
 from radarsim.scene.scene import Scene
 
 #: Scatterers per square metre at full detail; with level of detail twelve or more are left in a range-azimuth cell of

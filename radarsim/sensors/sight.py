@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from numba import njit, prange
 
-from radarsim.physics.crowd import Crowd
+from radarsim.physics.movingtargets import MovingTargets
 from radarsim.scene.scene import Scene
 
 #: What light passes. A scene without these panes is one pass of rays; going on from pane to pane took three times that.
@@ -25,7 +25,7 @@ class Sight:
         parts = [part for mover in scene.movers for part in mover.parts()]
         self._half = np.array([part.half for part in parts]).reshape(-1, 3)
         self._capsule = np.array([part.capsule for part in parts], bool)
-        self._crowd = Crowd(scene.movers, np.random.default_rng(0), density=0.0)  # for its poses
+        self._crowd = MovingTargets(scene.movers, np.random.default_rng(0), density=0.0)  # for its poses
 
     @cached_property
     def _behind_glass(self) -> Scene | None:

@@ -25,7 +25,7 @@ DATASETS = {
     "evaluation": {"A": ("handheld", "cart")},
     "inertial": {"A101": ("handheld", "cart")},
     "stress": {"corner": ("cart",)},
-    "radarhd": {"A301": ("cart", "handheld")},
+    "radarhd": {"A401": ("cart", "handheld")},
     "ablation/loops": {"office": ("handheld",)},
 }
 SECONDS, PLACE = 1.5, "stress/corner"

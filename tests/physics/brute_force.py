@@ -1,6 +1,6 @@
 """Independent float64 references. `beat`: the beat signal of world points sample by sample, from the motion itself.
 
-`transfer_matrix`: layers.
+`transfer_matrix`: layers. `kirchhoff_mirror`: what a mirror of any size passes on.
 """
 
 import numpy as np
@@ -71,3 +71,71 @@ def direct_sum(config: RadarConfig, lengths: np.ndarray, amplitudes: np.ndarray)
                 cycles = config.center_frequency / SPEED_OF_LIGHT * length[:, None] + beat[:, None] * n
                 out[loop, k, r] = amplitudes @ np.exp(2j * np.pi * cycles)
     return out
+
+
+def kirchhoff_mirror(half, place, wavelength, across=1601):
+    """Amplitude (1/m) of the way from the origin over a mirror about (1.5, 1, 0), facing -y, to a place, summed.
+
+    (1 / (j lambda)) int cos exp(jk (r1 + r2)) / (r1 r2) dA, Kirchhoff's approximation with the mean of both cosines,
+    relative to the image's phase.
+    """
+    x, z = (((np.arange(across) + 0.5) / across * 2 - 1) * h for h in half)
+    x = x[:, None] + 1.5
+    there = np.sqrt(x**2 + 1 + z**2)
+    back = np.sqrt((x - place[0]) ** 2 + (1 - place[1]) ** 2 + (z - place[2]) ** 2)
+    cosine = (1 / there + (1 - place[1]) / back) / 2
+    image = np.linalg.norm(place * [1, -1, 1] + [0, 2, 0])
+    field = np.sum(cosine * np.exp(2j * np.pi * (there + back - image) / wavelength) / (there * back))
+    return field * np.prod(2 * np.array(half) / across) / (1j * wavelength)
+
+
+def bounced(scene, position, up, axis, spread, bounces, wavelength, across=700):
+    """Echo amplitude, isotropic antenna, of rays that leave about an axis and meet so many conductors on their way.
+
+    Shooting and bouncing rays (Ling, Chou and Lee, IEEE TAP 37(2), 1989): geometric optics to the last surface, from
+    there physical optics back to the radar, if it can be seen. The fan ends smoothly, see `fan`.
+
+    Args:
+        scene: of which everything is taken for a perfect conductor.
+        position, up: of the antenna, m and unit vector.
+        axis, spread: unit vector, and tangent of the fan's half width.
+        across: rays along one side of the fan.
+    """
+    aside = np.cross(axis, [0.0, 0.0, 1.0] if abs(axis[2]) < 0.7 else [1.0, 0.0, 0.0])
+    aside /= np.linalg.norm(aside)
+    tangent = ((np.arange(across) + 0.5) / across * 2 - 1) * spread
+    x, y = (grid.ravel() for grid in np.meshgrid(tangent, tangent))
+    weight = fan(np.hypot(x, y), spread) * (2 * spread / across) ** 2 / (1 + x * x + y * y) ** 1.5
+    x, y, weight = x[weight > 0], y[weight > 0], weight[weight > 0]
+    way = axis + x[:, None] * aside + y[:, None] * np.cross(axis, aside)
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    place, field, there = np.broadcast_to(position, way.shape), _across(up, way), np.zeros(len(way))
+    for _ in range(bounces):
+        triangle = scene.hit(place + 1e-4 * way, way)[1]
+        way, place, field, there, weight = (a[triangle >= 0] for a in (way, place, field, there, weight))
+        triangle = triangle[triangle >= 0]
+        normal = scene.normals[triangle]
+        slope = _dot(way, normal)
+        step = _dot(scene.triangles[triangle, 0] - place, normal) / slope
+        place, there = place + step[:, None] * way, there + step
+        field, way = 2 * _dot(field, normal)[:, None] * normal - field, way - 2 * slope[:, None] * normal
+    normal = -np.sign(slope)[:, None] * normal
+    arriving, leaving, back = np.abs(slope), _dot(position - place, normal), np.linalg.norm(position - place, axis=1)
+    seen = (leaving > 0) & ~scene.occluded(place + 1e-4 * normal, np.broadcast_to(position, place.shape), margin=1e-4)
+    taken = _dot(field, _across(up, (position - place) / back[:, None]))
+    size = weight * there / back * (arriving + leaving / back) / (2 * arriving) * taken
+    return np.sum((size * np.exp(2j * np.pi * (there + back) / wavelength))[seen]) / (4 * np.pi)
+
+
+def fan(tangent, spread):
+    """1 in the inner half of a fan of rays, down to 0 at its end."""
+    return np.cos(np.pi / 2 * np.clip(2 * tangent / spread - 1, 0, 1)) ** 2
+
+
+def _dot(a, b):
+    return np.einsum("...d,...d->...", a, b)
+
+
+def _across(up, way):
+    field = up - _dot(way, up)[:, None] * way
+    return field / np.linalg.norm(field, axis=1, keepdims=True)

@@ -6,9 +6,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
-from radarsim.physics import chains
-from radarsim.physics.mirrors import Mirrors
-from tests.physics.rigs import conductors, isotropic_view
+from radarsim.physics import imagemethod, sight
+from tests.physics.rigs import conductors, isotropic
 
 LAMBDA = PRESETS["radarize"].wavelength
 
@@ -19,8 +18,7 @@ def corner(count, a, b, triangles=False):
     lift = b / 2 if count == 3 else 0.0
     plates = [(a / 2 * y + lift * z, y, z, (a / 2, b / 2)), (a / 2 * x + lift * z, z, x, (b / 2, a / 2)),
               (a / 2 * (x + y), x, y, (a / 2, a / 2))]  # fmt: skip
-    facets = conductors(*plates[:count])
-    mirrors = Mirrors.of(facets, None, 100.0)
+    mirrors = conductors(*plates[:count])
     if triangles:
         legs = [(y, z), (z, x), (x, y)]
         shape = np.array([[0 * p, a * p, a * q, 0 * p] for p, q in legs])
@@ -37,15 +35,26 @@ def looking(direction, roll=0.0):
 def cross_section(mirrors, direction, distance=6.0, roll=0.0):
     """RCS of all chains, as |a|^2 (4 pi)^3 R^4 / lambda^2, seen from a unit direction."""
     position = distance * np.asarray(direction)
-    chain, isometry, amplitude, _ = chains.images(
-        mirrors, np.arange(len(mirrors)), isotropic_view(position, LAMBDA, looking(-position / distance, roll))
-    )
-    both = chain[:, 0] != chain[:, 2]
-    isometry = np.concatenate([isometry, chains.reverse(isometry[both])])
-    amplitude = np.concatenate([amplitude, amplitude[both]])
+    chain, isometry, amplitude = both_ways(mirrors, isotropic(position, LAMBDA, looking(-position / distance, roll)))
     path = np.linalg.norm(position - isometry[:, :, :3] @ position - isometry[:, :, 3], axis=1)
     field = np.sum(amplitude * np.exp(2j * np.pi * path / LAMBDA))
     return abs(field) ** 2 * (4 * np.pi) ** 3 * distance**4 / LAMBDA**2
+
+
+def chains(mirrors, search):
+    """Chains over flat reflectors with nothing else about."""
+    return imagemethod.chains(mirrors, sight.couples(search, 0, mirrors, np.arange(len(mirrors))), search, 0)
+
+
+def both_ways(mirrors, search):
+    """Mirrors, isometry and amplitude of all chains, either way round."""
+    found = chains(mirrors, search)
+    both = found.mirrors[:, 0] != found.mirrors[:, 2]
+    return (
+        np.concatenate([found.mirrors, found.mirrors[both]]),
+        np.concatenate([found.isometry, imagemethod.reverse(found.isometry[both])]),
+        np.concatenate([found.amplitude, found.amplitude[both]]),
+    )
 
 
 def direction(azimuth, elevation):

@@ -9,11 +9,11 @@ from scipy.spatial.transform import Rotation
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import RadarConfig
 from radarsim.physics.coefficients import TABLE
-from radarsim.physics.facets import Facets
+from radarsim.physics.reflectors import Flat
+from radarsim.physics.search import Search
 from radarsim.physics.synthesis import Synthesizer
-from radarsim.physics.view import View
 
-ISOTROPIC = (np.ones(181), np.ones(181))
+ISOTROPIC = (np.ones(181), np.ones(181), 1.0)
 
 
 @dataclass
@@ -39,7 +39,7 @@ def conductors(*plates, reflection=(-1.0, 1.0)):
     u_, v_ = half[:, :1] * u, half[:, 1:] * v
     corners = center[:, None] + np.stack([-u_ - v_, u_ - v_, u_ + v_, v_ - u_], axis=1)
     gamma = np.broadcast_to(np.array(reflection)[:, None], (n, 2, TABLE)).astype(complex)
-    return Facets(corners, center, np.cross(u, v), u, v, half, none, none, none, gamma)
+    return Flat(corners, center, np.cross(u, v), u, v, half, none, none, gamma.copy(), np.zeros(n))
 
 
 def polar(range_, azimuth_deg=0.0, elevation_deg=0.0):
@@ -48,11 +48,11 @@ def polar(range_, azimuth_deg=0.0, elevation_deg=0.0):
     return range_ * np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
 
 
-def isotropic_view(position, wavelength, rotation=None, reach=100.0):
-    """All that an isotropic antenna receives at a place."""
-    return View(
-        np.asarray(position, float), np.eye(3) if rotation is None else rotation, reach, wavelength, 0.0, ISOTROPIC
-    )
+def isotropic(position, wavelength, rotation=None, range_=100.0):
+    """A search for all that an isotropic antenna receives at a place, frame 0."""
+    rotation = np.eye(3) if rotation is None else rotation
+    place = np.asarray(position, float)[None]
+    return Search(place, rotation[None], np.zeros(1), range_, wavelength, 0.0, *ISOTROPIC)
 
 
 def field(echoes, position, wavelength):

@@ -97,7 +97,7 @@ def test_same_things_from_everywhere():
 
 def test_coherent_under_motion():
     """An echo's phase moves by 2k times the way gone towards its thing, whatever the direction; nothing is redrawn."""
-    found = EchoFinder(None, clutter(room()), None, CONFIG, reach=30.0, antenna=ISOTROPIC)
+    found = EchoFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
     step = np.array([0.004, -0.003, 0.002])
     start = np.array([3.0, 0.5, 1.0])
     fields, places = [], []

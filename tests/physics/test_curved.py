@@ -5,14 +5,13 @@ import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics.bodies import recognise
-from radarsim.physics.curved import Curved
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
-from tests.physics.rigs import Rig, burst, isotropic_view, locate
+from tests.physics.rigs import Rig, burst, isotropic, locate
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -25,7 +24,7 @@ def scene_of(mesh):
 def field(mesh, position):
     """Echo of the round bodies of a mesh, all parts together, isotropic antenna."""
     position = np.asarray(position, float)
-    _, images, amplitude = Curved.of(scene_of(mesh), CONFIG).parts(isotropic_view(position, LAMBDA))
+    _, images, amplitude = Reflectors.of(scene_of(mesh), CONFIG).round.flashes(isotropic(position, LAMBDA), 0)
     mirrored = np.einsum("pij,j->pi", images[:, :, :3], position) + images[:, :, 3]
     return np.sum(amplitude * np.exp(2j * np.pi * np.linalg.norm(position - mirrored, axis=1) / LAMBDA))
 
@@ -85,10 +84,8 @@ def test_range_and_doppler_of_a_passing_sphere():
     """Range to the nearest point and closing speed to the centre, whichever way the radar moves."""
     radius, center = 0.1, np.array([3.0, 0.5, 0.0])
     scene = scene_of(shapes.sphere(center, radius))
-    finder = EchoFinder(
-        scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Facets.of(scene, CONFIG), CONFIG,
-        curved=Curved.of(scene, CONFIG),
-    )  # fmt: skip
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    finder = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)
     for velocity in ([1.0, 0, 0], [0, 1.2, 0], [0.7, -0.7, 0]):
         rig = Rig(velocity=tuple(velocity))
         middle = CONFIG.burst_center * np.array(velocity)
@@ -127,4 +124,5 @@ def test_what_is_round():
 
 def test_a_round_body_has_no_facets():
     scene = scene_of(shapes.cylinder((0, 0, 0), 0.3, 2.0, 12, without=("-z", "+z")))
-    assert not len(Facets.of(scene, CONFIG)) and len(Curved.of(scene, CONFIG)) == 1
+    found = Reflectors.of(scene, CONFIG)
+    assert not len(found.flat) and len(found.round) == 1

@@ -6,10 +6,10 @@ import yaml
 from scipy import stats
 
 from radarize.radar.presets import PRESETS
-from radarsim.physics.antenna import amplitude_gain, gain_tables
+from radarsim.physics.antenna import amplitude_gain, gain_pattern
 from radarsim.physics.echoes import Provenance
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS
@@ -35,7 +35,7 @@ def corner(tmp_path_factory):
 
 
 def finder_with_one_target(scene, place, weakest=0.0):
-    return EchoFinder(scene, Scatterers.points(place, np.ones(1)), Facets.of(scene, CONFIG), CONFIG, weakest)
+    return EchoFinder(scene, Scatterers.points(place, np.ones(1)), Reflectors.of(scene, CONFIG), CONFIG, weakest)
 
 
 def test_ghosts_stand_where_the_image_method_puts_them(corner):
@@ -49,7 +49,7 @@ def test_ghosts_stand_where_the_image_method_puts_them(corner):
     # radar equation with both legs, a conductor's coefficient and the antenna's gain in both directions
     out, back = np.linalg.norm(place), np.linalg.norm(image)
     isotropic = CONFIG.wavelength / (4 * np.pi) ** 1.5 / (out * back)
-    gain = amplitude_gain(*place, *gain_tables()) * amplitude_gain(*image, *gain_tables())
+    gain = amplitude_gain(*place, gain_pattern()) * amplitude_gain(*image, gain_pattern())
     assert abs(echoes.amplitude[0]) == pytest.approx(isotropic * gain, rel=0.02)
     assert echoes.amplitude[0] == echoes.amplitude[1]
 
@@ -90,7 +90,7 @@ def test_the_hidden_are_not_seen(corner):
 def test_reciprocity(corner):
     """Swapping the legs of every echo, that is TX and RX, leaves the set of echoes as it was."""
     scatterers = Surface(corner, np.random.default_rng(1), density=100.0).all()
-    echoes = EchoFinder(corner, scatterers, Facets.of(corner, CONFIG), CONFIG)(HERE, AHEAD)
+    echoes = EchoFinder(corner, scatterers, Reflectors.of(corner, CONFIG), CONFIG)(HERE, AHEAD)
     assert len(echoes.of(Provenance.GHOST_1)) > 50
     key = np.concatenate([echoes.points.reshape(-1, 6), echoes.amplitude[: len(echoes.points), None].view(float)], 1)
     swapped = np.concatenate([echoes.points[:, ::-1].reshape(-1, 6), key[:, 6:]], axis=1)
@@ -120,7 +120,7 @@ def speckle(places):
     rng = np.random.default_rng(5)
     place = np.stack([np.full(20000, 3.0), rng.uniform(-3, 3, 20000), rng.uniform(-1.0, 1.0, 20000)], axis=1)
     scatterers = Scatterers.points(place, np.ones(20000), rng.uniform(0, 2 * np.pi, 20000))
-    finder = EchoFinder(None, scatterers, None, CONFIG, reach=10.0)
+    finder = EchoFinder(None, scatterers, None, CONFIG, range=10.0)
     fields = []
     for y in np.arange(places) * 0.2:
         position = np.array([0.0, (y % 3) - 1.5, (y // 3) * 0.1 - 0.4])
@@ -150,7 +150,7 @@ def test_wall_flash_survives_the_whole_chain(corner):
     """The metal wall seen face on: lambda / (8 pi R) times the gain at boresight, at its range."""
     facing = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # boresight towards +y
     scatterers = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-    echoes = EchoFinder(corner, scatterers, Facets.of(corner, CONFIG), CONFIG)(HERE, facing)
+    echoes = EchoFinder(corner, scatterers, Reflectors.of(corner, CONFIG), CONFIG)(HERE, facing)
     flash = np.argmax(np.abs(echoes.amplitude))
     gain = 10 ** (10.5 / 10)
     rough = np.exp(-8 * (np.pi * 2e-5 / CONFIG.wavelength) ** 2)

@@ -6,7 +6,7 @@ import pytest
 from radarize.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.physics.antenna import ISOTROPIC, Antenna, amplitude_gain, gain_tables
+from radarsim.physics.antenna import ISOTROPIC, Antenna, amplitude_gain, gain_pattern
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, PhaseNoise
 
@@ -218,13 +218,13 @@ def test_mismatch_acts_on_every_echo():
 # --- antenna ---------------------------------------------------------------------------------------------------------
 def test_antenna_pattern():
     """10.5 dBi; 3 dB down at 28 deg azimuth and 14 deg elevation, 6 dB at 50 and 20."""
-    tables = gain_tables()
+    tables = gain_pattern()
     for azimuth, elevation, expected in ((0, 0, 10.5), (28, 0, 7.5), (-50, 0, 4.5), (0, 14, 7.5), (0, -20, 4.5)):
         a, e = np.deg2rad([azimuth, elevation])
-        gain = amplitude_gain(np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e), *tables)
+        gain = amplitude_gain(np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e), tables)
         assert 20 * np.log10(gain) == pytest.approx(expected, abs=0.01)
-    assert amplitude_gain(-1.0, 0.1, 0.0, *tables) == 0
-    assert amplitude_gain(1.0, 2.0, -1.0, *gain_tables(ISOTROPIC)) == 1
+    assert amplitude_gain(-1.0, 0.1, 0.0, tables) == 0
+    assert amplitude_gain(1.0, 2.0, -1.0, gain_pattern(ISOTROPIC)) == 1
 
 
 # --- switches and files ----------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ import pytest
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.physics.antenna import gain_tables
+from radarsim.physics.antenna import gain_pattern
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import Band, FrontEndConfig
@@ -32,7 +32,7 @@ def test_point_target_obeys_the_radar_equation(range_, azimuth, elevation):
     signal = burst(CONFIG, point_echoes(place, sigma=0.5), Rig())
     guess = (range_ + 0.01, np.deg2rad(azimuth + 1), np.deg2rad(elevation - 1), 0.02)
     found_range, found_azimuth, found_elevation, speed, amplitude = locate(CONFIG, signal, guess)
-    az, el = gain_tables()
+    az, el, _ = gain_pattern()
     degrees = np.linspace(0, 90, 181)
     gain = np.interp(abs(azimuth), degrees, az) ** 2 * np.interp(abs(elevation), degrees, el) ** 2
     expected = gain**2 * CONFIG.wavelength**2 * 0.5 / ((4 * np.pi) ** 3 * range_**4)

@@ -6,11 +6,11 @@ import pytest
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.physics.antenna import amplitude_gain, gain_tables
-from radarsim.physics.crowd import Crowd
+from radarsim.physics.antenna import amplitude_gain, gain_pattern
 from radarsim.physics.echoes import Provenance
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
+from radarsim.physics.movingtargets import MovingTargets
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.synthesis import BurstClock, Synthesizer
 from radarsim.scene.materials import MATERIALS
@@ -26,7 +26,7 @@ WALKER = Person(name="walker", path=((0, 0), (10, 0)), speed=1.2)
 
 def test_scatterers_are_carried_along():
     """A scatterer keeps its distance from every other of the same part."""
-    crowd = Crowd([WALKER, Fan(name="f", center=(3, 1, 2))], np.random.default_rng(1))
+    crowd = MovingTargets([WALKER, Fan(name="f", center=(3, 1, 2))], np.random.default_rng(1))
     places = crowd.positions(np.array([0.3, 1.7]))
     for part in (0, 3, 10):
         own = places[:, crowd.part == part]
@@ -39,7 +39,7 @@ def test_occlusion_against_brute_force():
     """Segments against capsules and boxes: the same as sampling a thousand points along each segment."""
     rng = np.random.default_rng(2)
     movers = [WALKER, Door(name="d", hinge=(2, 0.5, 1)), Fan(name="f", center=(1, -0.5, 1.5))]
-    crowd = Crowd(movers, rng)
+    crowd = MovingTargets(movers, rng)
     origins, targets = rng.uniform([-1, -1.5, 0], [4, 1.5, 2], (2, 1500, 3))
     hidden = crowd.occluded(origins, targets, t=0.9, margin=0.0)
     turn, center = crowd.poses(np.array([0.9]))
@@ -60,9 +60,9 @@ def test_occlusion_against_brute_force():
 
 def alone(movers, scene=None, surface=NOTHING, seed=0):
     """A finder that sees movers, and the crowd that they are."""
-    crowd = Crowd(movers, np.random.default_rng(seed), density=60.0)
-    facets = None if scene is None else Facets.of(scene, CONFIG)
-    return EchoFinder(scene, surface, facets, CONFIG, crowd=crowd), crowd
+    crowd = MovingTargets(movers, np.random.default_rng(seed), density=60.0)
+    facets = None if scene is None else Reflectors.of(scene, CONFIG)
+    return EchoFinder(scene, surface, facets, CONFIG, moving=crowd), crowd
 
 
 def brute_force(echoes, crowd, time, which, mirror=None):
@@ -156,7 +156,7 @@ def test_cross_section_of_a_person():
     person = Person(name="p", path=((3.0, 0),), floor=-1.0, cross_section=0.5)
     finder, _ = alone([person])
     echoes = finder(np.zeros(3), np.eye(3), 0.0)
-    gain = np.array([amplitude_gain(*point, *gain_tables()) for point in echoes.points[:, 0]])
+    gain = np.array([amplitude_gain(*point, gain_pattern()) for point in echoes.points[:, 0]])
     scale = CONFIG.wavelength / (4 * np.pi) ** 1.5 * gain**2 / np.sum(echoes.points[:, 0] ** 2, axis=1)
     found = np.sum((np.abs(echoes.amplitude) / scale) ** 2)
     assert 10 * np.log10(found / 0.5) == pytest.approx(0, abs=1.5)  # limbs hide one another

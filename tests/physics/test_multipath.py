@@ -10,17 +10,17 @@ from radarize.heatmaps import Heatmaps
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import ISOTROPIC as ISOTROPIC_ANTENNA
-from radarsim.physics.antenna import amplitude_gain, gain_tables
+from radarsim.physics.antenna import Antenna, amplitude_gain, gain_pattern
 from radarsim.physics.coefficients import TABLE, reflection, transmission
 from radarsim.physics.echoes import Provenance
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene, SceneObject
 from radarsim.scene.shapes import box, rectangle
-from tests.physics.brute_force import transfer_matrix
+from tests.physics.brute_force import kirchhoff_mirror, transfer_matrix
 from tests.physics.rigs import Rig, burst
 
 CONFIG = PRESETS["radarize"]
@@ -35,7 +35,7 @@ def sheet(name, material, position, size, facing):
 
 def finder(objects, place, **options):
     scene = Scene("test", objects)
-    return EchoFinder(scene, Scatterers.points(place, np.ones(1)), Facets.of(scene, CONFIG), CONFIG, **options)
+    return EchoFinder(scene, Scatterers.points(place, np.ones(1)), Reflectors.of(scene, CONFIG), CONFIG, **options)
 
 
 def points_of(echoes, provenance):
@@ -80,7 +80,7 @@ def test_all_phantoms_of_a_corner():
     place = np.array([2.4, 0.5, 0.0])
     left, end = place * [1, -1, 1] + [0, 2.4, 0], place * [-1, 1, 1] + [6.0, 0, 0]
     both = np.array([end[0], left[1], 0.0])
-    echoes = finder([LEFT, AT_END], place, reach=8.0)(HERE, AHEAD)
+    echoes = finder([LEFT, AT_END], place, range=8.0)(HERE, AHEAD)
     first, _ = points_of(echoes, Provenance.GHOST_1)
     expected = [(place, left), (left, place), (place, end), (end, place)]
     assert np.sort(first.reshape(4, 6), axis=0) == pytest.approx(np.sort(np.reshape(expected, (4, 6)), axis=0))
@@ -92,7 +92,7 @@ def test_all_phantoms_of_a_corner():
         here = np.linalg.norm(places - e, axis=1) < 1e-6
         assert here.any()
         # radar equation over both legs; conductors reflect all, so only antenna and distance count
-        gain = [amplitude_gain(*q, *gain_tables()) / np.linalg.norm(q) for q in (e[:3], e[3:])]
+        gain = [amplitude_gain(*q, gain_pattern()) / np.linalg.norm(q) for q in (e[:3], e[3:])]
         truth = LAMBDA / (4 * np.pi) ** 1.5 * gain[0] * gain[1]
         assert 20 * np.log10(abs(amplitude[here].sum()) / truth) == pytest.approx(0, abs=0.2)
     assert all(np.linalg.norm(known - e, axis=1).min() < 1e-6 for e in places)
@@ -158,7 +158,7 @@ def test_a_pane_flashes_once(closed):
     if closed:
         pane = SceneObject("pane", box((1.503, 0, 0), (0.006, 4.0, 4.0)), MATERIALS["glass"])
     scene = Scene("pane", [pane])
-    echoes = EchoFinder(scene, NOTHING, Facets.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC_ANTENNA)(HERE, AHEAD)
+    echoes = EchoFinder(scene, NOTHING, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC_ANTENNA)(HERE, AHEAD)
     m, f = MATERIALS["glass"], CONFIG.center_frequency
     _, r = transfer_matrix([(m.permittivity_at(f), m.thickness)], 1.0, f, False)
     apparent = np.linalg.norm(echoes.images[:, :, 3], axis=1)
@@ -203,7 +203,7 @@ def test_walls_and_doors():
 def office():
     scene = Scene.load("office")
     surface = Surface(scene, np.random.default_rng(0), 60.0)
-    return EchoFinder(scene, surface, Facets.of(scene, CONFIG), CONFIG, 7.5e-9)
+    return EchoFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 7.5e-9)
 
 
 def there_and_back(echoes, place):
@@ -235,7 +235,7 @@ def test_thinning_keeps_the_power_of_ghosts():
     """Of a sampled surface few scatterers are seen over mirrors, with the power of all: within 0.5 dB over 12 draws."""
     wall = sheet("wall", "brick", (3.0, 0, 0), (1.6, 1.6), (-1, 0, 0))
     scene = Scene("room", [LEFT, wall])
-    facets = Facets.of(scene, CONFIG)
+    facets = Reflectors.of(scene, CONFIG)
     power = {"thinned": np.zeros(2), "whole": np.zeros(2)}
     for seed in range(12):
         scatterers = Surface(scene, np.random.default_rng(seed), 800.0).all()
@@ -246,3 +246,52 @@ def test_thinning_keeps_the_power_of_ghosts():
             for k, cause in enumerate((Provenance.GHOST_1, Provenance.GHOST_2)):
                 power[name][k] += np.sum(np.abs(points_of(echoes, cause)[1]) ** 2)
     assert 10 * np.log10(power["thinned"] / power["whole"]) == pytest.approx(0, abs=0.5)
+
+
+@pytest.mark.parametrize("half", [(0.02, 0.02), (0.05, 0.03), (0.1, 0.1), (0.245, 0.25), (0.255, 0.25), (0.6, 0.5)])
+@pytest.mark.parametrize("off", [0.0, 0.03])
+def test_a_mirror_of_any_size(half, off):
+    """A ghost is as strong as what the aperture passes of its Fresnel zones: Kirchhoff's integral.
+
+    Within 1.1 dB: edges farther off than 2 Fresnel units fade from the sum.
+    """
+    place = np.array([3.0 + 2 * off, 0.0, 0.0])
+    board = SceneObject("board", rectangle((1.5, 1.0, 0), (2 * half[0], 2 * half[1]), (0, -1, 0)), MATERIALS["metal"])
+    echoes = finder([board], place, antenna=ISOTROPIC_ANTENNA)(HERE, AHEAD).of(Provenance.GHOST_1)
+    assert len(echoes.points) == 2
+    other = LAMBDA / (4 * np.pi) ** 1.5 / np.linalg.norm(place)
+    truth = abs(kirchhoff_mirror(half, place, LAMBDA)) * other
+    assert 20 * np.log10(abs(echoes.amplitude[0]) / truth) == pytest.approx(0, abs=1.1)
+
+
+def test_an_antenna_of_high_gain_has_its_ghosts():
+    """The search knows the antenna's peak: what 30 dBi lift above the threshold is found."""
+    place, lift = np.array([2.6, 0.3, 0.1]), 19.5
+    weak = finder([GLASS], place)(HERE, AHEAD)
+    ghosts = weak.of(Provenance.GHOST_2).amplitude
+    antenna = Antenna(peak_dbi=10.5 + lift)
+    strong = finder([GLASS], place, antenna=antenna, threshold=abs(ghosts).max() * 10)(HERE, AHEAD)
+    found = strong.of(Provenance.GHOST_2).amplitude
+    assert 20 * np.log10(abs(found).max() / abs(ghosts).max()) == pytest.approx(2 * lift, abs=0.01)
+
+
+def test_a_corner_behind_a_pane():
+    """A metal corner seen through 6 mm of glass: the pane's transmission twice over."""
+    plates = [
+        sheet("left", "metal", (3.0, 0.1, 0), (0.2, 0.2), (0, -1, 0)),
+        sheet("end", "metal", (3.1, 0, 0), (0.2, 0.2), (-1, 0, 0)),
+    ]
+    pane = sheet("pane", "glass", (1.5, 0, 0), (2.0, 2.0), (-1, 0, 0))
+
+    def level(objects):
+        scene = Scene("corner", objects)
+        echoes = EchoFinder(scene, NOTHING, Reflectors.of(scene, CONFIG), CONFIG)(HERE, AHEAD)
+        turns = np.abs(np.trace(echoes.images[:, :, :3], axis1=1, axis2=2) + 1) < 1e-9
+        near = turns & (np.abs(echoes.images[:, 0, 3] - 6.2) < 0.05)
+        return echoes.amplitude[near]
+
+    m, f = MATERIALS["glass"], CONFIG.center_frequency
+    tau, _ = transfer_matrix([(m.permittivity_at(f), m.thickness)], 1.0, f, False)
+    clear, behind = level(plates), level([*plates, pane])
+    assert len(clear) and len(behind)
+    assert 20 * np.log10(abs(behind).max() / abs(clear).max() / abs(tau) ** 2) == pytest.approx(0, abs=0.1)

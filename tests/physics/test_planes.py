@@ -7,8 +7,8 @@ import trimesh
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics import planes
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
@@ -33,7 +33,7 @@ def coherent_field(mesh, position):
     """Sum of all flashes, edges and corners that can be seen."""
     scene = Scene("scan", [SceneObject("wall", mesh, MATERIALS["concrete"])])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-    echoes = EchoFinder(scene, nothing, Facets.of(scene, CONFIG), CONFIG)(position, np.eye(3))
+    echoes = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(position, np.eye(3))
     return field(echoes, position, CONFIG.wavelength)
 
 

@@ -7,7 +7,11 @@ import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics import plates
-from tests.physics.rigs import conductors, isotropic_view
+from radarsim.physics.reflectors import Reflectors
+from radarsim.scene import shapes
+from radarsim.scene.materials import MATERIALS
+from radarsim.scene.scene import Scene, SceneObject
+from tests.physics.rigs import conductors, isotropic
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -22,9 +26,9 @@ def plate(half, gamma=-1.0, center=(0.0, 0.0, 0.0)):
 def field(facets, position):
     """Echo amplitude of the plate, all parts together."""
     position = np.asarray(position, float)
-    _, _, images, amplitude = plates.parts(facets, isotropic_view(position, LAMBDA))
-    mirrored = np.einsum("pij,j->pi", images[:, :, :3], position) + images[:, :, 3]
-    return np.sum(amplitude * np.exp(2j * np.pi * np.linalg.norm(position - mirrored, axis=1) / LAMBDA))
+    parts = plates.parts(facets, isotropic(position, LAMBDA), 0)
+    mirrored = np.einsum("pij,j->pi", parts.isometry[:, :, :3], position) + parts.isometry[:, :, 3]
+    return np.sum(parts.amplitude * np.exp(2j * np.pi * np.linalg.norm(position - mirrored, axis=1) / LAMBDA))
 
 
 def physical_optics(half, position, across=3001):
@@ -146,3 +150,14 @@ def test_abutting_plates_are_one_plate():
 
 def test_behind_a_one_sided_plate_there_is_nothing():
     assert field(plate((0.3, 0.3)), (1.0, 0, 0)) == 0
+
+
+@pytest.mark.parametrize(("material", "side"), [("metal", 0.019), ("metal", 0.01), ("concrete", 0.099), ("wood", 0.05)])
+def test_small_plates_keep_their_echo(material, side):
+    """The physical-optics integral of a small plate in a scene, whatever it is made of."""
+    distance = 3.0
+    mesh = shapes.rectangle((distance, 0, 0), (side, side), (-1, 0, 0))
+    scene = Scene("plate", [SceneObject("plate", mesh, MATERIALS[material])])
+    flat = Reflectors.of(scene, CONFIG).flat
+    truth = abs(flat.reflection[0, 0, -1] * physical_optics((side / 2, side / 2), (-distance, 0, 0), 401))
+    assert 20 * np.log10(abs(field(flat, (0, 0, 0))) / truth) == pytest.approx(0, abs=0.3)

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from radarize.radar.presets import PRESETS
-from radarsim.physics.antenna import amplitude_gain, gain_tables
+from radarsim.physics.antenna import amplitude_gain, gain_pattern
 from radarsim.physics.detail import detail, share
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.surface import DENSITY, Surface
@@ -42,7 +42,7 @@ def surface(seed=0, **options):
 def weights(scatterers, position):
     """Amplitude factor of each scatterer from a position, looking along x."""
     offset = scatterers.position - position
-    shares = [share(amplitude_gain(*d, *gain_tables()), np.linalg.norm(d)) for d in offset]
+    shares = [share(amplitude_gain(*d, gain_pattern()) / gain_pattern().peak_gain, np.linalg.norm(d)) for d in offset]
     return np.array([detail(rank, used) for rank, used in zip(scatterers.rank, shares, strict=True)])
 
 
@@ -108,7 +108,7 @@ def test_mean_power_does_not_depend_on_distance():
             finder = EchoFinder(None, Surface(board, np.random.default_rng(seed)), None, CONFIG)
             echoes = finder(np.array([-distance, 0, 0]), AHEAD)
             place = echoes.points[:, 0] + [distance, 0, 0]
-            gain = np.array([amplitude_gain(*d, *gain_tables()) for d in place])
+            gain = np.array([amplitude_gain(*d, gain_pattern()) for d in place])
             away = np.linalg.norm(place, axis=1)
             power += np.sum(np.abs(echoes.amplitude) ** 2 * (away / gain) ** 4 / (distance / away) ** 2)
         levels.append(10 * np.log10(power))
@@ -123,7 +123,7 @@ def amplitudes(finder, position):
 
 def test_nothing_pops_along_a_walk():
     """Frame to frame on a straight walk no scatterer comes, goes or changes by more than a part of its neighbours."""
-    finder = EchoFinder(None, surface(), None, CONFIG, reach=4.0)
+    finder = EchoFinder(None, surface(), None, CONFIG, range=4.0)
     path = [np.array([x, 0.1, 0.0]) for x in 0.5 + 0.03 * np.arange(12)]
     frames = [amplitudes(finder, p) for p in path]
     for before, after, position in zip(frames, frames[1:], path, strict=False):
@@ -144,7 +144,7 @@ def test_speckle_stays_coherent(step):
     world, start = surface(), np.array([1.0, 0.2, 0.1])
     finder = EchoFinder(None, world, None, CONFIG)
     moved = start + np.array(step)
-    drawn = world.near(np.stack([start, moved]), finder.reach)
+    drawn = world.near(np.stack([start, moved]), finder.range)
     whole = EchoFinder(None, replace(drawn, rank=np.full(len(drawn), -1.0)), None, CONFIG)(moved, AHEAD)
     before, now = (dict(zip(map(bytes, drawn.position), weights(drawn, p), strict=True)) for p in (start, moved))
 

@@ -5,8 +5,8 @@ import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import ISOTROPIC
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.unevenness import SCALES, Heights
 from radarsim.scene import shapes
@@ -101,7 +101,7 @@ def test_heights_are_as_rough_as_they_say():
 
 def finder(scene):
     field = Heights.of(scene, np.random.default_rng(0))
-    return EchoFinder(scene, NOWHERE, Facets.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC, heights=field)
+    return EchoFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC, heights=field)
 
 
 def flash(scene, place):

@@ -13,7 +13,7 @@ from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
 from radarsim.motion import Motion
-from radarsim.physics.facets import Facets
+from radarsim.physics.reflectors import Reflectors
 from radarsim.planner import plan_motion
 from radarsim.scenario import Scenario
 from radarsim.scene.importers import import_scene
@@ -165,8 +165,8 @@ def test_the_intel_lab(tmp_path):
         apart.append(shapely.distance(outline, shapely.points(points)))
     apart = np.concatenate(apart)
     assert np.median(apart) < 0.04 and np.mean(apart < 0.15) > 0.85
-    facets = Facets.of(scene, PRESETS["radarize"])
-    assert facets.mirror.sum() < 900
+    flat = Reflectors.of(scene, PRESETS["radarize"]).flat
+    assert np.sum(4 * flat.half.prod(axis=1) >= 0.25) < 900
     for platform in ("handheld", "robot"):
         plan_motion(scene, platform, 8.0, np.random.default_rng(1))
 

@@ -9,12 +9,12 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numba import njit, prange
 
-from radarsim.physics.lobes import LAMBERT
 from radarsim.physics.scatterers import BOUNCE_STRIDE, Scatterers
+from radarsim.physics.scatteringpattern import LAMBERT
 from radarsim.scene.movers import MovingThing
 
 
-class Crowd:
+class MovingTargets:
     """All movers of a scene: their scatterers at any time, and what they hide.
 
     Args:

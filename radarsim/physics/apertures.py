@@ -1,11 +1,16 @@
-"""What windows on a path leave of a wave: polygons in Fresnel units, and Kirchhoff's integral over them."""
+"""What apertures on a path leave of a wave, in Fresnel units: Kirchhoff's integral over polygons, rectangles."""
 
 import numpy as np
 from numba import njit
 
+from radarsim.physics.amplitudes import dot, minus
+from radarsim.physics.amplitudes import vector as vec
+
 #: Edges this far off the path, in units of the Fresnel integral, begin to fade from the sum, and those are left out:
 #: what they diffract comes on a path of its own, longer by s^2 lambda / 4.
-FADE, FAR = 5.0, 8.0
+FADE, FAR = 3.0, 5.0
+#: The same for one-way paths to scatterers: there are many, and at 3 an edge diffracts -23 dB.
+STRIP_FADE, STRIP_FAR = 2.0, 3.0
 #: Most corners that the overlap of three quadrilaterals and a square can have, and one to close it.
 CORNERS = 20
 
@@ -91,3 +96,63 @@ def _edge(s, low, high):
         x += step
     total += np.arctan(high / s) - np.arctan(low / s)
     return total * np.exp(0.5j * np.pi * s * s)
+
+
+@njit(cache=True)
+def strip(low, high):
+    """(1 / (1 + j)) int exp(j pi u^2 / 2) du from low to high: what a slit leaves; 1 for a wide one.
+
+    Fresnel's integrals by the auxiliary functions f and g (Abramowitz and Stegun 7.3.9, 7.3.32, 7.3.33), good to 0.002.
+    """
+    return _from_middle(high) - _from_middle(low)
+
+
+@njit(cache=True)
+def _from_middle(u):
+    x = abs(u)
+    if x >= STRIP_FAR:
+        return np.sign(u) * 0.5 + 0j
+    f = (1 + 0.926 * x) / (2 + 1.792 * x + 3.104 * x * x)
+    g = 1 / (2 + 4.142 * x + 3.492 * x * x + 6.670 * x * x * x)
+    edge = (g + 1j * f) * (0.5 - 0.5j) * np.exp(0.5j * np.pi * x * x)
+    weight = min((STRIP_FAR - x) / (STRIP_FAR - STRIP_FADE), 1.0)
+    return np.sign(u) * (0.5 - weight * weight * (3 - 2 * weight) * edge)
+
+
+@njit(inline="always")
+def misses(stop, way, square, aperture):
+    """Whether a path leaves nothing worth while: `passes` without a root, for a quick look."""
+    center, normal, u, v, half_u, half_v = aperture
+    offset, aside, cosine = minus(stop, center), dot(way, u), dot(way, normal)
+    x, y = max(abs(dot(offset, u)) - half_u, 0.0), max(abs(dot(offset, v)) - half_v, 0.0)
+    across = max(1 - aside * aside, 1e-6)
+    farthest = STRIP_FAR * STRIP_FAR * square
+    return x * x * across >= farthest or y * y * cosine * cosine >= farthest * across
+
+
+@njit(inline="always")
+def passes(stop, way, square, aperture):
+    """What the aperture of a mirror passes of a path in a direction over a stop on it.
+
+    Args:
+        stop: m.
+        way: unit direction of travel.
+        square: of the Fresnel unit across the path, m^2. In the mirror's plane it is longer along the plane of
+            incidence: by 1 / across along u, by across / cosine along v, which keeps its area and neglects its slant.
+        aperture: of the mirror, see `aperture`.
+    """
+    center, normal, u, v, half_u, half_v = aperture
+    offset = minus(stop, center)
+    aside, cosine = dot(way, u), abs(dot(way, normal))
+    across, size = np.sqrt(max(1 - aside * aside, 1e-6)), np.sqrt(square) + 1e-12
+    along_u, along_v = across / size, cosine / (across * size)
+    x, y, half_x, half_y = dot(offset, u) * along_u, dot(offset, v) * along_v, half_u * along_u, half_v * along_v
+    return strip(-half_x - x, half_x - x) * strip(-half_y - y, half_y - y)
+
+
+@njit(inline="always")
+def aperture(flat, m):
+    """The rectangle that stands for a flat reflector: center, normal, u, v, half sides."""
+    return (
+        vec(flat.center[m]), vec(flat.normal[m]), vec(flat.u[m]), vec(flat.v[m]), flat.half[m, 0], flat.half[m, 1]
+    )  # fmt: skip

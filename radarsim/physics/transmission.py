@@ -11,7 +11,7 @@ from radarsim.scene.scene import Scene
 MOST_SLABS = 2
 
 
-class Slabs:
+class Transmission:
     """The thin objects of a scene (`coefficients`).
 
     Args:

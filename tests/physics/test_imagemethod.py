@@ -7,16 +7,24 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
-from radarsim.physics import chains, plates
+from radarsim.physics import apertures, imagemethod, plates
 from radarsim.physics.echoes import Provenance
-from radarsim.physics.facets import Facets
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
-from radarsim.physics.mirrors import Mirrors
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene.scene import Scene
-from tests.physics.corners import corner, cross_section, direction, looking, seen_by_all, seen_by_both
-from tests.physics.rigs import isotropic_view
+from tests.physics.corners import (
+    both_ways,
+    chains,
+    corner,
+    cross_section,
+    direction,
+    looking,
+    seen_by_all,
+    seen_by_both,
+)
+from tests.physics.rigs import isotropic
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -76,8 +84,7 @@ def test_no_step_as_the_image_leaves_the_corner():
     for z in 0.5 + np.arange(-100, 100) * 1e-3:
         position = np.array([1.4, 1.4, z])
         pose = looking(np.array([-1, -1, 0]) / np.sqrt(2))
-        _, _, amplitude, _ = chains.images(mirrors, np.arange(2), isotropic_view(position, LAMBDA, pose))
-        values.append(np.sum(amplitude))
+        values.append(np.sum(chains(mirrors, isotropic(position, LAMBDA, pose)).amplitude))
     assert np.max(np.abs(np.diff(values))) < 0.03 * np.max(np.abs(values))
     assert abs(values[0]) > 10 * abs(values[-1])
 
@@ -95,23 +102,20 @@ def test_kirchhoff_integral(seed):
         inside &= (x1 - x0) * (y[:, None] - y0) - (y1 - y0) * (x - x0) > 0
     cell = np.prod(high - low) / n**2
     truth = np.sum(inside * np.exp(0.5j * np.pi * (x**2 + y[:, None] ** 2))) * cell / 2j
-    assert chains.kirchhoff(polygon, 5) == pytest.approx(truth, abs=3e-3)
+    assert apertures.kirchhoff(polygon, 5) == pytest.approx(truth, abs=3e-3)
 
 
-def images_of_a_room(view):
+def images_of_a_room(search):
     """Images of a radar in a box room, by walls and chains of them: isometries, amplitudes, orders."""
-    facets = Facets.of(Scene.load("physics/room"), CONFIG)
-    _, _, single, flash = plates.parts(facets, view)
+    flat = Reflectors.of(Scene.load("physics/room"), CONFIG).flat
+    parts = plates.parts(flat, search, 0)
+    single = parts.isometry
     walls = (
         np.abs(np.linalg.det(single[:, :, :3]) + 1 + np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1)) < 1e-6
     )
-    chain, isometry, amplitude, _ = chains.images(Mirrors.of(facets, None, 50.0), np.arange(6), view)
-    both = chain[:, 0] != chain[:, 2]
-    order = np.concatenate(
-        [np.ones(walls.sum(), int), *(2 + (chain[some, 1] != chain[some, 2]) for some in (both | True, both))]
-    )
-    isometry = np.concatenate([single[walls], isometry, chains.reverse(isometry[both])])
-    return isometry, np.concatenate([flash[walls], amplitude, amplitude[both]]), order
+    chain, isometry, amplitude = both_ways(flat, search)
+    order = np.concatenate([np.ones(walls.sum(), int), 2 + (chain[:, 1] != chain[:, 2])])
+    return np.concatenate([single[walls], isometry]), np.concatenate([parts.amplitude[walls], amplitude]), order
 
 
 def lattice(p):
@@ -130,11 +134,11 @@ def test_box_room_has_all_its_images(monkeypatch):
     lattice: a conductor turns the field E into 2 (E n) n - E. The antenna is made isotropic, and tilted, because two
     opposite walls send the wave out in front and take it in from behind.
     """
-    for module, kernel in ((chains, "_search"), (plates, "_parts")):
+    for module, kernel in ((imagemethod, "_search"), (plates, "_parts")):
         monkeypatch.setattr(module, "gain_towards", lambda *_: 1.0)
         monkeypatch.setattr(module, kernel, getattr(module, kernel).py_func)
     p, pose = np.array([0.37, -0.21, 1.23]), Rotation.from_euler("ZYX", [0.3, 0.4, 0.5]).as_matrix()
-    isometry, amplitude, order = images_of_a_room(isotropic_view(p, LAMBDA, pose))
+    isometry, amplitude, order = images_of_a_room(isotropic(p, LAMBDA, pose))
     found = isometry[:, :, :3] @ p + isometry[:, :, 3]
 
     counted, known = {1: 0, 2: 0, 3: 0}, np.zeros(len(found), bool)
@@ -159,9 +163,9 @@ def test_box_room_has_all_its_images(monkeypatch):
 def test_causes_in_a_box_room():
     """Edges and corners of a room echo from where they stand; images behind its walls are ghosts, by order."""
     scene = Scene.load("physics/room")
-    finder = EchoFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Facets.of(scene, CONFIG), CONFIG)
+    finder = EchoFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Reflectors.of(scene, CONFIG), CONFIG)
     position = np.array([0.37, -0.21, 1.23])
-    finder.reach = 8.0
+    finder.range = 8.0
     echoes = finder(position, looking(direction(0.2, 0.1)))
     apparent = (position + echoes.images[:, :, :3] @ position + echoes.images[:, :, 3]) / 2
     low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
@@ -175,13 +179,13 @@ def test_images_fade_out_before_their_paths_get_too_long():
     """Through the room in steps of 1 cm, images come and go at the longest path only where the IF filter has closed."""
     scene, front = Scene.load("physics/room"), FrontEnd(CONFIG)
     reach = front.settings.band.high * CONFIG.max_range
-    mirrors, ahead = Mirrors.of(Facets.of(scene, CONFIG), scene, 50.0), looking(direction(0.4, 0.1))
+    mirrors, ahead = Reflectors.of(scene, CONFIG).flat, looking(direction(0.4, 0.1))
     frames = []
     for x in np.arange(-1.5, 1.5, 0.01):
         position = np.array([x, 0.1, 1.4])
-        chain, isometry, _, _ = chains.images(mirrors, np.arange(6), isotropic_view(position, LAMBDA, ahead, reach))
-        path = np.linalg.norm(position - isometry[:, :, :3] @ position - isometry[:, :, 3], axis=1)
-        frames.append({tuple(c): p for c, p in zip(chain.tolist(), path, strict=True)})
+        found = chains(mirrors, isotropic(position, LAMBDA, ahead, reach))
+        path = np.linalg.norm(position - found.isometry[:, :, :3] @ position - found.isometry[:, :, 3], axis=1)
+        frames.append({tuple(c): p for c, p in zip(found.mirrors.tolist(), path, strict=True)})
     pops = []
     for before, after in zip(frames, frames[1:], strict=False):
         for some, other in ((before, after), (after, before)):

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.physics.lobes import LAMBERT, concentration, scattering, weights
+from radarsim.physics.scatteringpattern import LAMBERT, concentration, scattering, weights
 from radarsim.scene.materials import MATERIALS
 
 

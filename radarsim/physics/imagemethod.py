@@ -5,65 +5,96 @@ A chain m_1 ... m_k takes the receiver to M rx, M = R_1 ... R_k the product of t
 edge and three an inversion in their corner, whose path passes the edge or corner itself for every place of the radar;
 each order of the mirrors then holds its own share of the light.
 
-The mirrors are windows on the unfolded path. A window at distance d from one end of a path of length L diffracts as its
-offset x over sqrt(lambda d (L - d) / (2 L)) says (Fresnel), so in these units all windows of a chain overlap to one
+The mirrors are apertures on the unfolded path. One at distance d from an end of a path of length L diffracts as its
+offset x over sqrt(lambda d (L - d) / (2 L)) says (Fresnel), so in these units all apertures of a chain overlap to one
 polygon W, and the amplitude lambda / (4 pi L) of an endless mirror is taken F times,
 
     F = (1 / 2j) int_W exp(j pi r^2 / 2) dA = (1 / 2 pi) closed int (1 - exp(j pi r^2 / 2)) dphi,
 
-the Kirchhoff integral, here along the edges (Stokes, as Maggi and Rubinowicz did): 1 in the middle of large windows,
+the Kirchhoff integral, here along the edges (Stokes, as Maggi and Rubinowicz did): 1 in the middle of large apertures,
 1/2 on an edge, area over lambda times distance for small ones. So a dihedral of plates a x b has
 8 pi a^2 b^2 / lambda^2, and a trihedral of triangles 4 pi a^4 / (3 lambda^2).
 """
+
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
-from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length, minus, reflected, unit, upright
+from radarsim.physics.amplitudes import (
+    along,
+    cross,
+    dot,
+    gain_towards,
+    length,
+    minus,
+    mirrored,
+    reflected,
+    unit,
+    upright,
+)
 from radarsim.physics.amplitudes import vector as vec
-from radarsim.physics.mirrors import Mirrors
-from radarsim.physics.view import View
-from radarsim.physics.windows import CORNERS, FAR, depth, kirchhoff, overlap
+from radarsim.physics.apertures import CORNERS, FAR, depth, kirchhoff, overlap
+from radarsim.physics.reflectors import Flat
+from radarsim.physics.search import Search
+from radarsim.physics.table import Table
 
 
-def images(
-    mirrors: Mirrors,
-    near: Int[np.ndarray, "n"],
-    view: View,
-) -> tuple[
-    Int[np.ndarray, "image 3"],
-    Float[np.ndarray, "image 3 4"],
-    Complex[np.ndarray, "image"],
-    Float[np.ndarray, "image 3 3"],
-]:
-    """Chains of two and three mirrors that lead from the sensor back to it, each in one of its two directions.
+@dataclass(frozen=True)
+class Chains(Table):
+    """Ways over mirrors that lead from the sensor back to it, each in one of its two directions.
 
     The other direction (`reverse`) has the same amplitude and the inverse isometry; a chain with the same mirror at
     either end is its own reverse.
 
-    Args:
-        mirrors: and what can follow what.
-        near: mirrors that can be first and last.
-        view: the sensor.
-
-    Returns:
-        chain (of two: the second mirror twice), isometry of the receiver, amplitude, places of reflection of a ray that
-        takes this way (the last one repeated up to three), m.
+    Attributes:
+        mirrors: of two, the second one twice.
+        isometry: of the receiver.
+        amplitude: square root of received over transmitted power, with phase.
+        stops: places of reflection of a ray that takes this way (the last one repeated up to three), m.
     """
-    end = np.zeros(len(mirrors), bool)
-    end[near] = True
-    size = 256
+
+    mirrors: Int[np.ndarray, "chain 3"]
+    isometry: Float[np.ndarray, "chain 3 4"]
+    amplitude: Complex[np.ndarray, "chain"]
+    stops: Float[np.ndarray, "chain 3 3"]
+
+
+class _Orders(NamedTuple):
+    """What can follow what: firsts[start[b] : start[b + 1]] are the mirrors that can be before b, and after it."""
+
+    start: Int[np.ndarray, "mirror+1"]
+    firsts: Int[np.ndarray, "pair"]
+
+
+class _Room(NamedTuple):
+    """Scratch for polygons."""
+
+    planes: Float[np.ndarray, "12 3"]
+    polygon: Float[np.ndarray, "corner 2"]
+    spare: Float[np.ndarray, "corner 2"]
+
+
+def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], search: Search, frame: int) -> Chains:
+    """Chains of two and three mirrors above the threshold.
+
+    Args:
+        flat: mirrors.
+        pairs: which can be first, and which second after it (see `sight.Mirrors`).
+        search, frame: from where.
+    """
+    pairs = pairs[np.lexsort(pairs.T)]
+    orders = _Orders(np.searchsorted(pairs[:, 1], np.arange(len(flat) + 1)), np.ascontiguousarray(pairs[:, 0]))
+    size = 1024
     while True:
-        chain, isometry = np.empty((size, 3), np.int64), np.empty((size, 3, 4))
-        amplitude, stops = np.empty(size, complex), np.empty((size, 3, 3))
-        count = _search(
-            near, end, mirrors.first, mirrors.following, mirrors.center, mirrors.normal, mirrors.corners,
-            mirrors.two_sided, mirrors.reflection, view.position, view.rotation, view.reach, view.wavelength,
-            view.weakest, *view.tables, chain, isometry, amplitude, stops,
-        )  # fmt: skip
+        found = Chains(
+            np.empty((size, 3), np.int64), np.empty((size, 3, 4)), np.empty(size, complex), np.empty((size, 3, 3))
+        )
+        count = _search(search, frame, flat.columns, orders, found.columns)
         if count <= size:
-            return chain[:count], isometry[:count], amplitude[:count], stops[:count]
+            return found[:count]
         size = count
 
 
@@ -74,64 +105,60 @@ def reverse(isometry: Float[np.ndarray, "image 3 4"]) -> Float[np.ndarray, "imag
 
 
 @njit(cache=True)
-def _search(
-    near, end, first, following, center, normal, corners, two_sided, reflection, position, rotation, reach, wavelength,
-    weakest, azimuth_table, elevation_table, chain, isometry, amplitude, stops,
-):  # fmt: skip
+def _search(search, frame, flat, orders, found):
     """Tries all chains whose mirrors can follow one another; returns how many lead back, of which as many as fit."""
-    p = vec(position)
-    up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
-    planes, polygon, spare = np.empty((12, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 2))
+    p, rotation = vec(search.position[frame]), search.rotation[frame]
+    room = _Room(np.empty((12, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 2)))
     way = np.empty(3, np.int64)
     count = 0
-    for a in near:
-        image_a = _image(p, center[a], normal[a])
-        for ib in range(first[a], first[a + 1]):
-            b = following[ib]
-            image_b = _image(image_a, center[b], normal[b])
-            for ic in range(first[b] - 1, first[b + 1]):
-                order = 2 if ic < first[b] else 3
-                c = b if order == 2 else following[ic]
-                if c < a or not end[c]:  # the way back through the same mirrors is not searched for
+    for b in range(len(flat.center)):
+        firsts = orders.firsts[orders.start[b] : orders.start[b + 1]]
+        for i in range(len(firsts)):
+            a = firsts[i]
+            image_b = mirrored(p, vec(flat.center[a]), vec(flat.normal[a]))
+            image_b = mirrored(image_b, vec(flat.center[b]), vec(flat.normal[b]))
+            for j in range(i - 1, len(firsts)):
+                order = 2 if j < i else 3
+                c = b if order == 2 else firsts[j]
+                if order == 2 and (b < a or not _after(orders, b, a)):  # the way back is not searched for
                     continue
                 # The sensor's image in the last mirror: seen from there, the way leads straight to the sensor.
-                image = image_b if order == 2 else _image(image_b, center[c], normal[c])
+                image = image_b if order == 2 else mirrored(image_b, vec(flat.center[c]), vec(flat.normal[c]))
                 back = minus(p, image)
                 path = length(back)
-                if path > 2 * reach or path < 0.05:
+                if path > 2 * search.range or path < 0.05:
                     continue
                 back = (back[0] / path, back[1] / path, back[2] / path)
-                gain = gain_towards((-back[0], -back[1], -back[2]), rotation, azimuth_table, elevation_table)
-                strength = wavelength / (4 * np.pi * path) * gain
-                if strength * 3.4 <= weakest:  # 3.4: above the peak gain
+                if not _passes(image, back, path, search.wavelength, flat.center[c], flat.normal[c], flat.corners[c]):
                     continue
-                if not _passes(image, back, path, wavelength, center[c], normal[c], corners[c]):
+                gain = gain_towards((-back[0], -back[1], -back[2]), rotation, search)
+                strength = search.wavelength / (4 * np.pi * path) * gain
+                if strength * search.peak_gain <= search.threshold:
                     continue
                 way[0], way[1], way[2] = a, b, c
-                value, ray, e1, e2, off = _chain(
-                    way[:order], p, up, path, back, wavelength, center, normal, corners, two_sided, reflection, planes,
-                    polygon, spare,
-                )  # fmt: skip
-                value *= strength * gain_towards(ray, rotation, azimuth_table, elevation_table)
-                if abs(value) <= weakest:
+                value, ray, e1, e2, off = _chain(way[:order], p, path, back, search, frame, flat, room)
+                value *= strength * gain_towards(ray, rotation, search)
+                if abs(value) <= search.threshold:
                     continue
-                if count < len(amplitude):
+                if count < len(found.amplitude):
                     for k in range(3):
-                        chain[count, k] = way[min(k, order - 1)]
-                    _isometry(way[:order], center, normal, isometry[count])
-                    amplitude[count] = value
+                        found.mirrors[count, k] = way[min(k, order - 1)]
+                    _isometry(way[:order], flat, found.isometry[count])
+                    found.amplitude[count] = value
                     # A ray through the polygon, which misses the very edge of corners.
-                    zone = np.sqrt(wavelength * path / 8)
+                    zone = np.sqrt(search.wavelength * path / 8)
                     aim = along(along(along(p, path / 2, ray), zone * off[0], e1), zone * off[1], e2)
-                    _course(way[:order], p, aim, center, normal, stops[count])
+                    _course(way[:order], p, aim, flat, found.stops[count])
                 count += 1
     return count
 
 
 @njit(inline="always")
-def _image(p, center, normal):
-    n = vec(normal)
-    return along(p, -2 * dot(minus(p, vec(center)), n), n)
+def _after(orders, a, b):
+    """Whether b can be the mirror after a."""
+    some = orders.firsts[orders.start[b] : orders.start[b + 1]]
+    at = np.searchsorted(some, a)
+    return at < len(some) and some[at] == a
 
 
 @njit(inline="always")
@@ -153,11 +180,12 @@ def _passes(image, back, path, wavelength, center, normal, corners):
 
 
 @njit(cache=True)
-def _chain(
-    way, p, up, path, back, wavelength, center, normal, corners, two_sided, reflection, planes, polygon, spare
-):  # fmt: skip
+def _chain(way, p, path, back, search, frame, flat, room):
     """F times the reflection coefficients of a chain, and where it starts: direction, transverse axes, aim in them."""
     none = 0j, back, back, back, (0.0, 0.0)
+    normal, corners, planes, wavelength = flat.normal, flat.corners, room.planes, search.wavelength
+    rotation = search.rotation[frame]
+    up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
     # The direction at the start is that at the end, taken back through the mirrors.
     ray = back
     for k in range(len(way) - 1, -1, -1):
@@ -172,9 +200,9 @@ def _chain(
     start, now, f1, f2 = p, ray, e1, e2
     count, before = 0, 0.0
     for m in way:
-        n, c = vec(normal[m]), vec(center[m])
+        n, c = vec(normal[m]), vec(flat.center[m])
         slope = dot(now, n)
-        if abs(slope) < 0.02 or (slope > 0 and not two_sided[m]):
+        if abs(slope) < 0.02 or (slope > 0 and not flat.two_sided[m]):
             return none
         t = dot(minus(c, start), n) / slope
         if t <= 0.005 or t >= path - 0.005 or t < before - np.sqrt(wavelength * path):
@@ -208,21 +236,21 @@ def _chain(
             planes[count, 0], planes[count, 1], planes[count, 2] = nx, ny, offset
             count += 1
         after = along(now, -2 * slope, n)
-        field = reflected(field, now, after, n, reflection[m])
-        start = _image(start, center[m], normal[m])
+        field = reflected(field, now, after, n, flat.reflection[m])
+        start = mirrored(start, c, n)
         f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
         now = after
     taken = upright(up, now)
     value = dot(field, taken)
-    corner = overlap(planes, count, polygon, spare)
+    corner = overlap(planes, count, room.polygon, room.spare)
     if corner < 3:
         return none
-    share = kirchhoff(polygon, corner)
+    share = kirchhoff(room.polygon, corner)
     # The ray aims at the path itself, or where an edge is near, a little inside the polygon.
     mx, my = 0.0, 0.0
     for k in range(corner):
-        mx += polygon[k, 0] / corner
-        my += polygon[k, 1] / corner
+        mx += room.polygon[k, 0] / corner
+        my += room.polygon[k, 1] / corner
     toward = 0.0
     for step in (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0):
         toward = step
@@ -232,7 +260,7 @@ def _chain(
 
 
 @njit(cache=True)
-def _isometry(way, center, normal, out):
+def _isometry(way, flat, out):
     """R_1 ... R_k as matrix | offset."""
     for column in range(4):
         if column < 3:
@@ -240,20 +268,20 @@ def _isometry(way, center, normal, out):
         else:
             x = (0.0, 0.0, 0.0)
         for k in range(len(way) - 1, -1, -1):
-            n = vec(normal[way[k]])
-            height = dot(x, n) if column < 3 else dot(minus(x, vec(center[way[k]])), n)
+            n = vec(flat.normal[way[k]])
+            height = dot(x, n) if column < 3 else dot(minus(x, vec(flat.center[way[k]])), n)
             x = along(x, -2 * height, n)
         out[0, column], out[1, column], out[2, column] = x
 
 
 @njit(cache=True)
-def _course(way, p, aim, center, normal, stops):
+def _course(way, p, aim, flat, stops):
     """Where a ray from p through a point meets the mirrors of a chain."""
     start, now = p, unit(minus(aim, p))
     for k in range(3):
         if k < len(way):
-            n = vec(normal[way[k]])
-            t = dot(minus(vec(center[way[k]]), start), n) / dot(now, n)
+            n = vec(flat.normal[way[k]])
+            t = dot(minus(vec(flat.center[way[k]]), start), n) / dot(now, n)
             start = along(start, t, now)
             now = along(now, -2 * dot(now, n), n)
         stops[k, 0], stops[k, 1], stops[k, 2] = start

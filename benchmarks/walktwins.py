@@ -1,0 +1,159 @@
+"""Twins of real walks: what the lidar saw of RadarHD's training walks as a scene, the same drive through it simulated,
+and the radar's pictures side by side.
+
+The lidar tells where surfaces are, at its own height alone. What they are made of, how high rooms are and what stands
+in them is assumed, an assumption a row. What each is worth is told by how alike the twin's pictures are to those of the
+same instants, compared with those of other instants and of another walk.
+"""
+
+import tempfile
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import yaml
+from jaxtyping import Float, Int, UInt8
+
+from benchmarks.realism import CONFIG, shares
+from benchmarks.results import Data, command_line, publish
+from benchmarks.results import Walk as Facts
+from radarize import polar
+from radarize.console import progress
+from radarize.tum import planar_poses, write_tum
+from radarize.walkposes import BEARINGS, lidar_poses, scan, true_poses
+from radarize.walks import PERIOD, Walk
+from radarize.yamlfile import read_yaml
+from radarsim.motion import motion_from_tum
+from radarsim.scenario import Scenario
+from radarsim.scene.importers import import_scene
+from radarsim.scene.scene import Scene
+from radarsim.simulate import TOGETHER
+
+
+class Assumed(NamedTuple):
+    """What the lidar does not tell.
+
+    Attributes:
+        life: see `radarsim.scene.scene.Life`.
+        walls: their material.
+        room: floor to ceiling, m.
+        sensor: its height, m.
+    """
+
+    life: dict[str, float] = {"clutter": 1.0, "unevenness": 1.0}  # noqa: RUF012
+    walls: str = "plasterboard"
+    room: float = 2.7
+    sensor: float = 1.0
+
+
+ASSUMED = {
+    "walls alone": Assumed(life={}),
+    "clutter and unevenness": Assumed(),
+    "clutter x 3": Assumed(life={"clutter": 3.0, "unevenness": 1.0}),
+    "walls of concrete": Assumed(walls="concrete"),
+    "rooms of 4 m": Assumed(room=4.0),
+    "sensor at 0.5 m": Assumed(sensor=0.5),
+}
+#: Rows by which the twin's pictures may have to be moved: the real radar reads up to 0.34 m too far.
+_BIAS = range(9)
+#: Frames at either end of a walk that are left out.
+_MARGIN = 20
+
+Pictures = UInt8[np.ndarray, "frame range azimuth"]
+
+
+def scene(walk: Walk, poses: Float[np.ndarray, "frame 3"], assumed: Assumed, folder: Path) -> Path:
+    """The scene that the walk's lidar saw."""
+    ranges = np.stack([scan(polar.cartesian(walk.lidar(frame))) for frame in range(walk.frames)])
+    log = folder / f"{walk.number}.scans.npz"
+    step = BEARINGS[1] - BEARINGS[0]
+    far = np.where(np.isfinite(ranges), ranges, 2 * polar.REACH)
+    np.savez(log, ranges=far, angle_min=BEARINGS[0], angle_increment=step, range_max=polar.REACH)
+    write_tum(folder / f"{walk.number}.truth.tum", PERIOD * np.arange(walk.frames), planar_poses(poses))
+    path = import_scene(log, folder / f"{walk.number}.yaml", height=assumed.room).path
+    found = read_yaml(path)
+    for part in found["objects"]:
+        part["material"] = assumed.walls if part["name"] == "walls" else part["material"]
+    path.write_text(yaml.safe_dump(found | assumed.life, sort_keys=False))
+    return path
+
+
+def simulated(
+    path: Path, poses: Float[np.ndarray, "frame 3"], height: float, frames: Int[np.ndarray, "frame"], seed: int
+) -> Pictures:
+    """Pictures of some frames of the same drive."""
+    drive = planar_poses(poses)
+    drive[:, 2] = height
+    tum = write_tum(path.with_suffix(".drive.tum"), PERIOD * np.arange(len(poses)), drive)
+    scenario = Scenario(Scene.load(str(path)), motion_from_tum(tum), CONFIG, seed=seed)
+    parts = (frames[k : k + TOGETHER] for k in range(0, len(frames), TOGETHER))
+    return np.concatenate(
+        [polar.pictures(scenario.frames(PERIOD * part).samples, CONFIG, polar.MEASURED) for part in parts]
+    )
+
+
+def likeness(ones: Pictures, others: Pictures) -> float:
+    """Mean correlation of pictures, pair by pair."""
+    pairs = zip(ones.reshape(len(ones), -1).astype(float), others.reshape(len(others), -1).astype(float), strict=True)
+    return float(np.mean([np.corrcoef(a, b)[0, 1] for a, b in pairs]))
+
+
+def farther(pictures: Pictures, rows: int) -> Pictures:
+    """Read so many rows too far."""
+    return np.concatenate([np.zeros_like(pictures[:, :rows]), pictures[:, : polar.ROWS - rows]], axis=1)
+
+
+def compared(twin: Pictures, own: Pictures, other: Pictures) -> dict[str, float]:
+    """How alike a twin is to its own walk and to another, and how full both are."""
+    bias = max(_BIAS, key=lambda rows: likeness(farther(twin, rows), own))
+    twin = farther(twin, bias)
+    kept, ranges, azimuths = 100 * np.array(shares(twin > 0))
+    count = min(len(twin), len(other))
+    return {
+        "own instant": likeness(twin, own), "other instants": likeness(twin, own[::-1]),
+        "other walk": likeness(twin[:count], other[:count]), "bias m": bias * polar.RANGES[1],
+        "kept %": kept, "ranges lit %": ranges, "azimuths lit %": azimuths, "kept in reality %": 100 * (own > 0).mean(),
+    }  # fmt: skip
+
+
+PARSER = command_line(
+    __doc__,
+    data=(Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"),
+    walks=("112,113,120", "training walks, each beside the next one"),
+    poses=("", "folder of poses, WALK.tum; by the lidar if none"),
+    every=(15, "of so many frames one is simulated"),
+    seed=(0, "of clutter, unevenness and noise"),
+)
+
+
+def main() -> None:
+    options = PARSER.parse_args()
+    walks = [Walk.find(options.data, int(number)) for number in options.walks.split(",")]
+    frames = [np.arange(_MARGIN, walk.frames - _MARGIN, options.every) for walk in walks]
+    real = [np.stack([walk.radar(k) for k in some]) for walk, some in zip(walks, frames, strict=True)]
+    rows = []
+    with progress("twins") as report, tempfile.TemporaryDirectory() as folder:
+        for number, walk in enumerate(walks):
+            poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
+            for done, (about, assumed) in enumerate(ASSUMED.items()):
+                report(number * len(ASSUMED) + done, len(walks) * len(ASSUMED))
+                path = scene(walk, poses, assumed, Path(folder))
+                twin = simulated(path, poses, assumed.sensor, frames[number], options.seed)
+                other = real[(number + 1) % len(walks)]
+                rows.append({"walk": walk.number, "assumed": about, **compared(twin, real[number], other)})
+    publish(
+        "walktwins",
+        "Twins of real walks",
+        rows,
+        data=Data("RadarHD's training walks", tuple(Facts(f"radarhd {w.number}", None, None, False) for w in walks)),
+        networks=(),
+        notes=[
+            "Correlation of the twin's pictures (`radarize.polar`, four antennas) with real ones of the same instants, "
+            "of the same walk backwards, and of another walk; the twin's are moved by as much as fits best (bias).",
+            "The lidar's plane is all that is known of a room: nothing above or below it, no glass, no material.",
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,94 @@
+"""What reflects like a mirror: the flat parts of a scene, each with its aperture, and its round bodies."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float
+
+from radarize.radar.config import RadarConfig
+from radarsim.physics.bodies import recognise
+from radarsim.physics.coefficients import TABLE, as_slab, reflection
+from radarsim.physics.curved import RoundBodies
+from radarsim.physics.grid import Grid
+from radarsim.physics.planes import plates
+from radarsim.physics.table import Table
+from radarsim.physics.unevenness import FINISHES
+from radarsim.scene.materials import Material
+from radarsim.scene.scene import Scene
+
+
+@dataclass(frozen=True)
+class Flat(Table):
+    """Flat convex quadrilaterals, and in each a rectangle that stands for it where it mirrors scatterers.
+
+    Attributes:
+        corners: in order around, m; of a triangle two fall together.
+        center, normal, u, v: m and unit vectors; u, v lie along the rectangle's sides.
+        half: half the rectangle's side lengths along u and v, m.
+        two_sided: sheets without a volume show both sides.
+        horizontal: part of a floor or ceiling.
+        reflection: complex reflection coefficient by (facet, polarisation TE / TM, cosine of incidence), roughness
+            included, as it appears in the beat signal (conjugate of the field's).
+        finish: how uneven they are over plaster, see `unevenness.FINISHES`.
+    """
+
+    corners: Float[np.ndarray, "facet 4 3"]
+    center: Float[np.ndarray, "facet 3"]
+    normal: Float[np.ndarray, "facet 3"]
+    u: Float[np.ndarray, "facet 3"]
+    v: Float[np.ndarray, "facet 3"]
+    half: Float[np.ndarray, "facet 2"]
+    two_sided: Bool[np.ndarray, "facet"]
+    horizontal: Bool[np.ndarray, "facet"]
+    reflection: Complex[np.ndarray, "facet 2 cosine"]
+    finish: Float[np.ndarray, "facet"]
+
+    @classmethod
+    def none(cls) -> "Flat":
+        """No facet."""
+        no, empty = np.zeros(0, bool), np.zeros((0, 3))
+        table = np.zeros((0, 2, TABLE), complex)
+        return cls(np.zeros((0, 4, 3)), empty, empty, empty, empty, np.zeros((0, 2)), no, no, table, np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Reflectors:
+    """All of a scene.
+
+    Attributes:
+        flat: quadrilaterals that cover its flat regions.
+        round: its spheres and cylinders.
+    """
+
+    flat: Flat
+    round: RoundBodies
+
+    @cached_property
+    def _grid(self) -> Grid:
+        return Grid(self.flat.corners.min(axis=1), self.flat.corners.max(axis=1))
+
+    def near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> Flat:
+        """Flat ones within a distance (m) of any of the positions, in the same order."""
+        return self.flat[self._grid.near(positions, distance)[0]]
+
+    @classmethod
+    def of(cls, scene: Scene, config: RadarConfig) -> "Reflectors":
+        """The reflectors of a scene."""
+        flat, bodies = [], []
+        tables: dict[Material, np.ndarray] = {}
+        for item in scene.objects:
+            slab, _ = as_slab(item)
+            if slab not in tables:
+                tables[slab] = reflection(slab, config)
+            found, is_round = recognise(item.mesh)
+            sides = item.two_sided, item.is_floor_or_ceiling
+            finish = FINISHES.get(item.material.name, 0.0)
+            bodies += [(b.center, b.axis, b.radius, b.half, tables[slab]) for b in found]
+            flat += [
+                (p.corners, p.center, p.normal, p.u, p.v, p.half, *sides, tables[slab], finish)
+                # physical optics holds down to about a wavelength
+                for p in plates(item.mesh, ~is_round, config.wavelength**2)
+            ]
+        columns = [np.array(column) for column in zip(*flat, strict=True)]
+        return cls(Flat(*columns) if flat else Flat.none(), RoundBodies.of(bodies))

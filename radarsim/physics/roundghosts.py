@@ -1,0 +1,236 @@
+"""Spheres and cylinders seen over mirrors: specular ghosts of round bodies, out on one way and back on another.
+
+Seen through the mirrors of its two ways, the radar sends from one image and receives at another. Between the two, light
+takes the shortest way over the body, by the point P whose normal halves the angle. Its strength follows from how the
+path's length grows about P (stationary phase): an endless plane there would have 1 / (r_1 + r_2) and the Hessian
+H_0 = (1 / r_1 + 1 / r_2) (1 - t t'), t the tangential part of the direction; a body of curvature C has
+
+    1 / (r_1 + r_2) sqrt(det H_0 / det H),  H = H_0 + 2 cos(theta) C,
+
+geometric optics with its caustics (Deschamps, Proc. IEEE 60(9), 1972). A cylinder's ends cut Fresnel's integral along
+its axis.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float, Int, UInt8
+from numba import njit
+
+from radarsim.physics.amplitudes import (
+    along,
+    cross,
+    dot,
+    gain_towards,
+    length,
+    minus,
+    mirrored,
+    reflected,
+    unit,
+    upright,
+    write,
+)
+from radarsim.physics.amplitudes import vector as vec
+from radarsim.physics.apertures import STRIP_FAR, aperture, passes, strip
+from radarsim.physics.curved import RoundBodies
+from radarsim.physics.echoes import Provenance
+from radarsim.physics.obstacles import Obstacles
+from radarsim.physics.reflectors import Flat
+from radarsim.physics.search import Search
+from radarsim.physics.sight import Mirrors
+from radarsim.physics.table import Table
+
+#: Steps to the point between two images; each shrinks the error by at least the share of the radius in the distance.
+STEPS = 12
+
+
+@dataclass(frozen=True)
+class RoundGhosts(Table):
+    """Echoes of round bodies by way of mirrors.
+
+    Attributes:
+        points: P as seen through the mirrors of its ways out and back, m.
+        stops: place of reflection and P, out and back (P twice on a straight way), m.
+        bounces: mirrors on both ways, 1 or 2.
+        amplitude: square root of received over transmitted power, with phase.
+    """
+
+    points: Float[np.ndarray, "ghost 2 3"]
+    stops: Float[np.ndarray, "ghost 2 2 3"]
+    bounces: Int[np.ndarray, "ghost"]
+    amplitude: Complex[np.ndarray, "ghost"]
+
+    @property
+    def cause(self) -> UInt8[np.ndarray, "ghost"]:
+        """A `Provenance` each."""
+        return np.where(self.bounces == 1, Provenance.GHOST_1, Provenance.GHOST_2).astype(np.uint8)
+
+
+def seen(
+    search: Search, flat: Flat, mirrors: list[Mirrors], bodies: RoundBodies, obstacles: Obstacles
+) -> list[RoundGhosts]:
+    """Ghosts in each frame that nothing hides; slabs are opaque to them."""
+    found = [find(search, k, flat, some.seen, bodies) for k, some in enumerate(mirrors)]
+    frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
+    n = 2 * len(every)
+    factor, _ = obstacles.way(
+        search, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), np.zeros(n, bool)
+    )
+    clear = (factor != 0).reshape(-1, 2).all(axis=1)
+    return [every[clear & (frame == k)] for k in range(search.frames)]
+
+
+def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bodies: RoundBodies) -> RoundGhosts:
+    """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
+    size = 256
+    while True:
+        found = RoundGhosts(
+            np.empty((size, 2, 3)), np.empty((size, 2, 2, 3)), np.empty(size, np.int64), np.empty(size, complex)
+        )
+        count = _find(search, frame, flat.columns, seen, bodies.columns, found.columns)
+        if count <= size:
+            return found[:count]
+        size = count
+
+
+@njit(cache=True)
+def _find(search, frame, flat, seen, bodies, found):
+    """Returns how many there are, of which as many as fit are written."""
+    p, count = vec(search.position[frame]), 0
+    mirrors, images = np.empty(len(seen) + 1, np.int64), np.empty((len(seen) + 1, 3))
+    for b in range(len(bodies.radius)):
+        ways = _ways(search, p, flat, seen, bodies, b, (mirrors, images))
+        for i in range(ways):
+            for j in range(max(i, 1), ways):
+                place, n, size = _strength(search, bodies, b, vec(images[i]), vec(images[j]))
+                if abs(size) * search.peak_gain**2 <= search.threshold:
+                    continue
+                out = _over(search, frame, flat, mirrors[i], vec(images[i]), place)
+                back = _over(search, frame, flat, mirrors[j], vec(images[j]), place)
+                value = size * out[2] * back[2]
+                if abs(value) <= search.threshold:
+                    continue
+                ends = (mirrors[i], out[0]), (mirrors[j], back[0])
+                value *= _polarisation(search, frame, flat, ends, place, n, bodies.reflection[b])
+                if abs(value) <= search.threshold:
+                    continue
+                clear = along(place, 2e-3, n)
+                for swapped in range(1 if i == j else 2):
+                    if count < len(found.amplitude):
+                        found.amplitude[count] = value
+                        found.bounces[count] = (mirrors[i] >= 0) + (mirrors[j] >= 0)
+                        for end in range(2):
+                            way, m = (out, mirrors[i]) if end == swapped else (back, mirrors[j])
+                            write(way[1], found.points[count, end])
+                            write(way[0] if m >= 0 else clear, found.stops[count, end, 0])
+                            write(clear, found.stops[count, end, 1])
+                    count += 1
+    return count
+
+
+@njit(inline="always")
+def _ways(search, p, flat, seen, bodies, b, ways):
+    """Mirrors (-1: none, the first) and images of the radar of all ways that may lead to a body; returns how many."""
+    mirrors, images = ways
+    center, size = vec(bodies.center[b]), bodies.radius[b] + bodies.half[b]
+    if length(minus(center, p)) - size > search.range:
+        return 0
+    mirrors[0], count = -1, 1
+    write(p, images[0])
+    for m in seen:
+        c, n = vec(flat.center[m]), vec(flat.normal[m])
+        height = dot(minus(p, c), n)
+        level = dot(minus(center, c), n) * (1.0 if height > 0 else -1.0)
+        if abs(height) < 0.01 or level < 0.01:
+            continue
+        source = along(p, -2 * height, n)
+        share = abs(height) / (abs(height) + level)
+        at = minus(along(source, share, minus(center, source)), c)
+        spare = size * share + STRIP_FAR * np.sqrt(search.wavelength * search.range / 8) + 0.1
+        if (
+            abs(dot(at, vec(flat.u[m]))) < flat.half[m, 0] + spare
+            and abs(dot(at, vec(flat.v[m]))) < flat.half[m, 1] + spare
+        ):
+            mirrors[count] = m
+            write(source, images[count])
+            count += 1
+    return count
+
+
+@njit(inline="always")
+def _strength(search, bodies, b, one, two):
+    """The point of a body between two places, its normal there, and the amplitude that an isotropic antenna gets from
+    one place to the other."""
+    radius, half, axis, none = bodies.radius[b], bodies.half[b], vec(bodies.axis[b]), (0.0, 0.0, 0.0)
+    a, c = minus(one, vec(bodies.center[b])), minus(two, vec(bodies.center[b]))
+    z_a, z_c = dot(a, axis), dot(c, axis)
+    a, c = along(a, -z_a, axis), along(c, -z_c, axis)
+    n = unit(along(unit(a), 1.0, unit(c)))
+    for _ in range(STEPS):
+        n = unit(along(unit(along(a, -radius, n)), 1.0, unit(along(c, -radius, n))))
+    near, far = length(along(a, -radius, n)), length(along(c, -radius, n))
+    z = z_a + (z_c - z_a) * near / (near + far)
+    place = along(along(vec(bodies.center[b]), radius, n), z, axis)
+    there, back = minus(place, one), minus(place, two)
+    r1, r2 = length(there), length(back)
+    there, back = unit(there), unit(back)
+    cosine = -dot(n, there)
+    if cosine < 1e-3 or dot(n, back) > -1e-3 or r1 + r2 > 2 * search.range:
+        return none, none, 0j
+    # Hessians of the path over the tangent plane, of a plane there and of the body
+    side = axis if half > 0 else unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.9 else (1.0, 0.0, 0.0)))
+    curvature, bend = 1 / r1 + 1 / r2, 2 * cosine / radius
+    t1, t2 = dot(there, cross(n, side)), dot(there, side)
+    h11, h22, h12 = curvature * (1 - t1 * t1), curvature * (1 - t2 * t2), -curvature * t1 * t2
+    plane = h11 * h22 - h12 * h12
+    h11, h22 = h11 + bend, h22 + (0.0 if half > 0 else bend)
+    size = search.wavelength / (4 * np.pi * (r1 + r2)) * np.sqrt(plane / (h11 * h22 - h12 * h12)) + 0j
+    if half > 0:
+        zone = np.sqrt(search.wavelength / (2 * (h22 - h12 * h12 / h11)))
+        if abs(z) >= half + STRIP_FAR * zone:
+            return none, none, 0j
+        size *= strip((-half - z) / zone, (half - z) / zone)
+    return place, n, size
+
+
+@njit(inline="always")
+def _over(search, frame, flat, m, source, place):
+    """Where a way to a place leaves for, where the place is seen, and gain times what the mirror's aperture passes."""
+    p, rotation = vec(search.position[frame]), search.rotation[frame]
+    if m < 0:
+        return place, place, gain_towards(minus(place, p), rotation, search) + 0j
+    center, normal = vec(flat.center[m]), vec(flat.normal[m])
+    h, level = abs(dot(minus(source, center), normal)), abs(dot(minus(place, center), normal))
+    share, far = h / (h + level), length(minus(place, source))
+    stop = along(source, share, minus(place, source))
+    square = 0.5 * search.wavelength * far * share * (1 - share)
+    value = passes(stop, unit(minus(place, source)), square, aperture(flat, m))
+    return stop, mirrored(place, center, normal), value * gain_towards(minus(stop, p), rotation, search)
+
+
+@njit(inline="always")
+def _polarisation(search, frame, flat, ends, place, n, reflection):
+    """Product of the reflection coefficients, an upright field sent and taken.
+
+    Args:
+        ends: mirror and stop, out and back.
+        place, n, reflection: of the body.
+    """
+    p, rotation = vec(search.position[frame]), search.rotation[frame]
+    up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
+    (m, stop), (last, end) = ends
+    now = unit(minus(stop, p))
+    sent = upright(up, now)
+    field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
+    if m >= 0:
+        after = unit(minus(place, stop))
+        field = reflected(field, now, after, vec(flat.normal[m]), flat.reflection[m])
+        now = after
+    after = unit(minus(end if last >= 0 else p, place))
+    field = reflected(field, now, after, n, reflection)
+    now = after
+    if last >= 0:
+        after = unit(minus(p, end))
+        field = reflected(field, now, after, vec(flat.normal[last]), flat.reflection[last])
+        now = after
+    return dot(field, upright(up, now))

@@ -1,0 +1,273 @@
+"""One-way paths over one mirror and over two: which there are, how strong, and where they are reflected."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+from numba import njit, prange
+
+from radarsim.physics.amplitudes import (
+    along,
+    dot,
+    facing,
+    gain_towards,
+    length,
+    minus,
+    mirrored,
+    reflected,
+    unit,
+    upright,
+)
+from radarsim.physics.amplitudes import vector as vec
+from radarsim.physics.apertures import STRIP_FAR, aperture, misses, passes
+from radarsim.physics.candidates import Candidates
+from radarsim.physics.paths import OneWay
+from radarsim.physics.reflectors import Flat
+from radarsim.physics.search import Search
+from radarsim.physics.targets import Targets
+
+#: No two rectangular apertures pass more than this: Fresnel's integral over a slit is below 1.17.
+_MOST = 1.17**4
+
+
+class _Chains(NamedTuple):
+    """Mirrors in order from the sensor on, the second one -1 where there is none; the aims they may lead to, from one
+    on to before another; and room for what is found."""
+
+    mirrors: Int[np.ndarray, "chain 2"]
+    frame: Int[np.ndarray, "chain"]
+    aims: Int[np.ndarray, "chain 2"]
+    slots: Int[np.ndarray, "chain+1"]
+
+
+class _Aims(NamedTuple):
+    """Candidates: where they are, and bounds on a path's length (m) and on its amplitude times the root of the cosine
+    at the scatterer (1/m)."""
+
+    candidate: Int[np.ndarray, "aim"]
+    place: Float[np.ndarray, "3 aim"]
+    scatterer: Int[np.ndarray, "aim"]
+    longest: Float[np.ndarray, "aim"]
+    weakest: Float[np.ndarray, "aim"]
+
+
+class _Hits(NamedTuple):
+    """Paths that there are: how many over each chain, and from its slot on, to which aims and how strong."""
+
+    count: Int[np.ndarray, "chain"]
+    aim: Int[np.ndarray, "slot"]
+    amplitude: Complex[np.ndarray, "slot"]
+
+
+class SpecularCandidates:
+    """What paths over mirrors are tried: chains of mirrors for a frame, each with the candidates it may lead to.
+
+    A chain is (m, -1) or (m, n), from the sensor on; many chains share their candidates.
+    """
+
+    def __init__(self):
+        self._chains, self._frame, self._aims, self._rows, self._longest, self._weakest = [], [], [], [], [], []
+        self._size = 0
+
+    def add(
+        self, frame: int, chains: Int[np.ndarray, "chain 2"], rows: Int[np.ndarray, "n"],
+        longest: Float[np.ndarray, "n"], weakest: Float[np.ndarray, "n"],
+    ) -> None:  # fmt: skip
+        """Try chains to candidates.
+
+        Args:
+            frame: of all of them.
+            chains: mirrors.
+            rows: candidates.
+            longest, weakest: bounds, see `_Aims`, for each candidate.
+        """
+        aims = self._size, self._size + len(rows)
+        self._size += len(rows)
+        self._chains.append(chains)
+        self._frame.append(np.full(len(chains), frame))
+        self._aims.append(np.broadcast_to(aims, (len(chains), 2)))
+        for column, values in ((self._rows, rows), (self._longest, longest), (self._weakest, weakest)):
+            column.append(values)
+
+    def paths(
+        self, search: Search, targets: Targets, candidates: Candidates, flat: Flat
+    ) -> tuple[OneWay, Float[np.ndarray, "path 3 3"]]:
+        """The paths there are, not yet tested for what is in the way.
+
+        Returns:
+            the paths, and the places of reflection on each in order, followed by the scatterer's (up to three), m.
+        """
+        if not self._size:
+            return OneWay.straight(search, targets, candidates, np.zeros(0, int)), np.zeros((0, 3, 3))
+        mirrors, frame, span = (np.concatenate(x) for x in (self._chains, self._frame, self._aims))
+        rows, longest, weakest = (np.concatenate(x) for x in (self._rows, self._longest, self._weakest))
+        scatterer = candidates.scatterer[rows]
+        place = np.ascontiguousarray(np.take(targets.scatterers.position, scatterer, axis=0).T)
+        slots = np.concatenate([[0], np.cumsum(span[:, 1] - span[:, 0])])
+        chains = _Chains(mirrors, frame, span, slots)
+        size = chains.slots[-1]
+        hits = _Hits(np.zeros(len(mirrors), np.int64), np.empty(size, np.int32), np.empty(size, complex))
+        aims = _Aims(rows, place, scatterer, longest, weakest)
+        _strengths(search, flat.columns, chains, aims, targets.scatterers.columns, hits)
+        n = hits.count.sum()
+        found = OneWay(
+            np.empty(n, np.int64), np.repeat(1 + (mirrors[:, 1] >= 0), hits.count), np.empty(n, complex),
+            np.empty((n, 3)), np.empty((n, 3)), np.zeros(n, bool),
+        )  # fmt: skip
+        stops = np.empty((n, 3, 3))
+        _courses(search, flat.columns, chains, aims, hits, found.columns, stops)
+        return found, stops
+
+
+@njit(inline="always")
+def _crossing(a, b, center, normal):
+    """Where the line from a to b crosses a plane."""
+    ha, hb = dot(minus(a, center), normal), dot(minus(b, center), normal)
+    return along(a, ha / (ha - hb), minus(b, a))
+
+
+@njit(cache=True, error_model="numpy")
+def _reach(search, image, h, window, aims, begin, end):
+    """Which aims light may reach from an image through its mirror, at height h over the image.
+
+    A quick look at all of them, in arrays: it leaves out what `misses` does, what is too far, and what is too weak.
+    """
+    center, normal, u, v, half_u, half_v = window
+    x, y, z = aims.place[0][begin:end], aims.place[1][begin:end], aims.place[2][begin:end]
+    longest, weakest, lit = aims.longest[begin:end], aims.weakest[begin:end], np.empty(end - begin, np.bool_)
+    side, height = (1.0, h) if h > 0 else (-1.0, -h)
+    ox, oy, oz = image
+    begin_u, begin_v = dot(minus(image, center), u), dot(minus(image, center), v)
+    zone = STRIP_FAR * STRIP_FAR * 0.5 * search.wavelength
+    most = _MOST * search.peak_gain
+    for i in range(len(lit)):
+        dx, dy, dz = x[i] - ox, y[i] - oy, z[i] - oz
+        square = dx * dx + dy * dy + dz * dz
+        full = np.sqrt(square)
+        rise = side * (dx * normal[0] + dy * normal[1] + dz * normal[2])
+        part = height / rise
+        aside = dx * u[0] + dy * u[1] + dz * u[2]
+        off_u = abs(begin_u + part * aside) - half_u
+        off_v = abs(begin_v + part * (dx * v[0] + dy * v[1] + dz * v[2])) - half_v
+        across, farthest = square - aside * aside, zone * full * part * (1 - part)
+        lit[i] = (
+            (rise > height + 0.01)
+            & (full < longest[i])
+            & (weakest[i] * full < most)
+            & ((off_u <= 0) | (off_u * off_u * across < farthest * square))
+            & ((off_v <= 0) | (off_v * off_v * rise * rise < farthest * across))
+        )
+    return begin + np.flatnonzero(lit)
+
+
+@njit(parallel=True, cache=True)
+def _strengths(search, flat, chains, aims, scatterers, hits):
+    """Fills in the paths over every chain."""
+    for k in prange(len(chains.frame)):
+        _over(search, flat, chains, k, aims, scatterers, hits)
+
+
+@njit(cache=True)
+def _over(search, flat, chains, k, aims, scatterers, hits):
+    """Fills in the paths over one chain."""
+    frame = chains.frame[k]
+    p, rotation = vec(search.position[frame]), search.rotation[frame]
+    up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
+    one, two = chains.mirrors[k]
+    last = one if two < 0 else two
+    c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
+    source = mirrored(p, c1, n1)  # the sensor as seen in the last mirror but one
+    image = source
+    cl, nl = vec(flat.center[last]), vec(flat.normal[last])
+    if two >= 0:
+        image = mirrored(source, cl, nl)
+    h = -dot(minus(image, cl), nl)  # the source's height over the last mirror; its image is as far behind
+    if abs(h) < 0.01 or (h < 0 and not flat.two_sided[last]):
+        return
+    window = aperture(flat, last)
+    before, h1 = aperture(flat, one), dot(minus(p, c1), n1)
+    n = chains.slots[k]
+    begin, end = chains.aims[k]
+    for i in _reach(search, image, h, window, aims, begin, end):
+        s = (aims.place[0, i], aims.place[1, i], aims.place[2, i])
+        way = minus(s, image)
+        full = length(way)
+        hs = dot(minus(s, cl), nl)
+        part = h / (h + hs)  # of the way at which the last mirror lies
+        stop = along(image, part, way)
+        way = (way[0] / full, way[1] / full, way[2] / full)
+        square = 0.5 * search.wavelength * full * part * (1 - part)
+        bounce, earlier, wide = stop, way, square
+        if two >= 0:
+            hb = dot(minus(stop, c1), n1)
+            if hb * h1 <= 0 or abs(hb) < 0.005:
+                continue
+            part *= h1 / (h1 + hb)
+            bounce, earlier = _crossing(source, stop, c1, n1), unit(minus(stop, source))
+            wide = 0.5 * search.wavelength * full * part * (1 - part)
+            if misses(bounce, earlier, wide, before):
+                continue
+        j = aims.scatterer[i]
+        cosine = facing(scatterers.normal[j], (-way[0], -way[1], -way[2]), scatterers.two_sided[j])
+        if cosine <= 0:
+            continue
+        leaving = minus(bounce, p)
+        size = gain_towards(leaving, rotation, search) / full
+        least = aims.weakest[i] / np.sqrt(cosine)
+        if _MOST * size <= least:
+            continue
+        passed = passes(stop, way, square, window)
+        if two >= 0:
+            passed *= passes(bounce, earlier, wide, before)
+        if abs(passed) * size <= least:
+            continue
+        now = unit(leaving)
+        sent = upright(up, now)
+        field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
+        if two >= 0:
+            after = unit(minus(stop, bounce))
+            field = reflected(field, now, after, n1, flat.reflection[one])
+            now = after
+        after = unit(minus(s, stop))
+        field = reflected(field, now, after, nl, flat.reflection[last])
+        value = size * passed * dot(field, upright(up, after))
+        if abs(value) > least:
+            hits.aim[n] = i
+            hits.amplitude[n] = value
+            n += 1
+    hits.count[k] = n - chains.slots[k]
+
+
+@njit(parallel=True, cache=True)
+def _courses(search, flat, chains, aims, hits, found, stops):
+    """The paths that exist, in a row."""
+    ends = np.cumsum(hits.count)
+    for k in prange(len(chains.frame)):
+        _course(search, flat, chains, aims, hits, (k, ends[k] - hits.count[k]), found, stops)
+
+
+@njit(cache=True)
+def _course(search, flat, chains, aims, hits, where, found, stops):
+    """Those over one chain, from a row on."""
+    k, first = where
+    p, one, two = vec(search.position[chains.frame[k]]), chains.mirrors[k, 0], chains.mirrors[k, 1]
+    c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
+    source = mirrored(p, c1, n1)
+    for i in range(hits.count[k]):
+        e, j = first + i, chains.slots[k] + i
+        found.candidate[e], found.amplitude[e] = aims.candidate[hits.aim[j]], hits.amplitude[j]
+        s = vec(aims.place[:, hits.aim[j]])
+        if two < 0:
+            begin = _crossing(source, s, c1, n1)
+            end, seen = begin, mirrored(s, c1, n1)
+        else:
+            c2, n2 = vec(flat.center[two]), vec(flat.normal[two])
+            end = _crossing(mirrored(source, c2, n2), s, c2, n2)
+            begin = _crossing(source, end, c1, n1)
+            seen = mirrored(mirrored(s, c2, n2), c1, n1)
+        for d in range(3):
+            stops[e, 0, d] = begin[d]
+            stops[e, 1, d] = end[d] if two >= 0 else s[d]
+            stops[e, 2, d] = s[d]
+            found.virtual[e, d] = seen[d]
+            found.last[e, d] = end[d]

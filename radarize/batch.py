@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
 
+from radarize.disturbance import Flaws, find_flaws
 from radarize.features.maps import MapMaker
 from radarize.heatmaps import HeatmapConfig, Heatmaps
 from radarize.points import DENSE, PointClouds
@@ -55,7 +56,12 @@ class Batch:
         valid: False where a chirp was lost; all true if None.
         numbers: of the frames, counted as the radar delivered them; from 0 if None.
         before: stamp of the frame before the first, s; None if there was none.
+
+    Attributes:
+        flaws: of the frames; None where nobody looked.
     """
+
+    flaws: Flaws | None = None
 
     def __init__(
         self,
@@ -122,11 +128,12 @@ class Intake:
     Attributes:
         taken: frames so far.
         lost: of these, frames that are lost, nearly lost, or silent: left out, for a gap says more than nothing does.
+        disturbed: chirps that were disturbed, which count as lost.
     """
 
     def __init__(self, signal: Signal):
         self.signal = signal
-        self.taken = self.lost = 0
+        self.taken = self.lost = self.disturbed = 0
         self._before: float | None = None
 
     def take(
@@ -136,14 +143,16 @@ class Intake:
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
     ) -> Batch:
         """The next frames, without those that are left out; arguments are those of `Batch`."""
-        used = samples.reshape(len(samples), -1).any(axis=1)
-        if valid is not None:
-            used &= valid.mean(axis=(1, 2)) >= LEAST_SHARE
-            valid = valid[used]
+        valid = np.ones(samples.shape[:3], bool) if valid is None else valid
+        flaws = find_flaws(samples, valid)
+        valid = valid & ~flaws.disturbed
+        used = samples.reshape(len(samples), -1).any(axis=1) & (valid.mean(axis=(1, 2)) >= LEAST_SHARE)
         numbers = self.taken + np.flatnonzero(used)
         self.taken += len(used)
         self.lost += int(np.count_nonzero(~used))
-        batch = Batch(self.signal, samples[used], np.asarray(stamps, float)[used], valid, numbers, self._before)
+        self.disturbed += int(np.count_nonzero(flaws.disturbed))
+        batch = Batch(self.signal, samples[used], np.asarray(stamps, float)[used], valid[used], numbers, self._before)
+        batch.flaws = flaws.of(used)
         if len(batch):
             self._before = float(batch.stamps[-1])
         return batch

@@ -187,8 +187,7 @@ def live(
         most = _frames_within(duration, frames, radar.frame_period)
         live.run(stream, stopping, frames=most, writer=writer, progress=report)
         warnings = stream.troubles() + live.losses.warnings()
-    for words in (*warnings, *live.blindness.warnings()):
-        typer.echo(f"warning: {words}", err=True)
+    _warn([*warnings, *live.health.warnings(), *live.pipeline.slam.warnings()])
     print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
 
 
@@ -264,9 +263,13 @@ def run_(
             recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,
             progress=report,
         )  # fmt: skip
-    for words in RunFolder(written).facts["warnings"]:
-        typer.echo(f"warning: {words}", err=True)
+    _warn(RunFolder(written).warnings)
     print(written)
+
+
+def _warn(warnings: list[str]) -> None:
+    for words in warnings:
+        typer.echo(f"warning: {words}", err=True)
 
 
 @app.command("config")
@@ -340,12 +343,15 @@ def slam(
     SCANS holds ranges (scan, beam), angle_min, angle_increment, range_max and, unless one a second, times.
     """
     from radarize.log import run
+    from radarize.runfolder import RunFolder
     from radarize.slam.config import SlamConfig
 
     name = preset or ("radar" if scans.is_dir() else "lidar")
     settings = SlamConfig.load(config, name) if config else SlamConfig.preset(name)
     with progress("slam") as report:
-        print(run(scans, odometry, output, config=settings, reference=reference, progress=report))
+        written = run(scans, odometry, output, config=settings, reference=reference, progress=report)
+    _warn(RunFolder(written).warnings)
+    print(written)
 
 
 @app.command()

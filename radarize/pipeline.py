@@ -15,6 +15,7 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from radarize.batch import Batch
+from radarize.disturbance import Flaws
 from radarize.mapping.scans import BEARINGS
 from radarize.odometry.integration import Track
 from radarize.slam.backend import Slam
@@ -46,11 +47,13 @@ class Result:
         frames: numbers of its frames, counted as the radar delivered them.
         track: of these frames: poses, covariances, velocities.
         ranges: scans on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen.
+        flaws: of these frames; None where nobody looked.
     """
 
     frames: Int[np.ndarray, "frame"]
     track: Track
     ranges: Float32[np.ndarray, "frame bearing"]
+    flaws: Flaws | None = None
 
 
 class Pipeline:
@@ -85,7 +88,8 @@ class Pipeline:
                 for time, pose, covariance, scan in zip(track.time, track.pose, track.covariance, ranges, strict=True):
                     self.slam.add_odometry(time, pose, covariance)
                     self.slam.add_scan(time, BEARINGS, scan)
-            return Result(batch.numbers[used], track, ranges.astype(np.float32))
+            flaws = None if batch.flaws is None else batch.flaws.of(used)
+            return Result(batch.numbers[used], track, ranges.astype(np.float32), flaws)
 
     def follow(self, batches: Iterable[Batch]) -> Iterator[Result]:
         """Push all of a stream's batches that hold frames, then finish."""

@@ -84,7 +84,7 @@ def run_each(
 
     def make(folder: Path) -> None:
         pipelines[folder] = workshop.pipeline(*pairs[folder])
-        writers[folder] = stack.enter_context(RunWriter(folder))
+        writers[folder] = stack.enter_context(RunWriter(folder, source.config))
 
     def end(folder: Path) -> None:
         if intake.lost == intake.taken:
@@ -95,6 +95,7 @@ def run_each(
         writer.describe(source, inputs.signal.heatmaps)
         told = {
             "frames_lost": intake.lost,
+            "chirps_disturbed": intake.disturbed,
             "methods": dict(zip(("odometry", "scans"), pairs[folder], strict=True)) | dict(facts or {}),
             "configuration": inputs.configuration.model_dump(),
         }

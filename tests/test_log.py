@@ -7,11 +7,13 @@ import h5py
 import numpy as np
 import pytest
 
+from radarize.cli import app
 from radarize.console import run as run_app
 from radarize.errors import InputError
 from radarize.log import Log, run
 from radarize.pose import between
-from radarize.runfolder import OccupancyMap
+from radarize.report.run import report_run
+from radarize.runfolder import OccupancyMap, RunFolder
 from radarize.slam.config import SlamConfig
 from radarize.tum import planar_poses, read_tum, write_tum
 from tests.slam.world import box, scan
@@ -32,8 +34,6 @@ def files(folder, **changes):
 def test_what_is_written(tmp_path, capsys):
     scans, odometry = files(tmp_path)
     with pytest.raises(SystemExit) as stopped:
-        from radarize.cli import app
-
         run_app(app, "radarize", ["slam", str(scans), str(odometry), "-o", str(tmp_path / "RUN"),
                                   "--reference", str(odometry)])  # fmt: skip
     assert stopped.value.code == 0
@@ -50,6 +50,21 @@ def test_what_is_written(tmp_path, capsys):
     again = run(tmp_path / "RUN", None, tmp_path / "RUN2", config=SlamConfig.preset("lidar"))
     assert (again / "trajectory.tum").read_bytes() == (tmp_path / "RUN" / "trajectory.tum").read_bytes()
     assert (again / "reference.tum").is_file()
+
+
+def test_a_graph_that_cannot_be_solved_for_covariances_ends_no_run(tmp_path, capsys, monkeypatch):
+    def refuse(graph, values):
+        raise RuntimeError("Indeterminate linear system detected while working near variable 4")
+
+    monkeypatch.setattr("gtsam.Marginals", refuse)
+    monkeypatch.setattr("radarize.slam.posegraph._by_qr", refuse)
+    with pytest.raises(SystemExit) as stopped:
+        run_app(app, "radarize", ["slam", *map(str, files(tmp_path)), "-o", str(tmp_path / "RUN")])
+    assert stopped.value.code == 0
+    (warning,) = RunFolder(tmp_path / "RUN").warnings
+    assert "could not be solved for covariances" in warning and f"warning: {warning}" in capsys.readouterr().err
+    assert np.isfinite(RunFolder(tmp_path / "RUN").scans["trajectory_covariance"]).all()
+    assert warning in report_run(tmp_path / "RUN").read_text()
 
 
 def test_without_odometry(tmp_path):

@@ -11,8 +11,8 @@ from radarize.batch import Intake
 from radarize.capture.page import Page
 from radarize.capture.stream import Stream, follow
 from radarize.capture.view import View
+from radarize.health import Health
 from radarize.methods.registry import Inputs, Workshop
-from radarize.odometry.blindness import Blindness
 from radarize.recording import Losses, RecordingWriter
 from radarize.stopwatch import stage
 
@@ -32,7 +32,7 @@ class Live:
 
     Attributes:
         losses: of the frames that came.
-        blindness: of the odometry.
+        health: of the pipeline.
         busy: s spent on the frames so far, showing them included.
     """
 
@@ -40,7 +40,7 @@ class Live:
         self.pipeline, self.page = Workshop(inputs).pipeline(**methods), page
         self.intake = Intake(inputs.signal)
         self.view = View(self.pipeline, inputs.signal)
-        self.losses, self.blindness = Losses(), Blindness()
+        self.losses, self.health = Losses(), Health(inputs.radar)
         self.busy = 0.0
         self._frame_due = self._map_due = 0.0
 
@@ -71,7 +71,7 @@ class Live:
             adc, stamps, valid = came["adc"], came["time"], came["valid"]
             if batch := self.intake.take(adc, stamps, valid):
                 result = self.pipeline.push(batch)
-                self.blindness.add(result.frames, result.track)
+                self.health.add(result)
                 with stage("page"):
                     self.view.add(result)
             self.losses.add(valid)
@@ -86,8 +86,8 @@ class Live:
         self.page.send("end", {"troubles": self._troubles(stream)})
 
     def _troubles(self, stream: Stream) -> list[str]:
-        """What is wrong so far, and where the odometry was blind."""
-        return [*stream.troubles(), *self.blindness.warnings()]
+        """What is wrong so far, and where odometry had a hard time."""
+        return [*stream.troubles(), *self.health.warnings()]
 
     def _show(self, stream: Stream, adc: np.ndarray, valid: np.ndarray, stamp: float) -> None:
         now = time.monotonic()

@@ -5,6 +5,7 @@ trusted to the last that could not. Spans that sight parts for less than `BLINK`
 in the end is a blink, which the filters are made for, and is left out.
 """
 
+from collections.abc import Iterable
 from typing import Annotated
 
 import numpy as np
@@ -15,7 +16,8 @@ from radarize.odometry.integration import Track
 
 #: s
 BLINK = 0.3
-_CAUSES = ("no velocity", "no turn", "frames lost")
+#: Why, in the order in which they are named.
+CAUSES = ("no velocity", "no turn", "frames lost")
 
 
 Finite = Annotated[float, Field(allow_inf_nan=False), PlainSerializer(lambda value: round(value, 4))]
@@ -44,6 +46,30 @@ class BlindSpans(BaseModel):
     spans: list[Span]
 
 
+class Spans:
+    """Joins frames of which something is true to spans; memory grows with their number alone."""
+
+    def __init__(self):
+        self._spans: list[Span] = []
+
+    def add(self, start: float, stop: float, way: float, causes: Iterable[str]) -> None:
+        """Join the next stretch (s, m), some of `CAUSES` or another one being its cause, with the last, or begin a new
+        one."""
+        causes = {*causes}
+        span = self._spans.pop() if self._spans else None
+        if span and 0 <= start - span.stop_s < BLINK:
+            start, way, causes = span.start_s, span.way_m + way, causes | {*span.why.split(" and ")}
+        elif span and span.lasts >= BLINK:
+            self._spans.append(span)
+        why = " and ".join(sorted(causes, key=lambda cause: (*CAUSES, cause).index(cause)))
+        self._spans.append(Span(start_s=start, stop_s=stop, way_m=way, why=why))
+
+    @property
+    def found(self) -> list[Span]:
+        """All so far that are no blinks, in order of time."""
+        return sorted((span for span in self._spans if span.lasts >= BLINK), key=lambda span: span.start_s)
+
+
 class Blindness:
     """Finds the spans of a stream; memory grows with their number alone.
 
@@ -53,7 +79,7 @@ class Blindness:
 
     def __init__(self):
         self.way = 0.0
-        self._spans: list[Span] = []
+        self._spans = Spans()
         self._first = 0.0
         self._last: tuple[int, float] | None = None  # number and time of the frame before
 
@@ -69,30 +95,20 @@ class Blindness:
             # Frames that are left out on purpose come at a pace.
             lost = number - before > 1 and time - since >= BLINK
             if not velocity or not turn or lost:
-                self._extend(float(since), float(time), float(way), (not velocity, not turn, lost))
+                flags = not velocity, not turn, lost
+                causes = (cause for cause, is_so in zip(CAUSES, flags, strict=True) if is_so)
+                self._spans.add(float(since), float(time), float(way), causes)
             self._last = int(number), float(time)
 
     def lost(self, start: float, stop: float) -> None:
         """Say that there are no frames from `start` to `stop` (s), at either end of the stream."""
         if stop - start >= BLINK:
-            self._extend(start, stop, 0.0, (False, False, True))
-            self._spans.sort(key=lambda span: span.start_s)
-
-    def _extend(self, start: float, stop: float, way: float, flags: tuple[bool, ...]) -> None:
-        """Join the next span, `flags` of whose `_CAUSES` are true, with the last one, or begin a new one."""
-        causes = {cause for cause, is_so in zip(_CAUSES, flags, strict=True) if is_so}
-        span = self._spans.pop() if self._spans else None
-        if span and 0 <= start - span.stop_s < BLINK:
-            start, way, causes = span.start_s, span.way_m + way, causes | {*span.why.split(" and ")}
-        elif span and span.lasts >= BLINK:
-            self._spans.append(span)
-        why = " and ".join(cause for cause in _CAUSES if cause in causes)
-        self._spans.append(Span(start_s=start, stop_s=stop, way_m=way, why=why))
+            self._spans.add(start, stop, 0.0, ("frames lost",))
 
     @property
     def found(self) -> BlindSpans:
         """All so far, in order of time."""
-        spans = [span for span in self._spans if span.lasts >= BLINK]
+        spans = self._spans.found
         way = sum(span.way_m for span in spans)
         return BlindSpans(share_of_way=way / self.way if self.way > 0 else 0.0, way_m=way, spans=spans)
 

@@ -37,11 +37,15 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     page = Page(f"Run {folder.path.resolve().name}", _about(folder, errors))
     if errors:
         _result(page, metrics)
+    for sentence in folder.warnings:
+        page.text(f"Warning: {sentence}.")
     if blind:
         sentence, spans = words.blindness(blind)
         page.text(sentence)
         if spans.rows:
             page.table(*spans, sortable=True)
+    if health := folder.health:
+        page.table(*words.health(health), sortable=True)
     if errors and others:
         page.section("Beside other methods", "The same recording; odometry and SLAM against the truth.")
         rows = [(methods(folder), metrics), *((methods(other), evaluate(other)) for other in others)]

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from radarize.evaluation.figures import Figure
+from radarize.health import Condition
 from radarize.odometry.blindness import BlindSpans
 
 _TRAJECTORY = (
@@ -97,6 +98,12 @@ def beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> Table:
     head = ("method", *(figure.title for figure in _BESIDE))
     rows = [(name, *(figure.text(metrics, unit=False) for figure in _BESIDE)) for name, metrics in runs]
     return Table(head, rows, range(1, len(head)))
+
+
+def health(found: Sequence[Condition]) -> Table:
+    """Where odometry had a hard time, and what would help."""
+    rows = [(f"{each.start_s:.1f}", f"{each.stop_s:.1f}", each.kind, each.advice) for each in found]
+    return Table(("from, s", "to, s", "what", "advice"), rows, (0, 1))
 
 
 def blindness(found: BlindSpans) -> tuple[str, Table]:

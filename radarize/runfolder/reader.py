@@ -10,11 +10,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 from jaxtyping import Float
-from pydantic import ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from radarize.errors import InputError, explained
 from radarize.files import regular
 from radarize.hdf5 import dataset, open_hdf5
+from radarize.health import Condition
 from radarize.jsonfile import read_json
 from radarize.odometry.blindness import BlindSpans
 from radarize.plain import complaint
@@ -96,6 +97,18 @@ class RunFolder:
         return {name: str(value) for name, value in found.items()}
 
     @property
+    def warnings(self) -> list[str]:
+        """What ``run.json`` warns of.
+
+        Raises:
+            InputError: it is damaged.
+        """
+        found = self.facts.get("warnings", [])
+        if not isinstance(found, list):
+            raise InputError(f"{self.path / 'run.json'}: warnings is {str(found)[:60]!r}, expected a list")
+        return [str(words) for words in found]
+
+    @property
     def blind(self) -> BlindSpans | None:
         """Where odometry was blind, in s since the first pose; None where ``run.json`` does not say, as of old.
 
@@ -111,6 +124,22 @@ class RunFolder:
         start = float(self.trajectory[0][0])
         for span in found.spans:
             span.start_s, span.stop_s = span.start_s - start, span.stop_s - start
+        return found
+
+    @property
+    def health(self) -> list[Condition]:
+        """Where odometry had a hard time, in s since the first pose; empty where ``run.json`` does not say.
+
+        Raises:
+            InputError: it says something else.
+        """
+        try:
+            found = TypeAdapter(list[Condition]).validate_python(self.facts.get("health", []))
+        except ValidationError as error:
+            raise InputError(f"{self.path / 'run.json'}: health.{complaint(error)}") from error
+        start = float(self.trajectory[0][0])
+        for each in found:
+            each.start_s, each.stop_s = each.start_s - start, each.stop_s - start
         return found
 
     @cached_property

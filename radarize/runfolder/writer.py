@@ -16,10 +16,11 @@ from jaxtyping import Shaped
 
 from radarize import __version__
 from radarize.errors import InputError, explained
+from radarize.health import Health
 from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS
-from radarize.odometry.blindness import Blindness
 from radarize.pipeline import Result
+from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.replacing import Replacement
 from radarize.runfolder.occupancy import OccupancyMap
@@ -40,21 +41,24 @@ class RunWriter:
     """A sink of the pipeline that writes a run folder; a context manager. What is not finished when it exits leaves
     nothing behind, and a run that was there as it was.
 
-        with RunWriter(folder) as writer:
+        with RunWriter(folder, radar) as writer:
             for result in pipeline.follow(batches):
                 writer.add(result)
             writer.describe(recording, heatmaps)
             writer.finish(pipeline.slam, facts)
 
+    Args:
+        radar: configuration; None of a session that no radar's frames are added to.
+
     Attributes:
-        blindness: of the odometry so far.
+        health: of the pipeline so far.
 
     Raises:
         InputError: the folder cannot be written.
     """
 
-    def __init__(self, folder: str | Path):
-        self.folder, self.blindness = Path(folder), Blindness()
+    def __init__(self, folder: str | Path, radar: RadarConfig | None = None):
+        self.folder, self.health = Path(folder), None if radar is None else Health(radar)
         self._facts: dict[str, object] = {}
         self._files = Replacement(self.folder, FILES)
         try:
@@ -80,7 +84,7 @@ class RunWriter:
         track = result.track
         if not len(track.time):
             return
-        self.blindness.add(result.frames, track)
+        self.health.add(result)
         self.extend("time", track.time, "s, burst middles")
         self.extend("frames", result.frames, "numbers in the recording")
         self.extend("ranges", result.ranges, "m, inf: nothing seen")
@@ -98,15 +102,17 @@ class RunWriter:
         times, period, name = self._scans["time"], recording.config.frame_period, recording.path.name
         attributes = {k: v for k, v in recording.attributes.items() if isinstance(v, str | int | float)}
         centers = recording.times[[0, -1]] + recording.config.burst_center
-        self.blindness.lost(float(centers[0]), float(times[0]))
-        self.blindness.lost(float(times[-1]), float(centers[1]))
+        blindness = self.health.blindness
+        blindness.lost(float(centers[0]), float(times[0]))
+        blindness.lost(float(times[-1]), float(centers[1]))
         self._facts |= {
             "recording": name,
             "recording_attributes": attributes,
             "frames": len(recording),
             "duration_s": float(times[-1] - times[0] + period),
-            "blind": self.blindness.found.model_dump(),
-            "warnings": self.blindness.warnings(),
+            "blind": blindness.found.model_dump(),
+            "health": [each.model_dump() for each in self.health.found],
+            "warnings": self.health.warnings(),
             "radar": recording.config.model_dump(mode="json"),
         }
         self.put("azimuths", BEARINGS, "rad")
@@ -153,6 +159,7 @@ class RunWriter:
         times, poses = slam.trajectory()
         self.write_poses("trajectory", (times, planar_poses(poses)))
         made = {
+            "warnings": [*self._facts.get("warnings", ()), *slam.warnings()],
             "nodes": len(slam.nodes),
             "submaps": len(slam.submaps),
             "skipped": slam.skipped,

@@ -160,6 +160,15 @@ class Slam:
         before = np.maximum(after - 1, 0)
         return self.graph.covariances()[np.where(times - knots[before] <= knots[after] - times, before, after)]
 
+    def warnings(self) -> list[str]:
+        """One sentence where covariances could not be solved for, or none."""
+        if self.graph.solved:
+            return []
+        return [
+            "the pose graph could not be solved for covariances: those of odometry alone stand in, and loops were "
+            "searched as widely as these say"
+        ]
+
     def map(self) -> OccupancyGrid:
         """Occupancy grid of all nodes, drawn anew at their optimised poses."""
         grid = OccupancyGrid.empty(self.config.grid.map_resolution)

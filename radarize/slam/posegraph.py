@@ -10,6 +10,7 @@ import gtsam
 import numpy as np
 from jaxtyping import Float
 
+from radarize.pose import adjoint, between
 from radarize.slam.rows import Rows
 
 
@@ -25,12 +26,14 @@ class PoseGraph:
     Attributes:
         closures: (of, to) of all closures.
         accepted: (closure,) of each, whether it is believed.
+        solved: False once `covariances` could not be solved for.
     """
 
     def __init__(self, inlier_probability: float = 0.99):
         self.inlier_probability = inlier_probability
         self.closures: list[tuple[int, int]] = []
         self.accepted = np.zeros(0, bool)
+        self.solved = True
         self._poses = Rows(3)
         self._certain: list[gtsam.BetweenFactorPose2] = []
         self._matches: list[gtsam.BetweenFactorPose2] = []
@@ -103,11 +106,30 @@ class PoseGraph:
         self._isam = None
 
     def covariances(self) -> Float[np.ndarray, "node 3 3"]:
-        """Marginal covariance of every node for (x, y, yaw) in its own frame, given that node 0 is exact."""
+        """Marginal covariance of every node for (x, y, yaw) in its own frame, given that node 0 is exact; where no
+        solver finds it, that of odometry alone, and `solved` is False."""
         if not len(self.poses):
             return np.zeros((0, 3, 3))
-        marginals = gtsam.Marginals(self._graph(self._believed()), self._values())
-        return np.stack([marginals.marginalCovariance(k) for k in range(len(self.poses))])
+        graph, values = self._graph(self._believed()), self._values()
+        for solve in (gtsam.Marginals, _by_qr):
+            try:
+                solution = solve(graph, values)
+                found = np.stack([solution.marginalCovariance(k) for k in range(len(self.poses))])
+            except RuntimeError:
+                continue
+            if np.isfinite(found).all() and (found.diagonal(axis1=1, axis2=2) > 0).all():
+                return found
+        self.solved = False
+        return self._reckoned()
+
+    def _reckoned(self) -> Float[np.ndarray, "node 3 3"]:
+        """What odometry alone leaves unknown of every node: at least what it is with matches and closures."""
+        found = np.zeros((len(self.poses), 3, 3))
+        for factor in self._certain:
+            of, to = factor.keys()
+            carry = adjoint(between(self.poses[to], self.poses[of]))
+            found[to] = carry @ found[of] @ carry.T + factor.noiseModel().covariance()
+        return found
 
     def _believed(self) -> list:
         new = np.ones(len(self._matches) - len(self._matches_kept), bool)
@@ -144,6 +166,13 @@ class PoseGraph:
 def _factor(of, to, relative, covariance) -> gtsam.BetweenFactorPose2:
     noise = gtsam.noiseModel.Gaussian.Covariance(covariance)
     return gtsam.BetweenFactorPose2(of, to, gtsam.Pose2(*relative), noise)
+
+
+def _by_qr(graph: gtsam.NonlinearFactorGraph, values: gtsam.Values) -> gtsam.ISAM2:
+    """Slower than Cholesky, whose squares of residuals have twice the digits to lose."""
+    solution = gtsam.ISAM2(_incremental("QR"))
+    solution.update(graph, values)
+    return solution
 
 
 def _levenberg() -> gtsam.LevenbergMarquardtParams:

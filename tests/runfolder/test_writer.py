@@ -11,12 +11,13 @@ import pytest
 from radarize.errors import InputError
 from radarize.mapping.scans import BEARINGS
 from radarize.pipeline import Result
+from radarize.radar.presets import PRESETS
 from radarize.runfolder import RunFolder, RunWriter
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.tum import planar_poses, write_tum
 
-RNG = np.random.default_rng(0)
+RNG, RADAR = np.random.default_rng(0), PRESETS["radarize"]
 
 
 def result(first, count):
@@ -44,7 +45,7 @@ def session(results):
 
 
 def write(folder, results, facts=None):
-    with RunWriter(folder) as writer:
+    with RunWriter(folder, RADAR) as writer:
         for each in results:
             writer.add(each)
         writer.put("azimuths", BEARINGS, "rad")
@@ -64,7 +65,7 @@ def test_what_is_written_is_read(tmp_path):
     assert times == pytest.approx(run.scans["time"]) and poses[:, 0] == pytest.approx(0.02 * run.scans["frames"])
     assert len(run.trajectory[0]) == 61 and run.reference is None and run.map.occupied.any() and run.metrics == {}
     assert run.facts["nodes"] > 1 and run.methods == {"odometry": "doppler", "scans": "first-echo"}
-    assert [span.why for span in writer.blindness.found.spans] == ["frames lost", "no velocity"]
+    assert [span.why for span in writer.health.blindness.found.spans] == ["frames lost", "no velocity"]
     assert {path.name for path in run.path.iterdir()} == {
         "trajectory.tum", "odometry.tum", "map.pgm", "map.yaml", "scans.h5", "run.json",
     }  # fmt: skip
@@ -90,7 +91,7 @@ def test_a_run_that_fails_leaves_the_old_one_as_it_was(tmp_path, monkeypatch, er
         raise error
 
     for folder in (tmp_path / "old", tmp_path / "new"):
-        with pytest.raises(BaseException) as met, RunWriter(folder) as writer:
+        with pytest.raises(BaseException) as met, RunWriter(folder, RADAR) as writer:
             writer.add(result(0, 16))
             with monkeypatch.context() as patch:
                 patch.setattr("radarize.runfolder.writer.json.dumps", fail)
@@ -98,7 +99,7 @@ def test_a_run_that_fails_leaves_the_old_one_as_it_was(tmp_path, monkeypatch, er
         assert met.type is (InputError if isinstance(error, OSError) else type(error))
     assert {path.name: path.read_bytes() for path in (tmp_path / "old").iterdir()} == before
     assert [path.name for path in tmp_path.iterdir()] == ["old"]
-    with RunWriter(tmp_path / "new") as writer:
+    with RunWriter(tmp_path / "new", RADAR) as writer:
         writer.add(result(0, 16))  # and is given up
     assert not (tmp_path / "new").exists()
 
@@ -113,7 +114,7 @@ def test_what_one_who_died_left_is_no_run_and_in_nobodys_way(tmp_path):
 
 
 def test_memory_does_not_grow_with_what_is_written(tmp_path):
-    with RunWriter(tmp_path / "RUN") as writer:
+    with RunWriter(tmp_path / "RUN", RADAR) as writer:
         batch, taken = result(0, 16), []
         tracemalloc.start()
         for k in range(300):

@@ -87,6 +87,35 @@ def test_steps_known_to_a_tenth_of_a_millimetre_beside_such_that_are_not_known_a
     assert np.isfinite(graph.poses).all() and np.isfinite(graph.covariances()).all()
 
 
+def chain(known, unknown):
+    """Steps of 0.3 m with the variance `known`, one in their middle with `unknown`, and a loop as loose."""
+    graph = PoseGraph()
+    graph.add_node(np.zeros(3))
+    for k in range(5):
+        graph.add_node(compose(graph.poses[-1], np.array([0.3, 0, 0])))
+        graph.add_motion(k, k + 1, np.array([0.3, 0, 0]), np.eye(3) * (unknown if k == 2 else known))
+    graph.add_closure(0, 5, np.array([1.5, 0, 0]), np.eye(3) * unknown)
+    graph.believe(0)
+    return graph
+
+
+def test_covariances_that_cholesky_cannot_solve_for():
+    """Yaw is told by the step, by the loop, and by where both put the end, 0.6 m away."""
+    graph = chain(1e-8, 100.0)
+    yaw = 1 / (1 / 100 + 1 / 100 + 0.6**2 / (100 + 100))
+    np.testing.assert_allclose(graph.covariances()[:, 2, 2], [0, 1e-8, 2e-8, yaw, yaw, yaw], rtol=1e-3, atol=2e-12)
+    assert graph.solved
+
+
+def test_covariances_that_nothing_can_solve_for_are_those_of_odometry():
+    graph = chain(1e-16, 1e20)
+    found = graph.covariances()
+    np.testing.assert_allclose(found[:, 2, 2], [0, 1e-16, 2e-16, 1e20, 1e20, 1e20], rtol=1e-6)
+    # A yaw not known by s leaves what lies 0.6 m further not known by 0.6 s across, and by nothing more along.
+    np.testing.assert_allclose(found[5, :2, :2], np.diag([1e20, 1.36e20]), rtol=1e-6)
+    assert not graph.solved
+
+
 def test_empty_and_single():
     graph = PoseGraph()
     graph.optimise()

@@ -255,7 +255,9 @@ def test_what_is_missing_is_said_in_a_sentence(real, tmp_path):
 
     assert "no frame lies between two of its poses" in refused(altered(real, tmp_path / "clock.h5", other_clock))
     shifted = altered(
-        real, tmp_path / "shifted.h5", lambda poses, file: file["radar/time"].__setitem__(..., file["radar/time"][:] + 1e3) or poses
+        real,
+        tmp_path / "shifted.h5",
+        lambda poses, file: file["radar/time"].__setitem__(..., file["radar/time"][:] + 1e3) or poses,
     )
     with pytest.raises(InputError, match="has no frame with the stamp of a frame"):
         compare(real, shifted)

@@ -14,37 +14,26 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import torch
-from jaxtyping import Bool
 from torch import Generator, Tensor
 
 from benchmarks.results import Data, Network, command_line, publish
 from benchmarks.results import Walk as Facts
-from radarize import polar
 from radarize.clouds import Apart
 from radarize.console import progress
 from radarize.features.maps import Maps
 from radarize.methods.method import Weights
 from radarize.methods.pictures.network import PictureNet
 from radarize.methods.pictures.points import points
-from radarize.methods.pictures.training import (
-    LEAST,
-    TURN,
-    UNKNOWN,
-    ZOOM,
-    entropy,
-    rolled,
-    unpacked,
-    zoomed,
-)
+from radarize.methods.pictures.training import LEAST, elsewhere, entropy, unpacked
 from radarize.nets.weights import Header, build, load, save
 from radarize.radar.presets import PRESETS
-from radarize.walks import FIRST, PERIOD, Walk
+from radarize.walks import FIRST, PERIOD, TRAINING, Walk
 
 #: Walks by how many of them are shown; steps and rates of both trainings.
 SHOWN = {
     1: (112,),
     5: (112, 118, 123, 129, 136),
-    25: (*range(112, 117), *range(118, 124), *range(125, 132), *range(133, 139), 140),
+    25: TRAINING,
 }
 RATES = {"alone": 1e-3, "tuned": 3e-4}
 STEPS = {
@@ -87,20 +76,6 @@ class Seen:
         return pictures[:, :, None], unpacked(torch.stack([self.lidar[walk][k] for walk, k in items]))
 
 
-def augmented(pictures: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
-    """Mirrored, of larger and smaller and of turned worlds, as in the training on simulated walks."""
-
-    def draw(low: float, high: float) -> Tensor:
-        return low + (high - low) * torch.rand(len(label), generator=generator, device=label.device)
-
-    left, pictures = draw(0.0, 1.0)[:, None, None] < 0.5, pictures[:, :, 0]
-    pictures = torch.where(left[..., None], pictures.flip(3), pictures)
-    label = torch.where(left, label.flip(2), label)
-    factor, turn = draw(1 - ZOOM, 1 + ZOOM), draw(-TURN, TURN).round().long()
-    pictures = rolled(zoomed(pictures, factor), turn, 0.0)
-    return pictures[:, :, None], rolled(zoomed(label[:, None], factor), 2 * turn, UNKNOWN)[:, 0]
-
-
 def trained(
     seen: Seen, start: Path | None, rate: float, steps: int, report: Callable[[], None]
 ) -> tuple[PictureNet, Header]:
@@ -118,7 +93,7 @@ def trained(
             rate * min(1, 20 * (step + 1) / steps) * (1 + math.cos(math.pi * step / steps)) / 2
         )
         chosen = [items[k] for k in rng.integers(0, len(items), BATCH)]
-        pictures, label = augmented(*seen.windows(chosen, header.frames), generator)
+        pictures, label = elsewhere(*seen.windows(chosen, header.frames), generator)
         loss = entropy(net(pictures), label).mean()
         optimiser.zero_grad()
         loss.backward()
@@ -136,12 +111,9 @@ def least(net: PictureNet, seen: Seen, window: int, every: int = 12) -> float:
         pictures, label = seen.windows([item], window)
         likely = net.estimate(pictures)
         for value, found in apart.items():
-            found.append(_chamfer(points(likely, value)[0].cpu().numpy(), label[0].bool().cpu().numpy()))
+            shown = points(likely, value)[0].cpu().numpy()
+            found.append(Apart.of_pictures(shown, label[0].bool().cpu().numpy()).chamfer)
     return min(apart, key=lambda value: np.nanmedian(apart[value]))
-
-
-def _chamfer(found: Bool[np.ndarray, "row column"], true: Bool[np.ndarray, "row column"]) -> float:
-    return Apart.of(polar.cartesian(found), polar.cartesian(true)).chamfer
 
 
 PARSER = command_line(
@@ -183,7 +155,7 @@ def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, float],
             pictures = torch.from_numpy(np.stack([walk.radar(k) for k in frames]))[None, :, None].float()
             with torch.inference_mode():
                 cells = points(net.estimate(pictures), net.least)[0].numpy()
-            apart.append(Apart.of(polar.cartesian(cells), polar.cartesian(walk.lidar(end))).chamfer)
+            apart.append(Apart.of_pictures(cells, walk.lidar(end)).chamfer)
         found[walk.number] = float(np.nanmedian(apart))
     return found, header
 

@@ -20,7 +20,7 @@ from benchmarks.results import Walk as Facts
 from radarize import polar
 from radarize.console import progress
 from radarize.tum import planar_poses, write_tum
-from radarize.walkposes import BEARINGS, lidar_poses, scan, true_poses
+from radarize.walkposes import BEARINGS, lidar_poses, scan, stamps, true_poses
 from radarize.walks import PERIOD, Walk
 from radarize.yamlfile import read_yaml
 from radarsim.motion import motion_from_tum
@@ -62,15 +62,19 @@ _MARGIN = 20
 Pictures = UInt8[np.ndarray, "frame range azimuth"]
 
 
-def scene(walk: Walk, poses: Float[np.ndarray, "frame 3"], assumed: Assumed, folder: Path) -> Path:
-    """The scene that the walk's lidar saw."""
+def lidar_log(walk: Walk, poses: Float[np.ndarray, "frame 3"], folder: Path) -> Path:
+    """What the walk's lidar saw, as scenes are imported from."""
     ranges = np.stack([scan(polar.cartesian(walk.lidar(frame))) for frame in range(walk.frames)])
-    log = folder / f"{walk.number}.scans.npz"
-    step = BEARINGS[1] - BEARINGS[0]
+    log, step = folder / f"{walk.number}.scans.npz", BEARINGS[1] - BEARINGS[0]
     far = np.where(np.isfinite(ranges), ranges, 2 * polar.REACH)
     np.savez(log, ranges=far, angle_min=BEARINGS[0], angle_increment=step, range_max=polar.REACH)
-    write_tum(folder / f"{walk.number}.truth.tum", PERIOD * np.arange(walk.frames), planar_poses(poses))
-    path = import_scene(log, folder / f"{walk.number}.yaml", height=assumed.room).path
+    write_tum(folder / f"{walk.number}.truth.tum", stamps(walk.frames), planar_poses(poses))
+    return log
+
+
+def scene(log: Path, assumed: Assumed) -> Path:
+    """The scene that a lidar saw."""
+    path = import_scene(log, log.with_name(log.name.replace(".scans.npz", ".yaml")), height=assumed.room).path
     found = read_yaml(path)
     for part in found["objects"]:
         part["material"] = assumed.walls if part["name"] == "walls" else part["material"]
@@ -84,7 +88,7 @@ def simulated(
     """Pictures of some frames of the same drive."""
     drive = planar_poses(poses)
     drive[:, 2] = height
-    tum = write_tum(path.with_suffix(".drive.tum"), PERIOD * np.arange(len(poses)), drive)
+    tum = write_tum(path.with_suffix(".drive.tum"), stamps(len(poses)), drive)
     scenario = Scenario(Scene.load(str(path)), motion_from_tum(tum), CONFIG, seed=seed)
     parts = (frames[k : k + TOGETHER] for k in range(0, len(frames), TOGETHER))
     return np.concatenate(
@@ -135,9 +139,10 @@ def main() -> None:
     with progress("twins") as report, tempfile.TemporaryDirectory() as folder:
         for number, walk in enumerate(walks):
             poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
+            log = lidar_log(walk, poses, Path(folder))
             for done, (about, assumed) in enumerate(ASSUMED.items()):
                 report(number * len(ASSUMED) + done, len(walks) * len(ASSUMED))
-                path = scene(walk, poses, assumed, Path(folder))
+                path = scene(log, assumed)
                 twin = simulated(path, poses, assumed.sensor, frames[number], options.seed)
                 other = real[(number + 1) % len(walks)]
                 rows.append({"walk": walk.number, "assumed": about, **compared(twin, real[number], other)})

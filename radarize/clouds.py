@@ -3,8 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.spatial import cKDTree
+
+from radarize import polar
 
 
 @dataclass(frozen=True)
@@ -26,3 +28,8 @@ class Apart:
             return cls(np.nan, np.nan)
         there, back = cKDTree(true).query(found)[0], cKDTree(found).query(true)[0]
         return cls((there.mean() + back.mean()) / 2, max(np.median(there), np.median(back)))
+
+    @classmethod
+    def of_pictures(cls, found: Bool[np.ndarray, "range azimuth"], true: Bool[np.ndarray, "range azimuth"]) -> "Apart":
+        """Of polar pictures with any numbers of columns (`radarize.polar`)."""
+        return cls.of(polar.cartesian(found), polar.cartesian(true))

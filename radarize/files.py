@@ -7,6 +7,8 @@ from radarize.errors import InputError, explained
 
 #: Bytes of text that people write: a hundred thousand lines.
 TEXT = 8 << 20
+#: Bytes that deflate makes of one at most (zlib's technical details).
+DEFLATE = 1032
 #: Environment variable of processes in which files may name others anywhere.
 OUTSIDE = "RADARIZE_ALLOW_OUTSIDE"
 

@@ -13,9 +13,10 @@ from typing import BinaryIO
 import h5py
 
 from radarize.errors import InputError
+from radarize.files import DEFLATE
 
-#: Packed best, deflate makes 1032 bytes of one (zlib's technical details); a chunk takes that many bytes at least.
-_DEFLATE, _PACKED_CHUNK = 1032, 16
+#: Bytes that a packed chunk takes at least.
+_PACKED_CHUNK = 16
 #: Bytes and chunks that a data set may declare before they are on disk: frames of a growing file that are not flushed
 #: yet. HDF5 itself takes some 3 kB for each chunk that it reads at once.
 _BYTES_AHEAD, _CHUNKS_AHEAD = 64 << 20, 8192
@@ -57,7 +58,7 @@ def _elsewhere(file: h5py.File, name: bytes) -> str | None:
 
 
 def dataset(
-    group: h5py.Group, name: str, path: Path, packed: float = _DEFLATE, ahead: int = _BYTES_AHEAD, kinds: str = "biufc"
+    group: h5py.Group, name: str, path: Path, packed: float = DEFLATE, ahead: int = _BYTES_AHEAD, kinds: str = "biufc"
 ) -> h5py.Dataset:
     """A data set of numbers that lies in the file, and is no larger than what lies there can be.
 

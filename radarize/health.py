@@ -48,8 +48,7 @@ class Health:
         self.radar, self.blindness = radar, Blindness()
         self._spans: dict[tuple[str, str], Spans] = {}  # by kind and advice
         self._first = self._last = np.nan
-        advice = self._too_fast(), self._out_of_reach()
-        self._aliased, self._far = zip(("aliased", "out of reach"), advice, strict=True)
+        self._aliased, self._far = ("aliased", self._too_fast()), ("out of reach", self._out_of_reach())
 
     def add(self, result: Result) -> None:
         """Take in what the next frames gave."""

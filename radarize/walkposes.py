@@ -46,10 +46,21 @@ def lidar_poses(
         slam.add_scan(PERIOD * frame, BEARINGS, scan(polar.cartesian(walk.lidar(frame))))
         progress(frame, walk.frames)
     slam.finish()
-    times, poses = slam.trajectory()
-    frames = PERIOD * np.arange(walk.frames)
-    yaw = np.interp(frames, times, np.unwrap(poses[:, 2]))
-    return np.column_stack([np.interp(frames, times, poses[:, 0]), np.interp(frames, times, poses[:, 1]), wrap(yaw)])
+    return at(stamps(walk.frames), *slam.trajectory())
+
+
+def stamps(frames: int) -> Float[np.ndarray, "frame"]:
+    """Of a walk's frames, s."""
+    return PERIOD * np.arange(frames)
+
+
+def at(
+    times: Float[np.ndarray, "instant"], known: Float[np.ndarray, "pose"], poses: Float[np.ndarray, "pose 3"]
+) -> Float[np.ndarray, "instant 3"]:
+    """Poses at some times (s) from those that are known, interpolated."""
+    columns = poses[:, 0], poses[:, 1], np.unwrap(poses[:, 2])
+    x, y, yaw = (np.interp(times, known, column) for column in columns)
+    return np.column_stack([x, y, wrap(yaw)])
 
 
 def scan(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "bearing"]:

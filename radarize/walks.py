@@ -27,6 +27,8 @@ from radarize.radar.presets import PRESETS
 PERIOD = PRESETS["radarhd"].frame_period
 #: The authors' measures begin here: their network sees the frames before.
 FIRST = 40
+#: Walks that train.
+TRAINING = (*range(112, 117), *range(118, 124), *range(125, 132), *range(133, 139), 140)
 #: Bytes of another program's points of a walk, packed or not.
 _LARGEST = 256 << 20
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from radarize.recording import Recording
 from radarize.tum import planar
+from radarize.walks import TRAINING
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,7 @@ ODOMETRY = {
 }
 
 #: RadarHD's training walks, one by one and all together.
-PICTURES = {f"radarhd {number}": (None,) for number in range(112, 141)} | {"RadarHD, train": (None,)}
-del PICTURES["radarhd 117"], PICTURES["radarhd 132"]  # they test
+PICTURES = {f"radarhd {number}": (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
 
 CHOICES = (
     Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),

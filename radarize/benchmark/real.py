@@ -3,7 +3,9 @@ turns, trajectories and maps (`radarize.benchmark.realmotion`)."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -98,17 +100,18 @@ def real(
         load(path, kind, PRESETS["radarhd"]) if path.is_file() else None
         for path, kind in zip(weights, (PictureNet, PictureTurnNet), strict=True)
     )
-    steps = _Steps(sum(walk.frames for walk in walks), progress)
+    done, total = count(1), sum(walk.frames for walk in walks)
     rows, maps, errors = [], [], {}
     for walk in walks:
         poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
         others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
-        found, ranges, pictures = _judged(walk, scans, others, steps)
-        errors |= {(walk.number, name): [one for one in apart if one] for name, apart in found.items()}
-        moved = {"shifted pictures": turn_errors(shifted_turns(pictures), poses)}
+        judged = _judged(walk, scans, others, lambda: progress(next(done), total))
+        found = judged.apart
+        errors |= {(walk.number, name): apart for name, apart in found.items()}
+        moved = {"shifted pictures": turn_errors(shifted_turns(judged.pictures), poses)}
         if turns:
-            moved["network"] = turn_errors(network_turns(turns, pictures), poses)
-        drawn = _maps(walk, ranges, poses)
+            moved["network"] = turn_errors(network_turns(turns, judged.pictures), poses)
+        drawn = _maps(walk, judged, poses)
         maps += drawn
         mapped_by = {row["method"]: row for row in drawn}
         for name in dict.fromkeys([*found, *moved, *mapped_by]):
@@ -128,51 +131,56 @@ def real(
     return results
 
 
-@dataclass
-class _Steps:
-    """How far the comparison has come, in frames."""
+class _Judged(NamedTuple):
+    """A walk.
 
-    total: int
-    report: Callable[[int, int], None]
-    done: int = 0
+    Attributes:
+        apart: of each method, how far its points are from the lidar's in every frame that is judged.
+        ranges: scans of each method, and of the lidar.
+        clouds: the lidar's points.
+        pictures: the radar's.
+    """
 
-    def __call__(self) -> None:
-        self.done += 1
-        self.report(self.done, self.total)
+    apart: dict[str, list[Apart]]
+    ranges: dict[str, Float[np.ndarray, "frame bearing"]]
+    clouds: list[Float[np.ndarray, "point 2"]]
+    pictures: UInt8[np.ndarray, "frame range azimuth"]
 
 
 def _judged(
-    walk: Walk, network: tuple[PictureNet, Header] | None, others: dict[str, dict[int, np.ndarray]], steps: _Steps
-) -> tuple[dict[str, list[Apart | None]], dict[str, Float[np.ndarray, "frame bearing"]], np.ndarray]:
-    """Of each method: how far its points are from the lidar's by frame, None of those that are not judged, and its
-    scans. And all pictures."""
-    found, ranges = {}, {}
-    pictures = np.empty((walk.frames, polar.ROWS, polar.COLUMNS), np.uint8)
+    walk: Walk,
+    network: tuple[PictureNet, Header] | None,
+    others: dict[str, dict[int, Float[np.ndarray, "point 2"]]],
+    step: Callable[[], None],
+) -> _Judged:
+    """Go through a walk's frames once; `step` is called after each."""
+    found = _Judged({}, {}, [], np.empty((walk.frames, polar.ROWS, polar.COLUMNS), np.uint8))
     for frame, picture, cells in _methods(walk, network):
-        steps()
-        pictures[frame] = picture
         true = polar.cartesian(walk.lidar(frame))
+        found.pictures[frame] = picture
+        found.clouds.append(true)
         clouds = {name: polar.cartesian(each) for name, each in cells.items()}
         clouds |= {name: known[frame] for name, known in others.items() if frame in known}
         for name, each in clouds.items():
             if frame >= FIRST:
-                found.setdefault(name, []).append(Apart.of(each, true))
+                found.apart.setdefault(name, []).append(Apart.of(each, true))
+        for name, each in (clouds | {"lidar": true}).items():
             if name not in ("picture", "cfar"):  # they have many points on a bearing
-                ranges.setdefault(name, np.full((walk.frames, len(BEARINGS)), np.nan))[frame] = scan(each)
-        ranges.setdefault("lidar", np.full((walk.frames, len(BEARINGS)), np.nan))[frame] = scan(true)
-    return found, ranges, pictures
+                if name not in found.ranges:
+                    found.ranges[name] = np.full((walk.frames, len(BEARINGS)), np.nan)
+                found.ranges[name][frame] = scan(each)
+        step()
+    return found
 
 
-def _maps(
-    walk: Walk, ranges: dict[str, Float[np.ndarray, "frame bearing"]], poses: Float[np.ndarray, "frame 3"]
-) -> list[dict[str, object]]:
+def _maps(walk: Walk, judged: _Judged, poses: Float[np.ndarray, "frame 3"]) -> list[dict[str, object]]:
     """A row for the scans of each method."""
-    surface, odometry = surface_of(walk, poses), disturbed(poses, walk.number)
-    rows = []
-    for name, each in ranges.items():
+    surface, odometry = surface_of(judged.clouds, poses), disturbed(poses, walk.number)
+    off, rows = drift(odometry, poses), []
+    for name, each in judged.ranges.items():
         alone = mapped(each, poses, surface, None)
         rows.append(
-            {"walk": walk.number, "method": name, "odometry_ate_m": drift(odometry, poses)}
+            {"walk": walk.number, "method": name, "odometry_ate_m": off}
             | mapped(each, poses, surface, odometry)
             | {"alone_ate_m": alone["ate_m"], "alone_map_f1_20cm": alone["map_f1_20cm"]}
         )

@@ -3,6 +3,8 @@
 The reference is the lidar beside the radar: its poses, and its points at these poses as the map.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 import torch
 from jaxtyping import Float, UInt8
@@ -10,6 +12,7 @@ from scipy.spatial import cKDTree
 
 from radarize import polar
 from radarize.errors import InputError
+from radarize.evaluation.mapping import agreement
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
 from radarize.evaluation.trajectory import trajectory
 from radarize.methods.pictures.turns import PictureTurnNet
@@ -20,8 +23,8 @@ from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.slam.grid import OccupancyGrid
 from radarize.tum import planar_poses
-from radarize.walkposes import BEARINGS, EVERY
-from radarize.walks import PERIOD, Walk
+from radarize.walkposes import BEARINGS, EVERY, at, stamps
+from radarize.walks import PERIOD
 
 #: Frames over which turns are measured: 0.2 s.
 SPAN = 4
@@ -56,15 +59,16 @@ def network_turns(
 ) -> Float[np.ndarray, "frame"]:
     """Turns by a network that was trained in simulation."""
     net, header = network
-    stride = header.stride(PRESETS["radarhd"])
-    if stride != SPAN:
-        raise InputError(f"picture-turns: is of frames {stride * PERIOD:g} s apart, expected {SPAN * PERIOD:g} s")
-    first = (net.frames - 1) * stride
+    windows, times = header.windows(PRESETS["radarhd"]), stamps(len(pictures))
+    if windows.stride != SPAN:
+        raise InputError(
+            f"picture-turns: is of frames {windows.stride * PERIOD:g} s apart, expected {SPAN * PERIOD:g} s"
+        )
     found = np.full(len(pictures), np.nan)
-    for end in range(first, len(pictures), 64):
-        ends = torch.arange(end, min(end + 64, len(pictures)))
-        frames = ends[:, None] - stride * torch.arange(net.frames - 1, -1, -1)
-        found[ends] = net.estimate(torch.from_numpy(pictures)[frames][:, :, None].float())[0][:, 0]
+    for start in range(0, len(pictures), 64):
+        some = slice(start, start + 64)
+        shown = windows.push({"picture": pictures[some].astype(np.float16)}, times[some])[0]
+        found[some] = np.where(shown.whole, net.estimate(shown.maps)[0][:, 0].numpy(), np.nan)
     return found
 
 
@@ -119,24 +123,28 @@ def mapped(
         slam.add_scan(PERIOD * frame, BEARINGS, ranges[frame])
     slam.finish()
     times, found = slam.trajectory()
-    turn, shift = _alignment(found, np.array([np.interp(times, _stamps(poses), each) for each in _unwrapped(poses)]).T)
-    agreement = map_agreement(slam.map(), turn, shift, surface)
-    return {"ate_m": float(_compared(times, found, poses).position.mean), **agreement}
+    turn, shift = _alignment(found, at(times, stamps(len(poses)), poses))
+    return {
+        "ate_m": float(_compared(times, found, poses).position.mean),
+        **map_agreement(slam.map(), turn, shift, surface),
+    }
 
 
 def drift(odometry: Float[np.ndarray, "frame 3"], poses: Float[np.ndarray, "frame 3"]) -> float:
     """ATE of an odometry, m."""
-    return float(_compared(_stamps(poses), odometry, poses).position.mean)
+    return float(_compared(stamps(len(poses)), odometry, poses).position.mean)
 
 
-def surface_of(walk: Walk, poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "point 2"]:
+def surface_of(
+    clouds: Sequence[Float[np.ndarray, "point 2"]], poses: Float[np.ndarray, "frame 3"]
+) -> Float[np.ndarray, "cell 2"]:
     """The lidar's map: middles of the cells that it has points in from several frames, m."""
-    counts: dict[tuple[int, int], int] = {}
-    for frame in range(walk.frames):
-        points = transform(poses[frame], polar.cartesian(walk.lidar(frame)))
-        for cell in map(tuple, np.unique(np.floor(points / _CELL).astype(int), axis=0)):
-            counts[cell] = counts.get(cell, 0) + 1
-    return (np.array([cell for cell, count in counts.items() if count >= _SEEN]) + 0.5) * _CELL
+    touched = [
+        np.unique(np.floor(transform(pose, cloud) / _CELL).astype(int), axis=0)
+        for pose, cloud in zip(poses, clouds, strict=True)
+    ]
+    cells, count = np.unique(np.concatenate(touched), axis=0, return_counts=True)
+    return (cells[count >= _SEEN] + 0.5) * _CELL
 
 
 def map_agreement(
@@ -149,16 +157,14 @@ def map_agreement(
         turn, shift: rad, m; from its frame to that of the surface.
         surface: of the lidar's map, m.
     """
-    row, column = np.nonzero(grid.probability > (0.5 if grid.probability.dtype.kind == "f" else 127))
-    cells = grid.origin + (np.column_stack([column, row]) + 0.5) * grid.resolution
-    cells = transform(np.array([*shift, turn]), cells)
+    row, column = np.nonzero(grid.probability > 0.5)
+    cells = transform(np.array([*shift, turn]), grid.origin + (np.column_stack([column, row]) + 0.5) * grid.resolution)
+    off_surface = cKDTree(surface).query(cells)[0]
+    off_map = cKDTree(cells).query(surface)[0]  # far from a map without cells
     found = {}
     for near in NEAR:
-        precision = float(np.mean(cKDTree(surface).query(cells)[0] <= near)) if len(cells) else np.nan
-        recall = float(np.mean(cKDTree(cells).query(surface)[0] <= near)) if len(cells) else 0.0
-        f1 = 2 * precision * recall / max(precision + recall, 1e-12)
-        name = f"{100 * near:.0f}cm"
-        found |= {f"map_precision_{name}": precision, f"map_recall_{name}": recall, f"map_f1_{name}": f1}
+        for name, value in agreement(off_surface, off_map, near).items():
+            found[f"map_{name}_{100 * near:.0f}cm"] = float(value)
     return found
 
 
@@ -171,16 +177,8 @@ def _alignment(
     return turn, true[:, :2].mean(axis=0) - transform(np.array([0.0, 0.0, turn]), found[:, :2]).mean(axis=0)
 
 
-def _stamps(poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "frame"]:
-    return PERIOD * np.arange(len(poses))
-
-
-def _unwrapped(poses: Float[np.ndarray, "frame 3"]) -> Float[np.ndarray, "3 frame"]:
-    return np.stack([poses[:, 0], poses[:, 1], np.unwrap(poses[:, 2])])
-
-
 def _compared(
     times: Float[np.ndarray, "scan"], found: Float[np.ndarray, "scan 3"], poses: Float[np.ndarray, "frame 3"]
 ) -> TrajectoryErrors:
-    reference = trajectory(_stamps(poses), planar_poses(poses))
+    reference = trajectory(stamps(len(poses)), planar_poses(poses))
     return evaluate_trajectory(trajectory(times, planar_poses(found)), reference)

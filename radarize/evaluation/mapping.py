@@ -84,10 +84,25 @@ def map_errors(
         return {"precision": np.nan, "recall": 0.0 if len(walls) else np.nan, "f1": np.nan, "chamfer": np.nan} | about
     off_wall = distance_to_plan(cells, plan)
     off_map, _ = cKDTree(cells).query(walls)
-    precision, recall = np.mean(off_wall <= TOLERANCE), np.mean(off_map <= TOLERANCE)
-    f1 = 2 * precision * recall / max(precision + recall, 1e-12)
-    chamfer = (off_wall.mean() + off_map.mean()) / 2
-    return {"precision": precision, "recall": recall, "f1": f1, "chamfer": chamfer} | about
+    return agreement(off_wall, off_map) | {"chamfer": (off_wall.mean() + off_map.mean()) / 2} | about
+
+
+def agreement(
+    off_surface: Float[np.ndarray, "cell"], off_map: Float[np.ndarray, "point"], near: float = TOLERANCE
+) -> dict[str, float]:
+    """How well a map's cells and a surface's points agree.
+
+    Args:
+        off_surface: distances of cells from the surface, m.
+        off_map: distances of the surface's points from the nearest cell, m.
+        near: m, within which they do.
+
+    Returns:
+        ``precision`` and ``recall``, the shares of cells and points that do, and ``f1``, their harmonic mean.
+    """
+    precision = np.mean(off_surface <= near) if len(off_surface) else np.nan
+    recall = np.mean(off_map <= near)
+    return {"precision": precision, "recall": recall, "f1": 2 * precision * recall / max(precision + recall, 1e-12)}
 
 
 def free_space_iou(

@@ -11,11 +11,12 @@ import h5py
 import numpy as np
 
 from radarize.errors import InputError, explained
+from radarize.files import DEFLATE
 from radarize.hdf5 import dataset, open_hdf5
 from radarize.npyfile import npy_header, open_npz
 
-#: Bytes of a compressed member unpacked at a time, and that deflate makes of one at most (zlib's technical details).
-_PIECE, _DEFLATE = 1 << 18, 1032
+#: Bytes of a compressed member unpacked at a time.
+_PIECE = 1 << 18
 #: Of entries, as numpy calls them: numbers, and pairs of them.
 _KINDS = "iufcV"
 
@@ -88,7 +89,7 @@ class MemberArray(MappedArray):
         self._file = tempfile.NamedTemporaryFile(dir=folder)
         with archive.open(member) as packed:
             header = npy_header(packed, name)
-            if member.file_size > _DEFLATE * member.compress_size:
+            if member.file_size > DEFLATE * member.compress_size:
                 raise InputError(f"{name}: declares {member.file_size} bytes packed in {member.compress_size}")
             while piece := packed.read(_PIECE):
                 self._file.write(piece)
@@ -152,7 +153,7 @@ def _open_npz(path: Path, variable: str | None, folder: Path) -> ArrayFile:
         for name, info in members.items():
             with archive.open(info) as packed:
                 headers[name] = npy_header(packed, f"{path}: {name}"), packed.tell()
-        shapes = {name: header[0] for name, (header, _) in headers.items() if header[2].kind in "iufcV"}
+        shapes = {name: header[0] for name, (header, _) in headers.items() if header[2].kind in _KINDS}
         chosen = _choose(path, variable, shapes)
         member, (header, length) = members[chosen], headers[chosen]
         if member.compress_type != zipfile.ZIP_STORED:

@@ -10,8 +10,8 @@ from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, RecordingWriter, Stream
 from radarize.tum import planar_poses
-from radarize.walkposes import lidar_poses
-from radarize.walks import PERIOD, Walk
+from radarize.walkposes import lidar_poses, stamps
+from radarize.walks import Walk
 
 
 def import_walk(
@@ -34,6 +34,7 @@ def import_walk(
         InputError: no such walk, or a picture is missing, damaged, or of another size.
     """
     walk = Walk.find(data, number)
+    times = stamps(walk.frames)
     streams = {
         "maps/picture": Stream((polar.ROWS, polar.COLUMNS), "u1", "", "RadarHD's picture of one loop, 0...255"),
         "truth/scan": Stream((polar.BEAMS,), "f4", "m", "range of the lidar's first point, inf where it has none"),
@@ -45,7 +46,7 @@ def import_walk(
         about["found"] = "no poses were given: they are by SLAM with the lidar's scans"
         poses = planar_poses(lidar_poses(walk, lambda done, total: progress(done, 2 * total)))
         products = products | {
-            "truth/time": Product(PERIOD * np.arange(walk.frames), "s", "of poses"),
+            "truth/time": Product(times, "s", "of poses"),
             "truth/pose": Product(poses, "m; x y z qx qy qz qw", "sensor in the lidar's map"),
         }
     writer = RecordingWriter(
@@ -57,7 +58,7 @@ def import_walk(
             lidar = np.stack([walk.lidar(frame) for frame in range(frames.start, frames.stop)])
             first = np.where(lidar.any(axis=1), polar.RANGES[lidar.argmax(axis=1)], np.inf)
             rows = {"maps/picture": pictures, "truth/scan": first, "truth/lidar": np.packbits(lidar, axis=2)}
-            writer.append(None, PERIOD * np.arange(frames.start, frames.stop), rows=rows)
+            writer.append(None, times[frames], rows=rows)
             progress(walk.frames + frames.stop, 2 * walk.frames)
     return output
 

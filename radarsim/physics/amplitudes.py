@@ -103,6 +103,19 @@ def upright(up, direction):
 
 
 @njit(inline="always")
+def upwards(rotation):
+    """Where the board's upper edge points, of a sensor that is turned so to the world."""
+    return rotation[0, 2], rotation[1, 2], rotation[2, 2]
+
+
+@njit(inline="always")
+def sent(up, direction):
+    """The field that sets out, as a complex vector."""
+    x, y, z = upright(up, direction)
+    return x + 0j, y + 0j, z + 0j
+
+
+@njit(inline="always")
 def reflected(field, arriving, leaving, normal, reflection):
     """A transverse field after a mirror: TE and TM parts times their Fresnel coefficients.
 

@@ -32,14 +32,17 @@ from radarsim.physics.amplitudes import (
     minus,
     mirrored,
     reflected,
+    sent,
     unit,
     upright,
+    upwards,
+    write,
 )
 from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.apertures import CORNERS, FAR, depth, kirchhoff, overlap
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
-from radarsim.physics.table import Table
+from radarsim.physics.table import Table, filled
 
 
 @dataclass(frozen=True)
@@ -87,15 +90,11 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], search: Search, frame: 
     """
     pairs = pairs[np.lexsort(pairs.T)]
     orders = _Orders(np.searchsorted(pairs[:, 1], np.arange(len(flat) + 1)), np.ascontiguousarray(pairs[:, 0]))
-    size = 1024
-    while True:
-        found = Chains(
-            np.empty((size, 3), np.int64), np.empty((size, 3, 4)), np.empty(size, complex), np.empty((size, 3, 3))
-        )
-        count = _search(search, frame, flat.columns, orders, found.columns)
-        if count <= size:
-            return found[:count]
-        size = count
+    return filled(
+        lambda n: Chains(np.empty((n, 3), np.int64), np.empty((n, 3, 4)), np.empty(n, complex), np.empty((n, 3, 3))),
+        lambda found: _search(search, frame, flat.columns, orders, found.columns),
+        1024,
+    )
 
 
 def reverse(isometry: Float[np.ndarray, "image 3 4"]) -> Float[np.ndarray, "image 3 4"]:
@@ -185,7 +184,7 @@ def _chain(way, p, path, back, search, frame, flat, room):
     none = 0j, back, back, back, (0.0, 0.0)
     normal, corners, planes, wavelength = flat.normal, flat.corners, room.planes, search.wavelength
     rotation = search.rotation[frame]
-    up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
+    up = upwards(rotation)
     # The direction at the start is that at the end, taken back through the mirrors.
     ray = back
     for k in range(len(way) - 1, -1, -1):
@@ -194,8 +193,7 @@ def _chain(way, p, path, back, search, frame, flat, room):
     aside = (0.0, 0.0, 1.0) if abs(ray[2]) < 0.7 else (1.0, 0.0, 0.0)
     e1 = unit(cross(aside, ray))
     e2 = cross(ray, e1)
-    sent = upright(up, ray)
-    field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
+    field = sent(up, ray)
     # Instead of unfolding the mirrors, the path and its axes are folded; the start moves to its images.
     start, now, f1, f2 = p, ray, e1, e2
     count, before = 0, 0.0
@@ -284,4 +282,4 @@ def _course(way, p, aim, flat, stops):
             t = dot(minus(vec(flat.center[way[k]]), start), n) / dot(now, n)
             start = along(start, t, now)
             now = along(now, -2 * dot(now, n), n)
-        stops[k, 0], stops[k, 1], stops[k, 2] = start
+        write(start, stops[k])

@@ -31,7 +31,7 @@ from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length,
 from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
-from radarsim.physics.table import Table
+from radarsim.physics.table import Table, filled
 
 #: The foot moves this far inwards, m: on a seam it is inside both plates, which adds up.
 NUDGE = 1e-8
@@ -58,13 +58,11 @@ class Parts(Table):
 
 def parts(flat: Flat, search: Search, frame: int) -> Parts:
     """Those of all facets above the threshold in one frame."""
-    size = 1024
-    while True:
-        found = Parts(np.empty(size, np.int64), np.empty((size, 3)), np.empty((size, 3, 4)), np.empty(size, complex))
-        count = _parts(flat.columns, search, frame, found.columns)
-        if count <= size:
-            return found[:count]
-        size = count
+    return filled(
+        lambda n: Parts(np.empty(n, np.int64), np.empty((n, 3)), np.empty((n, 3, 4)), np.empty(n, complex)),
+        lambda found: _parts(flat.columns, search, frame, found.columns),
+        1024,
+    )
 
 
 @njit(cache=True)

@@ -26,8 +26,10 @@ from radarsim.physics.amplitudes import (
     minus,
     mirrored,
     reflected,
+    sent,
     unit,
     upright,
+    upwards,
     write,
 )
 from radarsim.physics.amplitudes import vector as vec
@@ -38,7 +40,7 @@ from radarsim.physics.obstacles import Obstacles
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
 from radarsim.physics.sight import Mirrors
-from radarsim.physics.table import Table
+from radarsim.physics.table import Table, filled
 
 #: Steps to the point between two images; each shrinks the error by at least the share of the radius in the distance.
 STEPS = 12
@@ -82,15 +84,11 @@ def seen(
 
 def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bodies: RoundBodies) -> RoundGhosts:
     """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
-    size = 256
-    while True:
-        found = RoundGhosts(
-            np.empty((size, 2, 3)), np.empty((size, 2, 2, 3)), np.empty(size, np.int64), np.empty(size, complex)
-        )
-        count = _find(search, frame, flat.columns, seen, bodies.columns, found.columns)
-        if count <= size:
-            return found[:count]
-        size = count
+    return filled(
+        lambda n: RoundGhosts(np.empty((n, 2, 3)), np.empty((n, 2, 2, 3)), np.empty(n, np.int64), np.empty(n, complex)),
+        lambda found: _find(search, frame, flat.columns, seen, bodies.columns, found.columns),
+        256,
+    )
 
 
 @njit(cache=True)
@@ -217,11 +215,10 @@ def _polarisation(search, frame, flat, ends, place, n, reflection):
         place, n, reflection: of the body.
     """
     p, rotation = vec(search.position[frame]), search.rotation[frame]
-    up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
+    up = upwards(rotation)
     (m, stop), (last, end) = ends
     now = unit(minus(stop, p))
-    sent = upright(up, now)
-    field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
+    field = sent(up, now)
     if m >= 0:
         after = unit(minus(place, stop))
         field = reflected(field, now, after, vec(flat.normal[m]), flat.reflection[m])

@@ -15,8 +15,11 @@ from radarsim.physics.amplitudes import (
     minus,
     mirrored,
     reflected,
+    sent,
     unit,
     upright,
+    upwards,
+    write,
 )
 from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.apertures import STRIP_FAR, aperture, misses, passes
@@ -172,7 +175,7 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
     """Fills in the paths over one chain."""
     frame = chains.frame[k]
     p, rotation = vec(search.position[frame]), search.rotation[frame]
-    up = (rotation[0, 2], rotation[1, 2], rotation[2, 2])
+    up = upwards(rotation)
     one, two = chains.mirrors[k]
     last = one if two < 0 else two
     c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
@@ -222,8 +225,7 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
         if abs(passed) * size <= least:
             continue
         now = unit(leaving)
-        sent = upright(up, now)
-        field = (sent[0] + 0j, sent[1] + 0j, sent[2] + 0j)
+        field = sent(up, now)
         if two >= 0:
             after = unit(minus(stop, bounce))
             field = reflected(field, now, after, n1, flat.reflection[one])
@@ -265,9 +267,8 @@ def _course(search, flat, chains, aims, hits, where, found, stops):
             end = _crossing(mirrored(source, c2, n2), s, c2, n2)
             begin = _crossing(source, end, c1, n1)
             seen = mirrored(mirrored(s, c2, n2), c1, n1)
-        for d in range(3):
-            stops[e, 0, d] = begin[d]
-            stops[e, 1, d] = end[d] if two >= 0 else s[d]
-            stops[e, 2, d] = s[d]
-            found.virtual[e, d] = seen[d]
-            found.last[e, d] = end[d]
+        write(begin, stops[e, 0])
+        write(end if two >= 0 else s, stops[e, 1])
+        write(s, stops[e, 2])
+        write(seen, found.virtual[e])
+        write(end, found.last[e])

@@ -1,8 +1,9 @@
 """Rows in parallel arrays: what the search keeps many of, for numpy and for compiled kernels."""
 
 from collections import namedtuple
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -33,3 +34,22 @@ class Table:
     def joined(cls, parts: list[Self]) -> Self:
         """All rows of several tables."""
         return cls(*(np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True)))
+
+
+Rows = TypeVar("Rows", bound=Table)
+
+
+def filled(room: Callable[[int], Rows], fill: Callable[[Rows], int], size: int) -> Rows:
+    """A table of as many rows as there turn out to be.
+
+    Args:
+        room: makes a table of so many rows.
+        fill: writes as many rows as fit; returns how many there are.
+        size: rows to begin with.
+    """
+    while True:
+        found = room(size)
+        count = fill(found)
+        if count <= size:
+            return found[:count]
+        size = count

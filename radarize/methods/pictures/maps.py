@@ -3,10 +3,8 @@
 import numpy as np
 
 from radarize import polar
-from radarize.features.grid import Grid
 from radarize.features.maps import Axes, Maker
 from radarize.radar.config import RadarConfig
-from radarize.radar.presets import PRESETS
 
 #: Range bins within reach of a picture; numbers of a bin: real and imaginary part of four antennas.
 BINS, NUMBERS = 257, 8
@@ -44,8 +42,3 @@ class PictureMaker(Maker):
             heard = (heard / np.maximum(largest, 1e-30)).astype(np.complex64)
             made["antennas"] = np.ascontiguousarray(heard).view(np.float32).astype(np.float16)
         return made
-
-
-def picture_grid(grid: Grid) -> Grid:
-    """Of pictures that come as often as what they are made of."""
-    return Grid.of(PRESETS["radarhd"], "picture", PictureMaker).model_copy(update={"frame_period": grid.frame_period})

@@ -48,8 +48,7 @@ def rough(antennas: Maps, generator: Generator) -> Maps:
     """
 
     def draw(low: float, high: float, *shape: int) -> Tensor:
-        numbers = torch.rand((len(antennas), *shape), generator=generator, device=generator.device)
-        return low + (high - low) * numbers
+        return uniform(generator, low, high, len(antennas), *shape)
 
     def normal(*shape: int) -> Tensor:
         return torch.randn((len(antennas), *shape), generator=generator, device=generator.device)
@@ -68,10 +67,15 @@ def rough(antennas: Maps, generator: Generator) -> Maps:
     return kept(level.masked_fill(blocks.repeat_interleave(BLOCK, dim=3), FLOOR), generator)
 
 
+def uniform(generator: Generator, low: float, high: float, *shape: int) -> Tensor:
+    """Random numbers on the generator's device."""
+    return low + (high - low) * torch.rand(shape, generator=generator, device=generator.device)
+
+
 def kept(level: Float[Tensor, "item frame row column"], generator: Generator) -> Maps:
     """Pictures that keep a random share of their pixels: the share is of the newest, the threshold every one's."""
     newest = (level[:, -1] - level[:, -1].amax(dim=(1, 2), keepdim=True)).flatten(1).sort(dim=1, descending=True).values
-    share = torch.empty((len(level), 1), device=level.device).uniform_(*KEPT, generator=generator)
+    share = uniform(generator, *KEPT, len(level), 1)
     threshold = newest.gather(1, (share * newest.shape[1]).long())[:, :, None, None]
     return picture(level, threshold.clamp(-50.0, -15.0))[:, :, None]
 
@@ -137,5 +141,6 @@ def _added(frames: int, draw: Draw, normal: Draw) -> Heard:
 
 def _board(draw: Draw, normal: Draw) -> Complex64[Tensor, "item antenna"]:
     """Gains and phases of antennas, and the mount's yaw."""
-    yaw = torch.pi * draw(-YAW, YAW, 1) * torch.arange(4, device=draw(0, 1).device)
+    sine = draw(-YAW, YAW, 1)
+    yaw = torch.pi * sine * torch.arange(4, device=sine.device)
     return torch.polar(_amplitude(GAIN * normal(4)), draw(0.0, PHASE, 1) * normal(4) + yaw)

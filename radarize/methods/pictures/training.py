@@ -9,15 +9,15 @@ from torch import Generator, Tensor, nn
 
 from radarize import polar
 from radarize.clouds import Apart
-from radarize.features.grid import Grid
+from radarize.features.augment import chosen, mirrored
 from radarize.features.maps import Maps
 from radarize.features.table import Reading
 from radarize.methods.pictures import roughening
-from radarize.methods.pictures.maps import picture_grid
 from radarize.methods.pictures.network import COLUMNS, PictureNet
 from radarize.methods.pictures.points import points
-from radarize.methods.task import Settings, Task
-from radarize.nets.weights import Header
+from radarize.methods.pictures.roughening import uniform
+from radarize.methods.pictures.task import PictureTask
+from radarize.methods.task import Settings
 
 #: Choices for the least probability of a point.
 LEAST = (0.004, 0.006, 0.008, 0.01, 0.012, 0.015, 0.02, 0.03)
@@ -29,32 +29,15 @@ BIAS = (0.17, 0.34)
 UNKNOWN = -1.0
 
 
-class Pictures(Task):
+class Pictures(PictureTask):
     """Points of a lidar from polar pictures; labels are its pictures, packed."""
 
-    network, maps = PictureNet, ("antennas",)
-    truth = (Reading("lidar", "truth/lidar"),)
+    network, truth = PictureNet, (Reading("lidar", "truth/lidar"),)
     defaults = Settings(width=12, frames=5, epochs=20, batch=64, rate=2e-3, schedule="cosine")
-    reads = ("picture",)
-
-    def header(self, settings: Settings, grid: Grid | None, **about) -> Header:
-        """Of pictures, although training reads what they are made of."""
-        return super().header(settings, grid and picture_grid(grid), **about)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
-        def draw(low: float, high: float) -> Tensor:
-            return low + (high - low) * torch.rand(len(maps), generator=generator, device=generator.device)
-
-        pictures, label = roughening.rough(maps, generator)[:, :, 0], unpacked(label)
-        left = draw(0.0, 1.0)[:, None, None] < 0.5
-        pictures, label = (
-            torch.where(left[..., None], pictures.flip(3), pictures),
-            torch.where(left, label.flip(2), label),
-        )
-        factor, turn = draw(1 - ZOOM, 1 + ZOOM), draw(-TURN, TURN).round().long()
-        pictures = rolled(zoomed(pictures, factor), turn, 0.0)
-        label = rolled(zoomed(label[:, None], factor), 2 * turn, UNKNOWN)[:, 0]
-        return biased(pictures, draw(*BIAS)), label
+        pictures, label = elsewhere(roughening.rough(maps, generator), unpacked(label), generator)
+        return biased(pictures[:, :, 0], uniform(generator, *BIAS, len(maps))), label
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
         return entropy(net(maps), label)
@@ -68,7 +51,7 @@ class Pictures(Task):
         return {"loss": loss, "chamfer_m": chamfer}
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
-        """Choose the probability from which a column has a point: the least mean Chamfer distance."""
+        """Choose the probability from which a cell has a point: the least mean Chamfer distance."""
         total = torch.zeros(len(LEAST), device=net.least.device)
         for maps, label in batches:
             probability, label = net.estimate(validated(maps)), unpacked(label)
@@ -79,8 +62,7 @@ class Pictures(Task):
     def _chamfer(probability: Tensor, label: Tensor, least: float | Tensor) -> Float[Tensor, "item"]:
         found = points(probability, least).cpu().numpy()
         apart = [
-            Apart.of(polar.cartesian(one), polar.cartesian(true)).chamfer
-            for one, true in zip(found, label.bool().cpu().numpy(), strict=True)
+            Apart.of_pictures(one, true).chamfer for one, true in zip(found, label.bool().cpu().numpy(), strict=True)
         ]
         return torch.tensor(np.nan_to_num(apart, nan=polar.REACH / 2), dtype=torch.float32, device=label.device)
 
@@ -88,8 +70,22 @@ class Pictures(Task):
 def validated(maps: Maps) -> Maps:
     """The same roughening in every epoch, and the middle of the bias."""
     seed = int(maps.abs().double().sum()) % 2**31
-    pictures = roughening.rough(maps, Generator(maps.device).manual_seed(seed))[:, :, 0]
-    return biased(pictures, torch.full((len(maps),), sum(BIAS) / 2, device=maps.device))
+    pictures = roughening.rough(maps, Generator(maps.device).manual_seed(seed))
+    return biased(pictures[:, :, 0], torch.full((len(maps),), sum(BIAS) / 2, device=maps.device))
+
+
+def elsewhere(
+    pictures: Maps, label: Float[Tensor, "item row column"], generator: Generator
+) -> tuple[Maps, Float[Tensor, "item row column"]]:
+    """Pictures and labels of other worlds: mirrored, larger or smaller, and turned."""
+    left = chosen(pictures, generator)
+    pictures = torch.where(left, mirrored(pictures), pictures)[:, :, 0]
+    label = torch.where(left[:, 0, 0], label.flip(2), label)[:, None]
+    factor = uniform(generator, 1 - ZOOM, 1 + ZOOM, len(label))
+    turn = uniform(generator, -TURN, TURN, len(label)).round().long()
+    # A label's columns are half as wide.
+    pictures, label = rolled(zoomed(pictures, factor), turn, 0.0), rolled(zoomed(label, factor), 2 * turn, UNKNOWN)
+    return pictures[:, :, None], label[:, 0]
 
 
 def biased(pictures: Float[Tensor, "item frame row column"], metres: Float[Tensor, "item"]) -> Maps:

@@ -7,18 +7,19 @@ from jaxtyping import Float
 from torch import Generator, Tensor, nn
 
 from radarize import polar
-from radarize.features.grid import Grid
+from radarize.features import augment
 from radarize.features.maps import Maps
 from radarize.features.table import YAW, Table
 from radarize.methods.pictures import roughening
-from radarize.methods.pictures.maps import PictureMaker, picture_grid
+from radarize.methods.pictures.maps import PictureMaker
+from radarize.methods.pictures.task import PictureTask
 from radarize.methods.task import Motion, Settings, turns
 from radarize.nets import losses
 from radarize.nets.correlation import Correlation
 from radarize.nets.gaussian import Gaussian
 from radarize.nets.maps import coordinates
 from radarize.nets.resnet import ResNet18
-from radarize.nets.weights import Header, Network
+from radarize.nets.weights import Network
 
 #: Columns by which pictures are shifted against each other: 34 deg to either side.
 _SHIFTS = 12
@@ -49,43 +50,38 @@ class PictureTurnNet(Network):
 
     def forward(self, maps: Maps) -> Gaussian:
         """Turns of all windows."""
-        both = self.correlation(maps / 255)
-        image = both[: len(maps)]
+        image = self.correlation(maps / 255)[: len(maps)]
         return Gaussian.of(self.resnet(torch.cat([image, coordinates(image)], dim=1)), 1)
 
     def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item 1"], Float[Tensor, "item 1 1"]]:
         """Mean and covariance, averaged over a window and its mirror image, whose turn is the other way."""
-        found, mirrored = self(maps), self(maps.flip(4))
+        found, mirrored = self(maps), self(augment.mirrored(maps))
         covariance = (found.covariance + mirrored.covariance) / 2 * (2 * self.spread).exp()
         return (found.mean - mirrored.mean) / 2, covariance
 
 
-class PictureTurns(Motion):
+class PictureTurns(PictureTask, Motion):
     """Turn from the picture before the newest to the newest, rad. Pictures are as simulated, but for the share of them
     that is kept: echoes that are added at random turn with nothing."""
 
-    network, maps = PictureTurnNet, ("antennas",)
-    truth = (YAW,)
-    reads = ("picture",)
+    network, truth = PictureTurnNet, (YAW,)
     error, size = "rmse_rad", "rms_turn_rad"
     defaults = Settings(width=8, frames=5, epochs=24, batch=64, rate=1e-3, schedule="cosine")
-
-    def header(self, settings: Settings, grid: Grid | None, **about) -> Header:
-        """Of pictures, although training reads what they are made of."""
-        return super().header(settings, grid and picture_grid(grid), **about)
 
     def label(self, table: Table, frames: Tensor) -> Float[Tensor, "item 1"]:
         return turns(table, frames[:, -2:])
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
-        pictures = roughening.kept(roughening.levels(roughening.antennas_of(maps)), generator)
-        left = torch.rand(len(maps), generator=generator, device=maps.device) < 0.5
-        pictures = torch.where(left[:, None, None, None, None], pictures.flip(4), pictures)
-        return pictures, torch.where(left[:, None], -label, label)
+        pictures, left = self._pictures(maps, generator), augment.chosen(maps, generator)
+        pictures = torch.where(left, augment.mirrored(pictures), pictures)
+        return pictures, torch.where(left.flatten(1), -label, label)
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
         return losses.likelihood(net(maps), label)
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
-        generator = Generator(maps.device).manual_seed(0)
-        return super().judge(net, roughening.kept(roughening.levels(roughening.antennas_of(maps)), generator), label)
+        return super().judge(net, self._pictures(maps, Generator(maps.device).manual_seed(0)), label)
+
+    @staticmethod
+    def _pictures(maps: Maps, generator: Generator) -> Maps:
+        return roughening.kept(roughening.levels(roughening.antennas_of(maps)), generator)

@@ -48,7 +48,7 @@ def import_(
         typer.Argument(
             metavar="SOURCE",
             help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), "
-            "an array of samples (.npy, .npz, .mat), or RadarHD's dataset_5.",
+            "an array of samples (.npy, .npz, .mat), a sequence of I/Q-1M (roverd), or RadarHD's dataset_5.",
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],

@@ -141,8 +141,9 @@ def _open(source: Path, output: Path, given: Given) -> Capture:
         raise InputError(f"{source}: is no array, but shape or variable is given, expected {', '.join(_ARRAYS)}")
     if given.latency is not None and kind != "bag":
         raise InputError(f"{source}: is no ROS bag, but latency is {given.latency:g} s, expected none")
-    if given.encoding != "signed" and kind not in ("studio", "bin"):
-        raise InputError(f"{source}: is no .bin, but encoding is {given.encoding}, expected none")
+    for name, usual in (("encoding", "signed"), ("layout", "pairs")):
+        if (value := getattr(given, name)) != usual and kind not in ("studio", "bin"):
+            raise InputError(f"{source}: is no .bin, but {name} is {value}, expected none")
     if kind == "studio":
         return studio_format.open_studio(source, given)
     if kind == "rover":
@@ -159,7 +160,8 @@ def _open(source: Path, output: Path, given: Given) -> Capture:
     config, assumed = given.configure(str(source))
     if kind == "pcap":
         return pcap_format.open_pcap(source, config, given.cfg_text, assumed)
-    return bin_format.open_bin(bin_format.parts(source), config, given.cfg_text, assumed, encoding=given.encoding)
+    read = {"encoding": given.encoding, "layout": given.layout}
+    return bin_format.open_bin(bin_format.parts(source), config, given.cfg_text, assumed, **read)
 
 
 def _kind(source: Path) -> str:

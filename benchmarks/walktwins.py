@@ -169,7 +169,7 @@ def main() -> None:
         notes=[
             "Correlation of the twin's pictures (`radarize.polar`, four antennas) with real ones of the same instants, "
             "of the same walk backwards, and of another walk; the twin's are moved by as much as fits best (bias).",
-            "MS-SSIM: of the same instants, and of another walk. Range profile: correlation of the shares of cells kept "
+            "MS-SSIM: of the same instants, and of another walk. Range profile: correlation of shares of cells kept "
             "over range. Level: mean of the cells kept, between the least (0) and the largest (1) of a picture.",
             "The lidar's plane is all that is known of a room: nothing above or below it, no glass, no material.",
         ],

@@ -30,6 +30,7 @@ from radarize.benchmark.table import Table
 from radarize.clouds import Apart
 from radarize.features.windows import Windows
 from radarize.methods.method import Weights
+from radarize.methods.pictures.memory import Memory
 from radarize.methods.pictures.network import COLUMNS, PictureNet
 from radarize.methods.pictures.points import first_surfaces, points
 from radarize.methods.pictures.turns import PictureTurnNet
@@ -201,10 +202,10 @@ def _methods(
 ) -> Iterator[tuple[int, UInt8[np.ndarray, "range azimuth"], dict[str, Cells], dict[str, Ranges]]]:
     """A walk's pictures, frame by frame, where each method sees something in them, and scans of those that tell first
     surfaces themselves."""
-    windows = network[1].windows(PRESETS["radarhd"]) if network else None
+    windows, memory = (network[1].windows(PRESETS["radarhd"]), Memory()) if network else (None, None)
     for frames, pictures in walk.batches():
         stamps = PERIOD * np.arange(frames.start, frames.stop)
-        likely = _network(network[0], windows, pictures, stamps) if network else None
+        likely = _network(network[0], windows, memory, pictures, stamps) if network else None
         for k, picture in enumerate(pictures):
             stands = picture > level_around(picture.astype(float), _CFAR, 0, False) + _CFAR.threshold
             nearest = stands & (np.cumsum(stands, axis=0) == 1)
@@ -216,14 +217,19 @@ def _methods(
 
 @torch.inference_mode()
 def _network(
-    net: PictureNet, windows: Windows, pictures: UInt8[np.ndarray, "frame range azimuth"], stamps: np.ndarray
+    net: PictureNet,
+    windows: Windows,
+    memory: Memory,
+    pictures: UInt8[np.ndarray, "frame range azimuth"],
+    stamps: Float[np.ndarray, "frame"],
 ) -> tuple[Bool[np.ndarray, "frame range column"], Float[np.ndarray, "frame bearing"]]:
     """Points of a batch's frames, and their scans."""
     shown = windows.push({"picture": pictures.astype(np.float16)}, stamps)[0]
     likely = net.estimate(shown.maps)
     azimuths = np.linspace(-np.pi / 2, np.pi / 2, COLUMNS)
     nearest = np.abs(azimuths - BEARINGS[:, None]).argmin(axis=1)
-    return points(likely, net.dense).numpy(), first_surfaces(likely)[:, nearest]
+    # Maps average over time themselves: their scans are each frame's own.
+    return points(memory.push(likely, stamps), net.dense).numpy(), first_surfaces(likely)[:, nearest]
 
 
 def _row(found: Sequence[Apart]) -> dict[str, float]:

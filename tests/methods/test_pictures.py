@@ -11,6 +11,7 @@ from radarize import polar
 from radarize.features.table import Table
 from radarize.methods.pictures import roughening
 from radarize.methods.pictures.maps import BINS, PictureMaker
+from radarize.methods.pictures.memory import LASTS, Memory
 from radarize.methods.pictures.network import COLUMNS
 from radarize.methods.pictures.points import first_surfaces, points
 from radarize.methods.pictures.training import BIAS, UNKNOWN, biased, entropy, rolled, unpacked, zoomed
@@ -165,6 +166,22 @@ def test_first_surfaces_are_within_a_fifth():
     probability[0, -1] = 1 - probability[0, :-1].sum(dim=0)
     found = first_surfaces(probability)[0]
     assert np.allclose(found[:64], polar.RANGES[90]) and np.isinf(found[64:]).all()
+
+
+def test_memory_fades_with_time_whatever_the_batches():
+    """Each distribution counts by e^(-age / LASTS), against the sum written out; the first one takes what is left."""
+    rng = np.random.default_rng(0)
+    stamps = np.cumsum(rng.uniform(0.05, 0.4, 9))
+    seen = torch.from_numpy(rng.random((9, 257, 4))).float()
+    seen /= seen.sum(dim=1, keepdim=True)
+    memory = Memory()
+    found = torch.cat([memory.push(seen[:4], stamps[:4]), memory.push(seen[4:], stamps[4:])])
+    assert torch.equal(found, Memory().push(seen, stamps))
+    left = np.exp(-(stamps[-1] - stamps) / LASTS)
+    weights = left - np.concatenate([[0.0], left[:-1]])
+    expected = torch.einsum("k,krc->rc", torch.from_numpy(weights).float(), seen)
+    assert torch.allclose(found[-1], expected, atol=1e-6)
+    assert torch.allclose(found.sum(dim=1), torch.ones(9, 4), atol=1e-5)
 
 
 def test_a_mirrored_window_has_mirrored_points():

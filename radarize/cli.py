@@ -312,6 +312,9 @@ def train(
     from radarize.methods.registry import find_task
     from radarize.training.train import Options, train
 
+    if onnx:
+        import onnxscript  # noqa: F401  missed now, not after the training
+
     choices = {
         "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
         "patience": patience, "precision": precision, "seed": seed,

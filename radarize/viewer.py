@@ -49,13 +49,10 @@ def view(
         progress: called with (frames done, frames in all).
 
     Raises:
-        InputError: rerun-sdk is not installed, unusable source, or the file cannot be written.
+        InputError: unusable source, or the file cannot be written.
     """
-    try:
-        import rerun
-    except ImportError:
-        words = "viewing needs rerun-sdk, which is not installed; type: pip install 'radarize[viewer]'"
-        raise InputError(words) from None
+    import rerun
+
     source, run = Path(source), None if run is None else Path(run)
     if source.is_dir():
         if run is not None:

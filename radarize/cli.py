@@ -47,7 +47,7 @@ def import_(
         Path,
         typer.Argument(
             metavar="SOURCE",
-            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), "
+            help="A DCA1000 .bin, a .pcap or .pcapng, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), "
             "an array of samples (.npy, .npz, .mat), or RadarHD's dataset_5.",
         ),
     ],

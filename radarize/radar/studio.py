@@ -139,7 +139,10 @@ class _Node:
         return _Node(self.file, f"{self.path}.{field}".lstrip("."), self.get(field))
 
     def items(self, field: str) -> list["_Node"]:
+        """Entries of a list; a single one may stand there without a list, as some programs write it."""
         value = self.get(field)
+        if isinstance(value, dict) and value:
+            return [self.node(field)]
         if not isinstance(value, list) or not value:
             raise self.error(field, value, "a list with at least one entry")
         return [_Node(self.file, f"{self.path}.{field}[{i}]".lstrip("."), item) for i, item in enumerate(value)]

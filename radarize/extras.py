@@ -7,7 +7,7 @@ EXTRAS = {
         "trimesh",
     },
     "ray": {"ray"},
-    "viewer": {"rerun"},
+    "viewer": {"foxglove", "rerun"},
     "onnx": {"onnx", "onnxscript"},
 }  # fmt: skip
 

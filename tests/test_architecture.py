@@ -30,7 +30,7 @@ LAYERS = (
     "evaluation",
     "report",
     "benchmark",
-    "importers exporters capture viewer",
+    "importers exporters foxglove capture viewer mcap",
     "cli",
 )
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are

@@ -54,8 +54,9 @@ def import_recording(
 
     Args:
         source: a DCA1000 ``.bin``, whole or in parts (its ``.cfg`` of the same name, or mmWave Studio's JSON files, may
-            lie beside it), a ``.pcap`` or ``.pcapng`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an array of
-            samples (``.npy``, ``.npz``, ``.mat``), or RadarHD's data set of pictures, of which ``given.walk`` is taken.
+            lie beside it), a ``.pcap`` or ``.pcapng`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an
+            array of samples (``.npy``, ``.npz``, ``.mat``), or RadarHD's data set of pictures, of which ``given.walk``
+            is taken.
         output: recording to write.
         given: what the user says of it.
         progress: called with frames done and (estimated) frames in all.

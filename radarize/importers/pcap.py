@@ -1,7 +1,7 @@
 """Network captures of a DCA1000's UDP stream: ``.pcap``, and Wireshark's ``.pcapng``.
 
-Formats: https://www.ietf.org/archive/id/draft-ietf-opsawg-pcap-04.html, and -pcapng-03.html beside it, by dpkt; link type
-1 (Ethernet), IPv4, UDP to port 4098. Of a ``.pcapng``, the first interface says the link type and the clock.
+Formats: https://www.ietf.org/archive/id/draft-ietf-opsawg-pcap-04.html, and -pcapng-03.html beside it, by dpkt; link
+type 1 (Ethernet), IPv4, UDP to port 4098. Of a ``.pcapng``, the first interface says the link type and the clock.
 """
 
 import struct
@@ -123,9 +123,7 @@ def _packets(file: BinaryIO, path: Path) -> Iterator[tuple[float, bytes]]:
         link = struct.unpack(order + "I", header[20:])[0] & 0xFFFF
         packets = _classic(file, struct.Struct(order + "IIII"), ticks)
     else:
-        raise InputError(
-            f"{path}: starts with {magic.hex() or 'nothing'}, expected the header of a pcap or pcapng file"
-        )
+        raise InputError(f"{path}: starts with {magic.hex() or 'nothing'}, expected a pcap or pcapng header")
     if link != _ETHERNET:
         raise InputError(f"{path}: has link type {link}, expected {_ETHERNET} (Ethernet)")
     return packets

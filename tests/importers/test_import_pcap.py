@@ -182,7 +182,7 @@ def test_a_truncated_file_keeps_its_whole_frames(tmp_path, cut, write):
     "data, message",
     [
         (b"", "starts with nothing"),
-        (b"\xd4\xc3\xb2\xa1", "expected the header of a pcap"),
+        (b"\xd4\xc3\xb2\xa1", "expected a pcap or pcapng header"),
         (b"\x0a\x0d\x0d\x0a" + bytes(60), "broken pcapng section"),
         (SECTION, "IDB not found"),
         (SECTION + INTERFACE, "holds 0 bytes"),

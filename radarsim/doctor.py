@@ -10,6 +10,7 @@ import importlib.metadata
 import importlib.util
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
@@ -185,6 +186,21 @@ def _disk() -> Finding:
     if free >= FREE_DISK:
         return Finding("disk", "ok", found)
     return Finding("disk", "missing", f"{found}, expected {FREE_DISK / 1e9:.0f} GB or more")
+
+
+def describe() -> str:
+    """The findings, and what is installed, as text to paste into a bug report; the user's own folder is ``~``."""
+    from radarize import __version__
+
+    needed = importlib.metadata.requires("radarize") or []
+    names = sorted({re.match(r"[\w.-]+", line)[0] for line in needed} - {"radarize"})
+    versions = [f"{name} {_package(name).detail}" for name in names if _package(name).state == "ok"]
+    lines = [
+        f"radarize {__version__}, {platform.platform()}, {os.cpu_count()} cores",
+        *(f"- {each.what}: {each.state}, {each.detail}" for each in findings() if each.what not in PACKAGES),
+        "- packages: " + ", ".join(versions),
+    ]
+    return "\n".join(lines).replace(str(Path.home()), "~")
 
 
 def examine() -> bool:

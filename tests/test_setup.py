@@ -189,6 +189,14 @@ def test_doctor_finds_this_machine_usable(capsys):
     assert "LLVM" in out and "torch" in out and "ray test" in out and "missing" not in out
 
 
+def test_doctor_writes_a_report_that_names_no_folder_of_the_user(monkeypatch):
+    found = doctor.Finding("ray test", "ok", f"{Path.home()}/libLLVM.so.19.1")
+    monkeypatch.setattr(doctor, "findings", lambda: [found, doctor.Finding("torch", "ok", "2.13.0")])
+    text = doctor.describe()
+    assert text.startswith(f"radarize {__version__}, ") and "- ray test: ok, ~/libLLVM.so.19.1\n" in text
+    assert f"numpy {LOCK['numpy']}" in text and f"mitsuba {LOCK['mitsuba']}" in text and str(Path.home()) not in text
+
+
 def test_doctor_says_what_is_missing(monkeypatch, capsys):
     monkeypatch.setitem(doctor.LIBRARIES, "libnothing.so.7", "libnothing7")
     monkeypatch.setattr(doctor, "_ray_test", lambda: doctor.Finding("ray test", "ok", ""))

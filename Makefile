@@ -1,5 +1,6 @@
 # make demo: sets this machine up and runs the main job end to end      make test: sets up and passes the tests
 # make bounds: tests of compiled loops, which then look whether they index within bounds
+# make lint: style, and types of what other programs import
 # make documents: types every command of docs, too, as `make test` does of README, and where nothing is compiled yet
 RUN := runs/demo
 # A file's tests share what it makes; files begin in the order of tests/conftest.py.
@@ -30,6 +31,8 @@ documents: setup
 
 lint: setup
 	@.venv/bin/ruff check .
+	@.venv/bin/ruff format --check .
+	@.venv/bin/mypy --cache-dir build/mypy
 
 clean:
 	rm -rf .venv $(RUN) build *.egg-info

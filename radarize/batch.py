@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import TypeVar
+from typing import TypeVar, cast
 
 import numpy as np
 import torch
@@ -119,7 +119,7 @@ class Batch:
         so move on once a batch."""
         if by not in self._made:
             self._made[by] = by(self)
-        return self._made[by]
+        return cast(Made, self._made[by])
 
 
 class Intake:

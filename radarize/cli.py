@@ -47,8 +47,8 @@ def import_(
         Path,
         typer.Argument(
             metavar="SOURCE",
-            help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), "
-            "an array of samples (.npy, .npz, .mat), a sequence of I/Q-1M (roverd), or RadarHD's dataset_5.",
+            help="A DCA1000 .bin, a .pcap or .pcapng, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its "
+            "folder), an array of samples (.npy, .npz, .mat), a sequence of I/Q-1M (roverd), or RadarHD's dataset_5.",
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
@@ -159,6 +159,9 @@ def live(
     odometry: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
     scans: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
     address: Annotated[str, typer.Option(help="Where to show the page; port 0 is any.")] = "127.0.0.1:8470",
+    foxglove: Annotated[
+        str | None, typer.Option(metavar="HOST:PORT", help="Serve Foxglove as well, e.g. 127.0.0.1:8765.")
+    ] = None,
     overwrite: Overwrite = False,
 ):
     """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
@@ -182,10 +185,17 @@ def live(
     with until_interrupted() as stopping, ExitStack() as stack:
         with working("warming up"):
             inputs = prepare(Inputs(radar), chosen)
-        live = Live(inputs, chosen, stack.enter_context(Page(address)))
+        server = None
+        if foxglove is not None:
+            from radarize.foxglove import Server
+
+            server = stack.enter_context(Server(foxglove))
+        live = Live(inputs, chosen, stack.enter_context(Page(address)), server)
         report = stack.enter_context(progress("live"))
         stack.enter_context(stream)
         print(f"page: {live.page.url}", flush=True)
+        if server is not None:
+            print(f"Foxglove: {server.url}", flush=True)
         if output:
             writer = stack.enter_context(recording(stream, output, overwrite))
         most = _frames_within(duration, frames, radar.frame_period)
@@ -315,6 +325,9 @@ def train(
 
     from radarize.methods.registry import find_task
     from radarize.training.train import Options, train
+
+    if onnx:
+        import onnxscript  # noqa: F401  missed now, not after the training
 
     choices = {
         "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
@@ -491,13 +504,20 @@ def _benchmark_real(
 def view(
     source: Annotated[Path, typer.Argument(metavar="REC.h5|RUN", help="A recording, or a run's folder.")],
     run: Annotated[Path | None, typer.Option(help="Run of the recording, to show with it.")] = None,
-    save: Annotated[Path | None, typer.Option(metavar="FILE.rrd", help="Write a file instead of a window.")] = None,
+    save: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write .rrd, or .mcap for Foxglove, instead of a window.")
+    ] = None,
 ):
     """Look at a recording or a run in the Rerun viewer: maps, poses, scans, depth and causes on one time line."""
-    from radarize.viewer import view
-
     with progress("view") as report:
-        written = view(source, run, save, progress=report)
+        if save is not None and save.suffix == ".mcap":
+            from radarize.mcap import write_mcap
+
+            written = write_mcap(source, run, save, progress=report)
+        else:
+            from radarize.viewer import view
+
+            written = view(source, run, save, progress=report)
     if written:
         print(written)
 

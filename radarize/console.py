@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from radarize.errors import DEBUG, InputError, first_line, of_system
+from radarize.extras import lacking
 from radarize.files import OUTSIDE
 
 #: Exit code of everything that ends in an error sentence.
@@ -74,6 +75,8 @@ def _sentence(error: BaseException) -> str:
         return f"not enough memory ({first_line(error)}); a shorter recording or a smaller scene needs less"
     if isinstance(error, OSError):
         return of_system(error)
+    if sentence := lacking(error):
+        return sentence
     return f"internal error, {type(error).__name__}: {first_line(error)}; --debug shows where"
 
 

@@ -51,9 +51,9 @@ def adjoint(a: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
 
 def interpolate(a: Pose, b: Pose, fraction: np.ndarray | float) -> Pose:
     """Pose at a fraction (0 gives a, 1 gives b) of the way, position on the straight line, heading the short way."""
-    fraction = np.asarray(fraction, float)
-    position = a[..., :2] + fraction[..., None] * (b[..., :2] - a[..., :2])
-    yaw = wrap(a[..., 2] + fraction * wrap(b[..., 2] - a[..., 2]))
+    share = np.asarray(fraction, float)
+    position = a[..., :2] + share[..., None] * (b[..., :2] - a[..., :2])
+    yaw = np.asarray(wrap(a[..., 2] + share * wrap(b[..., 2] - a[..., 2])))
     return np.concatenate([position, yaw[..., None]], axis=-1)
 
 

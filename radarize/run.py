@@ -1,10 +1,11 @@
 """From a recording to a folder with trajectory, map and all that they were made of."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 
-from radarize.batch import BATCH, Intake
+from radarize.batch import BATCH, Batch, Intake
 from radarize.errors import InputError
 from radarize.methods.configuration import Configuration
 from radarize.methods.method import Inputs, Weights
@@ -41,9 +42,12 @@ def run(
     with Recording(recording) as source:
         best, why = (BEST, "") if weights else best_methods(source.config)
     pairs = {Path(output): (odometry or best["odometry"], scans or best["scans"])}
-    given = {"weights": weights, "configuration": configuration, "facts": {"no networks": why} if why else None}
-    for failed in run_each(recording, pairs, **given, progress=progress).values():
-        raise failed
+    failed = run_each(
+        recording, pairs, weights=weights, configuration=configuration,
+        facts={"no networks": why} if why else None, progress=progress,
+    )  # fmt: skip
+    for error in failed.values():
+        raise error
     return Path(output)
 
 
@@ -74,7 +78,7 @@ def run_each(
     pipelines: dict[Path, Pipeline] = {}
     writers: dict[Path, RunWriter] = {}
 
-    def each(act: Callable[[Path], None], folders) -> None:
+    def each(act: Callable[[Path], None], folders: Iterable[Path]) -> None:
         for folder in list(folders):
             try:
                 act(folder)
@@ -85,6 +89,9 @@ def run_each(
     def make(folder: Path) -> None:
         pipelines[folder] = workshop.pipeline(*pairs[folder])
         writers[folder] = stack.enter_context(RunWriter(folder, source.config))
+
+    def push(batch: Batch, folder: Path) -> None:
+        writers[folder].add(pipelines[folder].push(batch))
 
     def end(folder: Path) -> None:
         if intake.lost == intake.taken:
@@ -113,7 +120,7 @@ def run_each(
             if not pipelines:
                 break
             if batch := intake.take(adc, source.times[frames], source.valid(frames.start, frames.stop)):
-                each(lambda folder, batch=batch: writers[folder].add(pipelines[folder].push(batch)), pipelines)
+                each(partial(push, batch), pipelines)
             progress(frames.stop, len(source))
         each(end, pipelines)
     return failed

@@ -25,7 +25,7 @@ def read_tum(path: str | Path) -> tuple[Float[np.ndarray, "pose"], Float[np.ndar
         InputError: naming the line: not eight finite numbers, times that do not ascend, or no unit quaternion.
     """
     lines = read_bytes(path, "poses (TUM)", _LARGEST).decode(errors="replace").splitlines()
-    rows = []
+    rows: list[list[float]] = []
     for number, line in enumerate(lines, 1):
         words = line.split("#")[0].replace(",", " ").split()
         if not words:

@@ -10,8 +10,8 @@
 Everything is sent column-wise, in batches of frames.
 """
 
-from collections.abc import Callable
-from contextlib import nullcontext
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -49,23 +49,12 @@ def view(
         progress: called with (frames done, frames in all).
 
     Raises:
-        InputError: rerun-sdk is not installed, unusable source, or the file cannot be written.
+        InputError: unusable source, or the file cannot be written.
     """
-    try:
-        import rerun
-    except ImportError:
-        words = "viewing needs rerun-sdk, which is not installed; type: pip install 'radarize[viewer]'"
-        raise InputError(words) from None
-    source, run = Path(source), None if run is None else Path(run)
-    if source.is_dir():
-        if run is not None:
-            raise InputError(f"{source} is a run, and --run {run} another, expected a recording with --run")
-        source, run = None, source
-    folder = None if run is None else RunFolder(run)
-    with Recording(source) if source else nullcontext() as recording:
-        if recording is not None and not len(recording):
-            raise InputError(f"{source}: has no whole frame, expected at least one")
-        stream = rerun.RecordingStream("radarize", recording_id=str((source or run).resolve()))
+    import rerun
+
+    with opened(source, run) as (recording, folder):
+        stream = rerun.RecordingStream("radarize", recording_id=str(Path(source).resolve()))
         with replacing(save) if save else nullcontext() as part:
             if part:
                 stream.save(part, default_blueprint=_layout())
@@ -81,6 +70,25 @@ def view(
             stream.flush()
             stream.disconnect()
     return Path(save) if save else None
+
+
+@contextmanager
+def opened(source: Path, run: Path | None) -> Iterator[tuple[Recording | None, RunFolder | None]]:
+    """A recording and its run, or one of the two.
+
+    Raises:
+        InputError: two runs, a recording without a frame, or see `Recording` and `RunFolder`.
+    """
+    source = Path(source)
+    if source.is_dir():
+        if run is not None:
+            raise InputError(f"{source} is a run, and --run {run} another, expected a recording with --run")
+        yield None, RunFolder(source)
+        return
+    with Recording(source) as recording:
+        if not len(recording):
+            raise InputError(f"{source}: has no whole frame, expected at least one")
+        yield recording, None if run is None else RunFolder(run)
 
 
 def _layout():

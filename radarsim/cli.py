@@ -180,10 +180,21 @@ def info(scene: SceneName):
 def preview(
     scene: SceneName,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for the pictures.")] = Path("."),
+    web: Annotated[bool, typer.Option("--web", help="A page instead: building, tour and echoes in 3-D.")] = False,
+    time: Annotated[float, typer.Option(min=0.0, help="Of the frame whose echoes the page draws, s.")] = 0.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the page's tour.")] = 0,
 ):
     """Draw SCENE as pictures: its floor plan and a rendering with the ceilings taken off."""
-    from radarsim.scene.preview import preview
     from radarsim.scene.scene import Scene
+
+    if web:
+        from radarsim.webpreview import web_preview
+
+        with working("drawing the scene"):
+            loaded = Scene.load(scene)
+            print(web_preview(loaded, output / f"{loaded.name}.html", time=time, seed=seed))
+        return
+    from radarsim.scene.preview import preview
 
     with working("drawing the scene"):
         pictures = preview(Scene.load(scene), output)
@@ -313,10 +324,15 @@ def emulate(
 
 
 @app.command()
-def doctor():
+def doctor(
+    report: Annotated[bool, typer.Option("--report", help="Print text for a bug report instead.")] = False,
+):
     """Say what is missing on this machine and how to get it."""
-    from radarsim.doctor import examine
+    from radarsim.doctor import describe, examine
 
+    if report:
+        print(describe())
+        return
     if not examine():
         raise InputError("this machine cannot simulate yet; the lines above say what to type")
 

@@ -10,11 +10,13 @@ import importlib.metadata
 import importlib.util
 import os
 import platform
+import re
 import shutil
 import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from pathlib import Path
 
 from radarize.errors import InputError
 from radarsim import llvm
@@ -28,6 +30,8 @@ LIBRARIES = {
     "libX11.so.6": "libx11-6",
     "libidn2.so.0": "libidn2-0",
 }
+#: What brings Python packages: the checkout's set-up, or pip where there is none.
+REPAIR = "./setup.sh" if Path(__file__).parents[1].joinpath("setup.sh").is_file() else "pip install 'radarize[sim]'"
 PACKAGES = ("torch", "sionna-rt", "mitsuba", "drjit", "gtsam", "open3d", "numba", "h5py", "evo")
 #: A recording of a minute takes about a quarter of this.
 FREE_DISK = 2e9
@@ -103,7 +107,7 @@ def _package(name: str) -> Finding:
     try:
         return Finding(name, "ok", importlib.metadata.version(name))
     except importlib.metadata.PackageNotFoundError:
-        return Finding(name, "missing", "not installed", "./setup.sh")
+        return Finding(name, "missing", "not installed", REPAIR)
 
 
 def _llvm() -> Finding:
@@ -125,11 +129,11 @@ def _ray_test() -> Finding:
     try:
         done = subprocess.run([sys.executable, "-c", _RAY_TEST], capture_output=True, text=True, timeout=120)
     except subprocess.TimeoutExpired:
-        return Finding("ray test", "missing", "no answer within two minutes", "./setup.sh")
+        return Finding("ray test", "missing", "no answer within two minutes", REPAIR)
     if done.returncode == 0:
         return Finding("ray test", "ok", "Mitsuba's llvm_ad_mono_polarized variant hits a wall; Sionna RT imports")
     reason = (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1]
-    return Finding("ray test", "missing", reason, llvm.INSTALL if "LLVM" in done.stderr else "./setup.sh")
+    return Finding("ray test", "missing", reason, llvm.INSTALL if "LLVM" in done.stderr else REPAIR)
 
 
 def first_frame() -> float:
@@ -153,7 +157,7 @@ def _first_frame() -> Finding:
     if done.returncode == 0:
         return Finding("first frame", "ok", done.stdout.strip())
     reason = (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1]
-    return Finding("first frame", "missing", reason, "./setup.sh")
+    return Finding("first frame", "missing", reason, REPAIR)
 
 
 def _cuda() -> Finding:
@@ -182,6 +186,21 @@ def _disk() -> Finding:
     if free >= FREE_DISK:
         return Finding("disk", "ok", found)
     return Finding("disk", "missing", f"{found}, expected {FREE_DISK / 1e9:.0f} GB or more")
+
+
+def describe() -> str:
+    """The findings, and what is installed, as text to paste into a bug report; the user's own folder is ``~``."""
+    from radarize import __version__
+
+    needed = importlib.metadata.requires("radarize") or []
+    names = sorted({re.match(r"[\w.-]+", line)[0] for line in needed} - {"radarize"})
+    versions = [f"{name} {_package(name).detail}" for name in names if _package(name).state == "ok"]
+    lines = [
+        f"radarize {__version__}, {platform.platform()}, {os.cpu_count()} cores",
+        *(f"- {each.what}: {each.state}, {each.detail}" for each in findings() if each.what not in PACKAGES),
+        "- packages: " + ", ".join(versions),
+    ]
+    return "\n".join(lines).replace(str(Path.home()), "~")
 
 
 def examine() -> bool:

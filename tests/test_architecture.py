@@ -10,10 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from radarize.extras import EXTRAS
+
 ROOT = Path(__file__).parents[1]
 #: Packages and modules of `radarize`, lowest first: each imports only what stands before it, or beside it.
 LAYERS = (
-    "errors plain files locks replacing hdf5 yamlfile jsonfile npyfile pixels pose tum console stopwatch jobs",
+    "errors plain files locks replacing hdf5 yamlfile jsonfile npyfile pixels pose tum extras console stopwatch jobs",
     "radar",
     "recording",
     "heatmaps disturbance points contents polar clouds walks",
@@ -28,7 +30,7 @@ LAYERS = (
     "evaluation",
     "report",
     "benchmark",
-    "importers exporters capture viewer",
+    "importers exporters foxglove capture viewer mcap",
     "cli",
 )
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are
@@ -96,7 +98,7 @@ def cycle(graph: dict[str, set[str]]) -> list[str]:
 
 def test_the_pipeline_needs_no_simulator():
     """A user with a real radar needs no ray tracer."""
-    tracer = {"radarsim", "sionna", "mitsuba", "drjit"}
+    tracer = {"radarsim", *EXTRAS["sim"]}
     guilty = {(f, n) for f, names in imported("radarize").items() for n in names if n.split(".")[0] in tracer}
     assert not guilty
 

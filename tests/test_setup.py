@@ -15,6 +15,8 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from radarize import __version__
+from radarize.extras import EXTRAS
 from radarsim import doctor, llvm
 
 ROOT = Path(__file__).parents[1]
@@ -34,25 +36,55 @@ def python(code: str, **environment: str) -> subprocess.CompletedProcess:
     )
 
 
-def test_what_is_imported_is_declared():
-    """Every package that a file imports, wherever in it, is a requirement or an extra's."""
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = [
-        *declared["dependencies"],
-        *(line for extra in declared["optional-dependencies"].values() for line in extra),
-    ]
-    names = {canonicalize_name(Requirement(line).name) for line in wanted}
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+
+
+def names(*lines: str) -> set[str]:
+    return {canonicalize_name(Requirement(line).name) for line in lines}
+
+
+def imported(*packages: str) -> set[str]:
+    """Modules of others that files import, wherever in them."""
     found = {
         name.split(".")[0]
-        for package in ("radarize", "radarsim")
+        for package in packages
         for path in (ROOT / package).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text()))
         if isinstance(node, ast.Import | ast.ImportFrom)
         for name in ([node.module] if isinstance(node, ast.ImportFrom) else [alias.name for alias in node.names])
     }
+    return found - sys.stdlib_module_names - {"radarize", "radarsim"}
+
+
+def distributions(modules: set[str]) -> set[str]:
     source = importlib.metadata.packages_distributions()
-    others = found - sys.stdlib_module_names - {"radarize", "radarsim"}
-    assert not {name for name in others if not names & set(map(canonicalize_name, source.get(name, [name])))}
+    return {canonicalize_name(name) for module in modules for name in source.get(module, [module])}
+
+
+def test_what_is_imported_is_declared_and_the_other_way_round():
+    """The pipeline's needs in every installation, the simulator's by extra."""
+    extras = {extra: names(*lines) for extra, lines in PROJECT["optional-dependencies"].items()}
+    optional = extras["ray"] | extras["viewer"] | extras["onnx"]
+    always = names(*PROJECT["dependencies"])
+    pipeline, both = distributions(imported("radarize")), distributions(imported("radarize", "radarsim"))
+    assert pipeline <= always | optional
+    assert both <= always | optional | extras["sim"]
+    assert not always - both
+    assert (optional | extras["sim"]) - both <= {"mapbox-earcut", "rtree", "onnx"}  # trimesh's, and torch's
+
+
+def test_every_extras_modules_are_known():
+    """So that a command that misses one says which extra it is of."""
+    for extra, modules in EXTRAS.items():
+        declared = names(*PROJECT["optional-dependencies"][extra])
+        assert all(declared & distributions({module}) for module in modules)
+        assert declared <= distributions(modules)
+
+
+def test_the_version_is_said_once():
+    assert PROJECT["dynamic"] == ["version"]
+    assert f'\nversion: "{__version__}"' in (ROOT / "CITATION.cff").read_text()
+    assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] == __version__
 
 
 def test_the_lock_pins_everything_and_names_nothing_else():
@@ -63,8 +95,9 @@ def test_the_lock_pins_everything_and_names_nothing_else():
 
 
 def test_the_lock_is_complete():
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = [Requirement(text) for text in project["dependencies"] + project["optional-dependencies"]["dev"]]
+    extras = ("sim", "ray", "viewer", "onnx", "dev")
+    lines = [*PROJECT["dependencies"], *(line for extra in extras for line in PROJECT["optional-dependencies"][extra])]
+    wanted = [Requirement(line) for line in lines if not line.startswith("radarize[")]
     for name in LOCK:
         wanted += [Requirement(text) for text in importlib.metadata.requires(name) or []]
     for requirement in wanted:
@@ -154,6 +187,14 @@ def test_doctor_finds_this_machine_usable(capsys):
     assert doctor.examine()
     out = capsys.readouterr().out
     assert "LLVM" in out and "torch" in out and "ray test" in out and "missing" not in out
+
+
+def test_doctor_writes_a_report_that_names_no_folder_of_the_user(monkeypatch):
+    found = doctor.Finding("ray test", "ok", f"{Path.home()}/libLLVM.so.19.1")
+    monkeypatch.setattr(doctor, "findings", lambda: [found, doctor.Finding("torch", "ok", "2.13.0")])
+    text = doctor.describe()
+    assert text.startswith(f"radarize {__version__}, ") and "- ray test: ok, ~/libLLVM.so.19.1\n" in text
+    assert f"numpy {LOCK['numpy']}" in text and f"mitsuba {LOCK['mitsuba']}" in text and str(Path.home()) not in text
 
 
 def test_doctor_says_what_is_missing(monkeypatch, capsys):

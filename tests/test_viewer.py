@@ -1,11 +1,13 @@
 """What the viewer is sent, read back from an .rrd file and compared with the recording and the run."""
 
-import builtins
+import sys
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from radarize.cli import app
+from radarize.console import run
 from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
@@ -182,16 +184,13 @@ def test_what_cannot_be_shown_is_said_in_a_sentence(recording, tmp_path, monkeyp
     with pytest.raises(InputError, match="has no whole frame"):
         view(tmp_path / "empty.h5", save=tmp_path / "x.rrd")
     assert not list(tmp_path.glob("x.rrd*"))
-    imported = builtins.__import__
 
-    def without(name, *arguments, **options):
-        if name.split(".")[0] == "rerun":
-            raise ImportError(name)
-        return imported(name, *arguments, **options)
 
-    monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(InputError, match=r"type: pip install 'radarize\[viewer\]'"):
-        view(recording, save=tmp_path / "x.rrd")
+def test_without_the_viewer_the_command_says_what_to_type(recording, tmp_path, monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(SystemExit) as ended:
+        run(app, "radarize", ["view", str(recording), "--save", str(tmp_path / "x.rrd")])
+    assert ended.value.code == 2 and "type: pip install 'radarize[viewer]'" in capsys.readouterr().err
 
 
 def test_one_antenna_has_no_maps(tmp_path):

@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from threading import Event
+from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
@@ -14,7 +15,11 @@ from radarize.capture.view import View
 from radarize.health import Health
 from radarize.methods.registry import Inputs, Workshop
 from radarize.recording import Losses, RecordingWriter
+from radarize.runfolder import OccupancyMap
 from radarize.stopwatch import stage
+
+if TYPE_CHECKING:
+    from radarize.foxglove import Server
 
 #: Frames at a time, at most. Libraries keep what they have made for every number of frames, the more the larger it is:
 #: up to so many all of it is there after `prepare`, and memory then grows with the map alone.
@@ -29,6 +34,8 @@ class Live:
     Args:
         inputs: what its methods are made from; see `prepare`.
         methods: odometry and scans by name.
+        page: shows it.
+        foxglove: shows it, too.
 
     Attributes:
         losses: of the frames that came.
@@ -36,13 +43,13 @@ class Live:
         busy: s spent on the frames so far, showing them included.
     """
 
-    def __init__(self, inputs: Inputs, methods: dict[str, str], page: Page):
-        self.pipeline, self.page = Workshop(inputs).pipeline(**methods), page
+    def __init__(self, inputs: Inputs, methods: dict[str, str], page: Page, foxglove: "Server | None" = None):
+        self.pipeline, self.page, self.foxglove = Workshop(inputs).pipeline(**methods), page, foxglove
         self.intake = Intake(inputs.signal)
         self.view = View(self.pipeline, inputs.signal)
         self.losses, self.health = Losses(), Health(inputs.radar)
         self.busy = 0.0
-        self._frame_due = self._map_due = 0.0
+        self._frame_due = self._map_due = self._stamp = 0.0
 
     def run(
         self,
@@ -82,7 +89,7 @@ class Live:
             self.busy += time.monotonic() - start
             progress(int(came["number"][-1]) + 1, frames or 0)
         self.pipeline.finish()
-        self.page.send("map", self.view.map())
+        self._show_map()
         self.page.send("end", {"troubles": self._troubles(stream)})
 
     def _troubles(self, stream: Stream) -> list[str]:
@@ -91,9 +98,9 @@ class Live:
 
     def _show(self, stream: Stream, adc: np.ndarray, valid: np.ndarray, stamp: float) -> None:
         now = time.monotonic()
-        if now < self._frame_due or not self.page.watched:
+        if now < self._frame_due or not (self.page.watched or self.foxglove):
             return
-        self._frame_due = now + _FRAME_INTERVAL
+        self._frame_due, self._stamp = now + _FRAME_INTERVAL, stamp
         counts = stream.counts
         figures = {
             "frames": counts.frames,
@@ -104,14 +111,28 @@ class Live:
             "slots": stream.ring.slots,
             "troubles": self._troubles(stream),
         }
-        self.page.send("frame", self.view.frame(adc, valid, stamp) | figures)
+        pictures = self.view.pictures(adc, valid)
+        self.page.send("frame", self.view.frame(pictures, stamp) | figures)
+        if self.foxglove and (result := self.view.newest):
+            self.foxglove.pose(stamp, self.view.pose(), result.track.pose[-1])
+            self.foxglove.scan(stamp, result.ranges[-1])
+            for name, pixels in pictures.items():
+                self.foxglove.picture(stamp, name, pixels)
         drawn = time.monotonic()
         self.pipeline.seconds["page"] += drawn - now
         if now >= self._map_due and self.pipeline.slam.nodes:
-            self.page.send("map", self.view.map())
+            self._show_map()
             took = time.monotonic() - drawn
             self.pipeline.seconds["page"] += took
             self._map_due = now + max(_MAP_INTERVAL, took / _MAP_SHARE)
+
+    def _show_map(self) -> None:
+        slam = self.pipeline.slam
+        grid = slam.map()
+        self.page.send("map", self.view.map(grid))
+        if self.foxglove:
+            self.foxglove.map(self._stamp, OccupancyMap.of(grid))
+            self.foxglove.path(self._stamp, slam.graph.poses)
 
 
 def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
@@ -124,5 +145,5 @@ def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
         adc = rng.integers(-200, 200, (frames, *radar.frame_shape), dtype=np.int16)
         stamps = (intake.taken + np.arange(frames)) * radar.frame_period
         view.add(pipeline.push(intake.take(adc, stamps)))
-    view.frame(adc[-1:], np.ones((1, *adc.shape[1:3]), bool), 0.0)
+    view.frame(view.pictures(adc[-1:], np.ones((1, *adc.shape[1:3]), bool)), 0.0)
     return inputs

@@ -14,6 +14,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.pipeline import Pipeline, Result
 from radarize.pose import between, compose
 from radarize.report.drawings import DEPTH, LEAKAGE, decibels
+from radarize.slam.grid import OccupancyGrid
 
 #: Pixels across the fan, and s over which figures are averaged.
 _FAN, _SPAN = 260, 2.0
@@ -83,23 +84,26 @@ class View:
             "doppler": {"speed": -float(maps.velocities[0]), "azimuth": round(float(np.degrees(maps.azimuths[-1])), 1)},
         }
 
-    def frame(self, adc: np.ndarray, valid: np.ndarray, stamp: float) -> dict[str, object]:
-        """Heat maps of a frame, the pose, and the load; ``adc`` and ``valid`` have a frame axis of one."""
+    def pictures(self, adc: np.ndarray, valid: np.ndarray) -> dict[str, UInt8[np.ndarray, "row column 4"]]:
+        """Heat maps of a frame; ``adc`` and ``valid`` have a frame axis of one."""
         spectrum = self._heatmaps.spectrum(adc, valid)
         doppler = self._heatmaps.doppler_azimuth_of(spectrum)[0].numpy()
         return {
-            "time": stamp,
-            "pose": self._pose(),
-            "fan": png(self._fan.draw(self._heatmaps.range_azimuth_of(spectrum)[0].numpy())),
+            "fan": self._fan.draw(self._heatmaps.range_azimuth_of(spectrum)[0].numpy()),
             # Closing speeds up, left to the left.
-            "doppler": png(np.kron(colored(doppler)[::-1, ::-1], np.ones((5, 1, 1), np.uint8))),
-            "load": self._load(),
+            "doppler": np.kron(colored(doppler)[::-1, ::-1], np.ones((5, 1, 1), np.uint8)),
         }
 
-    def map(self) -> dict[str, object]:
+    def frame(self, pictures: dict[str, np.ndarray], stamp: float) -> dict[str, object]:
+        """A frame's pictures, the pose, and the load."""
+        pose = self.pose()
+        shown = {name: png(pixels) for name, pixels in pictures.items()}
+        place = None if pose is None else [round(float(value), 4) for value in pose]
+        return {"time": stamp, "pose": place, "load": self._load(), **shown}
+
+    def map(self, grid: OccupancyGrid) -> dict[str, object]:
         """Map and path after the last loop closure."""
         slam = self._pipeline.slam
-        grid = slam.map()
         chance = np.rint(255 * grid.probability[::-1] * grid.unit).astype(np.uint8)
         shade = 255 - chance
         colors = np.stack([shade, shade, shade, np.where(chance > 0, 255, 0).astype(np.uint8)], axis=-1)
@@ -112,7 +116,12 @@ class View:
             "loops": int(slam.graph.accepted.sum()),
         }
 
-    def _pose(self) -> list[float] | None:
+    @property
+    def newest(self) -> Result | None:
+        """What the last batch gave."""
+        return self._newest
+
+    def pose(self) -> Float[np.ndarray, "3"] | None:
         """Where the sensor is on the map: odometry since the last node, from that node on."""
         slam = self._pipeline.slam
         if self._newest is None:
@@ -120,7 +129,7 @@ class View:
         now = self._newest.track.pose[-1]
         if slam.nodes:
             now = compose(slam.graph.poses[-1], between(slam.odometry.pose(slam.nodes[-1].time), now))
-        return [round(float(value), 4) for value in now]
+        return now
 
     def _load(self) -> dict[str, object]:
         """Frames a second and ms a frame by stage, over the last seconds."""

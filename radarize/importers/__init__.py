@@ -34,7 +34,7 @@ _CERTAIN_DB = 10.0
 _ASKED = 8
 _BAGS, _ARRAYS = (".bag", ".mcap", ".db3"), (".npy", ".npz", ".mat")
 _EXPECTED = (
-    "a DCA1000 .bin, a .pcap, a folder of mmWave Studio files, a ROS bag (.bag, .mcap, .db3 or a folder), "
+    "a DCA1000 .bin, a .pcap or .pcapng, a folder of mmWave Studio files, a ROS bag (.bag, .mcap, .db3 or a folder), "
     "an array (.npy, .npz, .mat), a sequence in roverd's layout, or RadarHD's dataset_5"
 )
 #: What poses given by hand stand in for.
@@ -55,9 +55,9 @@ def import_recording(
 
     Args:
         source: a DCA1000 ``.bin``, whole or in parts (its ``.cfg`` of the same name, or mmWave Studio's JSON files, may
-            lie beside it), a ``.pcap`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an array of
-            samples (``.npy``, ``.npz``, ``.mat``), a sequence in roverd's layout, or RadarHD's data set of pictures,
-            of which ``given.walk`` is taken.
+            lie beside it), a ``.pcap`` or ``.pcapng`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an
+            array of samples (``.npy``, ``.npz``, ``.mat``), a sequence in roverd's layout, or RadarHD's data set of
+            pictures, of which ``given.walk`` is taken.
         output: recording to write.
         given: what the user says of it.
         progress: called with frames done and (estimated) frames in all.
@@ -176,7 +176,7 @@ def _kind(source: Path) -> str:
         return "cube"
     with explained(f"{source}: cannot be read", OSError), source.open("rb") as file:
         magic = file.read(4)
-    if magic in pcap_format.MAGIC or suffix in (".pcap", ".pcapng"):
+    if magic in (*pcap_format.MAGIC, pcap_format.NEXT_GENERATION) or suffix in (".pcap", ".pcapng"):
         return "pcap"
     if suffix == ".bin":
         configured = bin_format.whole_name(source).with_suffix(".cfg").is_file()

@@ -1,15 +1,18 @@
-"""Network captures (``.pcap``, classic format) of a DCA1000's UDP stream.
+"""Network captures of a DCA1000's UDP stream: ``.pcap``, and Wireshark's ``.pcapng``.
 
-Format: https://www.ietf.org/archive/id/draft-ietf-opsawg-pcap-04.html; link type 1 (Ethernet), IPv4, UDP to port 4098.
+Formats: https://www.ietf.org/archive/id/draft-ietf-opsawg-pcap-04.html, and -pcapng-03.html beside it, by dpkt; link
+type 1 (Ethernet), IPv4, UDP to port 4098. Of a ``.pcapng``, the first interface says the link type and the clock.
 """
 
 import struct
 from collections.abc import Iterator
 from pathlib import Path
+from typing import BinaryIO
 
+import dpkt
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.importers.capture import Batch, Capture, batch_frames
 from radarize.radar.assembler import FrameAssembler
 from radarize.radar.config import RadarConfig
@@ -22,7 +25,7 @@ MAGIC = {
     b"\x4d\x3c\xb2\xa1": ("<", 10**9),
     b"\xa1\xb2\x3c\x4d": (">", 10**9),
 }
-_NEXT_GENERATION = b"\x0a\x0d\x0d\x0a"
+NEXT_GENERATION = b"\x0a\x0d\x0d\x0a"
 _ETHERNET = 1
 _LONGEST_RECORD = 1 << 18
 #: With so many times more bytes lost than the file has, the byte counts are damaged, not the network.
@@ -33,13 +36,13 @@ def open_pcap(path: Path, config: RadarConfig, cfg_text: str = "", assumed: tupl
     """Open a network capture; an incomplete last frame is left out, lost samples are zero and marked.
 
     Raises:
-        InputError: not a classic pcap file of Ethernet packets, or (on reading) without a whole frame.
+        InputError: no pcap or pcapng file of Ethernet packets, or (on reading) without a whole frame.
     """
     expected = path.stat().st_size // config.frame_bytes
     capture = Capture(config, cfg_text, (), expected, assumed)
     capture.batches = _batches(path, capture)
     with path.open("rb") as file:
-        _read_header(file, path)
+        _packets(file, path)
     return capture
 
 
@@ -82,39 +85,82 @@ def _stack(frames: list[tuple[np.ndarray, np.ndarray]], config: RadarConfig) -> 
     return Batch(decode(np.concatenate(words), config), np.stack(valid))
 
 
-def _read_header(file, path: Path) -> tuple[str, int]:
-    """Byte order and ticks per second."""
-    header = file.read(24)
-    if header[:4] == _NEXT_GENERATION:
-        raise InputError(f"{path}: is in pcapng format, expected classic pcap (convert: editcap -F pcap IN OUT)")
-    if header[:4] not in MAGIC or len(header) < 24:
-        raise InputError(
-            f"{path}: starts with {header[:4].hex() or 'nothing'}, expected the header of a classic pcap file"
-        )
-    order, ticks = MAGIC[header[:4]]
-    link = struct.unpack(order + "I", header[20:])[0] & 0xFFFF
-    if link != _ETHERNET:
-        raise InputError(f"{path}: has link type {link}, expected {_ETHERNET} (Ethernet)")
-    return order, ticks
-
-
 def _payloads(path: Path, capture: Capture) -> Iterator[tuple[float, bytes]]:
-    """Arrival time (s since 1970) and UDP payload of each data packet."""
+    """Arrival time (s since 1970) and UDP payload of each data packet; a warning where the file ends too early."""
     with path.open("rb") as file:
-        order, ticks = _read_header(file, path)
-        record = struct.Struct(order + "IIII")
-        while header := file.read(record.size):
-            if len(header) < record.size:
-                capture.warnings.append(f"{path}: ends within a packet")
+        packets = _packets(file, path)
+        while True:
+            try:
+                time, data = next(packets)
+            except StopIteration:
                 return
-            seconds, fraction, length, _ = record.unpack(header)
-            data = file.read(length) if length <= _LONGEST_RECORD else b""
-            if len(data) < length:
-                what = "ends within a packet" if length <= _LONGEST_RECORD else f"has a packet of {length} bytes"
-                capture.warnings.append(f"{path}: {what}; what follows is left out")
+            except _Broken as error:
+                capture.warnings.append(f"{path}: {error}; what follows is left out")
                 return
             if payload := _udp_payload(data):
-                yield seconds + fraction / ticks, payload
+                yield time, payload
+
+
+class _Broken(Exception):
+    """Why no packet can be read from here on."""
+
+
+def _packets(file: BinaryIO, path: Path) -> Iterator[tuple[float, bytes]]:
+    """Arrival time and Ethernet frame of each packet.
+
+    Raises:
+        InputError: no network capture, or not of Ethernet; at once, before the first packet is asked for.
+        _Broken: (on reading) what follows cannot be read.
+    """
+    magic = file.read(4)
+    file.seek(0)
+    if magic == NEXT_GENERATION:
+        with explained(f"{path}: starts with a broken pcapng section", ValueError, dpkt.Error, struct.error):
+            reader = dpkt.pcapng.Reader(_Bounded(file))
+        link, packets = reader.datalink(), _next_generation(reader)
+    elif magic in MAGIC and len(header := file.read(24)) == 24:
+        order, ticks = MAGIC[magic]
+        link = struct.unpack(order + "I", header[20:])[0] & 0xFFFF
+        packets = _classic(file, struct.Struct(order + "IIII"), ticks)
+    else:
+        raise InputError(f"{path}: starts with {magic.hex() or 'nothing'}, expected a pcap or pcapng header")
+    if link != _ETHERNET:
+        raise InputError(f"{path}: has link type {link}, expected {_ETHERNET} (Ethernet)")
+    return packets
+
+
+def _classic(file: BinaryIO, record: struct.Struct, ticks: int) -> Iterator[tuple[float, bytes]]:
+    while header := file.read(record.size):
+        if len(header) < record.size:
+            raise _Broken("ends within a packet")
+        seconds, fraction, length, _ = record.unpack(header)
+        if length > _LONGEST_RECORD:
+            raise _Broken(f"has a packet of {length} bytes")
+        data = file.read(length)
+        if len(data) < length:
+            raise _Broken("ends within a packet")
+        yield seconds + fraction / ticks, data
+
+
+def _next_generation(reader: dpkt.pcapng.Reader) -> Iterator[tuple[float, bytes]]:
+    try:
+        yield from reader
+    except ValueError as error:
+        raise _Broken(str(error)) from error
+    except (dpkt.Error, struct.error) as error:
+        raise _Broken("ends within a packet") from error
+
+
+class _Bounded:
+    """A file of which nobody reads more at once than a packet may have: lengths come from the file itself."""
+
+    def __init__(self, file: BinaryIO):
+        self._file = file
+
+    def read(self, size: int) -> bytes:
+        if not 0 <= size <= _LONGEST_RECORD:
+            raise ValueError(f"has a block of {size + 8} bytes")
+        return self._file.read(size)
 
 
 def _udp_payload(data: bytes) -> bytes | None:

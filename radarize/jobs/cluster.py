@@ -86,10 +86,8 @@ def _largest_node(ray) -> dict[str, float]:
 
 
 def _connect(address: str):
-    try:
-        import ray
-    except ImportError:
-        raise InputError("ray is not installed; type: pip install 'radarize[ray]'") from None
+    import ray
+
     _knock(address)
     if not ray.is_initialized():
         with explained(f"--ray {address}: no cluster answers", ConnectionError, ValueError, RuntimeError):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from radarize.batch import Signal
 from radarize.errors import InputError
@@ -59,7 +59,7 @@ class Inputs:
         """What several methods share, made of the radar's configuration once."""
         if make not in self._parts:
             self._parts[make] = make(self.radar)
-        return self._parts[make]
+        return cast(Part, self._parts[make])
 
     def imu(self, method: str) -> Recording:
         """The recording, for a method that needs its IMU.

@@ -7,7 +7,6 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from radarize.errors import InputError
 from radarize.nets.weights import Header, example
 from radarize.replacing import replacing
 
@@ -29,13 +28,9 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
     ``covariance``, or ``probability``.
 
     Raises:
-        InputError: the packages for it are missing, or the file cannot be written.
+        InputError: the file cannot be written.
     """
-    try:
-        import onnxscript  # noqa: F401
-    except ImportError as error:
-        raise InputError("ONNX needs packages that are not installed; type: pip install 'radarize[onnx]'") from error
-    # It lists what it would do with torchvision.
+    # torch's exporter lists what it would do with torchvision.
     logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
     inputs, item = example(net, header), torch.export.Dim("item")
     with warnings.catch_warnings():

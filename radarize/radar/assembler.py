@@ -174,8 +174,9 @@ class FrameAssembler:
 
     def _follows(self, start: int, end: int) -> bool:
         """Whether a payload lies where the stream is. Until a frame was given out, the beginning may have been none."""
-        near = self.begun is not None and end <= self._newest + self.window
-        return near and (self._next > self._first or start >= self.begun - self.window)
+        if self.begun is None or end > self._newest + self.window:
+            return False
+        return self._next > self._first or start >= self.begun - self.window
 
     def _go_on(self, packets: list[Packet]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """The stream begins, or goes on after a gap, with packets that agree."""
@@ -242,6 +243,6 @@ class FrameAssembler:
         self._next += 1
         self.counts.lost_bytes += partial.missing
         loops, tx = self.config.frame_shape[:2]
-        fired = np.frombuffer(partial.arrived, bool).reshape(loops, tx, -1).all(axis=2)
+        fired = np.asarray(np.frombuffer(partial.arrived, bool).reshape(loops, tx, -1).all(axis=2))
         words = np.frombuffer(partial.data, "<i2").astype(np.int16, copy=False)
         return words, fired[:, list(self.config.slot)]

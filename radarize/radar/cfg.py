@@ -190,7 +190,8 @@ def _firing(
     enabled = channel.integer("txChannelEn", 1, 7)
     first = frame.integer("startIdx", 0, 511)
     end = frame.integer("endIdx", first, 511)
-    order, used = [], []
+    order: list[int] = []
+    used: list[int] = []
     for index in range(first, end + 1):
         matching = [c for c in chirps if c.integer("startIdx", 0, 511) <= index <= c.integer("endIdx", 0, 511)]
         if not matching:

@@ -1,6 +1,6 @@
 """The radar's configuration: what is transmitted, when, on which antennas, and how it is sampled."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -92,7 +92,7 @@ class RadarConfig(BaseModel):
         return self
 
     @classmethod
-    def build(cls, source: str, **fields: object) -> "RadarConfig":
+    def build(cls, source: str, **fields: Any) -> "RadarConfig":
         """A configuration from its fields; `source` is what errors name as their origin.
 
         Raises:

@@ -39,9 +39,10 @@ def load_config(source: str | Path | RadarConfig) -> tuple[RadarConfig, str]:
     Raises:
         InputError: no such preset or file, or its content cannot be used.
     """
-    config = source if isinstance(source, RadarConfig) else PRESETS.get(str(source))
-    if config is not None:
-        return config, write_cfg(config)
+    if not isinstance(source, RadarConfig):
+        source = PRESETS.get(str(source), source)
+    if isinstance(source, RadarConfig):
+        return source, write_cfg(source)
     path = Path(source)
     if not path.is_file():
         raise InputError(

@@ -139,22 +139,27 @@ class _Node:
         return _Node(self.file, f"{self.path}.{field}".lstrip("."), self.get(field))
 
     def items(self, field: str) -> list["_Node"]:
+        """Entries of a list; a single one may stand there without a list, as some programs write it."""
         value = self.get(field)
+        if isinstance(value, dict) and value:
+            return [self.node(field)]
         if not isinstance(value, list) or not value:
             raise self.error(field, value, "a list with at least one entry")
         return [_Node(self.file, f"{self.path}.{field}[{i}]".lstrip("."), item) for i, item in enumerate(value)]
 
     def decimal(self, field: str, unit: int = 0) -> float:
         value = self.get(field)
-        if isinstance(value, bool) or not isinstance(value, int | float | Decimal) or not abs(value) < 1e30:
+        if isinstance(value, bool) or not isinstance(value, int | Decimal) or not abs(Decimal(value)) < 10**30:
             raise self.error(field, value, "a number")
         return float(Decimal(value).scaleb(unit))
 
     def integer(self, field: str) -> int:
         value = self.get(field)
         try:
+            if not isinstance(value, str | int | Decimal):
+                raise ValueError
             number = int(value, 0) if isinstance(value, str) else int(value)
-        except (TypeError, ValueError, OverflowError):
+        except (ValueError, OverflowError):
             raise self.error(field, value, "a whole number") from None
         if isinstance(value, Decimal) and number != value or not 0 <= number < 2**32:
             raise self.error(field, value, "a whole number of at least 0")

@@ -4,7 +4,6 @@ Defaults are the preset ``lidar``; values without a source are ours.
 """
 
 from pathlib import Path
-from typing import Literal
 
 from radarize.errors import InputError
 from radarize.plain import Frozen, setting
@@ -126,7 +125,7 @@ class SlamConfig(Frozen):
     loop: LoopConfig = LoopConfig()
 
     @classmethod
-    def preset(cls, name: Literal["radar", "lidar", "cartographer"]) -> "SlamConfig":
+    def preset(cls, name: str) -> "SlamConfig":
         """A named set of parameters.
 
         ``lidar``: wide, dense and exact scans. ``radar``: 88 deg and 4.28 m of noisy scans at 30 Hz with odometry that

@@ -8,6 +8,7 @@ import trimesh
 from jaxtyping import Float
 
 from radarsim.scene import shapes
+from radarsim.scene.materials import Material
 from radarsim.scene.scene import Scene
 from radarsim.scene.section import Section
 
@@ -15,7 +16,7 @@ from radarsim.scene.section import Section
 BELOW_TOP = 0.45
 _AHEAD = np.array([0.30, 0.60, -0.80])
 _SUN = np.array([0.55, 0.35, -0.85])
-_CAP = (0.16, 0.16, 0.17)  # of walls cut through
+CAP = (0.16, 0.16, 0.17)  # of walls cut through
 
 
 def render(scene: Scene, width: int = 1100, samples: int = 40) -> Float[np.ndarray, "h w 3"]:
@@ -29,7 +30,7 @@ def render(scene: Scene, width: int = 1100, samples: int = 40) -> Float[np.ndarr
     Raises:
         InputError: no usable LLVM.
     """
-    meshes = _cut_open(scene)
+    meshes = cut_open(scene)
     corners = np.concatenate([m.vertices for m, _ in meshes])
     eye, target, tangent, height = _camera(corners, width)
     with _rgb() as mi:
@@ -51,8 +52,8 @@ def render(scene: Scene, width: int = 1100, samples: int = 40) -> Float[np.ndarr
                 "sampler": {"type": "independent", "sample_count": samples},
             },
         }
-        for number, (mesh, finish) in enumerate(meshes):
-            plan[f"part{number}"] = _shape(mi, f"part{number}", mesh, finish)
+        for number, (mesh, made) in enumerate(meshes):
+            plan[f"part{number}"] = _shape(mi, f"part{number}", mesh, _finish(made) if made else _diffuse(CAP))
         image = np.array(mi.render(mi.load_dict(plan), seed=0))
     alpha = np.clip(image[..., 3:], 0, 1)
     linear = np.clip(1.05 * image[..., :3] + (1 - alpha), 0, 1)  # on white
@@ -76,12 +77,12 @@ def _rgb() -> Iterator:
         mi.set_variant(before)
 
 
-def _cut_open(scene: Scene) -> list[tuple[trimesh.Trimesh, dict]]:
-    """Triangles below the cut by material, caps on the walls, and what each looks like."""
+def cut_open(scene: Scene) -> list[tuple[trimesh.Trimesh, Material | None]]:
+    """Triangles below the cut by material, and caps on the walls, which are of none."""
     low, high = scene.bounds[:, 2]
     level = high - BELOW_TOP if high - low > 2.2 else high + 0.01
     by_material: dict[str, list[np.ndarray]] = {}
-    looks = {}
+    made = {}
     for item in scene.objects:
         triangles = item.mesh.triangles
         below = triangles[:, :, 2].min(axis=1) < level
@@ -90,14 +91,14 @@ def _cut_open(scene: Scene) -> list[tuple[trimesh.Trimesh, dict]]:
         corners, faces = triangles[below].reshape(-1, 3), np.arange(3 * below.sum()).reshape(-1, 3)
         corners, faces, _ = trimesh.intersections.slice_faces_plane(corners, faces, [0, 0, -1], [0, 0, level])
         by_material.setdefault(item.material.name, []).append(corners[faces])
-        looks[item.material.name] = _finish(item.material)
-    parts = [(_mesh(np.concatenate(t)), looks[name]) for name, t in by_material.items()]
+        made[item.material.name] = item.material
+    parts = [(_mesh(np.concatenate(t)), made[name]) for name, t in by_material.items()]
     caps = [
         shapes.polygon(area.buffer(0), (0, 0, level)) for area, _ in Section.of(scene, level - 2e-3).areas(scene)
         if area.area > 1e-3
     ]  # fmt: skip
     if caps:
-        parts.append((shapes.joined(*caps), _diffuse(_CAP)))
+        parts.append((shapes.joined(*caps), None))
     return parts
 
 
@@ -110,7 +111,7 @@ def _diffuse(color: tuple[float, float, float]) -> dict:
     return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": linear}}}
 
 
-def _finish(material) -> dict:
+def _finish(material: Material) -> dict:
     """How a material looks: panes let light through, metal shines a little, all else is dull."""
     if material.name == "glass":
         return {"type": "mask", "opacity": 0.35, "bsdf": _diffuse(material.color)}

@@ -86,6 +86,23 @@ def test_a_replay_gives_what_the_file_gives(walk, tmp_path):
     assert live.losses.lost_frames == 1 and live.intake.taken == FRAMES and stream.counts.dropped == 0
 
 
+def test_foxglove_gets_what_the_page_gets(walk):
+    """The protocol itself: tests/test_foxglove.py."""
+    sent = []
+
+    class Server:
+        def __getattr__(self, name):
+            return lambda *given: sent.append((name, *given))
+
+    with Page("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
+        live = Kept(Inputs(PRESETS["radarize"]), CLASSICAL, page, Server())
+        live.run(stream, threading.Event())
+    assert {name for name, *_ in sent} == {"pose", "scan", "picture", "map", "path"}
+    _, slam, odometry = next(given for name, *given in reversed(sent) if name == "pose")
+    assert abs(poses(live.results) - odometry).max(axis=1).min() < 1e-9 and slam == pytest.approx(odometry, abs=0.2)
+    assert sent[-1][0] == "path" and np.array_equal(sent[-1][2], live.pipeline.slam.graph.poses)
+
+
 def test_too_slow_means_dropped_frames_not_delay(walk):
     """Ten times real time, and room for four frames: what is processed is whole, and the rest is counted."""
     with Page("127.0.0.1:0") as page, Replay(walk, speed=1e4, slots=4) as stream:

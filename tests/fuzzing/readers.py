@@ -45,7 +45,7 @@ from tests.evaluation.fake_run import write_run
 from tests.fuzzing.damage import damaged, misspelled
 from tests.fuzzing.hdf5 import RECORDING, altered, edits
 from tests.importers.ros import write_published
-from tests.importers.test_import_pcap import pcap, udp
+from tests.importers.test_import_pcap import pcap, pcapng, udp
 from tests.packets import packets
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
@@ -256,6 +256,7 @@ def network_capture() -> Reader:
     with tempfile.TemporaryDirectory() as folder:
         stream = [udp(packet.encode()) for packet in packets(encode(FRAMES, CONFIG).tobytes())]
         seeds = [pcap(Path(folder) / "a", stream).read_bytes(), pcap(Path(folder) / "b", stream, ">").read_bytes()]
+        seeds.append(pcapng(Path(folder) / "c", stream).read_bytes())
     seeds += [path.read_bytes() for path in sorted((RECORDINGS / "iwr1843-pcap").glob("*.pcap"))]
     return Reader(damaged(seeds), _file("a.pcap"), _importing())
 

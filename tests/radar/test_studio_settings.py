@@ -71,6 +71,25 @@ def test_refusals_name_the_field(settings, path, value, message):
     assert message in str(error.value) and "a.mmwave.json" in str(error.value)
 
 
+def test_single_entries_may_stand_without_a_list(settings):
+    """Some programs write a list of one as its entry."""
+    expected = parse_studio(json.dumps(settings))
+    rf = settings["mmWaveDevices"][0]["rfConfig"]
+    rf["rlProfiles"] = rf["rlProfiles"][0]
+    settings["mmWaveDevices"] = settings["mmWaveDevices"][0]
+    assert parse_studio(json.dumps(settings)) == expected
+    del rf["rlProfiles"]["rlProfileCfg_t"]["rxGain_dB"]
+    with pytest.raises(InputError, match=r"has no mmWaveDevices\.rfConfig\.rlProfiles\.rlProfileCfg_t\.rxGain_dB"):
+        parse_studio(json.dumps(settings))
+
+
+def test_transmitters_in_any_order(settings):
+    """TX2, TX1, TX3: masks 2, 1, 4."""
+    for chirp, mask in zip(settings["mmWaveDevices"][0]["rfConfig"]["rlChirps"], ("0x2", "0x1", 4), strict=False):
+        chirp["rlChirpCfg_t"]["txEnable"] = mask
+    assert parse_studio(json.dumps(settings)).tx_order == (1, 0, 2)
+
+
 def test_a_missing_field_is_named(settings):
     node, key = _at(settings, "rfConfig/rlFrameCfg_t/numLoops")
     del node[key]

@@ -1,0 +1,26 @@
+"""What CONTRIBUTING.md and the workflow point at is there."""
+
+import re
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_templates_and_their_tests_are_there():
+    text = (ROOT / "CONTRIBUTING.md").read_text()
+    named = re.findall(r"`([\w./-]+/[\w./-]*)`", text) + re.findall(r"\]\(([\w./-]+)\)", text)
+    assert len(named) > 20
+    assert not [name for name in named if not name.startswith("../") and not (ROOT / name).exists()]
+
+
+def test_the_workflow_runs_what_the_house_has():
+    jobs = yaml.safe_load((ROOT / ".github" / "workflows" / "ci.yml").read_text())["jobs"]
+    lines = [step["run"] for job in jobs.values() for step in job["steps"] if "run" in step]
+    targets = {target for line in lines for target in re.findall(r"make (\w+)", line)}
+    rules = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)[1].split()
+    assert {"lint", "docs"} <= targets <= set(rules)
+    assert ".ci/run" in lines
+    named = {word for line in lines for word in line.split() if word.startswith("tests/")}
+    assert named and all((ROOT / name).exists() for name in named)

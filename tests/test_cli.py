@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -41,11 +40,13 @@ def small_recording(path: Path, frames: int = 2) -> Path:
 
 @pytest.mark.parametrize("name", APPS)
 def test_help_is_instant(name):
+    """In processor time: others may have the clock's."""
     seconds = []
     for _ in range(3):
-        start = time.perf_counter()
+        before = os.times()
         done = subprocess.run([Path(sys.executable).parent / name, "--help"], capture_output=True, text=True)
-        seconds.append(time.perf_counter() - start)
+        after = os.times()
+        seconds.append(after.children_user + after.children_system - before.children_user - before.children_system)
         assert done.returncode == 0 and "Usage" in done.stdout
     assert min(seconds) < 0.7
 

@@ -1,12 +1,13 @@
 # make demo: sets this machine up and runs the main job end to end      make test: sets up and passes the tests
 # make bounds: tests of compiled loops, which then look whether they index within bounds
+# make docs: builds the pages of documentation, with an environment of its own (requirements-docs.lock)
 # make lint: style, and types of what other programs import
 # make documents: types every command of docs, too, as `make test` does of README, and where nothing is compiled yet
 RUN := runs/demo
 # A file's tests share what it makes; files begin in the order of tests/conftest.py.
 PYTEST := .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: setup demo test bounds documents lint clean
+.PHONY: setup demo test bounds documents docs lint clean
 
 setup:
 	@./setup.sh
@@ -28,6 +29,14 @@ bounds: setup
 
 documents: setup
 	@DOCUMENTS=1 .venv/bin/python -m pytest tests/documents
+
+docs: setup
+	@cmp -s requirements-docs.lock build/docs/.ready || { .venv/bin/python -m venv --clear build/docs && \
+		build/docs/bin/python -m pip install -qq --no-deps -r requirements-docs.lock && \
+		cp requirements-docs.lock build/docs/.ready; }
+	@.venv/bin/python docs/pages.py
+	@NO_MKDOCS_2_WARNING=1 build/docs/bin/mkdocs build --strict --quiet
+	@echo build/site/index.html
 
 lint: setup
 	@.venv/bin/ruff check .

@@ -9,7 +9,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 #: What is read first, and then, by two readers who each have what it left behind, in this order.
 FIRST = "README.md"
-THEN = (("docs/simulating.md", "docs/radar.md", "docs/physics.md"), ("docs/learning.md", "docs/comparing.md"))
+THEN = (
+    ("docs/tutorial.md", "docs/simulating.md", "docs/radar.md", "docs/ros2.md", "docs/physics.md"),
+    ("docs/learning.md", "docs/comparing.md"),
+)
 PAGES = (FIRST, *THEN[0], *THEN[1])
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 _OWN = re.compile(r"`((?:radarize|radarsim|torchrun|make|python) [^`]+)`")

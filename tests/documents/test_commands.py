@@ -50,8 +50,9 @@ TYPED_INSTEAD = (
     (r"^(radarize (?:capture|live) .*-o .*)$", r"\1 --overwrite"),  # README's is typed before
     (r"^(radarize live .*)$", r"\1 --address 127.0.0.1:0"),
     (r"^(radarsim emulate \S+) --port-link \S+", r"\1 --port-link {tty} {ports} --loop"),
+    (r"--foxglove \S+", "--foxglove 127.0.0.1:0"),
     # A window needs a screen.
-    (r"^(radarize view .*)$", r"\1 --save view.rrd"),
+    (r"^(radarize view (?!.*--save).*)$", r"\1 --save view.rrd"),
     # Places of the readers' own: where the room has none.
     (r"--origin '[^']*'", "--origin '0 0 0 0 0 0'"),
     (r"--at '[^']*'", "--at '9 6 1 0 0 0'"),
@@ -60,10 +61,13 @@ TYPED_INSTEAD = (
 NOT_TYPED = {
     r"make test": "this is part of it",
     r"radarize recover .*": "nothing was killed (tests/capture/test_kept.py)",
+    r"pip install .*": "tests/test_wheel.py installs the wheel",
+    r"(ros2|python3|ros/bin/pip) .*": "needs ROS 2; tests/examples has its messages",
+    r"make (docs|setup)": "makes an environment",
     r"sudo .*": "changes the machine's network and groups",
     r"building: .*": "a line of a scene file, as scenes/buildings have it",
     r"scene = Scene\.of.*": "Python; tests/scene/test_buildings.py has it",
-    r"radarsim doctor": "compiles what the others compile, too; tests/test_setup.py runs it",
+    r"radarsim doctor.*": "compiles what the others compile, too; tests/test_setup.py runs it",
     r"python -m benchmarks\..*": "draws the page's own pictures, by the checkout's benchmarks",
 }
 if not STUDIO.is_dir():

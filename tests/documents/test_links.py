@@ -1,0 +1,33 @@
+"""Links between pages lead somewhere, and the site has them all."""
+
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+ROOT = Path(__file__).parents[2]
+PAGES = [
+    *ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *(ROOT / "benchmarks" / "results").glob("*.md"),
+    ROOT / "radarize" / "weights" / "README.md",
+]  # fmt: skip
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+FENCE = re.compile(r"^```.*?^```", re.MULTILINE | re.DOTALL)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    links = [link for link in LINK.findall(FENCE.sub("", page.read_text())) if "://" not in link]
+    assert not [link for link in links if not (page.parent / link.split("#")[0]).exists()]
+
+
+def test_the_site_has_every_page():
+    """But for the reference of commands, which is written when the site is built, and the benchmarks' own pages."""
+    settings = yaml.safe_load((ROOT / "mkdocs.yml").read_text())
+    named = set(re.findall(r"[\w/]+\.md", yaml.safe_dump(settings["nav"])))
+    pages = {str(page.relative_to(ROOT)) for page in PAGES if "results" not in page.parts}
+    assert named - {"docs/reference/commands.md"} == pages
+
+
+def test_readme_is_short():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= 120

@@ -13,7 +13,8 @@ from radarsim.physics import images, roundghosts, sight
 from radarsim.physics.antenna import Antenna, gain_pattern
 from radarsim.physics.candidates import Candidates
 from radarsim.physics.echoes import Echoes, Provenance
-from radarsim.physics.images import LEAST_LOSS, Images
+from radarsim.physics.fresnelzone import LEAST_LOSS
+from radarsim.physics.images import Images
 from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.obstacles import CLEARANCE, Obstacles
 from radarsim.physics.paths import OneWay, TwoWay

@@ -96,8 +96,9 @@ class EchoFinder:
         two_way = TwoWay.of(search, targets, candidates, one_way)
         found = Images.none()
         if self.reflectors is not None:
+            facing = Flat.joined([flat, self.reflectors.inner_near(search.position, search.range)])
             found = Images.joined([
-                images.flashes(search, flat, self.reflectors.round, self.obstacles, self.heights),
+                images.flashes(search, facing, self.reflectors.round, self.obstacles, self.heights),
                 images.by_chains(search, flat, mirrors, self.obstacles),
             ])  # fmt: skip
         echoes = self._echoes(search, targets, candidates, one_way, two_way, found)

@@ -216,9 +216,11 @@ def import_(
     materials: Annotated[
         Path | None, typer.Option(help="YAML of 'pattern: material'; the first to match a part's name decides.")
     ] = None,
-    default: Annotated[str, typer.Option(help="Material of parts whose names say nothing.")] = "plasterboard",
+    default: Annotated[
+        str | None, typer.Option(help="Of parts whose names say nothing; else plasterboard, of whole rooms concrete.")
+    ] = None,
     units: Annotated[str | None, typer.Option(help="m, cm, mm, in or ft; else m, if that is plausible.")] = None,
-    up: Annotated[str | None, typer.Option(help="y or z; else y for glTF and z for others.")] = None,
+    up: Annotated[str | None, typer.Option(help="y or z; else as a glTF or OBJ mesh looks, z of others.")] = None,
     floor: Annotated[bool, typer.Option(help="Bring a mesh's floor to z = 0.")] = True,
     budget: Annotated[int, typer.Option(help="Decimate a mesh to this many triangles.")] = 300_000,
     height: Annotated[float, typer.Option(help="Floor to ceiling of a map or log, m.")] = 2.7,

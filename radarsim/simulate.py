@@ -96,7 +96,8 @@ def record(
         the path written.
 
     Raises:
-        InputError: the motion is shorter than a frame, or the recording cannot be written.
+        InputError: the motion is shorter than a frame, none of its frames has an echo, or the recording cannot be
+            written.
     """
     spare(Path(output))
     times = scenario.times if times is None else times
@@ -104,6 +105,8 @@ def record(
 
     def made(first: int, last: int) -> tuple[Int16[np.ndarray, "frame loop tx rx sample 2"], dict[str, np.ndarray]]:
         frames = scenario.frames(times[first:last], times[last] if last < len(times) else None)
+        if first == 0 and not any(map(len, frames.echoes)):
+            _require_echoes(scenario, times)
         arrived = np.True_ if valid is None else valid[first:last, ..., None, None, None]
         return frames.samples * arrived, suite.observe(frames, first, start)
 
@@ -126,6 +129,16 @@ def record(
             if progress:
                 progress(last, len(times))
     return Path(output)
+
+
+def _require_echoes(scenario: Scenario, times: Float[np.ndarray, "frame"]) -> None:
+    """Refuse a recording of nothing, as a look at some frames all over it tells."""
+    some = np.unique(np.linspace(0, len(times) - 1, TOGETHER).astype(int))
+    if not any(map(len, scenario.frames(times[some]).echoes)):
+        raise InputError(
+            f"scene {scenario.scene.name}: no frame has an echo, expected surfaces that face the radar within "
+            f"{scenario.config.max_range:.1f} m of it"
+        )
 
 
 def facts(scenario: Scenario) -> dict[str, object]:

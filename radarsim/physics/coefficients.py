@@ -1,9 +1,9 @@
 """How objects reflect and transmit: coefficients tabled over the cosine of the angle of incidence.
 
 A sheet is a slab of its material's thickness, and so is each face of a thick closed body of such a material (hollow: a
-cabinet of boards, a stud wall). A thin closed body is one slab as thick as itself. All else is an opaque half space.
-What a slab reflects and what it lets through are of one formula (ITU-R P.2040-4, eqs. 42, 43), which is Airy's sum over
-the waves between its faces, at the centre of the sweep.
+cabinet of boards, a stud wall); its inner faces lie that much further in. A thin closed body is one slab as thick as
+itself. All else is an opaque half space. What a slab reflects and what it lets through are of one formula (ITU-R
+P.2040-4, eqs. 42, 43), which is Airy's sum over the waves between its faces, at the centre of the sweep.
 """
 
 from dataclasses import replace

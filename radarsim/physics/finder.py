@@ -13,7 +13,8 @@ from radarsim.physics import images, roundghosts, sight
 from radarsim.physics.antenna import Antenna, gain_pattern
 from radarsim.physics.candidates import Candidates
 from radarsim.physics.echoes import Echoes, Provenance
-from radarsim.physics.images import LEAST_LOSS, Images
+from radarsim.physics.fresnelzone import LEAST_LOSS
+from radarsim.physics.images import Images
 from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.obstacles import CLEARANCE, Obstacles
 from radarsim.physics.paths import OneWay, TwoWay
@@ -95,8 +96,9 @@ class EchoFinder:
         two_way = TwoWay.of(search, targets, candidates, one_way)
         found = Images.none()
         if self.reflectors is not None:
+            facing = Flat.joined([flat, self.reflectors.inner_near(search.position, search.range)])
             found = Images.joined([
-                images.flashes(search, flat, self.reflectors.round, self.obstacles, self.heights),
+                images.flashes(search, facing, self.reflectors.round, self.obstacles, self.heights),
                 images.by_chains(search, flat, mirrors, self.obstacles),
             ])  # fmt: skip
         echoes = self._echoes(search, targets, candidates, one_way, two_way, found)

@@ -5,18 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Complex, Float, Int, UInt8
 
-from radarsim.physics import imagemethod, plates
+from radarsim.physics import fresnelzone, imagemethod, plates
 from radarsim.physics.curved import RoundBodies
 from radarsim.physics.echoes import Provenance
+from radarsim.physics.fresnelzone import AT_RADAR, Stretches
 from radarsim.physics.obstacles import Obstacles
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
 from radarsim.physics.sight import Mirrors
 from radarsim.physics.table import Table
 from radarsim.physics.unevenness import Heights
-
-#: Slabs are looked for in the way of echoes that are at least this much stronger than the threshold.
-LEAST_LOSS = 4.0
 
 
 @dataclass(frozen=True)
@@ -45,7 +43,7 @@ def flashes(
     search: Search, flat: Flat, round_bodies: RoundBodies, obstacles: Obstacles, heights: Heights | None = None
 ) -> Images:
     """Plates, as even as `heights` says, and round bodies that face the radar."""
-    aims, found = [], []
+    found, ways = [], []
     for frame in range(search.frames):
         parts = plates.parts(flat, search, frame)
         aim, isometry, amplitude = round_bodies.flashes(search, frame)
@@ -54,13 +52,35 @@ def flashes(
         if heights is not None:
             uneven = _uneven(search, frame, flat[parts.facet], parts.aim, heights)
             parts = replace(parts, amplitude=parts.amplitude * uneven)
-        aims += [parts.aim, aim]
+        ways += [_to_parts(search, frame, flat, parts), _to_bodies(search, frame, aim)]
         isometry = np.concatenate([parts.isometry, isometry])
         found.append(Images(np.full(len(cause), frame), isometry, np.append(parts.amplitude, amplitude), cause))
-    images, aim = Images.joined(found), np.concatenate(aims)
-    worth = np.abs(images.amplitude) > LEAST_LOSS * search.threshold
-    factor, delay = obstacles.passage(search, images.frame, search.position[images.frame], aim, worth)
+    images, ways = Images.joined(found), Stretches.joined(ways)
+    factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(images.amplitude))
     return _passed(search, images, factor**2, 2 * delay)  # there and back
+
+
+def _to_parts(search: Search, frame: int, flat: Flat, parts: plates.Parts) -> Stretches:
+    """The ways to parts of plates; edges and corners are seen by one ray."""
+    here = search.position[frame]
+    flash = np.trace(parts.isometry[:, :, :3], axis1=1, axis2=2) > 0  # a reflection, no half turn or inversion
+    unit = np.sqrt(search.wavelength * np.linalg.norm(parts.aim - here, axis=1) / 4) * flash
+    after = unit[:, None, None] * np.stack([flat.u[parts.facet], flat.v[parts.facet]], axis=1)
+    mirrors = np.stack([np.full(len(parts), -1), np.where(flash, parts.facet, -1)], axis=1)
+    begin = np.broadcast_to(here, parts.aim.shape)
+    return Stretches(np.full(len(parts), frame), begin, parts.aim, AT_RADAR * after, after, mirrors)
+
+
+def _to_bodies(search: Search, frame: int, aim: Float[np.ndarray, "part 3"]) -> Stretches:
+    """The ways to round bodies, whose zones end in a point, or nearly so: a cone, as wide as they are half way."""
+    begin = np.broadcast_to(search.position[frame], aim.shape)
+    way = aim - begin
+    size = np.linalg.norm(way, axis=1, keepdims=True)
+    aside = np.cross(way / size, search.rotation[frame, :, 2])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    before = np.sqrt(search.wavelength * size / 8)[:, None] * np.stack([aside, np.cross(way / size, aside)], axis=1)
+    none = np.full((len(aim), 2), -1)
+    return Stretches(np.full(len(aim), frame), begin, aim, before, 0 * before, none)
 
 
 def _uneven(
@@ -91,6 +111,38 @@ def _passed(search: Search, images: Images, factor, delay) -> Images:
     return Images(images.frame, isometry, amplitude, cause)[np.abs(amplitude) > search.threshold]
 
 
+def _along(search: Search, flat: Flat, frame: Int[np.ndarray, "chain"], chains: imagemethod.Chains) -> Stretches:
+    """The four stretches of each chain, of two mirrors one of no length."""
+    here = search.position[frame, None]
+    stops = np.concatenate([here, chains.stops, here], axis=1)
+    way = np.diff(stops, axis=1)
+    size = np.linalg.norm(way, axis=2)
+    there, whole = np.cumsum(size, axis=1)[:, :3], size.sum(axis=1)[:, None]
+    unit = np.sqrt(search.wavelength * there * (whole - there) / (2 * whole))
+    now = way[:, 0] / size[:, 0, None]
+    aside = np.cross(now, search.rotation[frame, :, 2])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    axes = np.stack([aside, np.cross(now, aside)], axis=1)
+    apart = np.empty((len(frame), 5, 2, 3))  # of a unit aside, by stop
+    apart[:, 0] = AT_RADAR * unit[:, 0, None, None] * axes
+    for k in range(3):
+        normal = flat.normal[chains.mirrors[:, k]]
+        lift = np.einsum("cad,cd->ca", axes, normal)[..., None]
+        slope = np.einsum("cd,cd->c", now, normal)[:, None]
+        apart[:, k + 1] = unit[:, k, None, None] * (axes - lift * (now / slope)[:, None])  # in the mirror's plane
+        last = (chains.mirrors[:, k] == chains.mirrors[:, min(k + 1, 2)]) & (k < 2)  # twice: it reflects once
+        axes = np.where(last[:, None, None], axes, axes - 2 * lift * normal[:, None])
+        now = np.where(last[:, None], now, now - 2 * slope * normal)
+    apart[:, 4] = AT_RADAR * unit[:, 2, None, None] * axes
+    none = np.full((len(frame), 1), -1)
+    mirrors = np.concatenate([none, chains.mirrors, none], axis=1)
+    return Stretches(
+        np.repeat(frame, 4), stops[:, :-1].reshape(-1, 3), stops[:, 1:].reshape(-1, 3),
+        apart[:, :-1].reshape(-1, 2, 3), apart[:, 1:].reshape(-1, 2, 3),
+        np.stack([mirrors[:, :-1], mirrors[:, 1:]], axis=2).reshape(-1, 2),
+    )  # fmt: skip
+
+
 def by_chains(search: Search, flat: Flat, mirrors: list[Mirrors], obstacles: Obstacles) -> Images:
     """Chains of mirrors, either way round.
 
@@ -108,9 +160,9 @@ def by_chains(search: Search, flat: Flat, mirrors: list[Mirrors], obstacles: Obs
     cause = np.where(two, Provenance.GHOST_2, Provenance.GHOST_3).astype(np.uint8)
     cause[slant < 1e-3] = Provenance.DIRECT
     there = Images(frame, chains.isometry, chains.amplitude, cause)
-    stops = np.concatenate([chains.stops, search.position[frame, None]], axis=1)
-    worth = np.abs(chains.amplitude) > LEAST_LOSS * search.threshold
-    factor, delay = obstacles.way(search, frame, stops, np.full(len(frame), 4), worth)
+    ways = _along(search, flat, frame, chains)
+    factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(chains.amplitude).repeat(4))
+    factor, delay = factor.reshape(-1, 4).prod(axis=1), delay.reshape(-1, 4).sum(axis=1)
     back = replace(there, isometry=imagemethod.reverse(chains.isometry))
     two_ways = chains.mirrors[:, 0] != chains.mirrors[:, 2]
     return Images.joined([

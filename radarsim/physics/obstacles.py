@@ -33,6 +33,14 @@ class Obstacles:
                 hidden[now] = self.moving.occluded(begin[now], end[now], search.time[k])
         return hidden
 
+    def clear(
+        self, search: Search, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
+        end: Float[np.ndarray, "ray 3"],
+    ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
+        """Whether nothing is in the way, slabs included; frames and ends as `passage` has them."""
+        blocked = np.zeros(len(frame), bool) if self.scene is None else self.scene.occluded(begin, end, CLEARANCE)
+        return ~(blocked | self._shadowed(search, frame, begin, end))
+
     def passage(
         self, search: Search, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
         end: Float[np.ndarray, "ray 3"], allowed: Bool[np.ndarray, "ray"],

@@ -59,36 +59,50 @@ class Reflectors:
     Attributes:
         flat: quadrilaterals that cover its flat regions.
         round: its spheres and cylinders.
+        inner: the inner faces of hollow bodies, which are seen through outer ones: they flash, but mirror nothing else.
     """
 
     flat: Flat
     round: RoundBodies
+    inner: Flat = Flat.none()
 
     @cached_property
-    def _grid(self) -> Grid:
-        return Grid(self.flat.corners.min(axis=1), self.flat.corners.max(axis=1))
+    def _grids(self) -> tuple[Grid, Grid]:
+        outer, inner = (Grid(some.corners.min(axis=1), some.corners.max(axis=1)) for some in (self.flat, self.inner))
+        return outer, inner
 
     def near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> Flat:
         """Flat ones within a distance (m) of any of the positions, in the same order."""
-        return self.flat[self._grid.near(positions, distance)[0]]
+        return self.flat[self._grids[0].near(positions, distance)[0]]
+
+    def inner_near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> Flat:
+        """The same of inner faces."""
+        return self.inner[self._grids[1].near(positions, distance)[0]] if len(self.inner) else self.inner
 
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig) -> "Reflectors":
         """The reflectors of a scene."""
-        flat, bodies = [], []
+        flat, inner, bodies = [], [], []
         tables: dict[Material, np.ndarray] = {}
         for item in scene.objects:
-            slab, _ = as_slab(item)
+            slab, whole = as_slab(item)
             if slab not in tables:
                 tables[slab] = reflection(slab, config)
-            found, is_round = recognise(item.mesh)
+            round_, is_round = recognise(item.mesh)
             sides = item.two_sided, item.is_floor_or_ceiling
             finish = FINISHES.get(item.material.name, 0.0)
-            bodies += [(b.center, b.axis, b.radius, b.half, tables[slab]) for b in found]
-            flat += [
-                (p.corners, p.center, p.normal, p.u, p.v, p.half, *sides, tables[slab], finish)
-                # physical optics holds down to about a wavelength
-                for p in plates(item.mesh, ~is_round, config.wavelength**2)
-            ]
-        columns = [np.array(column) for column in zip(*flat, strict=True)]
-        return cls(Flat(*columns) if flat else Flat.none(), RoundBodies.of(bodies))
+            bodies += [(b.center, b.axis, b.radius, b.half, tables[slab]) for b in round_]
+            # physical optics holds down to about a wavelength
+            found = plates(item.mesh, ~is_round, config.wavelength**2)
+            rest = (*sides, tables[slab], finish)
+            flat += [(p.corners, p.center, p.normal, p.u, p.v, p.half, *rest) for p in found]
+            if slab.thickness is not None and not (whole or item.two_sided):
+                for p in found:
+                    inwards = -slab.thickness * p.normal
+                    place = p.corners[::-1] + inwards, p.center + inwards
+                    inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
+        return cls(_table(flat), RoundBodies.of(bodies), _table(inner))
+
+
+def _table(rows: list[tuple]) -> Flat:
+    return Flat(*(np.array(column) for column in zip(*rows, strict=True))) if rows else Flat.none()

@@ -1,6 +1,6 @@
 """Independent float64 references. `beat`: the beat signal of world points sample by sample, from the motion itself.
 
-`transfer_matrix`: layers. `kirchhoff_mirror`: what a mirror of any size passes on.
+`transfer_matrix`: layers. `kirchhoff_mirror`: what a mirror of any size passes on. `past_pole`: what a pole leaves.
 """
 
 import numpy as np
@@ -87,6 +87,28 @@ def kirchhoff_mirror(half, place, wavelength, across=1601):
     image = np.linalg.norm(place * [1, -1, 1] + [0, 2, 0])
     field = np.sum(cosine * np.exp(2j * np.pi * (there + back - image) / wavelength) / (there * back))
     return field * np.prod(2 * np.array(half) / across) / (1j * wavelength)
+
+
+def past_pole(offset, width, places, path, wavelength, nodes=200):
+    """Share of a wave's amplitude that passes an opaque strip beside the axis, met twice on a path, by Kirchhoff.
+
+    Babinet: all of it, less what comes through either strip, plus what comes through both; float64.
+
+    Args:
+        offset, width: of the strip, m.
+        places: where on the path it is met, from one end, m.
+        path: its length, m.
+    """
+    x = offset + ((np.arange(nodes) + 0.5) / nodes - 0.5) * width
+    gaps, wavenumber, step = np.diff([0.0, *places, path]), 2 * np.pi / wavelength, width / nodes
+    value = 1.0 + 0j
+    for d in places:
+        unit = 1 / d + 1 / (path - d)
+        value -= np.sum(np.exp(0.5j * wavenumber * x * x * unit)) * step * np.sqrt(unit / (1j * wavelength))
+    there, between, back = gaps
+    turn = x[:, None] ** 2 / there + (x[:, None] - x) ** 2 / between + x**2 / back
+    both = np.sum(np.exp(0.5j * wavenumber * turn)) * step**2
+    return value + both * np.sqrt(path / gaps.prod()) / (1j * wavelength)
 
 
 def bounced(scene, position, up, axis, spread, bounces, wavelength, across=700):

@@ -22,6 +22,8 @@ from radarsim.scene.importers.cleaning import clean, decimate, edges_of_many
 from radarsim.scene.importers.flatten import flatten
 from radarsim.scene.importers.naming import MaterialMap
 from radarsim.scene.importers.part import Part
+from radarsim.scene.importers.shells import turned_to_rooms
+from radarsim.scene.importers.upright import up_axis
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 #: Largest extent of a building, m; what seems larger or smaller is likely in other units.
@@ -57,7 +59,7 @@ def import_scene(
     output: Path,
     *,
     materials: Path | None = None,
-    default: str = "plasterboard",
+    default: str | None = None,
     units: str | None = None,
     up: str | None = None,
     floor: bool = True,
@@ -74,9 +76,9 @@ def import_scene(
             ``.log`` or ``.log.gz``, or ``.scans.npz`` with its ``.truth.tum``.
         output: scene file (.yaml), or a folder for one with the source's name. Its meshes go to `NAME.meshes` beside.
         materials: YAML file of patterns, see `MaterialMap`.
-        default: material of parts whose names say nothing.
+        default: material of parts whose names say nothing; default: plasterboard, and concrete of whole rooms.
         units: of a mesh or XML scene, one of `UNITS`; default: m, but of a mesh what makes a building of it.
-        up: ``y`` or ``z``; default: y for glTF, z otherwise.
+        up: ``y`` or ``z``; default: what glTF and OBJ meshes look like (`upright`), z of others.
         floor: bring the floor of a mesh or XML scene to z = 0.
         budget: triangles; larger meshes are decimated.
         height: of the walls of a map or log, m.
@@ -112,7 +114,7 @@ def import_scene(
         parts = floorplan.parts(grid, height, thickness, str(source), progress)
     else:
         parts = mitsuba.parts(source) if kind == "mitsuba" else meshes.parts(source)
-        up = up or ("y" if source.suffix.lower() in (".glb", ".gltf") else "z")
+        up = up or _up(parts, source, remarks)
         units = units or ("m" if kind == "mitsuba" else _guess(parts, remarks))
         parts = _fit(parts, source, units, up, floor, budget, remarks, progress)
     rows = []
@@ -121,7 +123,8 @@ def import_scene(
         name = part.material if isinstance(part.material, str) else "custom"
         rows.append(Row(part.name, name, why, len(part.mesh.faces), float(part.mesh.area)))
     if unsure := sum(row.chosen_by == "default" for row in rows):
-        remarks.append(f"{unsure} of {len(rows)} parts got the default material {default}; --materials can name theirs")
+        which = default or " or ".join(sorted({row.material for row in rows if row.chosen_by == "default"}))
+        remarks.append(f"{unsure} of {len(rows)} parts got the default material {which}; --materials can name theirs")
     with explained(f"{path}: cannot be written", OSError):
         _write(path, parts, source)
     return Imported(path, rows, remarks)
@@ -177,6 +180,9 @@ def _fit(parts, source, units, up, floor, budget, remarks, progress) -> list[Par
     if many := sum(edges_of_many(part.mesh) for part in parts):
         remarks.append(f"{many} edges have more than two triangles; each is traced as a sheet")
     parts = [_flat(part, source, number, len(parts), remarks, progress) for number, part in enumerate(parts, 1)]
+    parts, rooms = turned_to_rooms(parts)
+    if rooms:
+        remarks.append(f"{', '.join(rooms)}: closed around all else, taken for a room, its faces turned inwards")
     _place(parts, floor, remarks)
     total = sum(len(part.mesh.faces) for part in parts)
     if total > budget:
@@ -207,6 +213,16 @@ def _corners(parts: list[Part]) -> np.ndarray:
 def _extent(parts: list[Part]) -> np.ndarray:
     corners = _corners(parts)
     return np.ptp(corners[np.isfinite(corners).all(axis=1)], axis=0) if np.isfinite(corners).any() else np.zeros(3)
+
+
+def _up(parts: list[Part], source: Path, remarks: list[str]) -> str:
+    """The axis that points up, said where a file could have either."""
+    suffix = source.suffix.lower()
+    if suffix not in (".glb", ".gltf", ".obj"):
+        return "z"
+    up, why = up_axis(parts, "z" if suffix == ".obj" else "y")
+    remarks.append(f"{up} is taken for up ({why}); --up says otherwise")
+    return up
 
 
 def _guess(parts: list[Part], remarks: list[str]) -> str:

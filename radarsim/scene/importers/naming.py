@@ -41,17 +41,22 @@ class MaterialMap:
     (``*``, ``?``, ``[...]``, case ignored) are tried on a part's name, material, group and category.
     """
 
-    def __init__(self, patterns: dict[str, Choice], default: Choice):
+    def __init__(self, patterns: dict[str, Choice], default: Choice | None):
         self.patterns, self.default = patterns, default
 
     @classmethod
-    def read(cls, path: Path | None, default: str) -> "MaterialMap":
+    def read(cls, path: Path | None, default: str | None) -> "MaterialMap":
         """The map of a file.
+
+        Args:
+            path: none: no patterns.
+            default: material of parts whose names say nothing; none: plasterboard, and concrete of whole rooms.
 
         Raises:
             InputError: unreadable, malformed, or an unknown material, with the pattern.
         """
-        material(default)
+        if default is not None:
+            material(default)
         if path is None:
             return cls({}, default)
         data = read_yaml(path)
@@ -81,7 +86,7 @@ class MaterialMap:
         for name in (*part.labels, part.name):
             if guess := meaning(name):
                 return guess, f"name {name}"
-        return self.default, "default"
+        return self.default or ("concrete" if part.room else "plasterboard"), "default"
 
 
 def meaning(name: str) -> str | None:

@@ -15,6 +15,7 @@ class Part:
         material: a name of `radarsim.scene.materials` or the mapping of a custom one, as scene files have it; None:
             the source does not say.
         solid: part of the surface of a body: seen from its outside only.
+        room: a closed surface around all else, seen from its inside.
         labels: other names that material patterns may match: those of its material, group or category.
     """
 
@@ -22,4 +23,5 @@ class Part:
     mesh: trimesh.Trimesh
     material: str | dict | None = None
     solid: bool = False
+    room: bool = False
     labels: tuple[str, ...] = ()

@@ -1,0 +1,74 @@
+"""Hollow bodies: the leaf behind the front one, against the transfer matrix of board, air and board."""
+
+import numpy as np
+import pytest
+
+from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.radar.presets import PRESETS
+from radarsim.physics.antenna import ISOTROPIC
+from radarsim.physics.echoes import Provenance
+from radarsim.physics.finder import EchoFinder
+from radarsim.physics.reflectors import Reflectors
+from radarsim.physics.scatterers import Scatterers
+from radarsim.scene import shapes
+from radarsim.scene.materials import MATERIALS
+from radarsim.scene.scene import Scene, SceneObject
+from tests.physics.brute_force import transfer_matrix
+
+CONFIG = PRESETS["radarize"]
+BOARD = MATERIALS["plasterboard"]
+NEAR, DEEP = 2.0, 0.1
+SWEEP = CONFIG.center_frequency + CONFIG.bandwidth * ((np.arange(CONFIG.samples) + 0.5) / CONFIG.samples - 0.5)
+RANGES = NEAR + np.arange(-0.1, 0.3, 0.0005)
+
+
+def echoes(*objects):
+    """What faces the radar at the origin."""
+    scene = Scene("hollow", list(objects))
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    return EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)(np.zeros(3), np.eye(3))
+
+
+def profile(spectrum):
+    """Level over range of a beat signal, dB."""
+    turns = np.exp(-4j * np.pi / SPEED_OF_LIGHT * SWEEP * RANGES[:, None])
+    return 20 * np.log10(np.abs(turns @ (spectrum * np.hanning(len(SWEEP)))))
+
+
+def stud_wall():
+    """Range profiles of a wall of two boards, 10 cm deep: by transfer matrices at each frequency, and simulated, dB."""
+    layers = [(BOARD.permittivity_at(CONFIG.center_frequency), BOARD.thickness), (1.0, DEEP - 2 * BOARD.thickness)]
+    layers.append(layers[0])
+    gamma = np.array([transfer_matrix(layers, 1.0, f, False)[1] for f in SWEEP])
+    truth = np.conj(gamma) * np.exp(4j * np.pi / SPEED_OF_LIGHT * SWEEP * NEAR) / NEAR
+    found = echoes(SceneObject("wall", shapes.box((NEAR + DEEP / 2, 0, 0), (DEEP, 6, 6)), BOARD))
+    path = np.linalg.norm(found.images[:, :, 3], axis=1)
+    facing = path < 2 * (NEAR + 2 * DEEP)
+    turns = np.exp(2j * np.pi / SPEED_OF_LIGHT * SWEEP[:, None] * path[facing])
+    scale = 8 * np.pi / CONFIG.wavelength  # over an endless conductor's echo, times its distance
+    return profile(truth), profile(scale * turns @ found.amplitude[facing])
+
+
+def peak(level, low, high):
+    """Range of the highest peak within a span, m, and its level, dB."""
+    some = np.flatnonzero((RANGES > NEAR + low) & (RANGES < NEAR + high))
+    best = some[level[some].argmax()]
+    return RANGES[best], level[best]
+
+
+def test_the_rear_leaf_of_a_stud_wall():
+    truth, found = stud_wall()
+    for low, high in ((-0.03, 0.04), (0.07, 0.15)):
+        (there, size), (place, level) = peak(truth, low, high), peak(found, low, high)
+        assert place == pytest.approx(there, abs=0.008) and level == pytest.approx(size, abs=1.5)
+    assert peak(found, 0.07, 0.15)[1] - peak(found, -0.03, 0.04)[1] == pytest.approx(-14, abs=2)
+
+
+def test_inner_faces_count_where_the_material_lets_through():
+    """Of a cabinet of chipboard; not of one of metal, nor of a solid wooden block."""
+    far = {}
+    for name in ("chipboard", "metal", "wood"):
+        found = echoes(SceneObject("cabinet", shapes.box((NEAR + 0.2, 0, 0), (0.4, 2, 2)), MATERIALS[name]))
+        path = np.linalg.norm(found.images[:, :, 3], axis=1)
+        far[name] = (np.abs(path / 2 - NEAR - 0.4) < 0.05) & (found.provenance == Provenance.THROUGH_SLAB)
+    assert far["chipboard"].any() and not far["metal"].any() and not far["wood"].any()

@@ -8,6 +8,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
 
+from radarize.aliasing import Aliases
 from radarize.disturbance import Flaws, find_flaws
 from radarize.features.maps import MapMaker
 from radarize.heatmaps import HeatmapConfig, Heatmaps
@@ -30,6 +31,7 @@ class Signal:
     def __init__(self, radar: RadarConfig, settings: HeatmapConfig | None = None):
         self.radar = radar
         self.heatmaps = Heatmaps(radar, settings=settings)
+        self.aliases = Aliases(radar)
 
     @cached_property
     def maker(self) -> MapMaker:
@@ -92,10 +94,21 @@ class Batch:
         return np.diff(self.stamps, prepend=np.nan if self.before is None else self.before)
 
     @cached_property
-    def spectrum(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
+    def folded(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
         """See `Heatmaps.spectrum`."""
         with stage("spectra"):
             return self.signal.heatmaps.spectrum(self.samples, self.valid)
+
+    @cached_property
+    def aliases(self) -> Int[np.ndarray, "frame doppler"]:
+        """See `Aliases.of`."""
+        with stage("spectra"):
+            return self.signal.aliases.of(self.folded)
+
+    @cached_property
+    def spectrum(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
+        """`folded`, with the antennas of each bin as if sampled at once at the speed that it means."""
+        return self.signal.heatmaps.unfolded(self.folded, self.aliases)
 
     def maps(self, names: tuple[str, ...]) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
         """Maps that networks see, dB, see `radarize.features.maps`."""

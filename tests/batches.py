@@ -17,7 +17,7 @@ def batch(radar: RadarConfig | Signal, adc: np.ndarray, times: np.ndarray, valid
 def of_spectrum(signal: Signal, spectrum: torch.Tensor, times: np.ndarray) -> Batch:
     """Of a spectrum that no samples were made into."""
     found = Batch(signal, np.zeros((len(spectrum), 0)), times)
-    found.spectrum = spectrum
+    found.folded = spectrum
     return found
 
 

@@ -14,6 +14,7 @@ from radarize.features.maps import MapMaker
 from radarize.heatmaps import HeatmapConfig, Heatmaps
 from radarize.points import DENSE, PointClouds
 from radarize.radar.config import RadarConfig
+from radarize.receivers import Receivers
 from radarize.stopwatch import stage
 
 #: Frames a batch: enough to vectorise over, few enough to stay in cache.
@@ -31,7 +32,7 @@ class Signal:
     def __init__(self, radar: RadarConfig, settings: HeatmapConfig | None = None):
         self.radar = radar
         self.heatmaps = Heatmaps(radar, settings=settings)
-        self.aliases = Aliases(radar)
+        self.aliases, self.receivers = Aliases(radar), Receivers(radar)
 
     @cached_property
     def maker(self) -> MapMaker:
@@ -95,9 +96,10 @@ class Batch:
 
     @cached_property
     def folded(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
-        """See `Heatmaps.spectrum`."""
+        """See `Heatmaps.spectrum`; broken receivers are filled in."""
         with stage("spectra"):
-            return self.signal.heatmaps.spectrum(self.samples, self.valid)
+            spectrum = self.signal.heatmaps.spectrum(self.samples, self.valid)
+            return spectrum if self.flaws is None else self.signal.receivers.filled(spectrum, self.flaws.broken)
 
     @cached_property
     def aliases(self) -> Int[np.ndarray, "frame doppler"]:

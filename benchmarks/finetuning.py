@@ -24,7 +24,7 @@ from radarize.features.maps import Maps
 from radarize.methods.method import Weights
 from radarize.methods.pictures.network import PictureNet
 from radarize.methods.pictures.points import points
-from radarize.methods.pictures.training import LEAST, elsewhere, entropy, unpacked
+from radarize.methods.pictures.training import DENSE, elsewhere, entropy, unpacked
 from radarize.nets.weights import Header, build, load, save
 from radarize.radar.presets import PRESETS
 from radarize.walks import FIRST, PERIOD, TRAINING, Walk
@@ -104,9 +104,10 @@ def trained(
 
 
 @torch.inference_mode()
-def least(net: PictureNet, seen: Seen, window: int, every: int = 12) -> float:
-    """The least probability of a point that brings the points nearest to the lidar's, on the walks that were shown."""
-    apart = {value: [] for value in LEAST}
+def dense(net: PictureNet, seen: Seen, window: int, every: int = 12) -> float:
+    """The probability from which on every cell has a point that brings the points nearest to the lidar's, on the walks
+    that were shown."""
+    apart = {value: [] for value in DENSE}
     for item in seen.items(window)[::every]:
         pictures, label = seen.windows([item], window)
         likely = net.estimate(pictures)
@@ -137,7 +138,7 @@ def train(options: argparse.Namespace) -> None:
             seen = Seen(walks, device)
             step = lambda: report(next(done), sum(plan.values()))  # noqa: E731
             net, header = trained(seen, options.start if how == "tuned" else None, RATES[how], steps, step)
-            net.least.fill_(least(net, seen, header.frames))
+            net.dense.fill_(dense(net, seen, header.frames))
             metrics = {"minutes": sum(walk.frames for walk in walks) * PERIOD / 60}
             data = f"{shown} real walks" + (f" after {header.data}" if how == "tuned" else "")
             _path(options.out, shown, how).parent.mkdir(parents=True, exist_ok=True)
@@ -154,7 +155,7 @@ def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, float],
             frames = range(end - EVERY * (header.frames - 1), end + 1, EVERY)
             pictures = torch.from_numpy(np.stack([walk.radar(k) for k in frames]))[None, :, None].float()
             with torch.inference_mode():
-                cells = points(net.estimate(pictures), net.least)[0].numpy()
+                cells = points(net.estimate(pictures), net.dense)[0].numpy()
             apart.append(Apart.of_pictures(cells, walk.lidar(end)).chamfer)
         found[walk.number] = float(np.nanmedian(apart))
     return found, header
@@ -199,8 +200,8 @@ def main() -> None:
         notes=[
             "Median Chamfer distance of a walk's points from the lidar's, m, mean over the walks of a group; `alone`: "
             "trained on real walks alone; `tuned`: trained on simulated walks first; `simulation`: on these alone.",
-            "Steps, rates and walks were fixed before any test walk was looked at; the least probability of a point is "
-            "that which is best on the walks that were shown.",
+            "Steps, rates and walks were fixed before any test walk was looked at; the probability from which on "
+            "every cell has a point is that which is best on the walks that were shown.",
         ],
     )
 

@@ -28,6 +28,7 @@ from radarsim.scenario import Scenario
 from radarsim.scene.importers import import_scene
 from radarsim.scene.scene import Scene
 from radarsim.simulate import TOGETHER
+from radarsim.twin.likeness import DEPTH, correlation, similarity
 
 
 class Assumed(NamedTuple):
@@ -98,8 +99,18 @@ def simulated(
 
 def likeness(ones: Pictures, others: Pictures) -> float:
     """Mean correlation of pictures, pair by pair."""
-    pairs = zip(ones.reshape(len(ones), -1).astype(float), others.reshape(len(others), -1).astype(float), strict=True)
-    return float(np.mean([np.corrcoef(a, b)[0, 1] for a, b in pairs]))
+    return float(np.nanmean(correlation(ones, others)))
+
+
+def structure(ones: Pictures, others: Pictures) -> float:
+    """Mean MS-SSIM of pictures, pair by pair."""
+    a, b = (each * (DEPTH / 255) for each in (ones, others))
+    return float(np.nanmean(similarity(a, b)))
+
+
+def profile(pictures: Pictures) -> Float[np.ndarray, "range"]:
+    """Share of cells that are kept, over range."""
+    return (pictures > 0).mean(axis=(0, 2))
 
 
 def farther(pictures: Pictures, rows: int) -> Pictures:
@@ -116,6 +127,9 @@ def compared(twin: Pictures, own: Pictures, other: Pictures) -> dict[str, float]
     return {
         "own instant": likeness(twin, own), "other instants": likeness(twin, own[::-1]),
         "other walk": likeness(twin[:count], other[:count]), "bias m": bias * polar.RANGES[1],
+        "MS-SSIM": structure(twin, own), "MS-SSIM other walk": structure(twin[:count], other[:count]),
+        "range profile": float(np.corrcoef(profile(twin), profile(own))[0, 1]),
+        "level": float(twin[twin > 0].mean() / 255), "level in reality": float(own[own > 0].mean() / 255),
         "kept %": kept, "ranges lit %": ranges, "azimuths lit %": azimuths, "kept in reality %": 100 * (own > 0).mean(),
     }  # fmt: skip
 
@@ -155,6 +169,8 @@ def main() -> None:
         notes=[
             "Correlation of the twin's pictures (`radarize.polar`, four antennas) with real ones of the same instants, "
             "of the same walk backwards, and of another walk; the twin's are moved by as much as fits best (bias).",
+            "MS-SSIM: of the same instants, and of another walk. Range profile: correlation of shares of cells kept "
+            "over range. Level: mean of the cells kept, between the least (0) and the largest (1) of a picture.",
             "The lidar's plane is all that is known of a room: nothing above or below it, no glass, no material.",
         ],
     )

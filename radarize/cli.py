@@ -48,7 +48,7 @@ def import_(
         typer.Argument(
             metavar="SOURCE",
             help="A DCA1000 .bin, a .pcap, a folder of mmWave Studio, a ROS bag (.bag, .mcap, .db3 or its folder), "
-            "an array of samples (.npy, .npz, .mat), or RadarHD's dataset_5.",
+            "an array of samples (.npy, .npz, .mat), a sequence of I/Q-1M (roverd), or RadarHD's dataset_5.",
         ),
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="Recording to write (.h5).")],
@@ -73,6 +73,10 @@ def import_(
     encoding: Annotated[
         Literal["signed", "offset-binary"], typer.Option(help="Of a .bin's words; a warning says where it looks other.")
     ] = "signed",
+    layout: Annotated[
+        Literal["pairs", "interleaved", "real"],
+        typer.Option(help="Of a .bin's words: I and Q in pairs, receivers by turns (four lanes), or real samples."),
+    ] = "pairs",
     board: Annotated[str | None, typer.Option(help="Antenna layout, e.g. iwr1843boost.")] = None,
     start_frequency: Annotated[float | None, typer.Option(help="Hz.")] = None,
     slope: Annotated[float | None, typer.Option(help="Hz/s (80 MHz/us is 80e12).")] = None,
@@ -96,7 +100,7 @@ def import_(
     from radarize.recording import keeping
 
     radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk, encoding)
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk, encoding, layout)
     with keeping(output), progress("import") as report:
         _tell(import_recording(source, output, given, progress=report))
 

@@ -13,12 +13,14 @@ from jaxtyping import Bool, Float, UInt8
 
 from radarize import polar
 from radarize.benchmark.realmotion import (
+    SMOOTH,
     SPAN,
     disturbed,
     drift,
     mapped,
     network_turns,
     shifted_turns,
+    smoothed,
     surface_of,
     turn_errors,
 )
@@ -28,8 +30,9 @@ from radarize.benchmark.table import Table
 from radarize.clouds import Apart
 from radarize.features.windows import Windows
 from radarize.methods.method import Weights
-from radarize.methods.pictures.network import PictureNet
-from radarize.methods.pictures.points import points
+from radarize.methods.pictures.memory import Memory
+from radarize.methods.pictures.network import COLUMNS, PictureNet
+from radarize.methods.pictures.points import first_surfaces, points
 from radarize.methods.pictures.turns import PictureTurnNet
 from radarize.nets.weights import Header, load
 from radarize.points import Cfar, level_around
@@ -39,13 +42,16 @@ from radarize.walks import FIRST, PERIOD, Predictions, Walk
 
 #: What stands in every picture, by name: all cells; the first one of each azimuth that stands out; all that do.
 _CFAR = Cfar(window=8, guard=4, threshold=64.0)
+_BEFORE = ("picture", "cfar")
 NOTES = (
     "Medians over all frames from the 40th on, points through the authors' grid; +-: standard error, with as many "
     "independent frames as the errors' autocorrelation leaves.",
     "`network` has seen simulated walks alone, and nothing of it was chosen on test walks. Training walks of the set "
     "told what the model card names.",
-    f"Turns over {SPAN * PERIOD:g} s, from pictures alone. ATE and map (F1 within 20 cm) of SLAM with each method's "
-    "scans and an odometry whose errors are drawn; `lidar`: with the lidar's own first points, the best there is.",
+    f"Turns over {SPAN * PERIOD:g} s, from pictures alone; `smoothed`: with those before and after them, by a Gaussian "
+    f"of {SMOOTH * PERIOD:g} s standard deviation, so known later.",
+    "ATE and map (F1 within 20 cm) of SLAM with each method's scans and an odometry whose errors are drawn; `lidar`: "
+    "with the lidar's own first points, the best there is.",
 )
 MAP_NOTE = (
     "With the same odometry for all methods: the lidar's poses with errors added, see `radarize.benchmark.realmotion`; "
@@ -54,6 +60,7 @@ MAP_NOTE = (
 )
 
 Cells = Bool[np.ndarray, "range column"]
+Ranges = Float[np.ndarray, "bearing"]
 
 
 @dataclass(frozen=True)
@@ -108,9 +115,11 @@ def real(
         judged = _judged(walk, scans, others, lambda: progress(next(done), total))
         found = judged.apart
         errors |= {(walk.number, name): apart for name, apart in found.items()}
-        moved = {"shifted pictures": turn_errors(shifted_turns(judged.pictures), poses)}
+        told = {"shifted pictures": shifted_turns(judged.pictures)}
         if turns:
-            moved["network"] = turn_errors(network_turns(turns, judged.pictures), poses)
+            told["network"] = network_turns(turns, judged.pictures)
+        told |= {f"{name}, smoothed": smoothed(each) for name, each in told.items()}
+        moved = {name: turn_errors(each, poses) for name, each in told.items()}
         drawn = _maps(walk, judged, poses)
         maps += drawn
         mapped_by = {row["method"]: row for row in drawn}
@@ -155,7 +164,7 @@ def _judged(
 ) -> _Judged:
     """Go through a walk's frames once; `step` is called after each."""
     found = _Judged({}, {}, [], np.empty((walk.frames, polar.ROWS, polar.COLUMNS), np.uint8))
-    for frame, picture, cells in _methods(walk, network):
+    for frame, picture, cells, first in _methods(walk, network):
         true = polar.cartesian(walk.lidar(frame))
         found.pictures[frame] = picture
         found.clouds.append(true)
@@ -164,11 +173,12 @@ def _judged(
         for name, each in clouds.items():
             if frame >= FIRST:
                 found.apart.setdefault(name, []).append(Apart.of(each, true))
-        for name, each in (clouds | {"lidar": true}).items():
-            if name not in ("picture", "cfar"):  # they have many points on a bearing
-                if name not in found.ranges:
-                    found.ranges[name] = np.full((walk.frames, len(BEARINGS)), np.nan)
-                found.ranges[name][frame] = scan(each)
+        # The nearest points; pictures and CFAR have many that stand before a surface.
+        scans = {name: scan(each) for name, each in (clouds | {"lidar": true}).items() if name not in _BEFORE}
+        for name, each in (scans | first).items():
+            if name not in found.ranges:
+                found.ranges[name] = np.full((walk.frames, len(BEARINGS)), np.nan)
+            found.ranges[name][frame] = each
         step()
     return found
 
@@ -189,25 +199,37 @@ def _maps(walk: Walk, judged: _Judged, poses: Float[np.ndarray, "frame 3"]) -> l
 
 def _methods(
     walk: Walk, network: tuple[PictureNet, Header] | None
-) -> Iterator[tuple[int, UInt8[np.ndarray, "range azimuth"], dict[str, Cells]]]:
-    """A walk's pictures, frame by frame, and where each method sees something in them."""
-    windows = network[1].windows(PRESETS["radarhd"]) if network else None
+) -> Iterator[tuple[int, UInt8[np.ndarray, "range azimuth"], dict[str, Cells], dict[str, Ranges]]]:
+    """A walk's pictures, frame by frame, where each method sees something in them, and scans of those that tell first
+    surfaces themselves."""
+    windows, memory = (network[1].windows(PRESETS["radarhd"]), Memory()) if network else (None, None)
     for frames, pictures in walk.batches():
         stamps = PERIOD * np.arange(frames.start, frames.stop)
-        likely = _network(network[0], windows, pictures, stamps) if network else None
+        likely = _network(network[0], windows, memory, pictures, stamps) if network else None
         for k, picture in enumerate(pictures):
             stands = picture > level_around(picture.astype(float), _CFAR, 0, False) + _CFAR.threshold
-            first = stands & (np.cumsum(stands, axis=0) == 1)
-            cells = {"picture": picture > 0, "cfar": stands, "first-echo": first}
-            yield frames.start + k, picture, cells | ({"network": likely[k]} if network else {})
+            nearest = stands & (np.cumsum(stands, axis=0) == 1)
+            cells, first = {"picture": picture > 0, "cfar": stands, "first-echo": nearest}, {}
+            if likely:
+                cells["network"], first["network"] = (each[k] for each in likely)
+            yield frames.start + k, picture, cells, first
 
 
 @torch.inference_mode()
 def _network(
-    net: PictureNet, windows: Windows, pictures: UInt8[np.ndarray, "frame range azimuth"], stamps: np.ndarray
-) -> Bool[np.ndarray, "frame range column"]:
+    net: PictureNet,
+    windows: Windows,
+    memory: Memory,
+    pictures: UInt8[np.ndarray, "frame range azimuth"],
+    stamps: Float[np.ndarray, "frame"],
+) -> tuple[Bool[np.ndarray, "frame range column"], Float[np.ndarray, "frame bearing"]]:
+    """Points of a batch's frames, and their scans."""
     shown = windows.push({"picture": pictures.astype(np.float16)}, stamps)[0]
-    return points(net.estimate(shown.maps), net.least).numpy()
+    likely = net.estimate(shown.maps)
+    azimuths = np.linspace(-np.pi / 2, np.pi / 2, COLUMNS)
+    nearest = np.abs(azimuths - BEARINGS[:, None]).argmin(axis=1)
+    # Maps average over time themselves: their scans are each frame's own.
+    return points(memory.push(likely, stamps), net.dense).numpy(), first_surfaces(likely)[:, nearest]
 
 
 def _row(found: Sequence[Apart]) -> dict[str, float]:

@@ -16,6 +16,7 @@ from radarize.importers import bin as bin_format
 from radarize.importers import cube as cube_format
 from radarize.importers import pcap as pcap_format
 from radarize.importers import pictures as picture_format
+from radarize.importers import rover as rover_format
 from radarize.importers import studio as studio_format
 from radarize.importers.capture import Batch, Capture
 from radarize.importers.parameters import Given
@@ -34,7 +35,7 @@ _ASKED = 8
 _BAGS, _ARRAYS = (".bag", ".mcap", ".db3"), (".npy", ".npz", ".mat")
 _EXPECTED = (
     "a DCA1000 .bin, a .pcap, a folder of mmWave Studio files, a ROS bag (.bag, .mcap, .db3 or a folder), "
-    "an array (.npy, .npz, .mat), or RadarHD's dataset_5"
+    "an array (.npy, .npz, .mat), a sequence in roverd's layout, or RadarHD's dataset_5"
 )
 #: What poses given by hand stand in for.
 _POSES = ("truth/time", "truth/pose", "truth/velocity")
@@ -55,7 +56,8 @@ def import_recording(
     Args:
         source: a DCA1000 ``.bin``, whole or in parts (its ``.cfg`` of the same name, or mmWave Studio's JSON files, may
             lie beside it), a ``.pcap`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an array of
-            samples (``.npy``, ``.npz``, ``.mat``), or RadarHD's data set of pictures, of which ``given.walk`` is taken.
+            samples (``.npy``, ``.npz``, ``.mat``), a sequence in roverd's layout, or RadarHD's data set of pictures,
+            of which ``given.walk`` is taken.
         output: recording to write.
         given: what the user says of it.
         progress: called with frames done and (estimated) frames in all.
@@ -139,10 +141,13 @@ def _open(source: Path, output: Path, given: Given) -> Capture:
         raise InputError(f"{source}: is no array, but shape or variable is given, expected {', '.join(_ARRAYS)}")
     if given.latency is not None and kind != "bag":
         raise InputError(f"{source}: is no ROS bag, but latency is {given.latency:g} s, expected none")
-    if given.encoding != "signed" and kind not in ("studio", "bin"):
-        raise InputError(f"{source}: is no .bin, but encoding is {given.encoding}, expected none")
+    for name, usual in (("encoding", "signed"), ("layout", "pairs")):
+        if (value := getattr(given, name)) != usual and kind not in ("studio", "bin"):
+            raise InputError(f"{source}: is no .bin, but {name} is {value}, expected none")
     if kind == "studio":
         return studio_format.open_studio(source, given)
+    if kind == "rover":
+        return rover_format.open_sequence(source, given)
     beside = bin_format.whole_name(source).with_suffix(".cfg")
     if given.config is None and beside.is_file():
         given = given.or_else(*load_config(beside))
@@ -155,11 +160,14 @@ def _open(source: Path, output: Path, given: Given) -> Capture:
     config, assumed = given.configure(str(source))
     if kind == "pcap":
         return pcap_format.open_pcap(source, config, given.cfg_text, assumed)
-    return bin_format.open_bin(bin_format.parts(source), config, given.cfg_text, assumed, encoding=given.encoding)
+    read = {"encoding": given.encoding, "layout": given.layout}
+    return bin_format.open_bin(bin_format.parts(source), config, given.cfg_text, assumed, **read)
 
 
 def _kind(source: Path) -> str:
     if source.is_dir():
+        if rover_format.is_sequence(source):
+            return "rover"
         return "bag" if (source / "metadata.yaml").is_file() else "studio"
     suffix = source.suffix.lower()
     if suffix in _BAGS:

@@ -4,7 +4,8 @@ Long captures come in parts, ``NAME_Raw_0.bin``, ``NAME_Raw_1.bin``, ..., cut an
 """
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,10 @@ from jaxtyping import Bool, Int16
 
 from radarize.errors import InputError, explained
 from radarize.importers.capture import Batch, Capture, batch_frames
+from radarize.importers.layout import arranged, likely, recorded
 from radarize.importers.words import oddity, signed
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import check_layout, decode
+from radarize.radar.dca1000 import check_layout
 
 #: Bytes by which a capture is judged.
 _LOOKED_AT = 1 << 20
@@ -62,8 +64,12 @@ def open_bin(
     assumed: tuple[str, ...] = (),
     warnings: Sequence[str] = (),
     encoding: str = "signed",
+    layout: str = "pairs",
 ) -> Capture:
     """Open raw files that follow each other.
+
+    Args:
+        encoding, layout: of their words, see `radarize.importers.words` and `radarize.importers.layout`.
 
     An incomplete last frame is left out with a warning, unless the samples show that it is the configuration which
     does not fit; of words that are plainly something else than `encoding` says there is a warning, too. Chirps of
@@ -72,23 +78,27 @@ def open_bin(
     Raises:
         InputError: less than one frame, or the samples repeat with another period than the configuration's loop.
     """
+    told, config = config, recorded(config, layout)
     check_layout(config)
     warnings = list(warnings)
     size = sum(path.stat().st_size for path in files)
     whole, rest = divmod(size, config.frame_bytes)
     loops, tx, rx, samples, _ = config.frame_shape
     name = ", ".join(str(path) for path in files)
-    layout = f"{config.frame_bytes} bytes a frame ({loops} loops x {tx} TX x {rx} RX x {samples} samples x 4 bytes)"
+    each = f"{config.frame_bytes} bytes a frame ({loops} loops x {tx} TX x {rx} RX x {samples} samples x 4 bytes)"
     if not whole:
-        raise InputError(f"{name}: has {size} bytes, less than one frame; expected a multiple of {layout}")
+        raise InputError(f"{name}: has {size} bytes, less than one frame; expected a multiple of {each}")
     with files[0].open("rb") as file:
-        odd = oddity(file.read(_LOOKED_AT), encoding)
-    if odd:
+        begins = file.read(_LOOKED_AT)
+    words = signed(np.frombuffer(begins, "<i2", len(begins) // 2), encoding)
+    if odd := oddity(begins, encoding):
         warnings.append(f"{name}: {odd}")
-    elif period := _other_period(files[0], config):
+    elif (other := likely(words, told, layout)) != layout:
+        warnings.append(f"{name}: its words look {other}, not {layout}; --layout {other} reads those")
+    elif layout == "pairs" and (period := _other_period(files[0], config)):
         expected = tx * rx * samples
         message = (
-            f"{name}: has {size} bytes, {whole} frames and {rest} bytes of {layout}, but its samples repeat every "
+            f"{name}: has {size} bytes, {whole} frames and {rest} bytes of {each}, but its samples repeat every "
             f"{period} and not every {expected} (TX x RX x samples), expected the configuration of this capture"
         )
         if rest:
@@ -97,17 +107,20 @@ def open_bin(
     elif rest:
         warnings.append(
             f"{name}: has {size} bytes, {whole} whole frames and {rest} bytes of an incomplete one, which is left out; "
-            f"expected {layout}"
+            f"expected {each}"
         )
-    return Capture(config, cfg_text, _batches(files, config, encoding), whole, assumed, warnings)
+    read = partial(arranged, config=config, layout=layout)
+    return Capture(config, cfg_text, _batches(files, config, encoding, read), whole, assumed, warnings)
 
 
-def _batches(files: Sequence[Path], config: RadarConfig, encoding: str) -> Iterator[Batch]:
+def _batches(
+    files: Sequence[Path], config: RadarConfig, encoding: str, read: Callable[[np.ndarray], np.ndarray]
+) -> Iterator[Batch]:
     for data in _blocks(files, batch_frames(config) * config.frame_bytes):
         words = np.frombuffer(data, "<i2", len(data) // config.frame_bytes * config.frame_bytes // 2)
         words = words.astype(np.int16, copy=False)
         if words.size:
-            yield Batch(decode(signed(words, encoding), config), ~all_zero(words, config))
+            yield Batch(read(signed(words, encoding)), ~all_zero(words, config))
 
 
 def _blocks(files: Sequence[Path], size: int) -> Iterator[bytes]:

@@ -43,6 +43,7 @@ class Given:
             length.
         walk: number of a walk in a data set of pictures.
         encoding: of a .bin's words, ``signed`` or ``offset-binary``.
+        layout: of a .bin's words, see `radarize.importers.layout`.
     """
 
     config: RadarConfig | None = None
@@ -55,6 +56,7 @@ class Given:
     latency: float | None = None
     walk: int | None = None
     encoding: str = "signed"
+    layout: str = "pairs"
 
     def or_else(self, config: RadarConfig, cfg_text: str) -> "Given":
         """The same with a configuration, and its text, unless there is one."""

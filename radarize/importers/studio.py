@@ -35,7 +35,7 @@ def open_studio(source: Path, given: Given) -> Capture:
         captures = {parts(path) for path in folder.glob("*.bin")}
         files = captures.pop() if len(captures) == 1 else [_one(folder, "*.bin")]
     warnings = (f"{filled} bytes were lost on capture and filled with zeros",) if filled else ()
-    return open_bin(files, config, given.cfg_text, warnings=warnings, encoding=given.encoding)
+    return open_bin(files, config, given.cfg_text, warnings=warnings, encoding=given.encoding, layout=given.layout)
 
 
 def _captured(setup: dict, folder: Path) -> tuple[list[Path], int]:

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from radarize import polar
 from radarize.benchmark.real import median_error
-from radarize.benchmark.realmotion import disturbed, shifted_turns, turn_errors
+from radarize.benchmark.realmotion import SMOOTH, disturbed, shifted_turns, smoothed, turn_errors
 from radarize.cli import app
 from radarize.errors import InputError
 from radarize.tum import write_tum
@@ -54,7 +54,7 @@ def test_every_walk_and_method_has_a_row(clone, tmp_path):
     assert done.exit_code == 0, done.exception
     rows = json.loads((tmp_path / "out" / "real.json").read_text())["tables"][0]["rows"]
     found = {row["method"]: row for row in rows}
-    methods = {"picture", "cfar", "first-echo", "others", "shifted pictures", "lidar"}
+    methods = {"picture", "cfar", "first-echo", "others", "shifted pictures", "shifted pictures, smoothed", "lidar"}
     assert {row["walk"] for row in rows} == {7} and methods == found.keys()
     # Who stands has not moved, and nothing turned; maps of the wall agree as its scans do.
     assert found["lidar"]["ate_m"] < 0.02 and found["shifted pictures"]["yaw_rmse_deg"] < 0.1
@@ -99,6 +99,18 @@ def test_turns_to_the_left_are_positive():
     poses = np.column_stack([np.zeros((40, 2)), step / 4 * np.arange(40)])
     errors = turn_errors(found, poses)
     assert errors["turns_rms_deg"] == pytest.approx(np.degrees(step)) and errors["yaw_median_deg"] < 0.05
+
+
+def test_smoothed_turns_lose_noise_and_keep_turns():
+    """Of white noise a Gaussian leaves 1 / (2 sqrt(pi) sigma) of the variance; steady turns stay, unknown ones are."""
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=20000)
+    left = np.var(smoothed(noise)) * 2 * np.sqrt(np.pi) * SMOOTH
+    assert left == pytest.approx(1, rel=0.1)
+    steady = np.full(100, 0.02)
+    steady[:4] = steady[50:60] = np.nan
+    found = smoothed(steady)
+    assert np.array_equal(np.isnan(found), np.isnan(steady)) and np.nanmax(np.abs(found - 0.02)) < 1e-12
 
 
 def test_scans_have_the_nearest_point_of_each_bearing():

@@ -11,8 +11,9 @@ from radarize import polar
 from radarize.features.table import Table
 from radarize.methods.pictures import roughening
 from radarize.methods.pictures.maps import BINS, PictureMaker
+from radarize.methods.pictures.memory import LASTS, Memory
 from radarize.methods.pictures.network import COLUMNS
-from radarize.methods.pictures.points import points
+from radarize.methods.pictures.points import first_surfaces, points
 from radarize.methods.pictures.training import BIAS, UNKNOWN, biased, entropy, rolled, unpacked, zoomed
 from radarize.methods.registry import find_task
 from radarize.radar.presets import PRESETS
@@ -128,12 +129,12 @@ def test_augmented_labels_stay_on_their_echoes():
         assert ((off > BIAS[0] - 0.1) & (off < BIAS[1] + 0.1)).any()
 
 
-def test_loss_and_points_against_loops():
+def test_loss_against_loops():
     generator = torch.Generator().manual_seed(0)
     logits = torch.randn((3, 257, COLUMNS), generator=generator).log_softmax(dim=1)
     label = (torch.rand((3, 256, COLUMNS), generator=generator) < 0.004).float()
     label[1, :, 5:9] = UNKNOWN
-    loss, found = entropy(logits, label), points(logits.exp(), 0.01)
+    loss = entropy(logits, label)
     for item in range(3):
         total, known = 0.0, 0
         for column in range(COLUMNS):
@@ -143,7 +144,52 @@ def test_loss_and_points_against_loops():
             total -= logits[item, rows, column].mean() if len(rows) else logits[item, 256, column]
             known += 1
         assert loss[item] == pytest.approx(float(total) / known, rel=1e-5)
-        assert torch.equal(found[item], logits[item, :256].exp() >= 0.01)
+
+
+def test_points_are_as_dense_as_the_square_of_their_probability():
+    """Every cell from `dense` on; of cells of 0.7 of it, half; of 0.25 of it, a sixteenth, spread so evenly that no two
+    of them are next to each other; none where there is nothing."""
+    probability = torch.zeros((4, 257, COLUMNS))
+    for item, share in enumerate((1.0, 0.7, 0.25, 0.0)):
+        probability[item, :-1] = 0.03 * share
+    found = points(probability, 0.03)
+    shares = found.float().mean(dim=(1, 2)).tolist()
+    assert shares == pytest.approx([1.0, 0.49, 0.0625, 0.0], abs=1 / 64)
+    blocks = found[2, :256].float().unfold(0, 4, 4).unfold(1, 4, 4).sum(dim=(2, 3))
+    assert (blocks == 1).all()
+
+
+def test_first_surfaces_are_within_a_fifth():
+    probability = torch.zeros((1, 257, COLUMNS))
+    probability[0, 40, :] = 0.15
+    probability[0, 90, :64] = 0.5
+    probability[0, -1] = 1 - probability[0, :-1].sum(dim=0)
+    found = first_surfaces(probability)[0]
+    assert np.allclose(found[:64], polar.RANGES[90]) and np.isinf(found[64:]).all()
+
+
+def test_memory_fades_with_time_whatever_the_batches():
+    """Each distribution counts by e^(-age / LASTS), against the sum written out; the first one takes what is left."""
+    rng = np.random.default_rng(0)
+    stamps = np.cumsum(rng.uniform(0.05, 0.4, 9))
+    seen = torch.from_numpy(rng.random((9, 257, 4))).float()
+    seen /= seen.sum(dim=1, keepdim=True)
+    memory = Memory()
+    found = torch.cat([memory.push(seen[:4], stamps[:4]), memory.push(seen[4:], stamps[4:])])
+    assert torch.equal(found, Memory().push(seen, stamps))
+    left = np.exp(-(stamps[-1] - stamps) / LASTS)
+    weights = left - np.concatenate([[0.0], left[:-1]])
+    expected = torch.einsum("k,krc->rc", torch.from_numpy(weights).float(), seen)
+    assert torch.allclose(found[-1], expected, atol=1e-6)
+    assert torch.allclose(found.sum(dim=1), torch.ones(9, 4), atol=1e-5)
+
+
+def test_a_mirrored_window_has_mirrored_points():
+    net = find_task("pictures").network(5, ("picture",), 4).eval()
+    maps = torch.randint(0, 255, (2, 5, 1, polar.ROWS, polar.COLUMNS)).float()
+    with torch.no_grad():
+        found, mirrored = net.estimate(maps), net.estimate(maps.flip(-1))
+    assert torch.allclose(found.flip(2), mirrored, atol=1e-6) and not torch.allclose(found, mirrored, atol=1e-5)
 
 
 def test_it_learns_where_the_wall_is(one_thread):

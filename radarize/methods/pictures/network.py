@@ -8,6 +8,7 @@ from torch import Tensor, nn
 from torch.nn.functional import pixel_shuffle
 
 from radarize import polar
+from radarize.features import augment
 from radarize.features.maps import Maps
 from radarize.methods.pictures.maps import PictureMaker
 from radarize.nets.maps import coordinates
@@ -36,8 +37,8 @@ class PictureNet(Network):
         super().__init__(frames, maps, width)
         self.unet = UNet(_FOLD * frames * len(self.maps) + 2, _FOLD * COLUMNS // polar.COLUMNS, width)
         self.nothing = nn.Parameter(torch.zeros(()))
-        #: Least probability of a cell with a point; training fits it.
-        self.register_buffer("least", torch.tensor(0.01))
+        #: Probability from which on every cell has a point (`points`); training fits it.
+        self.register_buffer("dense", torch.tensor(0.03))
 
     def forward(self, maps: Maps) -> Float[Tensor, "item 257 column"]:
         """Logarithms of the probability of each row, and last, of nothing."""
@@ -47,5 +48,5 @@ class PictureNet(Network):
         return torch.cat([logits, nothing], dim=1).log_softmax(dim=1)
 
     def estimate(self, maps: Maps) -> Float[Tensor, "item 257 column"]:
-        """Probabilities of the same."""
-        return self(maps).exp()
+        """Probabilities of the same, averaged over a window and its mirror image."""
+        return (self(maps).exp() + self(augment.mirrored(maps)).exp().flip(2)) / 2

@@ -19,8 +19,8 @@ from radarize.methods.pictures.roughening import uniform
 from radarize.methods.pictures.task import PictureTask
 from radarize.methods.task import Settings
 
-#: Choices for the least probability of a point.
-LEAST = (0.004, 0.006, 0.008, 0.01, 0.012, 0.015, 0.02, 0.03)
+#: Choices for the probability from which on every cell has a point.
+DENSE = (0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06)
 #: By how much rooms are larger or smaller, and columns of a picture by which they are turned, at most.
 ZOOM, TURN = 0.25, 8
 #: m: the radar reads too far by range bias and lever arm of the data set's rig, on its training walks.
@@ -44,23 +44,23 @@ class Pictures(PictureTask):
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
         logits, label = net(validated(maps)), unpacked(label)
-        return torch.stack([entropy(logits, label), self._chamfer(logits.exp(), label, net.least)], dim=1)
+        return torch.stack([entropy(logits, label), self._chamfer(logits.exp(), label, net.dense)], dim=1)
 
     def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
         loss, chamfer = means.tolist()
         return {"loss": loss, "chamfer_m": chamfer}
 
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
-        """Choose the probability from which a cell has a point: the least mean Chamfer distance."""
-        total = torch.zeros(len(LEAST), device=net.least.device)
+        """Choose the probability from which on every cell has a point: the least mean Chamfer distance."""
+        total = torch.zeros(len(DENSE), device=net.dense.device)
         for maps, label in batches:
             probability, label = net.estimate(validated(maps)), unpacked(label)
-            total += torch.stack([self._chamfer(probability, label, least).sum() for least in LEAST])
-        net.least.fill_(LEAST[int(total.argmin())])
+            total += torch.stack([self._chamfer(probability, label, dense).sum() for dense in DENSE])
+        net.dense.fill_(DENSE[int(total.argmin())])
 
     @staticmethod
-    def _chamfer(probability: Tensor, label: Tensor, least: float | Tensor) -> Float[Tensor, "item"]:
-        found = points(probability, least).cpu().numpy()
+    def _chamfer(probability: Tensor, label: Tensor, dense: float | Tensor) -> Float[Tensor, "item"]:
+        found = points(probability, dense).cpu().numpy()
         apart = [
             Apart.of_pictures(one, true).chamfer for one, true in zip(found, label.bool().cpu().numpy(), strict=True)
         ]

@@ -8,11 +8,13 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
 
+from radarize.aliasing import Aliases
 from radarize.disturbance import Flaws, find_flaws
 from radarize.features.maps import MapMaker
 from radarize.heatmaps import HeatmapConfig, Heatmaps
 from radarize.points import DENSE, PointClouds
 from radarize.radar.config import RadarConfig
+from radarize.receivers import Receivers
 from radarize.stopwatch import stage
 
 #: Frames a batch: enough to vectorise over, few enough to stay in cache.
@@ -30,6 +32,7 @@ class Signal:
     def __init__(self, radar: RadarConfig, settings: HeatmapConfig | None = None):
         self.radar = radar
         self.heatmaps = Heatmaps(radar, settings=settings)
+        self.aliases, self.receivers = Aliases(radar), Receivers(radar)
 
     @cached_property
     def maker(self) -> MapMaker:
@@ -92,10 +95,22 @@ class Batch:
         return np.diff(self.stamps, prepend=np.nan if self.before is None else self.before)
 
     @cached_property
-    def spectrum(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
-        """See `Heatmaps.spectrum`."""
+    def folded(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
+        """See `Heatmaps.spectrum`; broken receivers are filled in."""
         with stage("spectra"):
-            return self.signal.heatmaps.spectrum(self.samples, self.valid)
+            spectrum = self.signal.heatmaps.spectrum(self.samples, self.valid)
+            return spectrum if self.flaws is None else self.signal.receivers.filled(spectrum, self.flaws.broken)
+
+    @cached_property
+    def aliases(self) -> Int[np.ndarray, "frame doppler"]:
+        """See `Aliases.of`."""
+        with stage("spectra"):
+            return self.signal.aliases.of(self.folded)
+
+    @cached_property
+    def spectrum(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
+        """`folded`, with the antennas of each bin as if sampled at once at the speed that it means."""
+        return self.signal.heatmaps.unfolded(self.folded, self.aliases)
 
     def maps(self, names: tuple[str, ...]) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
         """Maps that networks see, dB, see `radarize.features.maps`."""

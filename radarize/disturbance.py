@@ -37,6 +37,11 @@ class Flaws(NamedTuple):
     dead: Bool[np.ndarray, "frame rx"]
     saturated: Bool[np.ndarray, "frame rx"]
 
+    @property
+    def broken(self) -> Bool[np.ndarray, "frame rx"]:
+        """Receivers that are dead or saturated."""
+        return self.dead | self.saturated
+
     def of(self, frames: Bool[np.ndarray, "frame"]) -> "Flaws":
         """Of some of the frames."""
         return Flaws(*(each[frames] for each in self))

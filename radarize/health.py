@@ -129,4 +129,6 @@ class Health:
 
     def _broken(self, place: int, word: str) -> str:
         name = f"RX{self.radar.rx[place] + 1}"
-        return f"{name} is {word}, and angles are wrong: repair it, or leave {name} out of the configuration"
+        return (
+            f"{name} is {word}, and its neighbours stand in for it: repair it, or leave {name} out of the configuration"
+        )

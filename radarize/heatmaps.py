@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float32, Int16
+from jaxtyping import Bool, Complex64, Float32, Int, Int16
 from scipy.signal import windows
 
 from radarize.errors import InputError
@@ -93,8 +93,9 @@ class Heatmaps:
         """Range-Doppler spectrum of every virtual antenna, flat (tx, rx), TDM delays compensated.
 
         The compensation takes each cell at its bin's speed; echoes beyond `config.max_velocity` alias and keep a
-        phase step of 2 pi slot / slots between transmitters. Lost chirps weigh nothing and the remaining ones of the
-        same transmitter more, so that transmitters stay balanced; a transmitter without any chirp reads zero.
+        phase step of 2 pi slot / slots between transmitters, see `unfolded`. Lost chirps weigh nothing and the
+        remaining ones of the same transmitter more, so that transmitters stay balanced; a transmitter without any
+        chirp reads zero.
 
         Args:
             adc: raw samples; a torch tensor is taken as well.
@@ -116,6 +117,17 @@ class Heatmaps:
         spectrum = torch.fft.fftshift(torch.fft.ifft(profiles, dim=1, norm="forward"), dim=1)
         spectrum = spectrum * self._slots[..., None]
         return spectrum.permute(0, 4, 1, 2, 3).flatten(3)
+
+    def unfolded(
+        self,
+        spectrum: Complex64[torch.Tensor, "frame range doppler antenna"],
+        aliases: Int[np.ndarray, "frame doppler"],
+    ) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
+        """A spectrum whose bins mean speeds so many unambiguous spans higher, with the TDM delays of these."""
+        if not aliases.any():
+            return spectrum
+        turn = 2 * np.pi * aliases[..., None] * np.repeat(self.config.slot, len(self.config.rx)) / len(self.config.slot)
+        return spectrum * self._tensor(np.exp(1j * turn), torch.complex64)[:, None]
 
     def _loop_weights(self, frames: int, valid: np.ndarray | None) -> torch.Tensor:
         loops, tx = self.config.frame_shape[:2]

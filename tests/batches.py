@@ -15,9 +15,9 @@ def batch(radar: RadarConfig | Signal, adc: np.ndarray, times: np.ndarray, valid
 
 
 def of_spectrum(signal: Signal, spectrum: torch.Tensor, times: np.ndarray) -> Batch:
-    """Of a spectrum that no samples were made into."""
+    """Of a spectrum that no samples were made into, or of what stands for one."""
     found = Batch(signal, np.zeros((len(spectrum), 0)), times)
-    found.spectrum = spectrum
+    found.folded = found.spectrum = spectrum
     return found
 
 

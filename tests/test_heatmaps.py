@@ -65,6 +65,18 @@ def test_doppler_azimuth_peak(azimuth, speed):
     assert vertex(power.max(axis=1), maps.velocities) == pytest.approx(speed, abs=0.015)
 
 
+def test_what_aliases_has_its_azimuth_once_unfolded():
+    """A slot's turn of 120 deg looks like another azimuth."""
+    maps = Heatmaps(CONFIG)
+    spectrum = maps.spectrum(frame(point(2.0, 10), velocity=(2.4, 0, 0)))
+
+    def off(spectrum):
+        return abs(peak(maps.range_azimuth_of(spectrum)[0].numpy(), maps.ranges, np.degrees(maps.azimuths))[1] - 10)
+
+    assert off(maps.unfolded(spectrum, np.ones((1, CONFIG.loops), int))) <= 1 < 4 < off(spectrum)
+    assert maps.unfolded(spectrum, np.zeros((1, CONFIG.loops), int)) is spectrum
+
+
 def test_static_world_draws_the_cosine_ridge():
     azimuths = np.array([-50, -25, 0, 25, 50])
     maps = Heatmaps(CONFIG)

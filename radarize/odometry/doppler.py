@@ -84,8 +84,8 @@ class DopplerConfig(Frozen):
 class DopplerVelocity:
     """Velocity estimator by robust least squares over Doppler peaks; stateless between frames.
 
-    Speeds beyond `config.max_velocity` alias. Residuals are taken modulo the unambiguous span, so a faster walk is
-    still found from the echoes to the side, which close slowly enough.
+    Speeds beyond `config.max_velocity` are as `Batch.aliases` has them. Residuals are taken modulo the unambiguous
+    span, so where nothing tells aliases, a faster walk is still found from the echoes to the side.
 
     Attributes:
         lever: m, see `VelocityEstimator`.
@@ -110,7 +110,8 @@ class DopplerVelocity:
         """Velocities of the next frames."""
         spectrum = batch.spectrum
         power = self._heatmaps.beamformed(spectrum, self.row, self._steering).numpy()
-        found = [self._solve(self._echoes(*frame)) for frame in zip(spectrum.numpy(), power, strict=True)]
+        frames = zip(spectrum.numpy(), power, batch.aliases, strict=True)
+        found = [self._solve(self._echoes(*frame)) for frame in frames]
         velocity, covariance, inliers = map(np.array, zip(*found, strict=True))
         seen = (np.linalg.eigvalsh(covariance)[:, -1] < _DETERMINED**2) & (inliers >= _ECHOES)
         covariance[seen] = self.settings.independent * covariance[seen] + self._shared(velocity[seen])
@@ -126,15 +127,16 @@ class DopplerVelocity:
     def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 6"]:
         """Peaks of one frame: range bin, closing speed (m/s), u_y, u_z and its variance, power over the median."""
         power = self._heatmaps.beamformed(spectrum[None], self.row, self._steering)[0].numpy()
-        return self._echoes(spectrum.numpy(), power)
+        return self._echoes(spectrum.numpy(), power, np.zeros(spectrum.shape[1], int))
 
-    def _echoes(self, cells: np.ndarray, power: np.ndarray) -> np.ndarray:
+    def _echoes(self, cells: np.ndarray, power: np.ndarray, aliases: np.ndarray) -> np.ndarray:
         level = float(np.median(power[self._first :: 2, :, ::4]))
         found = _peaks(power, max(level, 1e-12) * self.settings.threshold, self._first)
         if len(found) > self.settings.echoes:
             strength = power[found[:, 0], found[:, 1], found[:, 2]]
             found = found[np.argsort(-strength, kind="stable")[: self.settings.echoes]]
-        echoes = _refine(found, power, cells, self._array, self.settings.beam)
+        speeds = self._array.velocities + 2 * self.config.max_velocity * aliases
+        echoes = _refine(found, power, cells, self._array._replace(velocities=speeds), self.settings.beam)
         echoes[:, 5] /= max(level, 1e-12)
         return echoes
 
@@ -275,6 +277,7 @@ def _fit(echoes, draws, noise, inlier, span):
     u[:, 1], u[:, 2] = echoes[:, 1], echoes[:, 2] * elevation**2 / (elevation**2 + spread)
     u[:, 0] = np.sqrt(np.maximum(1 - u[:, 1] ** 2 - u[:, 2] ** 2 - spread, 0.02))
 
+    limit = max(1.5 * span / 2, 1.2 * np.abs(speed).max())
     best, score = np.zeros(2), -1.0
     for h in range(len(draws) + 1):
         v = np.zeros(2)  # the first hypothesis is standing still
@@ -285,7 +288,7 @@ def _fit(echoes, draws, noise, inlier, span):
                 continue
             v[0] = (speed[i] * u[j, 1] - speed[j] * u[i, 1]) / det
             v[1] = (u[i, 0] * speed[j] - u[j, 0] * speed[i]) / det
-            if v[0] ** 2 + v[1] ** 2 > (1.5 * span / 2) ** 2:
+            if v[0] ** 2 + v[1] ** 2 > limit**2:
                 continue
         total = 0.0
         for k in range(count):

@@ -24,6 +24,7 @@ from torch.nn.functional import avg_pool1d
 
 from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
+from radarize.odometry.compass import Compass, Strongest, Turn
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.ties import wandered
@@ -38,6 +39,12 @@ _SIGMAS = 3.0
 _INDEPENDENT = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
 _ASTRAY = np.radians(45.0)
+#: Probability from which on an echo is a wall's flash to the map, and m to either side of it, where it hides the rest.
+_FLASH, _RING = 0.9, 0.1
+#: rad: standard deviation of the compass from which on it tells the turn even where no match does.
+_SURE = np.radians(0.3)
+#: s over which what is predicted may contradict the compass before it is believed less.
+_DISSENT = 0.33
 
 
 @dataclass(frozen=True)
@@ -103,6 +110,7 @@ class MapRotation:
         self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
         self._ranges = heatmaps.ranges[self._first :]
         self._map = LocalMap(self._ranges[-1], s.cell)
+        self._compass, self._dissent = Compass(heatmaps, self._first), 0.0
         self._noise = s.yaw_noise if prior is None else s.guided_yaw_noise
         self._time: float | None = None
         self._velocity = self._position = np.zeros(2)
@@ -125,6 +133,10 @@ class MapRotation:
         surroundings = _box_mean(_box_mean(level, _TEXTURE[1]).mT, _TEXTURE[0]).mT
         return (level - surroundings).contiguous().numpy(), self._elevation(spectrum).numpy()
 
+    def echoes(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> list[Strongest]:
+        """The strongest of each frame."""
+        return [self._compass.strongest(cells) for cells in spectrum.numpy()]
+
     def _elevation(self, spectrum: torch.Tensor) -> torch.Tensor:
         if self._heatmaps.pairs is None:
             return torch.zeros(len(spectrum), len(self._ranges), self.settings.columns)
@@ -136,12 +148,13 @@ class MapRotation:
         """Yaw increments of the next frames, given their velocities."""
         told = None if self._prior is None else self._prior.estimate(batch, velocities)
         yaw, variance, seen = np.zeros(len(batch)), np.zeros(len(batch)), np.ones(len(batch), bool)
-        for i, (feature, u_z) in enumerate(zip(*self.features(batch.spectrum), strict=True)):
+        shown = zip(*self.features(batch.spectrum), self.echoes(batch.spectrum), strict=True)
+        for i, (feature, u_z, echo) in enumerate(shown):
             view = View(feature, u_z, self._ranges, self._sines)
             time, velocity = float(batch.centers[i]), velocities.velocity[i]
             if self._time is not None:
                 turn = None if told is None else (told.yaw[i], told.variance[i])
-                yaw[i], variance[i], seen[i] = self._turn(view, time - self._time, velocity, turn)
+                yaw[i], variance[i], seen[i] = self._turn(view, time - self._time, velocity, turn, echo)
             dt = self.settings.memory if self._time is None else time - self._time
             self._position = self._map.follow(self._position)
             self._map.blend(view, self._position, self._heading[0], -np.expm1(-dt / self.settings.memory))
@@ -149,15 +162,26 @@ class MapRotation:
         return Rotations(yaw, variance, seen if told is None else seen | told.seen)
 
     def _turn(
-        self, view: View, dt: float, velocity: Float[np.ndarray, "2"], told: tuple[float, float] | None
+        self,
+        view: View,
+        dt: float,
+        velocity: Float[np.ndarray, "2"],
+        told: tuple[float, float] | None,
+        echo: Strongest,
     ) -> tuple[float, float, bool]:
         """Yaw increment to a frame `dt` s after the last one, its variance, and whether a match was believed."""
         start, known = self._heading[0], self._spread[0, 0]
         self._predict(dt, told)
+        turn = self._compass.turn(echo, dt, (self._velocity + velocity) / 2, self._heading[0] - start)
+        if turn is not None:
+            self._steer(start, known, dt, turn)
+            if turn.flash > _FLASH:  # no landmark: it slides along the wall as the sensor does
+                view.feature[np.abs(self._ranges - echo.range) < _RING] = 0.0
         middle = (start + self._heading[0]) / 2
         c, d = np.cos(middle), np.sin(middle)
         self._position = self._position + dt * np.array([[c, -d], [d, c]]) @ ((self._velocity + velocity) / 2)
-        growth = max(self._spread[0, 0] - known, 0.0) + self.settings.unseen**2 * dt
+        sure = turn is not None and turn.variance < _SURE**2
+        growth = max(self._spread[0, 0] - known, 0.0) + (0.0 if sure else self.settings.unseen**2 * dt)
         if self._spread[0, 0] > _ASTRAY**2:
             self._map.forget()
             turned = self._heading[0] - start
@@ -165,7 +189,7 @@ class MapRotation:
             return turned, growth, False
         offset, correlation = self._match(view)
         if correlation < self.settings.least_correlation:
-            return self._heading[0] - start, growth, False
+            return self._heading[0] - start, growth, sure
         gain = self._spread[:, 0] / (self._spread[0, 0] + (self._noise / correlation) ** 2)
         self._heading = self._heading + gain * offset
         self._spread = self._spread - np.outer(gain, self._spread[0])
@@ -183,6 +207,20 @@ class MapRotation:
             turn, variance = told
             self._heading = np.array([self._heading[0] + turn, turn / dt])
             self._spread = np.diag([self._spread[0, 0] + variance, variance / dt**2])
+
+    def _steer(self, start: float, known: float, dt: float, turn: Turn) -> None:
+        """Update the turn since the last frame, when the yaw was `start` and of variance `known`, by the compass.
+
+        Where the prediction contradicts the compass for some time, it is wrong without knowing.
+        """
+        innovation = turn.yaw - (self._heading[0] - start)
+        self._dissent = np.exp(-dt / _DISSENT) * self._dissent + innovation
+        allowed = _SIGMAS**2 * turn.variance * _DISSENT / dt
+        doubt = dt / _DISSENT * max(self._dissent**2 - allowed, 0.0)
+        growth = max(self._spread[0, 0] - known, 0.0) + doubt
+        gain = growth / (growth + turn.variance)
+        self._heading[0] += gain * innovation
+        self._spread[0, 0] = known + (1 - gain) * growth
 
     def _match(self, view: View) -> tuple[float, float]:
         """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is

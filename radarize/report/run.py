@@ -42,10 +42,10 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
     if blind:
         sentence, spans = words.blindness(blind)
         page.text(sentence)
-        if spans.rows:
+        if spans.rows and not folder.health:  # of a version that gave no advice
             page.table(*spans, sortable=True)
-    if health := folder.health:
-        page.table(*words.health(health), sortable=True)
+    if folder.health:
+        page.table(*words.health(folder.health), sortable=True)
     if errors and others:
         page.section("Beside other methods", "The same recording; odometry and SLAM against the truth.")
         rows = [(methods(folder), metrics), *((methods(other), evaluate(other)) for other in others)]

@@ -93,11 +93,21 @@ def test_without_echoes_the_covariance_is_large():
     assert not found.seen.any()
 
 
-def test_faster_than_the_unambiguous_speed(room):
+@pytest.mark.parametrize("velocity", [(2.0, 0.0), (2.4, 0.3), (-2.2, 0.0), (1.6, 1.6), (0.4, 2.1)])
+def test_faster_than_the_unambiguous_speed(room, velocity):
     maps = Heatmaps(CONFIG)
-    found = DopplerVelocity(maps).estimate(batch(CONFIG, burst(room, (2.0, 0.0)), np.zeros(1)))
-    # Straight ahead the world aliases to receding; to the sides it does not.
-    np.testing.assert_allclose(found.velocity[0], (2.0, 0.0), atol=0.15)
+    found = DopplerVelocity(maps).estimate(batch(CONFIG, burst(room, velocity), np.zeros(1)))
+    np.testing.assert_allclose(found.velocity[0], velocity, atol=0.05)
+    error = found.velocity[0] - velocity
+    assert error @ np.linalg.solve(found.covariance[0], error) < 14
+
+
+@pytest.mark.parametrize("speed", [0.8, 1.2, 1.5])
+def test_a_radar_whose_limit_is_below_walking_pace(room, speed):
+    slow = CONFIG.model_copy(update={"idle_time": CONFIG.idle_time + CONFIG.chirp_time})  # 0.92 m/s
+    adc = burst(room, (speed, 0.1), config=slow)
+    found = DopplerVelocity(Heatmaps(slow)).estimate(batch(slow, adc, np.zeros(1)))
+    np.testing.assert_allclose(found.velocity[0], (speed, 0.1), atol=0.04)
 
 
 def echoes_about(rng, spread, count=60, speed=1.0):

@@ -5,6 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from radarize.batch import Signal
+from radarize.odometry.compass import Strongest
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.rotation import MapRotation, Rotations
@@ -34,6 +35,7 @@ def follow(times: np.ndarray, poses: np.ndarray, prior=None) -> Rotations:
     """What `MapRotation` makes of frames at true poses whose velocities are known."""
     rotation = MapRotation(SIGNAL.heatmaps, prior=prior)
     rotation.features = lambda poses: see(rotation, poses, np.random.default_rng(1))
+    rotation.echoes = lambda poses: [Strongest(0.0, 0.0, 0.0, clear=False)] * len(poses)
     velocity = np.gradient(poses[:, :2], times, axis=0)
     cos, sin = np.cos(poses[:, 2]), np.sin(poses[:, 2])
     velocity = np.stack([cos * velocity[:, 0] + sin * velocity[:, 1], cos * velocity[:, 1] - sin * velocity[:, 0]], 1)
@@ -99,6 +101,7 @@ def test_what_a_blind_second_claims_does_not_depend_on_the_frame_rate(rate):
     rotation = MapRotation(SIGNAL.heatmaps)
     shape = len(rotation._ranges), len(rotation._sines)
     rotation.features = lambda frames: (np.zeros((len(frames), *shape), np.float32),) * 2
+    rotation.echoes = lambda frames: [Strongest(0.0, 0.0, 0.0, clear=False)] * len(frames)
     count = rate + 1
     nothing = Velocities(np.zeros((count, 2)), np.tile(np.eye(2), (count, 1, 1)), np.zeros(count, int), np.zeros(count))
     rotation._spread[1, 1] = np.radians(5) ** 2

@@ -174,6 +174,15 @@ def test_blind_spans_are_counted_from_the_first_pose(tmp_path):
     assert RunFolder(tell(run, blind=BLIND | {"spans": spans})).blind.model_dump() == BLIND
 
 
+def test_blind_spans_stand_in_one_table(tmp_path):
+    """With advice, where there is some."""
+    found = [{"kind": "blind", "start_s": 3.0, "stop_s": 4.5, "advice": "turn more slowly"}]
+    run = tell(write_run(tmp_path / "run"), blind=BLIND)
+    assert "blind from, s" in report_run(run).read_text()
+    shown = report_run(tell(run, blind=BLIND, health=found)).read_text()
+    assert "blind from, s" not in shown and "turn more slowly" in shown and "12 % of the way" in shown
+
+
 def test_blindness_is_told_without_truth_too(tmp_path):
     seeing = {"share_of_way": 0.0, "way_m": 0.0, "spans": []}
     shown = report_run(tell(write_run(tmp_path / "run", truth=False), blind=seeing)).read_text()

@@ -37,12 +37,13 @@ class LearnedVelocity:
     def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames; no echoes are counted."""
         shown = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
+        told = shown.whole & ~batch.aliases.any(axis=1)  # it was taught speeds that do not alias
         velocity = np.zeros((len(batch), 2))
         covariance = np.tile(_ANY_VELOCITY**2 * np.eye(2), (len(batch), 1, 1))
-        if shown.whole.any():
-            mean, spread = self._net.estimate(shown.maps[shown.whole])
-            velocity[shown.whole], covariance[shown.whole] = mean.double().numpy(), spread.double().numpy()
-        return Velocities(velocity, covariance, np.zeros(len(batch), int), shown.whole)
+        if told.any():
+            mean, spread = self._net.estimate(shown.maps[told])
+            velocity[told], covariance[told] = mean.double().numpy(), spread.double().numpy()
+        return Velocities(velocity, covariance, np.zeros(len(batch), int), told)
 
 
 class LearnedRotation:

@@ -18,6 +18,8 @@ def of_spectrum(signal: Signal, spectrum: torch.Tensor, times: np.ndarray) -> Ba
     """Of a spectrum that no samples were made into, or of what stands for one."""
     found = Batch(signal, np.zeros((len(spectrum), 0)), times)
     found.folded = found.spectrum = spectrum
+    if not isinstance(spectrum, torch.Tensor):
+        found.aliases = np.zeros((len(spectrum), signal.radar.loops), int)
     return found
 
 

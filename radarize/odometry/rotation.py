@@ -219,8 +219,11 @@ class MapRotation:
         doubt = dt / _DISSENT * max(self._dissent**2 - allowed, 0.0)
         growth = max(self._spread[0, 0] - known, 0.0) + doubt
         gain = growth / (growth + turn.variance)
-        self._heading[0] += gain * innovation
-        self._spread[0, 0] = known + (1 - gain) * growth
+        self._spread[0, 0] += doubt
+        whole = self._spread[0, 0]
+        along = self._spread[:, 0] / whole
+        self._heading = self._heading + gain * innovation * along
+        self._spread = self._spread - min(gain * growth, whole) * np.outer(along, along)
 
     def _match(self, view: View) -> tuple[float, float]:
         """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is

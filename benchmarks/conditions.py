@@ -307,8 +307,6 @@ def main() -> None:
         notes=[
             "Mean errors after alignment; yaw: the largest error of odometry after alignment, and the standard "
             "deviation of the last yaw that it claims, given the first. Health: kinds of conditions that were told.",
-            "These walks also helped to choose the settings of the compass and of aliases "
-            "(`radarize.odometry.compass`, `radarize.aliasing`).",
         ],
     )
 

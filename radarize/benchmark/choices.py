@@ -86,6 +86,7 @@ PICTURES = {f"radarhd {number}": (None,) for number in TRAINING} | {"RadarHD, tr
 CHOICES = (
     Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),
     Choice("what odometry claims of its errors, and its fusion with the network", ODOMETRY),
+    Choice("the compass and what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),
     Choice("scans and the back end's preset radar", {"office": (7,)}),

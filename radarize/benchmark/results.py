@@ -7,6 +7,7 @@ that are refused.
 
 import os
 import platform
+import shlex
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -141,7 +142,8 @@ def commit(source: Path) -> str:
 
 def command(name: str) -> str:
     """A program's name with the arguments of this process; folders are the machine's business, not the reader's."""
-    return " ".join([name, *(Path(word).name if Path(word).is_absolute() else word for word in sys.argv[1:])])
+    words = [Path(word).name if Path(word).is_absolute() else word for word in sys.argv[1:]]
+    return " ".join([name, shlex.join(words)]) if words else name
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ from radarsim.scene.materials import EPS0, Material
 
 FREQUENCY = 77e9  # at which Sionna RT's own solvers start out
 _REACH = 1000.0
+#: Entries of four bytes that a processor's widest instruction takes at a time.
+_PACKET = 16
 
 
 @dataclass(frozen=True)
@@ -164,8 +166,8 @@ class Scene:
             label = f"{number} {item.name}".replace(".", "_")  # Mitsuba keeps dots for paths
             shape = mi.Mesh(label, len(item.mesh.vertices), len(item.mesh.faces))
             data = mi.traverse(shape)
-            data["vertex_positions"] = np.ravel(item.mesh.vertices).astype(np.float32)
-            data["faces"] = np.ravel(item.mesh.faces).astype(np.uint32)
+            data["vertex_positions"] = _lent(np.ravel(item.mesh.vertices), np.float32)
+            data["faces"] = _lent(np.ravel(item.mesh.faces), np.uint32)
             data.update()
             items.append(rt.SceneObject(mi_mesh=shape, name=label, radio_material=radio[item.material.name]))
         scene.edit(add=items)
@@ -187,7 +189,7 @@ class Scene:
             return np.zeros(0, bool)
         directions, lengths = _directions(targets - origins)
         ray = _ray(origins + margin * directions, directions)
-        ray.maxt = mi.Float(np.maximum(lengths - 2 * margin, 0).astype(np.float32))
+        ray.maxt = mi.Float(_lent(np.maximum(lengths - 2 * margin, 0), np.float32))
         return geometry.ray_test(ray).numpy().astype(bool)
 
     def hit(
@@ -276,10 +278,16 @@ def _directions(vectors: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "n
 def _ray(origins: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]):
     import mitsuba as mi
 
-    return mi.Ray3f(
-        mi.Point3f(np.ascontiguousarray(origins.T, np.float32)),
-        mi.Vector3f(np.ascontiguousarray(directions.T, np.float32)),
-    )
+    return mi.Ray3f(mi.Point3f(_lent(origins.T, np.float32)), mi.Vector3f(_lent(directions.T, np.float32)))
+
+
+def _lent(values: np.ndarray, dtype: type) -> np.ndarray:
+    """An array with room after its end: Dr.Jit reads NumPy's memory where it lies, in whole packets, and where the end
+    of an array is the end of what the process may read, that would be its end, too."""
+    room = np.zeros(values.size + _PACKET, dtype)
+    found = room[: values.size].reshape(values.shape)
+    found[...] = values
+    return found
 
 
 def _radio_material(material: Material):

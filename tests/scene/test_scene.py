@@ -6,7 +6,7 @@ import pytest
 from radarize.errors import InputError
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.scene import Scene, SceneObject, _lent
 
 WOOD, METAL = MATERIALS["wood"], MATERIALS["metal"]
 
@@ -160,3 +160,18 @@ def test_refuses_what_rays_cannot_use():
         Scene("x", [])
     with pytest.raises(InputError, match="within 1000 m"):
         Scene("x", [SceneObject("a", shapes.box((5e5, 0, 0), (1, 1, 1)), WOOD)])
+
+
+def test_rays_are_read_in_packets_past_their_end(clutter):
+    """What Dr.Jit is lent has room behind it; and it is read where it lies, which is why."""
+    assert clutter.occluded(np.zeros(3), np.ones((1, 3))).shape == (1,)  # Dr.Jit is there
+    values = np.arange(10.0).reshape(2, 5)
+    found = _lent(values.T, np.float32)
+    assert np.array_equal(found, values.T) and found.flags.c_contiguous
+    behind = found.base.size - found.size
+    assert found.base.ctypes.data == found.ctypes.data and behind >= 64 // found.itemsize
+    import mitsuba as mi
+
+    number = mi.Float(flat := _lent(np.zeros(3), np.float32))
+    flat[1] = 7
+    assert number.numpy()[1] == 7

@@ -98,7 +98,7 @@ def test_echoes_of_imported_walls_are_those_of_native_ones(tmp_path):
     scan.merge_vertices()
     scan.vertices = scan.vertices + np.random.default_rng(1).normal(0, 0.003, scan.vertices.shape)
     scan.export(tmp_path / "scan.ply")
-    scanned = Scene.load(import_scene(tmp_path / "scan.ply", tmp_path / "out").path)
+    scanned = Scene.load(import_scene(tmp_path / "scan.ply", tmp_path / "out", default="plasterboard").path)
     for position, yaw in (((3.2, 2.7, 1.2), np.pi), ((3.0, 2.5, 1.2), -np.pi / 2 + 0.3)):
         expected = peak(Scene("native", native.objects), position, yaw)
         for scene in (plan, scanned):

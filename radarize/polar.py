@@ -113,10 +113,15 @@ def lidar_pixels(
     return np.unique(np.stack([row, column], axis=1), axis=0)
 
 
+def azimuths(columns: int) -> Float[np.ndarray, "column"]:
+    """Of a picture with any number of columns, rad."""
+    return np.linspace(-np.pi / 2, np.pi / 2, columns)
+
+
 def cartesian(picture: Bool[np.ndarray, "range azimuth"]) -> Float[np.ndarray, "point 2"]:
     """Points (x forward, y left, m) of a picture with any number of columns, through the grid of the measures."""
     rows, columns = np.nonzero(picture)
-    azimuth = np.linspace(-np.pi / 2, np.pi / 2, picture.shape[1])[columns]
+    azimuth = azimuths(picture.shape[1])[columns]
     ranges = RANGES[rows]
     return gridded(np.stack([ranges * np.cos(azimuth), ranges * np.sin(azimuth)], axis=1))
 

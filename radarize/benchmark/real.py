@@ -37,12 +37,14 @@ from radarize.methods.pictures.turns import PictureTurnNet
 from radarize.nets.weights import Header, load
 from radarize.points import Cfar, level_around
 from radarize.radar.presets import PRESETS
-from radarize.walkposes import BEARINGS, lidar_poses, scan, true_poses
+from radarize.walkposes import BEARINGS, lidar_poses, scan, stamps, true_poses
 from radarize.walks import FIRST, PERIOD, Predictions, Walk
 
 #: What stands in every picture, by name: all cells; the first one of each azimuth that stands out; all that do.
 _CFAR = Cfar(window=8, guard=4, threshold=64.0)
 _BEFORE = ("picture", "cfar")
+#: The network's column at each bearing of a scan.
+_NEAREST = np.abs(polar.azimuths(COLUMNS) - BEARINGS[:, None]).argmin(axis=1)
 NOTES = (
     "Medians over all frames from the 40th on, points through the authors' grid; +-: standard error, with as many "
     "independent frames as the errors' autocorrelation leaves.",
@@ -203,9 +205,9 @@ def _methods(
     """A walk's pictures, frame by frame, where each method sees something in them, and scans of those that tell first
     surfaces themselves."""
     windows, memory = (network[1].windows(PRESETS["radarhd"]), Memory()) if network else (None, None)
+    times = stamps(walk.frames)
     for frames, pictures in walk.batches():
-        stamps = PERIOD * np.arange(frames.start, frames.stop)
-        likely = _network(network[0], windows, memory, pictures, stamps) if network else None
+        likely = _network(network[0], windows, memory, pictures, times[frames]) if network else None
         for k, picture in enumerate(pictures):
             stands = picture > level_around(picture.astype(float), _CFAR, 0, False) + _CFAR.threshold
             nearest = stands & (np.cumsum(stands, axis=0) == 1)
@@ -221,15 +223,13 @@ def _network(
     windows: Windows,
     memory: Memory,
     pictures: UInt8[np.ndarray, "frame range azimuth"],
-    stamps: Float[np.ndarray, "frame"],
+    times: Float[np.ndarray, "frame"],
 ) -> tuple[Bool[np.ndarray, "frame range column"], Float[np.ndarray, "frame bearing"]]:
     """Points of a batch's frames, and their scans."""
-    shown = windows.push({"picture": pictures.astype(np.float16)}, stamps)[0]
+    shown = windows.push({"picture": pictures.astype(np.float16)}, times)[0]
     likely = net.estimate(shown.maps)
-    azimuths = np.linspace(-np.pi / 2, np.pi / 2, COLUMNS)
-    nearest = np.abs(azimuths - BEARINGS[:, None]).argmin(axis=1)
     # Maps average over time themselves: their scans are each frame's own.
-    return points(memory.push(likely, stamps), net.dense).numpy(), first_surfaces(likely)[:, nearest]
+    return points(memory.push(likely, times), net.dense).numpy(), first_surfaces(likely)[:, _NEAREST]
 
 
 def _row(found: Sequence[Apart]) -> dict[str, float]:

@@ -61,11 +61,15 @@ def png(pixels: UInt8[np.ndarray, "row column ..."]) -> str:
 
 
 class View:
-    """Pictures and figures of a pipeline, as plain data for a page."""
+    """Pictures and figures of a pipeline, as plain data for a page.
+
+    Attributes:
+        newest: what the last batch with frames gave.
+    """
 
     def __init__(self, pipeline: Pipeline, signal: Signal):
         self._pipeline, self._heatmaps = pipeline, signal.heatmaps
-        self._newest: Result | None = None
+        self.newest: Result | None = None
         self._frames = 0
         self._fan = Fan(self._heatmaps)
         self._history: deque[tuple[float, int, dict[str, float]]] = deque()  # clock, frames, seconds by stage
@@ -73,7 +77,7 @@ class View:
     def add(self, result: Result) -> None:
         """Take what a batch gave: the sink of a live pipeline."""
         if len(result.frames):
-            self._newest, self._frames = result, int(result.frames[-1]) + 1
+            self.newest, self._frames = result, int(result.frames[-1]) + 1
 
     def facts(self) -> dict[str, object]:
         """What does not change: axes of the heat maps, the budget."""
@@ -116,17 +120,12 @@ class View:
             "loops": int(slam.graph.accepted.sum()),
         }
 
-    @property
-    def newest(self) -> Result | None:
-        """What the last batch gave."""
-        return self._newest
-
     def pose(self) -> Float[np.ndarray, "3"] | None:
         """Where the sensor is on the map: odometry since the last node, from that node on."""
         slam = self._pipeline.slam
-        if self._newest is None:
+        if self.newest is None:
             return None
-        now = self._newest.track.pose[-1]
+        now = self.newest.track.pose[-1]
         if slam.nodes:
             now = compose(slam.graph.poses[-1], between(slam.odometry.pose(slam.nodes[-1].time), now))
         return now

@@ -161,7 +161,9 @@ def _poses(path: Path) -> dict[str, Product]:
     }
 
 
-def _batches(words: _Channel, stamps: _Channel, doubtful: Bool[np.ndarray, "frame"], config: RadarConfig) -> Iterator:
+def _batches(
+    words: _Channel, stamps: _Channel, doubtful: Bool[np.ndarray, "frame"], config: RadarConfig
+) -> Iterator[Batch]:
     size = batch_frames(config)
     for start in range(0, len(doubtful), size):
         stop = min(start + size, len(doubtful))

@@ -30,7 +30,7 @@ BEST = {"odometry": "fused", "scans": "segmentation"}
 #: Methods without networks, for radars that the shipped ones do not fit.
 CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
 #: Methods for recordings of pictures.
-PICTURED = {"odometry": "scan-matching", "scans": "pictures"}
+PICTURED = {"odometry": "pictures", "scans": "pictures"}
 
 
 class Workshop:

@@ -56,7 +56,7 @@ def test_a_real_walk_goes_through_the_pipeline(recordings, tmp_path):
     walk = import_recording(clone, tmp_path / "227.h5", Given(walk=227, poses=poses))
     folder = RunFolder(run(walk, tmp_path / "run"))
     facts = json.loads((tmp_path / "run" / "run.json").read_text())
-    assert facts["methods"] == {"odometry": "scan-matching", "scans": "pictures"} and facts["frames_lost"] == 0
+    assert facts["methods"] == {"odometry": "pictures", "scans": "pictures"} and facts["frames_lost"] == 0
     scans, lidar = folder.scans["ranges"], folder.scans["truth/scan"]
     column = np.abs(folder.scans["truth/scan_azimuths"][:, None] - BEARINGS).argmin(axis=0)
     assert (np.isfinite(scans) & np.isfinite(lidar[:, column])).mean() > 0.5
@@ -87,7 +87,7 @@ def pictured(tmp_path):
 
 
 def test_what_needs_samples_says_so(pictured, tmp_path):
-    for what, name, wanted in (("odometry", "fused", "scan-matching"), ("scans", "first-echo", "pictures")):
+    for what, name, wanted in (("odometry", "fused", "pictures"), ("scans", "first-echo", "pictures")):
         words = f"has no raw samples, which {what} {name} needs, expected {what} {wanted}"
         with pytest.raises(InputError, match=words):
             run(pictured, tmp_path / "r", **{what: name})

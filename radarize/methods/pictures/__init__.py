@@ -2,6 +2,14 @@
 
 from radarize.methods.method import Method
 
+ODOMETRY = {
+    "pictures": Method(
+        "scan matching, turns by a network",
+        "radarize.methods.pictures.odometry:odometry",
+        ("picture-turns",),
+        scans=True,
+    )
+}
 SCANS = {
     "pictures": Method(
         "network on polar pictures", "radarize.methods.pictures.scans:scanner", ("pictures",), pictures=True

@@ -17,7 +17,9 @@ from radarize.benchmark.realmotion import (
     SPAN,
     disturbed,
     drift,
+    followed,
     mapped,
+    network_rates,
     network_turns,
     shifted_turns,
     smoothed,
@@ -56,7 +58,7 @@ NOTES = (
 )
 MAP_NOTE = (
     "With the same odometry for all methods: the lidar's poses with errors added, see `radarize.benchmark.realmotion`; "
-    "`alone`: by matching scans alone. Maps against the lidar's points at its poses, of which three frames have seen a "
+    "`alone`: odometry, too, is by matching scans, for `network` with the turns that its partner tells. Maps against the lidar's points at its poses, of which three frames have seen a "
     "cell of 5 cm. `odometry`: its ATE without SLAM."
 )
 
@@ -121,7 +123,8 @@ def real(
             told["network"] = network_turns(turns, judged.pictures)
         told |= {f"{name}, smoothed": smoothed(each) for name, each in told.items()}
         moved = {name: turn_errors(each, poses) for name, each in told.items()}
-        drawn = _maps(walk, judged, poses)
+        rates = network_rates(weights[1], judged.pictures) if turns else None
+        drawn = _maps(walk, judged, poses, rates)
         maps += drawn
         mapped_by = {row["method"]: row for row in drawn}
         for name in dict.fromkeys([*found, *moved, *mapped_by]):
@@ -184,15 +187,22 @@ def _judged(
     return found
 
 
-def _maps(walk: Walk, judged: _Judged, poses: Float[np.ndarray, "frame 3"]) -> list[dict[str, object]]:
-    """A row for the scans of each method."""
+def _maps(
+    walk: Walk,
+    judged: _Judged,
+    poses: Float[np.ndarray, "frame 3"],
+    rates: Float[np.ndarray, "frame 2"] | None,
+) -> list[dict[str, object]]:
+    """A row for the scans of each method; `rates` of turning are those of our networks alone."""
     surface, odometry = surface_of(judged.clouds, poses), disturbed(poses, walk.number)
     off, rows = drift(odometry, poses), []
     for name, each in judged.ranges.items():
-        alone = mapped(each, poses, surface, None)
+        matched, covariance = followed(each, rates if name == "network" else None)
+        alone = mapped(each, poses, surface, matched, covariance)
         rows.append(
             {"walk": walk.number, "method": name, "odometry_ate_m": off}
             | mapped(each, poses, surface, odometry)
+            | {"alone_odometry_ate_m": drift(matched, poses)}
             | {"alone_ate_m": alone["ate_m"], "alone_map_f1_20cm": alone["map_f1_20cm"]}
         )
     return rows

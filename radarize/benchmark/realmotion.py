@@ -4,6 +4,8 @@ The reference is the lidar beside the radar: its poses, and its points at these 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -12,11 +14,14 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
 
 from radarize import polar
+from radarize.batch import Batch, Signal
 from radarize.errors import InputError
 from radarize.evaluation.mapping import agreement
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
 from radarize.evaluation.trajectory import trajectory
+from radarize.methods.pictures.odometry import PictureRates
 from radarize.methods.pictures.turns import PictureTurnNet
+from radarize.methods.scan_matching.odometry import ScanMatching
 from radarize.nets.weights import Header
 from radarize.pose import between, compose, transform, wrap
 from radarize.radar.presets import PRESETS
@@ -24,7 +29,7 @@ from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.slam.grid import OccupancyGrid
 from radarize.tum import planar_poses
-from radarize.walkposes import BEARINGS, EVERY, at, stamps
+from radarize.walkposes import BEARINGS, at, stamps
 from radarize.walks import PERIOD
 
 #: Frames over which turns are measured: 0.2 s.
@@ -114,11 +119,50 @@ def disturbed(poses: Float[np.ndarray, "frame 3"], seed: int) -> Float[np.ndarra
     return np.array(found)
 
 
+def followed(
+    ranges: Float[np.ndarray, "frame bearing"], rates: Float[np.ndarray, "frame 2"] | None
+) -> tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame 3 3"]]:
+    """Poses by matching scans alone, and the covariance of each step.
+
+    Args:
+        ranges: scans on `BEARINGS`, m.
+        rates: of turning, rad/s, and their variances, as a network tells them; nan: not known.
+    """
+    batch = Batch(Signal(PRESETS["radarhd"]), None, stamps(len(ranges)))
+    told = None if rates is None else lambda batch: rates
+    matching = ScanMatching(_Given(np.where(np.isnan(ranges), np.inf, ranges)), rates=told, bearings=BEARINGS)
+    track = matching.follow(batch)
+    return track.pose, track.covariance
+
+
+@dataclass(frozen=True)
+class _Given:
+    """Scans that are known."""
+
+    ranges: Float[np.ndarray, "frame bearing"]
+
+    def scan(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
+        """Of all frames."""
+        return self.ranges
+
+
+def network_rates(weights: Path, pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float[np.ndarray, "frame 2"]:
+    """Rates of turning (rad/s) and their variances by a network that was trained in simulation; nan: not known."""
+    radar = PRESETS["radarhd"]
+    network, signal, times = PictureRates(radar, weights), Signal(radar), stamps(len(pictures))
+    found = np.empty((len(pictures), 2))
+    for start in range(0, len(pictures), 64):
+        some = slice(start, start + 64)
+        found[some] = network.rates(Batch(signal, None, times[some], maps={"picture": pictures[some]}))
+    return found
+
+
 def mapped(
     ranges: Float[np.ndarray, "frame bearing"],
     poses: Float[np.ndarray, "frame 3"],
     surface: Float[np.ndarray, "point 2"],
-    odometry: Float[np.ndarray, "frame 3"] | None,
+    odometry: Float[np.ndarray, "frame 3"],
+    covariance: Float[np.ndarray, "frame 3 3"] | None = None,
 ) -> dict[str, float]:
     """SLAM with scans: error of its trajectory, and its map against the lidar's.
 
@@ -126,12 +170,12 @@ def mapped(
         ranges: scans on `BEARINGS`, m; nan: not known.
         poses: true ones.
         surface: of the lidar's map, m, in the frame of the poses.
-        odometry: that SLAM is given; scans alone if None.
+        odometry: that SLAM is given.
+        covariance: of its steps; as the back end's settings have them if None.
     """
     slam = Slam(_CONFIG)
-    for frame in range(0, len(ranges), 1 if odometry is not None else EVERY):
-        if odometry is not None:
-            slam.add_odometry(PERIOD * frame, odometry[frame])
+    for frame in range(len(ranges)):
+        slam.add_odometry(PERIOD * frame, odometry[frame], None if covariance is None else covariance[frame])
         slam.add_scan(PERIOD * frame, BEARINGS, ranges[frame])
     slam.finish()
     times, found = slam.trajectory()

@@ -35,6 +35,7 @@ class ScanMatching:
         scanner: makes the scans.
         settings: of node, grid and matcher.
         rates: says rate of turning (rad/s) and its variance of each frame, NaN where it does not know; None: nobody.
+        bearings: of the scans, rad.
     """
 
     def __init__(
@@ -42,8 +43,10 @@ class ScanMatching:
         scanner: Scanner,
         settings: SlamConfig | None = None,
         rates: Callable[[Batch], Float[np.ndarray, "frame 2"]] | None = None,
+        bearings: Float[np.ndarray, "bearing"] = BEARINGS,
     ):
         self.scanner, self.settings, self.rates = scanner, settings or SlamConfig.preset("lidar"), rates
+        self.bearings = bearings
         self._keys: deque[tuple[np.ndarray, Node]] = deque(maxlen=_KEYS)
         self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
         self._time: float | None = None
@@ -62,7 +65,7 @@ class ScanMatching:
         with stage("translation"):
             for i, (time, dt) in enumerate(zip(centers, steps, strict=True)):
                 before = self._pose
-                seen[i] = self._step(Scan(time, np.zeros(3), BEARINGS, ranges[i]), dt, turning[i])
+                seen[i] = self._step(Scan(time, np.zeros(3), self.bearings, ranges[i]), dt, turning[i])
                 poses[i], rates[i], spreads[i] = self._pose, self._rate, self._spread[3:, 3:]
                 moved[i] = between(before, self._pose)
         spread = spreads * steps[:, None, None] ** 2

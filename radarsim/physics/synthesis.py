@@ -32,6 +32,9 @@ from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 #: Instants (in half bursts from the middle) at which path lengths are evaluated: Chebyshev nodes.
 NODES = np.array([-np.sqrt(3) / 2, 0.0, np.sqrt(3) / 2])
 
+#: Loops that are summed side by side, in the width of the processor's registers.
+LANES = 16
+
 
 @dataclass(frozen=True)
 class BurstClock:
@@ -112,7 +115,7 @@ class Synthesizer:
         moments = np.zeros((n, orders, tx * rx, loops, 2), np.float32)
         _accumulate(
             moments, edges, order, lengths, amplitudes, cells // n * ((n - 1) / 2), tone, np.float32(1 / width),
-            self._start, self._step, config.center_frequency / SPEED_OF_LIGHT,
+            self._start, self._step, config.center_frequency / SPEED_OF_LIGHT, (0.0,) * orders,
         )  # fmt: skip
         return self._samples(moments, np.pi * width)
 
@@ -163,21 +166,21 @@ def _tones(lengths, start, step, loops, per_metre, per_rate):
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def _accumulate(moments, edges, order, lengths, amplitudes, aliased, tone, scale, start, step, wavenumber):
+def _accumulate(moments, edges, order, lengths, amplitudes, aliased, tone, scale, start, step, wavenumber, series):
     """moments[cell, p, antenna, loop] += A exp(j phase) T_p(u), over the echoes of each cell.
 
     Cells repeat after N bins, but phases are referred to the instant n_c = (N - 1) / 2, where a tone N bins higher has
-    turned n_c cycles further: `aliased`, in cycles.
+    turned n_c cycles further: `aliased`, in cycles. `series` is as long as there are orders: a tuple's length is known
+    when this is compiled, so all orders of some loops stay in registers.
     """
     n, orders, virtual, loops, _ = moments.shape
+    blocks = -(-loops // LANES)
     for i in prange(n):
         # Threads get contiguous ranges of i; near cells hold few echoes, so deal the cells out alternately.
         cell = 2 * i if 2 * i < n else 2 * (i - (n + 1) // 2) + 1
         if edges[cell] == edges[cell + 1]:
             continue
-        re, im = np.empty(loops, np.float32), np.empty(loops, np.float32)
-        u, before, now = np.empty(loops, np.float32), np.empty(loops, np.float32), np.empty(loops, np.float32)
-        acc = np.zeros((2, orders, virtual, loops), np.float32)
+        acc = np.zeros((virtual, blocks, len(series), 2, LANES), np.float32)
         for j in range(edges[cell], edges[cell + 1]):
             e = order[j]
             size = np.float32(abs(amplitudes[e]))
@@ -194,28 +197,32 @@ def _accumulate(moments, edges, order, lengths, amplitudes, aliased, tone, scale
                 u0 = np.float32(t0 + s * (t1 + s * t2)) * scale
                 u1 = np.float32(step * (t1 + 2 * s * t2)) * scale
                 u2 = np.float32(step * step * t2) * scale
-                for loop in range(loops):
-                    k = np.float32(loop)
-                    x = p0 + k * (p1 + k * p2)
-                    x -= np.floor(x + np.float32(0.5))
-                    sine, cosine = _sincos_cycles(x)
-                    re[loop] = size * cosine
-                    im[loop] = size * sine
-                    u[loop] = u0 + k * (u1 + k * u2)
-                    before[loop] = u[loop]
-                    now[loop] = np.float32(1)
-                for p in range(orders):
-                    for loop in range(loops):
-                        acc[0, p, a, loop] += re[loop] * now[loop]
-                        acc[1, p, a, loop] += im[loop] * now[loop]
-                        following = np.float32(2) * u[loop] * now[loop] - before[loop]
-                        before[loop] = now[loop]
-                        now[loop] = following
+                for block in range(blocks):
+                    _add(acc[a, block], np.float32(block * LANES), (size, p0, p1, p2), (u0, u1, u2), series)
         for p in range(orders):
             for a in range(virtual):
                 for loop in range(loops):
-                    moments[cell, p, a, loop, 0] = acc[0, p, a, loop]
-                    moments[cell, p, a, loop, 1] = acc[1, p, a, loop]
+                    moments[cell, p, a, loop, 0] = acc[a, loop // LANES, p, 0, loop % LANES]
+                    moments[cell, p, a, loop, 1] = acc[a, loop // LANES, p, 1, loop % LANES]
+
+
+@njit(inline="always", fastmath=True)
+def _add(acc, first, wave, tone, series):
+    """One echo at one antenna in some loops: what it adds to all orders' real and imaginary parts."""
+    size, p0, p1, p2 = wave
+    u0, u1, u2 = tone
+    for lane in range(LANES):
+        k = first + np.float32(lane)
+        x = p0 + k * (p1 + k * p2)
+        x -= np.floor(x + np.float32(0.5))
+        sine, cosine = _sincos_cycles(x)
+        re, im = size * cosine, size * sine
+        u = u0 + k * (u1 + k * u2)
+        before, now = u, np.float32(1)
+        for p in range(len(series)):
+            acc[p, 0, lane] += re * now
+            acc[p, 1, lane] += im * now
+            before, now = now, np.float32(2) * u * now - before
 
 
 @njit(inline="always", fastmath=True)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Complex, Float, Float32, Int
 from numba import njit, prange
 
 from radarsim.physics.amplitudes import (
@@ -48,10 +48,10 @@ class _Aims(NamedTuple):
     at the scatterer (1/m)."""
 
     candidate: Int[np.ndarray, "aim"]
-    place: Float[np.ndarray, "3 aim"]
+    place: Float32[np.ndarray, "3 aim"]
     scatterer: Int[np.ndarray, "aim"]
-    longest: Float[np.ndarray, "aim"]
-    weakest: Float[np.ndarray, "aim"]
+    longest: Float32[np.ndarray, "aim"]
+    weakest: Float32[np.ndarray, "aim"]
 
 
 class _Hits(NamedTuple):
@@ -103,9 +103,10 @@ class SpecularCandidates:
         if not self._size:
             return OneWay.straight(search, targets, candidates, np.zeros(0, int)), np.zeros((0, 3, 3))
         mirrors, frame, span = (np.concatenate(x) for x in (self._chains, self._frame, self._aims))
-        rows, longest, weakest = (np.concatenate(x) for x in (self._rows, self._longest, self._weakest))
+        rows = np.concatenate(self._rows)
+        longest, weakest = (np.concatenate(x).astype(np.float32) for x in (self._longest, self._weakest))
         scatterer = candidates.scatterer[rows]
-        place = np.ascontiguousarray(np.take(targets.scatterers.position, scatterer, axis=0).T)
+        place = np.ascontiguousarray(np.take(targets.scatterers.position, scatterer, axis=0).T, np.float32)
         slots = np.concatenate([[0], np.cumsum(span[:, 1] - span[:, 0])])
         chains = _Chains(mirrors, frame, span, slots)
         size = chains.slots[-1]
@@ -118,7 +119,7 @@ class SpecularCandidates:
             np.empty((n, 3)), np.empty((n, 3)), np.zeros(n, bool),
         )  # fmt: skip
         stops = np.empty((n, 3, 3))
-        _courses(search, flat.columns, chains, aims, hits, found.columns, stops)
+        _courses(search, flat.columns, chains, aims, targets.scatterers.columns, hits, found.columns, stops)
         return found, stops
 
 
@@ -133,34 +134,47 @@ def _crossing(a, b, center, normal):
 def _reach(search, image, h, window, aims, begin, end):
     """Which aims light may reach from an image through its mirror, at height h over the image.
 
-    A quick look at all of them, in arrays: it leaves out what `misses` does, what is too far, and what is too weak.
+    A quick look at all of them, in arrays of single precision: it leaves out what `misses` does, what is too far, and
+    what is too weak.
     """
+    f = np.float32
     center, normal, u, v, half_u, half_v = window
     x, y, z = aims.place[0][begin:end], aims.place[1][begin:end], aims.place[2][begin:end]
-    longest, weakest, lit = aims.longest[begin:end], aims.weakest[begin:end], np.empty(end - begin, np.bool_)
-    side, height = (1.0, h) if h > 0 else (-1.0, -h)
-    ox, oy, oz = image
-    begin_u, begin_v = dot(minus(image, center), u), dot(minus(image, center), v)
-    zone = STRIP_FAR * STRIP_FAR * 0.5 * search.wavelength
-    most = _MOST * search.peak_gain
-    for i in range(len(lit)):
+    longest, weakest = aims.longest[begin:end], aims.weakest[begin:end]
+    side, height = (f(1.0), f(h)) if h > 0 else (f(-1.0), f(-h))
+    ox, oy, oz = f(image[0]), f(image[1]), f(image[2])
+    nx, ny, nz = side * f(normal[0]), side * f(normal[1]), side * f(normal[2])
+    ux, uy, uz, vx, vy, vz = f(u[0]), f(u[1]), f(u[2]), f(v[0]), f(v[1]), f(v[2])
+    begin_u, begin_v = f(dot(minus(image, center), u)), f(dot(minus(image, center), v))
+    half_u, half_v = f(half_u), f(half_v)
+    zone = f(STRIP_FAR * STRIP_FAR * 0.5 * search.wavelength)
+    most = f(_MOST * search.peak_gain)
+    lit = np.zeros(-(-len(x) // 8) * 8, np.bool_)
+    for i in range(len(x)):
         dx, dy, dz = x[i] - ox, y[i] - oy, z[i] - oz
         square = dx * dx + dy * dy + dz * dz
         full = np.sqrt(square)
-        rise = side * (dx * normal[0] + dy * normal[1] + dz * normal[2])
+        rise = dx * nx + dy * ny + dz * nz
         part = height / rise
-        aside = dx * u[0] + dy * u[1] + dz * u[2]
+        aside = dx * ux + dy * uy + dz * uz
         off_u = abs(begin_u + part * aside) - half_u
-        off_v = abs(begin_v + part * (dx * v[0] + dy * v[1] + dz * v[2])) - half_v
-        across, farthest = square - aside * aside, zone * full * part * (1 - part)
+        off_v = abs(begin_v + part * (dx * vx + dy * vy + dz * vz)) - half_v
+        across, farthest = square - aside * aside, zone * full * part * (f(1) - part)
         lit[i] = (
-            (rise > height + 0.01)
+            (rise > height + f(0.01))
             & (full < longest[i])
             & (weakest[i] * full < most)
-            & ((off_u <= 0) | (off_u * off_u * across < farthest * square))
-            & ((off_v <= 0) | (off_v * off_v * rise * rise < farthest * across))
+            & ((off_u <= f(0)) | (off_u * off_u * across < farthest * square))
+            & ((off_v <= f(0)) | (off_v * off_v * rise * rise < farthest * across))
         )
-    return begin + np.flatnonzero(lit)
+    found, n = np.empty(len(x), np.int64), 0
+    for eight, any_of_them in enumerate(lit.view(np.uint64)):
+        if any_of_them != 0:  # few are
+            for i in range(8 * eight, 8 * eight + 8):
+                if lit[i]:
+                    found[n] = begin + i
+                    n += 1
+    return found[:n]
 
 
 @njit(parallel=True, cache=True)
@@ -192,7 +206,7 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
     n = chains.slots[k]
     begin, end = chains.aims[k]
     for i in _reach(search, image, h, window, aims, begin, end):
-        s = (aims.place[0, i], aims.place[1, i], aims.place[2, i])
+        s = vec(scatterers.position[aims.scatterer[i]])
         way = minus(s, image)
         full = length(way)
         hs = dot(minus(s, cl), nl)
@@ -241,15 +255,15 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
 
 
 @njit(parallel=True, cache=True)
-def _courses(search, flat, chains, aims, hits, found, stops):
+def _courses(search, flat, chains, aims, scatterers, hits, found, stops):
     """The paths that exist, in a row."""
     ends = np.cumsum(hits.count)
     for k in prange(len(chains.frame)):
-        _course(search, flat, chains, aims, hits, (k, ends[k] - hits.count[k]), found, stops)
+        _course(search, flat, chains, aims, scatterers, hits, (k, ends[k] - hits.count[k]), found, stops)
 
 
 @njit(cache=True)
-def _course(search, flat, chains, aims, hits, where, found, stops):
+def _course(search, flat, chains, aims, scatterers, hits, where, found, stops):
     """Those over one chain, from a row on."""
     k, first = where
     p, one, two = vec(search.position[chains.frame[k]]), chains.mirrors[k, 0], chains.mirrors[k, 1]
@@ -258,7 +272,7 @@ def _course(search, flat, chains, aims, hits, where, found, stops):
     for i in range(hits.count[k]):
         e, j = first + i, chains.slots[k] + i
         found.candidate[e], found.amplitude[e] = aims.candidate[hits.aim[j]], hits.amplitude[j]
-        s = vec(aims.place[:, hits.aim[j]])
+        s = vec(scatterers.position[aims.scatterer[hits.aim[j]]])
         if two < 0:
             begin = _crossing(source, s, c1, n1)
             end, seen = begin, mirrored(s, c1, n1)

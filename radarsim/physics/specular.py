@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Complex, Float, Float32, Int
+from jaxtyping import Bool, Complex, Float, Float32, Int
 from numba import njit, prange
 
 from radarsim.physics.amplitudes import (
@@ -35,12 +35,13 @@ _MOST = 1.17**4
 
 class _Chains(NamedTuple):
     """Mirrors in order from the sensor on, the second one -1 where there is none; the aims they may lead to, from one
-    on to before another; and room for what is found."""
+    on to before another; and which of these are within reach: `lit` from a place on, in eights."""
 
     mirrors: Int[np.ndarray, "chain 2"]
     frame: Int[np.ndarray, "chain"]
     aims: Int[np.ndarray, "chain 2"]
-    slots: Int[np.ndarray, "chain+1"]
+    begin: Int[np.ndarray, "chain+1"]
+    lit: Bool[np.ndarray, "place"]
 
 
 class _Aims(NamedTuple):
@@ -57,6 +58,7 @@ class _Aims(NamedTuple):
 class _Hits(NamedTuple):
     """Paths that there are: how many over each chain, and from its slot on, to which aims and how strong."""
 
+    slots: Int[np.ndarray, "chain+1"]
     count: Int[np.ndarray, "chain"]
     aim: Int[np.ndarray, "slot"]
     amplitude: Complex[np.ndarray, "slot"]
@@ -107,11 +109,13 @@ class SpecularCandidates:
         longest, weakest = (np.concatenate(x).astype(np.float32) for x in (self._longest, self._weakest))
         scatterer = candidates.scatterer[rows]
         place = np.ascontiguousarray(np.take(targets.scatterers.position, scatterer, axis=0).T, np.float32)
-        slots = np.concatenate([[0], np.cumsum(span[:, 1] - span[:, 0])])
-        chains = _Chains(mirrors, frame, span, slots)
-        size = chains.slots[-1]
-        hits = _Hits(np.zeros(len(mirrors), np.int64), np.empty(size, np.int32), np.empty(size, complex))
         aims = _Aims(rows, place, scatterer, longest, weakest)
+        eights = _from_nought(-(-(span[:, 1] - span[:, 0]) // 8))
+        chains = _Chains(mirrors, frame, span, 8 * eights, np.zeros(8 * eights[-1], np.bool_))
+        count = np.zeros(len(mirrors), np.int64)
+        _reaches(search, flat.columns, chains, aims, count)
+        slots = _from_nought(count)
+        hits = _Hits(slots, np.zeros_like(count), np.empty(slots[-1], np.int32), np.empty(slots[-1], complex))
         _strengths(search, flat.columns, chains, aims, targets.scatterers.columns, hits)
         n = hits.count.sum()
         found = OneWay(
@@ -130,13 +134,59 @@ def _crossing(a, b, center, normal):
     return along(a, ha / (ha - hb), minus(b, a))
 
 
+def _from_nought(counts: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n+1"]:
+    """Where each of some stretches of places begins, and where the last one ends."""
+    return np.concatenate([[0], np.cumsum(counts)])
+
+
+@njit(inline="always")
+def _image(p, flat, mirrors):
+    """The last of some mirrors; the sensor as seen in all but it, its image in all, and the former's height over it,
+    nought where its back is turned."""
+    one, two = mirrors
+    last = one if two < 0 else two
+    source = mirrored(p, vec(flat.center[one]), vec(flat.normal[one]))
+    image = source
+    if two >= 0:
+        image = mirrored(source, vec(flat.center[last]), vec(flat.normal[last]))
+    h = -dot(minus(image, vec(flat.center[last])), vec(flat.normal[last]))
+    if h < 0 and not flat.two_sided[last]:
+        h = 0.0
+    return last, source, image, h
+
+
+@njit(parallel=True, cache=True)
+def _reaches(search, flat, chains, aims, count):
+    """Fills in what is lit, and how many."""
+    for k in prange(len(count)):
+        last, _, image, h = _image(vec(search.position[chains.frame[k]]), flat, chains.mirrors[k])
+        if abs(h) >= 0.01:
+            lit = chains.lit[chains.begin[k] : chains.begin[k + 1]]
+            _reach(search, image, h, aperture(flat, last), aims, chains.aims[k], lit)
+            count[k] = len(_lit(lit))
+
+
+@njit(cache=True)
+def _lit(lit):
+    """Which are."""
+    found, n = np.empty(len(lit), np.int64), 0
+    for eight, some in enumerate(lit.view(np.uint64)):
+        if some != 0:  # few are
+            for i in range(8 * eight, 8 * eight + 8):
+                if lit[i]:
+                    found[n] = i
+                    n += 1
+    return found[:n]
+
+
 @njit(cache=True, error_model="numpy")
-def _reach(search, image, h, window, aims, begin, end):
+def _reach(search, image, h, window, aims, which, lit):
     """Which aims light may reach from an image through its mirror, at height h over the image.
 
     A quick look at all of them, in arrays of single precision: it leaves out what `misses` does, what is too far, and
     what is too weak.
     """
+    begin, end = which
     f = np.float32
     center, normal, u, v, half_u, half_v = window
     x, y, z = aims.place[0][begin:end], aims.place[1][begin:end], aims.place[2][begin:end]
@@ -149,7 +199,6 @@ def _reach(search, image, h, window, aims, begin, end):
     half_u, half_v = f(half_u), f(half_v)
     zone = f(STRIP_FAR * STRIP_FAR * 0.5 * search.wavelength)
     most = f(_MOST * search.peak_gain)
-    lit = np.zeros(-(-len(x) // 8) * 8, np.bool_)
     for i in range(len(x)):
         dx, dy, dz = x[i] - ox, y[i] - oy, z[i] - oz
         square = dx * dx + dy * dy + dz * dz
@@ -167,14 +216,6 @@ def _reach(search, image, h, window, aims, begin, end):
             & ((off_u <= f(0)) | (off_u * off_u * across < farthest * square))
             & ((off_v <= f(0)) | (off_v * off_v * rise * rise < farthest * across))
         )
-    found, n = np.empty(len(x), np.int64), 0
-    for eight, any_of_them in enumerate(lit.view(np.uint64)):
-        if any_of_them != 0:  # few are
-            for i in range(8 * eight, 8 * eight + 8):
-                if lit[i]:
-                    found[n] = begin + i
-                    n += 1
-    return found[:n]
 
 
 @njit(parallel=True, cache=True)
@@ -191,21 +232,12 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
     p, rotation = vec(search.position[frame]), search.rotation[frame]
     up = upwards(rotation)
     one, two = chains.mirrors[k]
-    last = one if two < 0 else two
-    c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
-    source = mirrored(p, c1, n1)  # the sensor as seen in the last mirror but one
-    image = source
-    cl, nl = vec(flat.center[last]), vec(flat.normal[last])
-    if two >= 0:
-        image = mirrored(source, cl, nl)
-    h = -dot(minus(image, cl), nl)  # the source's height over the last mirror; its image is as far behind
-    if abs(h) < 0.01 or (h < 0 and not flat.two_sided[last]):
-        return
+    last, source, image, h = _image(p, flat, chains.mirrors[k])
+    c1, n1, cl, nl = vec(flat.center[one]), vec(flat.normal[one]), vec(flat.center[last]), vec(flat.normal[last])
     window = aperture(flat, last)
     before, h1 = aperture(flat, one), dot(minus(p, c1), n1)
-    n = chains.slots[k]
-    begin, end = chains.aims[k]
-    for i in _reach(search, image, h, window, aims, begin, end):
+    n = hits.slots[k]
+    for i in chains.aims[k, 0] + _lit(chains.lit[chains.begin[k] : chains.begin[k + 1]]):
         s = vec(scatterers.position[aims.scatterer[i]])
         way = minus(s, image)
         full = length(way)
@@ -251,7 +283,7 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
             hits.aim[n] = i
             hits.amplitude[n] = value
             n += 1
-    hits.count[k] = n - chains.slots[k]
+    hits.count[k] = n - hits.slots[k]
 
 
 @njit(parallel=True, cache=True)
@@ -270,7 +302,7 @@ def _course(search, flat, chains, aims, scatterers, hits, where, found, stops):
     c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
     source = mirrored(p, c1, n1)
     for i in range(hits.count[k]):
-        e, j = first + i, chains.slots[k] + i
+        e, j = first + i, hits.slots[k] + i
         found.candidate[e], found.amplitude[e] = aims.candidate[hits.aim[j]], hits.amplitude[j]
         s = vec(scatterers.position[aims.scatterer[hits.aim[j]]])
         if two < 0:

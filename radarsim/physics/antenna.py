@@ -89,9 +89,19 @@ def amplitude_gain(x, y, z, pattern):
     """
     if x <= 0.0:
         return 0.0
-    azimuth = abs(np.arctan2(y, x)) * (360.0 / np.pi)
-    elevation = abs(np.arctan2(z, np.hypot(x, y))) * (360.0 / np.pi)
+    azimuth = _angle(abs(y), x) * (360.0 / np.pi)
+    elevation = _angle(abs(z), np.sqrt(x * x + y * y)) * (360.0 / np.pi)
     i, j = min(int(azimuth), 179), min(int(elevation), 179)
     a = pattern.azimuth_gain[i] + (azimuth - i) * (pattern.azimuth_gain[i + 1] - pattern.azimuth_gain[i])
     b = pattern.elevation_gain[j] + (elevation - j) * (pattern.elevation_gain[j + 1] - pattern.elevation_gain[j])
     return a * b
+
+
+@njit(inline="always")
+def _angle(y, x):
+    """arctan(y / x) for x > 0 and y >= 0 to 2e-8 rad, three times as fast (Abramowitz and Stegun 4.4.49)."""
+    t = min(x, y) / max(x, y)
+    s = t * t
+    angle = t * (1 + s * (-0.3333314528 + s * (0.1999355085 + s * (-0.1420889944 + s * (0.1065626393
+            + s * (-0.0752896400 + s * (0.0429096138 + s * (-0.0161657367 + s * 0.0028662257))))))))  # fmt: skip
+    return angle if y < x else 0.5 * np.pi - angle

@@ -114,7 +114,8 @@ def _from_middle(u):
         return np.sign(u) * 0.5 + 0j
     f = (1 + 0.926 * x) / (2 + 1.792 * x + 3.104 * x * x)
     g = 1 / (2 + 4.142 * x + 3.492 * x * x + 6.670 * x * x * x)
-    edge = (g + 1j * f) * (0.5 - 0.5j) * np.exp(0.5j * np.pi * x * x)
+    angle = 0.5 * np.pi * x * x
+    edge = (g + 1j * f) * (0.5 - 0.5j) * complex(np.cos(angle), np.sin(angle))
     weight = min((STRIP_FAR - x) / (STRIP_FAR - STRIP_FADE), 1.0)
     return np.sign(u) * (0.5 - weight * weight * (3 - 2 * weight) * edge)
 

@@ -57,7 +57,7 @@ def _look(scatterers, owner, search, count, index, columns):
     scale = search.wavelength / (4 * np.pi) ** 1.5
     for frame in prange(len(search.position)):
         position, rotation = vec(search.position[frame]), search.rotation[frame]
-        n = 0
+        forward, n = (rotation[0, 0], rotation[1, 0], rotation[2, 0]), 0
         for i in range(len(scatterers.position)):
             d = minus(vec(scatterers.position[i]), position)
             square = dot(d, d)
@@ -67,13 +67,13 @@ def _look(scatterers, owner, search, count, index, columns):
             rank, mirrored = scatterers.rank[i], scatterers.bounces[i] > 0
             if rank > 0 and rank * rank * square >= (2 * FULL_DETAIL) ** 2:
                 continue
+            # the sign of the cosine, and whether it is behind the board
+            turned = facing(scatterers.normal[i], (-d[0], -d[1], -d[2]), scatterers.two_sided[i])
+            if not mirrored and (turned <= 0 or dot(d, forward) <= 0):
+                continue
             away = np.sqrt(square)
             cosine = facing(scatterers.normal[i], (-d[0] / away, -d[1] / away, -d[2] / away), scatterers.two_sided[i])
-            if cosine <= 0 and not mirrored:
-                continue
             gain = gain_towards(d, rotation, search)
-            if gain == 0 and not mirrored:
-                continue
             shown = detail(rank, share(gain / search.peak_gain, away))
             if shown == 0:
                 continue

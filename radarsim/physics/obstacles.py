@@ -76,7 +76,6 @@ class Obstacles:
         begins = np.concatenate([search.position[frame, None], stops[:, :-1]], axis=1)
         way, stop = np.nonzero(np.arange(stops.shape[1]) < stretches[:, None])
         passed, extra = self.passage(search, frame[way], begins[way, stop], stops[way, stop], allowed[way])
-        factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
-        np.multiply.at(factor, way, passed)
-        np.add.at(delay, way, extra)
-        return factor, delay
+        factor, delay = np.ones(begins.shape[:2], complex), np.zeros(begins.shape[:2])
+        factor[way, stop], delay[way, stop] = passed, extra
+        return factor.prod(axis=1), delay.sum(axis=1)

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Bool, Complex, Float, Float32, Int
 from numba import njit, prange
 
 from radarsim.physics.amplitudes import (
@@ -35,12 +35,13 @@ _MOST = 1.17**4
 
 class _Chains(NamedTuple):
     """Mirrors in order from the sensor on, the second one -1 where there is none; the aims they may lead to, from one
-    on to before another; and room for what is found."""
+    on to before another; and which of these are within reach: `lit` from a place on, in eights."""
 
     mirrors: Int[np.ndarray, "chain 2"]
     frame: Int[np.ndarray, "chain"]
     aims: Int[np.ndarray, "chain 2"]
-    slots: Int[np.ndarray, "chain+1"]
+    begin: Int[np.ndarray, "chain+1"]
+    lit: Bool[np.ndarray, "place"]
 
 
 class _Aims(NamedTuple):
@@ -48,15 +49,16 @@ class _Aims(NamedTuple):
     at the scatterer (1/m)."""
 
     candidate: Int[np.ndarray, "aim"]
-    place: Float[np.ndarray, "3 aim"]
+    place: Float32[np.ndarray, "3 aim"]
     scatterer: Int[np.ndarray, "aim"]
-    longest: Float[np.ndarray, "aim"]
-    weakest: Float[np.ndarray, "aim"]
+    longest: Float32[np.ndarray, "aim"]
+    weakest: Float32[np.ndarray, "aim"]
 
 
 class _Hits(NamedTuple):
     """Paths that there are: how many over each chain, and from its slot on, to which aims and how strong."""
 
+    slots: Int[np.ndarray, "chain+1"]
     count: Int[np.ndarray, "chain"]
     aim: Int[np.ndarray, "slot"]
     amplitude: Complex[np.ndarray, "slot"]
@@ -103,14 +105,17 @@ class SpecularCandidates:
         if not self._size:
             return OneWay.straight(search, targets, candidates, np.zeros(0, int)), np.zeros((0, 3, 3))
         mirrors, frame, span = (np.concatenate(x) for x in (self._chains, self._frame, self._aims))
-        rows, longest, weakest = (np.concatenate(x) for x in (self._rows, self._longest, self._weakest))
+        rows = np.concatenate(self._rows)
+        longest, weakest = (np.concatenate(x).astype(np.float32) for x in (self._longest, self._weakest))
         scatterer = candidates.scatterer[rows]
-        place = np.ascontiguousarray(np.take(targets.scatterers.position, scatterer, axis=0).T)
-        slots = np.concatenate([[0], np.cumsum(span[:, 1] - span[:, 0])])
-        chains = _Chains(mirrors, frame, span, slots)
-        size = chains.slots[-1]
-        hits = _Hits(np.zeros(len(mirrors), np.int64), np.empty(size, np.int32), np.empty(size, complex))
+        place = np.ascontiguousarray(np.take(targets.scatterers.position, scatterer, axis=0).T, np.float32)
         aims = _Aims(rows, place, scatterer, longest, weakest)
+        eights = _from_nought(-(-(span[:, 1] - span[:, 0]) // 8))
+        chains = _Chains(mirrors, frame, span, 8 * eights, np.zeros(8 * eights[-1], np.bool_))
+        count = np.zeros(len(mirrors), np.int64)
+        _reaches(search, flat.columns, chains, aims, count)
+        slots = _from_nought(count)
+        hits = _Hits(slots, np.zeros_like(count), np.empty(slots[-1], np.int32), np.empty(slots[-1], complex))
         _strengths(search, flat.columns, chains, aims, targets.scatterers.columns, hits)
         n = hits.count.sum()
         found = OneWay(
@@ -118,7 +123,7 @@ class SpecularCandidates:
             np.empty((n, 3)), np.empty((n, 3)), np.zeros(n, bool),
         )  # fmt: skip
         stops = np.empty((n, 3, 3))
-        _courses(search, flat.columns, chains, aims, hits, found.columns, stops)
+        _courses(search, flat.columns, chains, aims, targets.scatterers.columns, hits, found.columns, stops)
         return found, stops
 
 
@@ -129,38 +134,88 @@ def _crossing(a, b, center, normal):
     return along(a, ha / (ha - hb), minus(b, a))
 
 
+def _from_nought(counts: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n+1"]:
+    """Where each of some stretches of places begins, and where the last one ends."""
+    return np.concatenate([[0], np.cumsum(counts)])
+
+
+@njit(inline="always")
+def _image(p, flat, mirrors):
+    """The last of some mirrors; the sensor as seen in all but it, its image in all, and the former's height over it,
+    nought where its back is turned."""
+    one, two = mirrors
+    last = one if two < 0 else two
+    source = mirrored(p, vec(flat.center[one]), vec(flat.normal[one]))
+    image = source
+    if two >= 0:
+        image = mirrored(source, vec(flat.center[last]), vec(flat.normal[last]))
+    h = -dot(minus(image, vec(flat.center[last])), vec(flat.normal[last]))
+    if h < 0 and not flat.two_sided[last]:
+        h = 0.0
+    return last, source, image, h
+
+
+@njit(parallel=True, cache=True)
+def _reaches(search, flat, chains, aims, count):
+    """Fills in what is lit, and how many."""
+    for k in prange(len(count)):
+        last, _, image, h = _image(vec(search.position[chains.frame[k]]), flat, chains.mirrors[k])
+        if abs(h) >= 0.01:
+            lit = chains.lit[chains.begin[k] : chains.begin[k + 1]]
+            _reach(search, image, h, aperture(flat, last), aims, chains.aims[k], lit)
+            count[k] = len(_lit(lit))
+
+
+@njit(cache=True)
+def _lit(lit):
+    """Which are."""
+    found, n = np.empty(len(lit), np.int64), 0
+    for eight, some in enumerate(lit.view(np.uint64)):
+        if some != 0:  # few are
+            for i in range(8 * eight, 8 * eight + 8):
+                if lit[i]:
+                    found[n] = i
+                    n += 1
+    return found[:n]
+
+
 @njit(cache=True, error_model="numpy")
-def _reach(search, image, h, window, aims, begin, end):
+def _reach(search, image, h, window, aims, which, lit):
     """Which aims light may reach from an image through its mirror, at height h over the image.
 
-    A quick look at all of them, in arrays: it leaves out what `misses` does, what is too far, and what is too weak.
+    A quick look at all of them, in arrays of single precision: it leaves out what `misses` does, what is too far, and
+    what is too weak.
     """
+    begin, end = which
+    f = np.float32
     center, normal, u, v, half_u, half_v = window
     x, y, z = aims.place[0][begin:end], aims.place[1][begin:end], aims.place[2][begin:end]
-    longest, weakest, lit = aims.longest[begin:end], aims.weakest[begin:end], np.empty(end - begin, np.bool_)
-    side, height = (1.0, h) if h > 0 else (-1.0, -h)
-    ox, oy, oz = image
-    begin_u, begin_v = dot(minus(image, center), u), dot(minus(image, center), v)
-    zone = STRIP_FAR * STRIP_FAR * 0.5 * search.wavelength
-    most = _MOST * search.peak_gain
-    for i in range(len(lit)):
+    longest, weakest = aims.longest[begin:end], aims.weakest[begin:end]
+    side, height = (f(1.0), f(h)) if h > 0 else (f(-1.0), f(-h))
+    ox, oy, oz = f(image[0]), f(image[1]), f(image[2])
+    nx, ny, nz = side * f(normal[0]), side * f(normal[1]), side * f(normal[2])
+    ux, uy, uz, vx, vy, vz = f(u[0]), f(u[1]), f(u[2]), f(v[0]), f(v[1]), f(v[2])
+    begin_u, begin_v = f(dot(minus(image, center), u)), f(dot(minus(image, center), v))
+    half_u, half_v = f(half_u), f(half_v)
+    zone = f(STRIP_FAR * STRIP_FAR * 0.5 * search.wavelength)
+    most = f(_MOST * search.peak_gain)
+    for i in range(len(x)):
         dx, dy, dz = x[i] - ox, y[i] - oy, z[i] - oz
         square = dx * dx + dy * dy + dz * dz
         full = np.sqrt(square)
-        rise = side * (dx * normal[0] + dy * normal[1] + dz * normal[2])
+        rise = dx * nx + dy * ny + dz * nz
         part = height / rise
-        aside = dx * u[0] + dy * u[1] + dz * u[2]
+        aside = dx * ux + dy * uy + dz * uz
         off_u = abs(begin_u + part * aside) - half_u
-        off_v = abs(begin_v + part * (dx * v[0] + dy * v[1] + dz * v[2])) - half_v
-        across, farthest = square - aside * aside, zone * full * part * (1 - part)
+        off_v = abs(begin_v + part * (dx * vx + dy * vy + dz * vz)) - half_v
+        across, farthest = square - aside * aside, zone * full * part * (f(1) - part)
         lit[i] = (
-            (rise > height + 0.01)
+            (rise > height + f(0.01))
             & (full < longest[i])
             & (weakest[i] * full < most)
-            & ((off_u <= 0) | (off_u * off_u * across < farthest * square))
-            & ((off_v <= 0) | (off_v * off_v * rise * rise < farthest * across))
+            & ((off_u <= f(0)) | (off_u * off_u * across < farthest * square))
+            & ((off_v <= f(0)) | (off_v * off_v * rise * rise < farthest * across))
         )
-    return begin + np.flatnonzero(lit)
 
 
 @njit(parallel=True, cache=True)
@@ -177,22 +232,13 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
     p, rotation = vec(search.position[frame]), search.rotation[frame]
     up = upwards(rotation)
     one, two = chains.mirrors[k]
-    last = one if two < 0 else two
-    c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
-    source = mirrored(p, c1, n1)  # the sensor as seen in the last mirror but one
-    image = source
-    cl, nl = vec(flat.center[last]), vec(flat.normal[last])
-    if two >= 0:
-        image = mirrored(source, cl, nl)
-    h = -dot(minus(image, cl), nl)  # the source's height over the last mirror; its image is as far behind
-    if abs(h) < 0.01 or (h < 0 and not flat.two_sided[last]):
-        return
+    last, source, image, h = _image(p, flat, chains.mirrors[k])
+    c1, n1, cl, nl = vec(flat.center[one]), vec(flat.normal[one]), vec(flat.center[last]), vec(flat.normal[last])
     window = aperture(flat, last)
     before, h1 = aperture(flat, one), dot(minus(p, c1), n1)
-    n = chains.slots[k]
-    begin, end = chains.aims[k]
-    for i in _reach(search, image, h, window, aims, begin, end):
-        s = (aims.place[0, i], aims.place[1, i], aims.place[2, i])
+    n = hits.slots[k]
+    for i in chains.aims[k, 0] + _lit(chains.lit[chains.begin[k] : chains.begin[k + 1]]):
+        s = vec(scatterers.position[aims.scatterer[i]])
         way = minus(s, image)
         full = length(way)
         hs = dot(minus(s, cl), nl)
@@ -237,28 +283,28 @@ def _over(search, flat, chains, k, aims, scatterers, hits):
             hits.aim[n] = i
             hits.amplitude[n] = value
             n += 1
-    hits.count[k] = n - chains.slots[k]
+    hits.count[k] = n - hits.slots[k]
 
 
 @njit(parallel=True, cache=True)
-def _courses(search, flat, chains, aims, hits, found, stops):
+def _courses(search, flat, chains, aims, scatterers, hits, found, stops):
     """The paths that exist, in a row."""
     ends = np.cumsum(hits.count)
     for k in prange(len(chains.frame)):
-        _course(search, flat, chains, aims, hits, (k, ends[k] - hits.count[k]), found, stops)
+        _course(search, flat, chains, aims, scatterers, hits, (k, ends[k] - hits.count[k]), found, stops)
 
 
 @njit(cache=True)
-def _course(search, flat, chains, aims, hits, where, found, stops):
+def _course(search, flat, chains, aims, scatterers, hits, where, found, stops):
     """Those over one chain, from a row on."""
     k, first = where
     p, one, two = vec(search.position[chains.frame[k]]), chains.mirrors[k, 0], chains.mirrors[k, 1]
     c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
     source = mirrored(p, c1, n1)
     for i in range(hits.count[k]):
-        e, j = first + i, chains.slots[k] + i
+        e, j = first + i, hits.slots[k] + i
         found.candidate[e], found.amplitude[e] = aims.candidate[hits.aim[j]], hits.amplitude[j]
-        s = vec(aims.place[:, hits.aim[j]])
+        s = vec(scatterers.position[aims.scatterer[hits.aim[j]]])
         if two < 0:
             begin = _crossing(source, s, c1, n1)
             end, seen = begin, mirrored(s, c1, n1)

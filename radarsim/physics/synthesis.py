@@ -21,6 +21,7 @@ three dimensions come apart:
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -31,6 +32,9 @@ from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 
 #: Instants (in half bursts from the middle) at which path lengths are evaluated: Chebyshev nodes.
 NODES = np.array([-np.sqrt(3) / 2, 0.0, np.sqrt(3) / 2])
+
+#: Loops that are summed side by side, in the width of the processor's registers.
+LANES = 16
 
 
 @dataclass(frozen=True)
@@ -79,15 +83,16 @@ class Synthesizer:
         self.accuracy = accuracy
         clock = BurstClock.of(config)
         first = (config.chirp_times[0] - clock.middle) / clock.half
-        self._start = np.repeat(first, len(config.rx))  # s of loop 0 per virtual antenna
-        self._step = config.loop_time / clock.half
+        self._axes = _Axes(
+            start=np.repeat(first, len(config.rx)), step=config.loop_time / clock.half, loops=config.loops,
+            samples=config.samples, per_metre=1 / (2 * config.range_resolution),
+            per_rate=config.center_frequency / SPEED_OF_LIGHT * config.samples / config.sample_rate / clock.half,
+            wavenumber=config.center_frequency / SPEED_OF_LIGHT,
+        )  # fmt: skip
         n = config.samples
         # Of the instants v = -1...1 within the window, those of the upper half and the middle.
         self._v = (np.arange(n // 2, n) - (n - 1) / 2) / (n / 2)
         self._dft = np.exp(1j * np.pi * np.arange(n) * self._v[:, None]).astype(np.complex64)
-        self._bins_per_metre = 1 / (2 * config.range_resolution)
-        # f_c / c dL/dt in bins, for dL/ds
-        self._bins_per_rate = config.center_frequency / SPEED_OF_LIGHT * n / config.sample_rate / clock.half
 
     def __call__(
         self, lengths: Float[np.ndarray, "echo virtual 3"], amplitudes: Complex[np.ndarray, "echo"]
@@ -105,15 +110,14 @@ class Synthesizer:
         loops, tx, rx, n, _ = config.frame_shape
         if not len(amplitudes):
             return np.zeros((loops, tx, rx, n), np.complex64)
-        cells, tone, width = _tones(lengths, self._start, self._step, loops, self._bins_per_metre, self._bins_per_rate)
+        cells, waves, off = _waves(lengths, amplitudes, self._axes)
+        width = max(0.5, off.max())
         orders = self._orders(np.pi * width)
         order = np.argsort(cells % n, kind="stable")
         edges = np.searchsorted(cells[order] % n, np.arange(n + 1))
         moments = np.zeros((n, orders, tx * rx, loops, 2), np.float32)
-        _accumulate(
-            moments, edges, order, lengths, amplitudes, cells // n * ((n - 1) / 2), tone, np.float32(1 / width),
-            self._start, self._step, config.center_frequency / SPEED_OF_LIGHT,
-        )  # fmt: skip
+        size = np.abs(amplitudes).astype(np.float32)
+        _accumulate(moments, edges, order, size, waves, np.float32(1 / width), (0.0,) * orders)
         return self._samples(moments, np.pi * width)
 
     def _orders(self, x: float) -> int:
@@ -137,85 +141,105 @@ class Synthesizer:
         return out.transpose(3, 1, 2, 0)
 
 
-@njit(cache=True)
-def _tones(lengths, start, step, loops, per_metre, per_rate):
-    """Cell of each echo, its tone's parabola in s relative to that cell (bins), and the largest distance from it."""
+class _Axes(NamedTuple):
+    """Normalised time s of loop 0 per virtual antenna, and between loops; bins per m, and per m of dL/ds; cycles per m
+    of the carrier."""
+
+    start: Float[np.ndarray, "virtual"]
+    step: float
+    loops: int
+    samples: int
+    per_metre: float
+    per_rate: float
+    wavenumber: float
+
+
+@njit(parallel=True, cache=True)
+def _waves(lengths, amplitudes, axes):
+    """Cell of each echo; parabolas in the loop number, of its phase (cycles) and of its tone from that cell (bins), by
+    echo, coefficient (three of either) and antenna; and how far from it the tone gets.
+
+    Cells repeat after N bins, but phases are referred to the instant n_c = (N - 1) / 2, where a tone N bins higher has
+    turned n_c cycles further.
+    """
     echoes, virtual, _ = lengths.shape
-    cells = np.empty(echoes, np.int64)
-    tone = np.empty((echoes, virtual, 3))
-    width = 0.5
-    for e in range(echoes):
+    step, wavenumber = axes.step, axes.wavenumber
+    cells, off = np.empty(echoes, np.int64), np.zeros(echoes)
+    waves = np.empty((echoes, 6, virtual), np.float32)
+    for e in prange(echoes):
         middle = 0.0
         for a in range(virtual):
-            c0, c1, c2 = lengths[e, a]
-            tone[e, a, 0] = c0 * per_metre + c1 * per_rate
-            tone[e, a, 1] = c1 * per_metre + 2 * c2 * per_rate
-            tone[e, a, 2] = c2 * per_metre
-            middle += tone[e, a, 0]
-        cells[e] = np.int64(np.floor(middle / virtual + 0.5))
+            middle += lengths[e, a, 0] * axes.per_metre + lengths[e, a, 1] * axes.per_rate
+        cell = np.floor(middle / virtual + 0.5)
+        cells[e] = np.int64(cell)
+        turn = np.arctan2(amplitudes[e].imag, amplitudes[e].real) / (2 * np.pi)
+        turn -= cells[e] // axes.samples * ((axes.samples - 1) / 2)
         for a in range(virtual):
-            tone[e, a, 0] -= cells[e]
-            for loop in (0, loops - 1):
-                s = start[a] + step * loop
-                off = abs(tone[e, a, 0] + s * (tone[e, a, 1] + s * tone[e, a, 2]))
-                width = max(width, off)
-    return cells, tone, width
+            c0, c1, c2 = lengths[e, a, 0], lengths[e, a, 1], lengths[e, a, 2]
+            s = axes.start[a]
+            # float64 only for the part that is large
+            p0 = turn + wavenumber * (c0 + s * (c1 + s * c2))
+            waves[e, 0, a] = p0 - np.floor(p0)
+            waves[e, 1, a] = wavenumber * step * (c1 + 2 * s * c2)
+            waves[e, 2, a] = wavenumber * step * step * c2
+            t0 = c0 * axes.per_metre + c1 * axes.per_rate - cell
+            t1 = c1 * axes.per_metre + 2 * c2 * axes.per_rate
+            t2 = c2 * axes.per_metre
+            waves[e, 3, a] = t0 + s * (t1 + s * t2)
+            waves[e, 4, a] = step * (t1 + 2 * s * t2)
+            waves[e, 5, a] = step * step * t2
+        for a in range(virtual):
+            t0, t1, t2, last = waves[e, 3, a], waves[e, 4, a], waves[e, 5, a], axes.loops - 1
+            off[e] = max(off[e], abs(t0), abs(t0 + last * (t1 + last * t2)))
+    return cells, waves, off
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def _accumulate(moments, edges, order, lengths, amplitudes, aliased, tone, scale, start, step, wavenumber):
+def _accumulate(moments, edges, order, sizes, waves, scale, series):
     """moments[cell, p, antenna, loop] += A exp(j phase) T_p(u), over the echoes of each cell.
 
-    Cells repeat after N bins, but phases are referred to the instant n_c = (N - 1) / 2, where a tone N bins higher has
-    turned n_c cycles further: `aliased`, in cycles.
+    `series` is as long as there are orders: a tuple's length is known when this is compiled, so all orders of some
+    loops stay in registers.
     """
     n, orders, virtual, loops, _ = moments.shape
+    blocks = -(-loops // LANES)
     for i in prange(n):
         # Threads get contiguous ranges of i; near cells hold few echoes, so deal the cells out alternately.
         cell = 2 * i if 2 * i < n else 2 * (i - (n + 1) // 2) + 1
         if edges[cell] == edges[cell + 1]:
             continue
-        re, im = np.empty(loops, np.float32), np.empty(loops, np.float32)
-        u, before, now = np.empty(loops, np.float32), np.empty(loops, np.float32), np.empty(loops, np.float32)
-        acc = np.zeros((2, orders, virtual, loops), np.float32)
+        acc = np.zeros((virtual, blocks, len(series), 2, LANES), np.float32)
         for j in range(edges[cell], edges[cell + 1]):
             e = order[j]
-            size = np.float32(abs(amplitudes[e]))
-            turn = np.arctan2(amplitudes[e].imag, amplitudes[e].real) / (2 * np.pi) - aliased[e]
             for a in range(virtual):
-                c0, c1, c2 = lengths[e, a]
-                s = start[a]
-                # phase in cycles as a parabola in the loop number; float64 only for the part that is large
-                p0 = turn + wavenumber * (c0 + s * (c1 + s * c2))
-                p0 = np.float32(p0 - np.floor(p0))
-                p1 = np.float32(wavenumber * step * (c1 + 2 * s * c2))
-                p2 = np.float32(wavenumber * step * step * c2)
-                t0, t1, t2 = tone[e, a]
-                u0 = np.float32(t0 + s * (t1 + s * t2)) * scale
-                u1 = np.float32(step * (t1 + 2 * s * t2)) * scale
-                u2 = np.float32(step * step * t2) * scale
-                for loop in range(loops):
-                    k = np.float32(loop)
-                    x = p0 + k * (p1 + k * p2)
-                    x -= np.floor(x + np.float32(0.5))
-                    sine, cosine = _sincos_cycles(x)
-                    re[loop] = size * cosine
-                    im[loop] = size * sine
-                    u[loop] = u0 + k * (u1 + k * u2)
-                    before[loop] = u[loop]
-                    now[loop] = np.float32(1)
-                for p in range(orders):
-                    for loop in range(loops):
-                        acc[0, p, a, loop] += re[loop] * now[loop]
-                        acc[1, p, a, loop] += im[loop] * now[loop]
-                        following = np.float32(2) * u[loop] * now[loop] - before[loop]
-                        before[loop] = now[loop]
-                        now[loop] = following
+                wave = sizes[e], waves[e, 0, a], waves[e, 1, a], waves[e, 2, a]
+                tone = waves[e, 3, a] * scale, waves[e, 4, a] * scale, waves[e, 5, a] * scale
+                for block in range(blocks):
+                    _add(acc[a, block], np.float32(block * LANES), wave, tone, series)
         for p in range(orders):
             for a in range(virtual):
                 for loop in range(loops):
-                    moments[cell, p, a, loop, 0] = acc[0, p, a, loop]
-                    moments[cell, p, a, loop, 1] = acc[1, p, a, loop]
+                    moments[cell, p, a, loop, 0] = acc[a, loop // LANES, p, 0, loop % LANES]
+                    moments[cell, p, a, loop, 1] = acc[a, loop // LANES, p, 1, loop % LANES]
+
+
+@njit(inline="always", fastmath=True)
+def _add(acc, first, wave, tone, series):
+    """One echo at one antenna in some loops: what it adds to all orders' real and imaginary parts."""
+    size, p0, p1, p2 = wave
+    u0, u1, u2 = tone
+    for lane in range(LANES):
+        k = first + np.float32(lane)
+        x = p0 + k * (p1 + k * p2)
+        x -= np.floor(x + np.float32(0.5))
+        sine, cosine = _sincos_cycles(x)
+        re, im = size * cosine, size * sine
+        u = u0 + k * (u1 + k * u2)
+        before, now = u, np.float32(1)
+        for p in range(len(series)):
+            acc[p, 0, lane] += re * now
+            acc[p, 1, lane] += im * now
+            before, now = now, np.float32(2) * u * now - before
 
 
 @njit(inline="always", fastmath=True)

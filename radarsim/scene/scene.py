@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import shapely
 import trimesh
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Float32, Int
+from numba import njit
 
 from radarize.errors import InputError
 from radarsim.scene.materials import EPS0, Material
@@ -187,9 +188,9 @@ class Scene:
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
         if not len(origins):
             return np.zeros(0, bool)
-        directions, lengths = _directions(targets - origins)
-        ray = _ray(origins + margin * directions, directions)
-        ray.maxt = mi.Float(_lent(np.maximum(lengths - 2 * margin, 0), np.float32))
+        rays = _lent_rays(origins, targets - origins, margin)
+        ray = mi.Ray3f(mi.Point3f(rays[:3]), mi.Vector3f(rays[3:6]))
+        ray.maxt = mi.Float(rays[6])
         return geometry.ray_test(ray).numpy().astype(bool)
 
     def hit(
@@ -206,7 +207,9 @@ class Scene:
         origins, directions = np.broadcast_arrays(np.asarray(origins, float), np.asarray(directions, float))
         if not len(origins):
             return np.zeros(0), np.zeros(0, int)
-        found = scene.mi_scene.ray_intersect_preliminary(_ray(origins, _directions(directions)[0]), coherent)
+        rays = _lent_rays(origins, directions, 0.0)
+        ray = mi.Ray3f(mi.Point3f(rays[:3]), mi.Vector3f(rays[3:6]))
+        found = scene.mi_scene.ray_intersect_preliminary(ray, coherent)
         shape = dr.reinterpret_array(mi.UInt32, found.shape)
         dr.eval(found.t, shape, found.prim_index)
         distance = found.t.numpy().astype(float)
@@ -270,24 +273,41 @@ class Scene:
         return np.where(distance <= max_range, distance, np.inf)
 
 
-def _directions(vectors: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n"]]:
-    lengths = np.linalg.norm(vectors, axis=1)
-    return vectors / np.maximum(lengths, 1e-12)[:, None], lengths
+def _lent_rays(
+    origins: Float[np.ndarray, "n 3"], ways: Float[np.ndarray, "n 3"], margin: float
+) -> Float32[np.ndarray, "7 n"]:
+    """Origins, unit directions and lengths of rays along ways, both ends shortened by `margin`, m; see `_room`."""
+    rays = _room((7, len(ways)), np.float32)
+    _aim(np.ascontiguousarray(origins), np.ascontiguousarray(ways), margin, rays)
+    return rays
 
 
-def _ray(origins: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]):
-    import mitsuba as mi
-
-    return mi.Ray3f(mi.Point3f(_lent(origins.T, np.float32)), mi.Vector3f(_lent(directions.T, np.float32)))
+@njit(cache=True)
+def _aim(origins, ways, margin, rays):
+    for i in range(len(ways)):
+        x, y, z = ways[i]
+        length = np.sqrt(x * x + y * y + z * z)
+        some = max(length, 1e-12)
+        for d in range(3):
+            rays[3 + d, i] = ways[i, d] / some
+            rays[d, i] = origins[i, d] + margin * (ways[i, d] / some)
+        rays[6, i] = max(length - 2 * margin, 0.0)
 
 
 def _lent(values: np.ndarray, dtype: type) -> np.ndarray:
-    """An array with room after its end: Dr.Jit reads NumPy's memory where it lies, in whole packets, and where the end
-    of an array is the end of what the process may read, that would be its end, too."""
-    room = np.zeros(values.size + _PACKET, dtype)
-    found = room[: values.size].reshape(values.shape)
+    """An array as Dr.Jit may have it, see `_room`."""
+    found = _room(values.shape, dtype)
     found[...] = values
     return found
+
+
+def _room(shape: tuple[int, ...], dtype: type) -> np.ndarray:
+    """An array with room after its end: Dr.Jit reads NumPy's memory where it lies, in whole packets, and where the end
+    of an array is the end of what the process may read, that would be its end, too."""
+    size = int(np.prod(shape))
+    room = np.empty(size + _PACKET, dtype)
+    room[size:] = 0
+    return room[:size].reshape(shape)
 
 
 def _radio_material(material: Material):

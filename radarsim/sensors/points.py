@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from radarize.points import COLUMNS, PointClouds
 from radarize.recording import Stream
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
@@ -12,6 +11,8 @@ class ChipPoints(Sensor):
     """TI's point cloud of every frame, from the simulated samples."""
 
     def __init__(self, scenario: Scenario):
+        from radarize.points import COLUMNS, PointClouds  # loads PyTorch: two seconds that few recordings need
+
         super().__init__(scenario)
         self._clouds = PointClouds(scenario.config)
         about = f"{' '.join(COLUMNS)} of TI's point cloud in the sensor frame, closing velocity positive"

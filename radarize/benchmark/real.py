@@ -58,8 +58,8 @@ NOTES = (
 )
 MAP_NOTE = (
     "With the same odometry for all methods: the lidar's poses with errors added, see `radarize.benchmark.realmotion`; "
-    "`alone`: odometry, too, is by matching scans, for `network` with the turns that its partner tells. Maps against the lidar's points at its poses, of which three frames have seen a "
-    "cell of 5 cm. `odometry`: its ATE without SLAM."
+    "`alone`: odometry, too, is by matching scans, for `network` with the turns that its partner tells. Maps against "
+    "the lidar's points at its poses, of which three frames have seen a cell of 5 cm. `odometry`: its ATE without SLAM."
 )
 
 Cells = Bool[np.ndarray, "range column"]

@@ -62,6 +62,7 @@ class Slam:
         self.skipped = {"odometry": 0, "scans": 0}
         self._waiting: deque[tuple[float, np.ndarray, np.ndarray]] = deque()
         self._scan_times = Rows()
+        self._azimuths = np.zeros(0)  # of the last scan
         self._open: list[Scan] = []
         self._local: list[np.ndarray] = []  # of every node in the local frame
         self._drift = Drift(self.config.odometry.scale)
@@ -111,6 +112,9 @@ class Slam:
         if len(self._scan_times) and time <= self._scan_times.values[-1]:
             self.skipped["scans"] += 1
             return
+        if np.array_equal(azimuths, self._azimuths):
+            azimuths = self._azimuths  # kept once for all nodes
+        self._azimuths = azimuths
         self._scan_times.append(float(time))
         self._waiting.append((float(time), azimuths, ranges))
         self._drain()
@@ -173,7 +177,8 @@ class Slam:
         """Occupancy grid of all nodes, drawn anew at their optimised poses."""
         grid = OccupancyGrid.empty(self.config.grid.map_resolution)
         for node, pose in zip(self.nodes, self.graph.poses, strict=True):
-            grid.insert(transform(pose, node.origins), transform(pose, node.ends), node.hits, self.config.grid)
+            origins, ends, hits = node.rays
+            grid.insert(transform(pose, origins), transform(pose, ends), hits, self.config.grid)
         return grid.crop(margin=4)
 
     # --- the algorithm, step by step ---------------------------------------------------------------------------------
@@ -231,17 +236,17 @@ class Slam:
 
     def _match(self, node: Node, predicted: np.ndarray, covariance: np.ndarray) -> np.ndarray:
         """Local pose of a new node: the prediction, moved to fit the older of the submaps being built."""
-        c = self.config.matcher
-        if not c.enabled or len(node.points) < self.config.node.min_points:
+        c, points = self.config.matcher, node.points
+        if not c.enabled or len(points) < self.config.node.min_points:
             return predicted
         submap = self._building[0]
         prior = between(self._local[submap.anchor], predicted)
         guess = prior
         if c.presearch_distance > 0:
-            weight = np.linalg.inv(covariance) * c.presearch_sigma**2 / len(node.points)
+            weight = np.linalg.inv(covariance) * c.presearch_sigma**2 / len(points)
             found = search(
                 Pyramid.of(submap.grid, 3, c.presearch_distance),
-                node.points,
+                points,
                 prior,
                 distance=c.presearch_distance,
                 angle=c.presearch_angle,
@@ -250,7 +255,7 @@ class Slam:
             )
             guess = prior if found is None else found[0]
         result = match(
-            submap.grid, node.points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
+            submap.grid, points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
         )
         noise = uncertainty(result, c.translation_floor, c.rotation_floor)
         self.graph.add_match(submap.anchor, len(self.nodes), result.pose, noise)

@@ -3,6 +3,7 @@
 from collections import deque
 
 import numpy as np
+from jaxtyping import Float
 
 from radarize.batch import Batch
 from radarize.mapping.scans import BEARINGS
@@ -63,7 +64,8 @@ class ScanMatching:
         """Move on to the next scan; whether it has enough points to be matched."""
         first, self._time = self._time is None, scan.time
         node = Node.gather([scan], self.settings)
-        seen = len(node.points) >= self.settings.node.min_points
+        points = node.points
+        seen = len(points) >= self.settings.node.min_points
         if first:
             self._add(node)
             return seen
@@ -71,16 +73,16 @@ class ScanMatching:
         move = np.eye(6) + dt * np.eye(6, k=3)
         self._spread = move @ self._spread @ move.T + np.kron(wandered(1.0, dt), np.diag(_WANDER**2))
         if seen:
-            self._correct(node)
+            self._correct(points)
         x, y, yaw = between(self._keys[-1][0], self._pose)
         if np.hypot(x, y) >= self.settings.node.distance or abs(yaw) >= self.settings.node.angle:
             self._add(node)
         return seen
 
-    def _correct(self, node: Node) -> None:
-        """Fit the pose to the grid; the rate follows as much as its error goes along with the pose's."""
+    def _correct(self, points: Float[np.ndarray, "point 2"]) -> None:
+        """Fit the pose to the grid by a scan's points; the rate follows as much as its error goes along with the pose's."""
         prior = self._spread[:3, :3]
-        found = match(self._grid, node.points, self._pose, sigma=_SIGMA, prior=self._pose, covariance=prior)
+        found = match(self._grid, points, self._pose, sigma=_SIGMA, prior=self._pose, covariance=prior)
         fitted = np.linalg.inv(np.linalg.inv(prior) + found.information)
         along = self._spread[3:, :3] @ np.linalg.inv(prior)
         self._rate = self._rate + along @ between(self._pose, found.pose)
@@ -93,8 +95,10 @@ class ScanMatching:
         self._keys.append((self._pose, node))
         self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
         for pose, key in self._keys:
-            ends = transform(pose, key.origins), transform(pose, key.ends)
-            self._grid.insert(*ends, key.hits, self.settings.grid, spread=True)
+            origins, ends, hits = key.rays
+            self._grid.insert(
+                transform(pose, origins), transform(pose, ends), hits, self.settings.grid, spread=True
+            )
 
 
 def odometry(inputs: Inputs, scanner: Scanner) -> ScanMatching:

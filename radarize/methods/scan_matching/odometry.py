@@ -80,7 +80,7 @@ class ScanMatching:
         return seen
 
     def _correct(self, points: Float[np.ndarray, "point 2"]) -> None:
-        """Fit the pose to the grid by a scan's points; the rate follows as much as its error goes along with the pose's."""
+        """Fit the pose of a scan's points to the grid; the rate follows as much as its error goes along with the pose's."""
         prior = self._spread[:3, :3]
         found = match(self._grid, points, self._pose, sigma=_SIGMA, prior=self._pose, covariance=prior)
         fitted = np.linalg.inv(np.linalg.inv(prior) + found.information)
@@ -96,9 +96,7 @@ class ScanMatching:
         self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
         for pose, key in self._keys:
             origins, ends, hits = key.rays
-            self._grid.insert(
-                transform(pose, origins), transform(pose, ends), hits, self.settings.grid, spread=True
-            )
+            self._grid.insert(transform(pose, origins), transform(pose, ends), hits, self.settings.grid, spread=True)
 
 
 def odometry(inputs: Inputs, scanner: Scanner) -> ScanMatching:

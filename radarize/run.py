@@ -5,7 +5,8 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-from radarize.batch import BATCH, Batch, Intake
+from radarize.batch import Batch, Intake
+from radarize.effort import together
 from radarize.errors import InputError
 from radarize.methods.configuration import Configuration
 from radarize.methods.method import Inputs, Weights
@@ -116,7 +117,7 @@ def run_each(
         inputs = Inputs(source.config, configuration or Configuration(), Weights(weights), source)
         workshop, intake = Workshop(inputs), Intake(inputs.signal)
         each(make, pairs)
-        for frames, adc in source.batches(BATCH):
+        for frames, adc in source.batches(together(source.config)):
             if not pipelines:
                 break
             if batch := intake.take(adc, source.times[frames], source.valid(frames.start, frames.stop)):

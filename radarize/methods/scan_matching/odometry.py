@@ -80,7 +80,7 @@ class ScanMatching:
         return seen
 
     def _correct(self, points: Float[np.ndarray, "point 2"]) -> None:
-        """Fit the pose of a scan's points to the grid; the rate follows as much as its error goes along with the pose's."""
+        """Fit the pose of a scan to the grid; the rate follows as much as its error goes along with the pose's."""
         prior = self._spread[:3, :3]
         found = match(self._grid, points, self._pose, sigma=_SIGMA, prior=self._pose, covariance=prior)
         fitted = np.linalg.inv(np.linalg.inv(prior) + found.information)

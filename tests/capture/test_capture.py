@@ -170,13 +170,13 @@ def test_a_stranger_who_never_stops_does_not_keep_a_capture_from_ending(played, 
 
     def pester(port: int) -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
-            while not ended.wait(0.02):
+            while not ended.wait(0.02) and time.monotonic() < start + 20:
                 stranger.sendto(bytes(100), (COMPUTER, port))
 
     with emulated(path) as (board, where), sensor(board, where) as stream:
         guest = threading.Thread(target=pester, args=(where.data_port,))
-        guest.start()
         start = time.monotonic()
+        guest.start()
         try:
             record(stream, tmp_path / "captured.h5", threading.Event(), frames=10)
         finally:

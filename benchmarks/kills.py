@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from benchmarks.results import Data, command_line, publish, surroundings, timed
+from benchmarks.results import Data, command_line, publish, same, surroundings, timed
 from radarize.radar.presets import load_config
 from radarize.recording import Recording, recover
 from tests.virtual import BOARD, COMPUTER, emulator, record
@@ -171,7 +171,7 @@ def main() -> None:
     publish(
         "kills",
         "Kills at random moments",
-        found,
+        same(found),
         data=Data("two walks of half a second in a simulated office, and noise", (), options.seed),
         networks=(),
         notes=[

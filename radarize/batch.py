@@ -1,12 +1,12 @@
 """What goes through the pipeline: a batch of frames, and what is made of them, once, when somebody asks for it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TypeVar, cast
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
+from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16, Shaped
 
 from radarize.aliasing import Aliases
 from radarize.disturbance import Flaws, find_flaws
@@ -52,11 +52,12 @@ class Batch:
 
     Args:
         signal: what makes something of them.
-        samples: raw I/Q.
+        samples: raw I/Q; None where nothing but maps is known.
         stamps: starts of the frames' first chirps, s.
         valid: False where a chirp was lost; all true if None.
         numbers: of the frames, counted as the radar delivered them; from 0 if None.
         before: stamp of the frame before the first, s; None if there was none.
+        maps: that are known already, such as pictures of a radar whose samples nobody kept.
 
     Attributes:
         flaws: of the frames; None where nobody looked.
@@ -67,20 +68,22 @@ class Batch:
     def __init__(
         self,
         signal: Signal,
-        samples: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        samples: Int16[np.ndarray, "frame loop tx rx sample 2"] | None,
         stamps: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
         numbers: Int[np.ndarray, "frame"] | None = None,
         before: float | None = None,
+        maps: Mapping[str, Shaped[np.ndarray, "frame row azimuth"]] | None = None,
     ):
         self.signal, self.samples, self.valid = signal, samples, valid
         self.stamps = np.asarray(stamps, float)
-        self.numbers = np.arange(len(samples)) if numbers is None else numbers
+        self.numbers = np.arange(len(self.stamps)) if numbers is None else numbers
         self.before = before
+        self._maps = dict(maps or {})
         self._made: dict[Callable, object] = {}
 
     def __len__(self) -> int:
-        return len(self.samples)
+        return len(self.stamps)
 
     @property
     def centers(self) -> Float[np.ndarray, "frame"]:
@@ -116,10 +119,6 @@ class Batch:
         if missing:
             self._maps.update(self.signal.maker.of(self.spectrum, missing))
         return {name: self._maps[name] for name in names}
-
-    @cached_property
-    def _maps(self) -> dict[str, np.ndarray]:
-        return {}
 
     @cached_property
     def points(self) -> tuple[Float[np.ndarray, "point 6"], Int[np.ndarray, "point"]]:
@@ -168,4 +167,13 @@ class Intake:
         batch.flaws = flaws.of(used)
         if len(batch):
             self._before = float(batch.stamps[-1])
+        return batch
+
+    def take_maps(
+        self, maps: Mapping[str, Shaped[np.ndarray, "frame row azimuth"]], stamps: Float[np.ndarray, "frame"]
+    ) -> Batch:
+        """The next frames of a recording that holds maps and no samples."""
+        numbers = self.taken + np.arange(len(stamps))
+        batch = Batch(self.signal, None, stamps, numbers=numbers, before=self._before, maps=maps)
+        self.taken, self._before = self.taken + len(stamps), float(batch.stamps[-1])
         return batch

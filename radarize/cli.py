@@ -275,7 +275,8 @@ def run_(
         odometry = scans = "published"
     configuration = Configuration() if config is None else Configuration.load(config)
     with Recording(recording) as source:
-        _warn([words] if (words := effort(source.config, len(source))) else [])
+        words = effort(source.config, len(source)) if source.has_samples else ""
+    _warn([words] if words else [])
     with progress("run", f"{output} is as it was before, and so is the recording") as report:
         written = run(
             recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,

@@ -48,7 +48,7 @@ def contents(path: Path) -> dict[str, object]:
             "start_time": float(times[0]) if len(times) else None,
             "lost_chirps": int(np.size(valid) - np.count_nonzero(valid)),
             "lost_share": float(1 - np.mean(valid)) if np.size(valid) else 0.0,
-            "effort": effort(config, len(recording)),
+            "effort": effort(config, len(recording)) if recording.has_samples else "",
             "config": recording.config.model_dump(mode="json"),
             "derived": {name: float(getattr(config, name)) for name in DERIVED},
             "data_sets": {name: _plain(recording.describe(name)) for name in recording.names()},

@@ -6,18 +6,15 @@ from pathlib import Path
 import foxglove
 import numpy as np
 
-from radarize.features.maps import MapMaker, maps_of
 from radarize.foxglove import Messages
-from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
 from radarize.replacing import replacing
-from radarize.report.drawings import LEAKAGE
 from radarize.runfolder import RunFolder
+from radarize.shownmaps import ShownMaps
 from radarize.tum import planar
-from radarize.viewer import opened, picture
+from radarize.viewer import opened
 
 _BATCH = 16
-_MAPS = ("range_azimuth", "doppler_azimuth")
 
 
 def write_mcap(
@@ -65,14 +62,11 @@ def _write_run(shown: Messages, run: RunFolder) -> None:
 
 
 def _write_frames(shown: Messages, recording: Recording, progress: Callable[[int, int], None]) -> None:
-    if len(azimuth_row(recording.config)) < 2:
-        return
-    maker = MapMaker(recording.config)
+    maps = ShownMaps(recording)
     times = recording.times + recording.config.burst_center
     for first in range(0, len(recording), _BATCH):
         last = min(first + _BATCH, len(recording))
-        for name, levels in maps_of(recording, first, last, _MAPS, maker).items():
-            near = maker.heatmaps.ranges < LEAKAGE if name == "range_azimuth" else np.zeros(levels.shape[1], bool)
-            for time, pixels in zip(times[first:last], picture(levels.astype(np.float32), near), strict=True):
+        for name, images in maps.of(first, last).items():
+            for time, pixels in zip(times[first:last], images, strict=True):
                 shown.picture(float(time), name, pixels)
         progress(last, len(recording))

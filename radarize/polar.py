@@ -10,7 +10,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Complex128, Float, Int, Int16, UInt8
+from jaxtyping import Bool, Complex128, Float, Float32, Int, Int16, UInt8
 from scipy.fft import fft
 
 from radarize.errors import InputError
@@ -32,7 +32,8 @@ PUBLISHED, MEASURED = (0, 2), (0,)
 _SQUARE, _FIELD = 10.0, np.radians(70)
 #: Edges of the measures' grid, m: x ahead, y to the left.
 GRID = np.linspace(0, REACH, 256), np.linspace(-REACH, REACH, 512)
-#: A lidar's pictures in a recording.
+#: A radar's pictures in a recording, and a lidar's.
+PICTURE = "maps/picture"
 LIDAR = Stream(
     (ROWS, BEAMS // 8), "u1", "",
     "cells of range (0...10.8 m) and azimuth (-90...90 deg, 512, packed) that hold points of a lidar",
@@ -98,6 +99,12 @@ def pictures(
             share = (level - level.min()) / np.ptp(level)
             np.maximum.at(picture, inside.pixel[kept], (share * 255).astype(np.uint8))
     return found.reshape(-1, ROWS, COLUMNS)
+
+
+def power(pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float32[np.ndarray, "frame range azimuth"]:
+    """What pictures show, the strongest cell of each 1: their greys are even steps of decibels, down to `THRESHOLD`."""
+    share = pictures.astype(np.float32) / 255
+    return np.where(pictures > 0, np.float32(THRESHOLD**2) ** (1 - share), np.float32(0))
 
 
 def lidar_pixels(

@@ -1,6 +1,6 @@
 """From a recording to a folder with trajectory, map and all that they were made of."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -10,8 +10,9 @@ from radarize.effort import together
 from radarize.errors import InputError
 from radarize.methods.configuration import Configuration
 from radarize.methods.method import Inputs, Weights
-from radarize.methods.registry import BEST, Workshop, best_methods
+from radarize.methods.registry import BEST, PICTURED, Workshop, best_methods
 from radarize.pipeline import Pipeline
+from radarize.polar import PICTURE
 from radarize.recording import Recording
 from radarize.runfolder import RunWriter
 
@@ -41,7 +42,9 @@ def run(
         InputError: unusable recording or unknown method.
     """
     with Recording(recording) as source:
+        pictured = not source.has_samples and source.has(PICTURE)
         best, why = (BEST, "") if weights else best_methods(source.config)
+        best, why = (PICTURED, "") if pictured else (best, why)
     pairs = {Path(output): (odometry or best["odometry"], scans or best["scans"])}
     failed = run_each(
         recording, pairs, weights=weights, configuration=configuration,
@@ -117,11 +120,23 @@ def run_each(
         inputs = Inputs(source.config, configuration or Configuration(), Weights(weights), source)
         workshop, intake = Workshop(inputs), Intake(inputs.signal)
         each(make, pairs)
-        for frames, adc in source.batches(together(source.config)):
+        for done, batch in _batches(source, intake):
             if not pipelines:
                 break
-            if batch := intake.take(adc, source.times[frames], source.valid(frames.start, frames.stop)):
+            if batch:
                 each(partial(push, batch), pipelines)
-            progress(frames.stop, len(source))
+            progress(done, len(source))
         each(end, pipelines)
     return failed
+
+
+def _batches(source: Recording, intake: Intake) -> Iterator[tuple[int, Batch]]:
+    """A recording's batches, each with how many frames have been read."""
+    size = together(source.config)
+    for start in range(0, len(source), size):
+        stop = min(start + size, len(source))
+        stamps = source.times[start:stop]
+        if source.has_samples or not source.has(PICTURE):
+            yield stop, intake.take(source.adc(start, stop), stamps, source.valid(start, stop))
+        else:
+            yield stop, intake.take_maps({"picture": source.rows(PICTURE, start, stop)}, stamps)

@@ -15,18 +15,16 @@ from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Shaped, UInt8
+from jaxtyping import Float, Shaped
 
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import trajectories
 from radarize.evaluation.trajectory import fitted, trajectory
-from radarize.features.maps import MapMaker, maps_of
-from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
 from radarize.replacing import replacing
-from radarize.report.drawings import LEAKAGE
 from radarize.report.page import COLORS
 from radarize.runfolder import RunFolder
+from radarize.shownmaps import ShownMaps
 
 _BATCH = 16
 _MAPS = ("range_azimuth", "doppler_azimuth")
@@ -199,10 +197,10 @@ def show_recording(screen: Screen, recording: Recording, progress: Callable[[int
         screen.fixed("radar/cause", rr.AnnotationContext([*labels, (255, "noise", (0, 0, 0))]))
     if recording.has("truth/depth_mount") and recording.has("truth/depth_intrinsics"):
         _send_camera(screen, recording)
-    maker = MapMaker(config) if len(azimuth_row(config)) > 1 else None
+    maps = ShownMaps(recording)
     for first in range(0, len(recording), _BATCH):
         last = min(first + _BATCH, len(recording))
-        _send_frames(screen, recording, first, last, maker)
+        _send_frames(screen, recording, first, last, maps)
         progress(last, len(recording))
 
 
@@ -222,13 +220,11 @@ def _send_camera(screen: Screen, recording: Recording) -> None:
     screen.fixed("world/truth/radar/camera/depth", turn, lens)
 
 
-def _send_frames(screen: Screen, recording: Recording, first: int, last: int, maker: MapMaker | None) -> None:
+def _send_frames(screen: Screen, recording: Recording, first: int, last: int, maps: ShownMaps) -> None:
     """Frames first...last-1; a recording's streams belong to the middles of the bursts."""
     rr, times = screen.rr, recording.times[first:last] + recording.config.burst_center
-    if maker is not None:
-        for name, levels in maps_of(recording, first, last, _MAPS, maker).items():
-            near = maker.heatmaps.ranges < LEAKAGE if name == "range_azimuth" else np.zeros(levels.shape[1], bool)
-            screen.pictures(f"radar/{name}", times, picture(levels.astype(np.float32), near), rr.Image)
+    for name, pixels in maps.of(first, last).items():
+        screen.pictures(f"radar/{name}", times, pixels, rr.Image)
     if recording.has("truth/cause"):
         cause = recording.rows("truth/cause", first, last)[:, ::-1, ::-1]
         screen.pictures("radar/cause", times, cause, rr.SegmentationImage)
@@ -246,18 +242,6 @@ def _send_frames(screen: Screen, recording: Recording, first: int, last: int, ma
 def _rgb(color: str) -> tuple[int, int, int]:
     """From #rrggbb."""
     return tuple(bytes.fromhex(color[1:]))
-
-
-def picture(
-    levels: Float[np.ndarray, "frame row azimuth"], near: Shaped[np.ndarray, "row"]
-) -> UInt8[np.ndarray, "frame row azimuth 3"]:
-    """Maps in dB as colours, from a map's median to its strongest cell of those not `near`; far is up, left is left."""
-    from matplotlib import colormaps
-
-    top = levels[:, ~near].max(axis=(1, 2), keepdims=True)
-    low = np.median(levels, axis=(1, 2), keepdims=True)
-    shade = np.clip((levels - low) / np.maximum(top - low, 1e-6), 0, 1)[:, ::-1, ::-1]
-    return colormaps["magma"](shade, bytes=True)[..., :3]
 
 
 def show_run(screen: Screen, run: RunFolder) -> None:

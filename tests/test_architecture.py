@@ -30,7 +30,7 @@ LAYERS = (
     "evaluation",
     "report",
     "benchmark",
-    "importers exporters foxglove capture viewer mcap",
+    "importers exporters foxglove capture shownmaps viewer mcap",
     "cli",
 )
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are

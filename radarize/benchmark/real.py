@@ -31,8 +31,9 @@ from radarize.clouds import Apart
 from radarize.features.windows import Windows
 from radarize.methods.method import Weights
 from radarize.methods.pictures.memory import Memory
-from radarize.methods.pictures.network import COLUMNS, PictureNet
+from radarize.methods.pictures.network import PictureNet
 from radarize.methods.pictures.points import first_surfaces, points
+from radarize.methods.pictures.scans import on_bearings
 from radarize.methods.pictures.turns import PictureTurnNet
 from radarize.nets.weights import Header, load
 from radarize.points import Cfar, level_around
@@ -43,8 +44,6 @@ from radarize.walks import FIRST, PERIOD, Predictions, Walk
 #: What stands in every picture, by name: all cells; the first one of each azimuth that stands out; all that do.
 _CFAR = Cfar(window=8, guard=4, threshold=64.0)
 _BEFORE = ("picture", "cfar")
-#: The network's column at each bearing of a scan.
-_NEAREST = np.abs(polar.azimuths(COLUMNS) - BEARINGS[:, None]).argmin(axis=1)
 NOTES = (
     "Medians over all frames from the 40th on, points through the authors' grid; +-: standard error, with as many "
     "independent frames as the errors' autocorrelation leaves.",
@@ -229,7 +228,7 @@ def _network(
     shown = windows.push({"picture": pictures.astype(np.float16)}, times)[0]
     likely = net.estimate(shown.maps)
     # Maps average over time themselves: their scans are each frame's own.
-    return points(memory.push(likely, times), net.dense).numpy(), first_surfaces(likely)[:, _NEAREST]
+    return points(memory.push(likely, times), net.dense).numpy(), on_bearings(first_surfaces(likely), BEARINGS)
 
 
 def _row(found: Sequence[Apart]) -> dict[str, float]:

@@ -37,9 +37,8 @@ _MOST = 4
 #: Errors of the odometry that SLAM is given: of a step's length and m per step; rad per step and as a bias, rad/s. A
 #: cart's wheel odometry as the lidar logs have it.
 _STEP, _YAW, _BIAS = (0.05, 0.001), np.radians(0.1), np.radians(0.3)
-#: Of the back end: that for radar scans, as far as pictures reach.
-_RADAR = SlamConfig.preset("radar")
-_CONFIG = _RADAR.model_copy(update={"grid": _RADAR.grid.model_copy(update={"max_range": polar.REACH})})
+#: Of the back end: that for radar scans.
+_CONFIG = SlamConfig.preset("radar")
 #: m: cells of the lidar's map, how many frames must have seen one, and the distances at which maps agree.
 _CELL, _SEEN, NEAR = 0.05, 3, (0.1, 0.2)
 

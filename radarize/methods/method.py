@@ -83,6 +83,7 @@ class Method:
             this radar or a stream.
         networks: kinds of weights that it needs.
         scans: this odometry is made from scans.
+        pictures: it reads polar pictures (`radarize.polar`), so it needs no samples.
         options: further arguments of `make`.
     """
 
@@ -90,6 +91,7 @@ class Method:
     make: str | Callable
     networks: tuple[str, ...] = ()
     scans: bool = False
+    pictures: bool = False
     options: Mapping[str, object] = field(default_factory=dict)
 
     @property

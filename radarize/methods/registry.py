@@ -11,6 +11,7 @@ from radarize.methods.method import Inputs, Method, Weights, load
 from radarize.methods.task import Task
 from radarize.nets.weights import check
 from radarize.pipeline import Follower, Pipeline, Scanner
+from radarize.polar import PICTURE
 from radarize.radar.config import RadarConfig
 
 _FOLDERS = (radarize, doppler, ransac, scan_matching, milliego, rnin, radarhd, pictures, published)
@@ -28,6 +29,8 @@ TASKS: dict[str, str | Callable[[], Task]] = _all("TASKS")
 BEST = {"odometry": "fused", "scans": "segmentation"}
 #: Methods without networks, for radars that the shipped ones do not fit.
 CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
+#: Methods for recordings of pictures.
+PICTURED = {"odometry": "pictures", "scans": "pictures"}
 
 
 class Workshop:
@@ -47,7 +50,7 @@ class Workshop:
             InputError: unknown name, or see `Method`.
         """
         if name not in self._scanners:
-            method = _method("scans", name, SCANS)
+            method = self._method("scans", name, SCANS)
             self._scanners[name] = method.maker(self.inputs, **method.options)
         return self._scanners[name]
 
@@ -57,7 +60,7 @@ class Workshop:
         Raises:
             InputError: unknown name, or see `Method`.
         """
-        method = _method("odometry", name, ODOMETRY)
+        method = self._method("odometry", name, ODOMETRY)
         key = name, scans if method.scans else None
         if key not in self._followers:
             taken = (self.scanner(scans),) if method.scans else ()
@@ -72,6 +75,15 @@ class Workshop:
         """
         slam = self.inputs.configuration.slam
         return Pipeline(self.odometry(odometry, scans), self.scanner(scans), slam, endless)
+
+    def _method(self, what: str, name: str, known: dict[str, Method]) -> Method:
+        if name not in known:
+            raise InputError(f"{what} is {name!r}, expected one of {', '.join(known)}")
+        recording, method = self.inputs.recording, known[name]
+        if recording is not None and not recording.has_samples and not (method.pictures or method.scans):
+            wanted = f"{what} {PICTURED[what]}" if recording.has(PICTURE) else "a recording with /radar/adc"
+            raise InputError(f"{recording.path}: has no raw samples, which {what} {name} needs, expected {wanted}")
+        return method
 
 
 def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
@@ -97,13 +109,7 @@ def find_task(kind: str) -> Task:
     return (load(place) if isinstance(place, str) else place)()
 
 
-def _method(what: str, name: str, known: dict[str, Method]) -> Method:
-    if name not in known:
-        raise InputError(f"{what} is {name!r}, expected one of {', '.join(known)}")
-    return known[name]
-
-
 __all__ = [
-    "BEST", "CLASSICAL", "ODOMETRY", "SCANS", "TASKS", "Configuration", "Inputs", "Method", "Weights", "Workshop",
-    "best_methods", "find_task",
+    "BEST", "CLASSICAL", "ODOMETRY", "PICTURED", "SCANS", "TASKS", "Configuration", "Inputs", "Method", "Weights",
+    "Workshop", "best_methods", "find_task",
 ]  # fmt: skip

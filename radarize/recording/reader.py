@@ -83,6 +83,11 @@ class Recording:
         self._files.close()
 
     @property
+    def has_samples(self) -> bool:
+        """Whether raw samples were kept."""
+        return self._adc is not None
+
+    @property
     def attributes(self) -> dict[str, object]:
         """Scene, seed, versions and the like.
 

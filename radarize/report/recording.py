@@ -3,8 +3,10 @@
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Int
 from scipy.signal import find_peaks
 
+from radarize import polar
 from radarize.contents import contents, data_sets
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
@@ -52,11 +54,15 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
                 (f"{100 * found['lost_share']:.2g} %", f"chirps lost ({found['lost_chirps']})"),
             ]
         )
-        maps = Heatmaps(config)
-        _profiles(page, recording, maps)
-        _maps(page, recording, maps)
-        _samples(page, recording)
-        show_sensors(page, recording, [index for index, *_ in _batches(recording, _FRAMES)])
+        shown = np.unique(np.linspace(0, len(recording) - 1, _FRAMES).astype(int))
+        if not recording.has_samples and recording.has(polar.PICTURE):
+            _pictures(page, recording, shown)
+        else:
+            maps = Heatmaps(config)
+            _profiles(page, recording, maps)
+            _maps(page, recording, maps)
+            _samples(page, recording)
+        show_sensors(page, recording, shown)
         if recording.has("truth/pose"):
             _trajectory(page, recording)
     page.section("What is in it")
@@ -120,6 +126,17 @@ def _maps(page: Page, recording: Recording, maps: Heatmaps) -> None:
         speeds = maps.doppler_azimuth(adc, valid)[0].numpy()
         draw_doppler(axes[0, -1], speeds, maps.velocities, maps.azimuths, "Doppler-azimuth", velocity)
         page.picture(figure, f"Frame {index}, {recording.times[index] - recording.times[0]:.2f} s after the start")
+
+
+def _pictures(page: Page, recording: Recording, shown: Int[np.ndarray, "picture"]) -> None:
+    about = "Pictures, no samples. From above: forward is up, left is left. dB below the strongest cell."
+    page.section("Azimuth", about)
+    figure, axes = canvas(len(shown))
+    for axis, index in zip(axes[0], shown, strict=True):
+        picture = polar.power(recording.rows(polar.PICTURE, index, index + 1))[0]
+        title = f"frame {index}, {recording.times[index] - recording.times[0]:.2f} s"
+        draw_fan(axis, picture, polar.RANGES, polar.AZIMUTHS, title)
+    page.picture(figure, "Pictures of three frames")
 
 
 def _samples(page: Page, recording: Recording) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from jaxtyping import Shaped
 
-from radarize import __version__
+from radarize import __version__, polar
 from radarize.errors import InputError, explained
 from radarize.health import Health
 from radarize.heatmaps import Heatmaps
@@ -140,8 +140,14 @@ class RunWriter:
     def _picture(self, recording: Recording, maps: Heatmaps) -> None:
         shown = np.unique(np.linspace(0, len(self._scans["frames"]) - 1, _PICTURES).astype(int))
         numbers = self._scans["frames"][shown]
-        spectrum = torch.cat([maps.spectrum(recording.adc(k, k + 1), recording.valid(k, k + 1)) for k in numbers])
         self.put("heatmaps/frames", shown, "index into /time")
+        if not recording.has_samples:
+            pictures = np.concatenate([recording.rows(polar.PICTURE, k, k + 1) for k in numbers])
+            self.put("heatmaps/range_azimuth", polar.power(pictures), "share of the strongest cell")
+            self.put("heatmaps/ranges", polar.RANGES, "m")
+            self.put("heatmaps/azimuths", polar.AZIMUTHS, "rad")
+            return
+        spectrum = torch.cat([maps.spectrum(recording.adc(k, k + 1), recording.valid(k, k + 1)) for k in numbers])
         self.put("heatmaps/range_azimuth", maps.range_azimuth_of(spectrum).numpy(), "counts^2")
         self.put("heatmaps/doppler_azimuth", maps.doppler_azimuth_of(spectrum).numpy(), "counts^2")
         if maps.pairs is not None:

@@ -128,9 +128,9 @@ class SlamConfig(Frozen):
     def preset(cls, name: str) -> "SlamConfig":
         """A named set of parameters.
 
-        ``lidar``: wide, dense and exact scans. ``radar``: 88 deg and 4.28 m of noisy scans at 30 Hz with odometry that
-        is good in translation and weak in heading; matches weigh little, so that they do no harm. ``cartographer``:
-        what the paper published of its settings, and Cartographer's own defaults beside them, where they apply.
+        ``lidar``: wide, dense and exact scans. ``radar``: narrow, short and noisy scans at 30 Hz with odometry that is
+        good in translation and weak in heading; matches weigh little, so that they do no harm. ``cartographer``: what
+        the paper published of its settings, and Cartographer's own defaults beside them, where they apply.
 
         Raises:
             InputError: there is no preset of that name.
@@ -157,8 +157,8 @@ PRESETS: dict[str, SlamConfig] = {
             rotation_per_radian=0.05,
         ),
         node=NodeConfig(distance=0.3, angle=0.2, duration=3.0, scans=10, min_points=25),
-        # Cartographer's settings published with Radarize: 0.08 m cells, ranges of 0.3-4.284 m.
-        grid=GridConfig(resolution=0.08, hit=0.65, miss=0.45, min_range=0.3, max_range=4.284, free_range=0.0, nodes=16),
+        # Cartographer's settings published with Radarize: 0.08 m cells, ranges from 0.3 m.
+        grid=GridConfig(resolution=0.08, hit=0.65, miss=0.45, min_range=0.3, free_range=0.0, nodes=16),
         matcher=MatcherConfig(
             presearch_distance=0.0, presearch_angle=0.0, sigma=2.0, translation_floor=0.03, rotation_floor=0.015
         ),

@@ -11,6 +11,7 @@ from radarize.methods.registry import (
     BEST,
     CLASSICAL,
     ODOMETRY,
+    PICTURED,
     SCANS,
     TASKS,
     Inputs,
@@ -120,7 +121,7 @@ def test_networks_where_they_fit_and_classical_methods_elsewhere(tmp_path):
 
 
 def test_every_choice_is_in_the_registry():
-    for choice in (BEST, CLASSICAL):
+    for choice in (BEST, CLASSICAL, PICTURED):
         assert choice["odometry"] in ODOMETRY and choice["scans"] in SCANS
 
 

@@ -54,6 +54,23 @@ def test_follows_walls(way):
     assert normalised < 2
 
 
+def test_rates_of_turning_are_believed_where_nothing_is_seen(way):
+    """A sensor that sees nothing and is said to turn at 0.4 rad/s for two seconds has turned by 0.8 rad; said with a
+    doubt of 1000 rad/s, which tells nothing, it has not, and its claim says how little is known."""
+    frames = 61
+    times = np.arange(frames) * CONFIG.frame_period
+    nothing = np.full((frames, len(BEARINGS)), np.inf)
+
+    def track(doubt: float):
+        told = np.column_stack([np.full(frames, 0.4), np.full(frames, doubt**2)])
+        return ScanMatching(Says(), FAR, lambda batch: told).follow(Batch(SIGNAL, nothing, times))
+
+    sure, unsure = track(0.01), track(1000.0)
+    assert abs(sure.pose[-1, 2] - 0.4 * times[-1]) < 0.02 * 0.4 * times[-1]
+    assert abs(unsure.pose[-1, 2]) < 0.3 * 0.4 * times[-1]
+    assert sure.covariance[-1, 2, 2] < 1e-2 * unsure.covariance[-1, 2, 2]
+
+
 def test_batches_do_not_matter(way):
     _, times, scans = way
     whole = ScanMatching(Says()).follow(Batch(SIGNAL, scans[:50], times[:50]))

@@ -1,6 +1,7 @@
-"""Odometry from scans alone: each is matched with a grid of the last few, where constant velocity puts it."""
+"""Odometry from scans: each is matched with a grid of the last few, where constant velocity puts it."""
 
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
@@ -33,10 +34,16 @@ class ScanMatching:
     Args:
         scanner: makes the scans.
         settings: of node, grid and matcher.
+        rates: says rate of turning (rad/s) and its variance of each frame, NaN where it does not know; None: nobody.
     """
 
-    def __init__(self, scanner: Scanner, settings: SlamConfig | None = None):
-        self.scanner, self.settings = scanner, settings or SlamConfig.preset("lidar")
+    def __init__(
+        self,
+        scanner: Scanner,
+        settings: SlamConfig | None = None,
+        rates: Callable[[Batch], Float[np.ndarray, "frame 2"]] | None = None,
+    ):
+        self.scanner, self.settings, self.rates = scanner, settings or SlamConfig.preset("lidar"), rates
         self._keys: deque[tuple[np.ndarray, Node]] = deque(maxlen=_KEYS)
         self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
         self._time: float | None = None
@@ -49,19 +56,20 @@ class ScanMatching:
         centers = batch.centers
         steps = intervals(centers, self._time)
         ranges = batch.made(self.scanner.scan)
+        turning = np.full((len(centers), 2), np.nan) if self.rates is None else self.rates(batch)
         moved, seen = np.zeros((len(centers), 3)), np.zeros(len(centers), bool)
         poses, rates, spreads = moved.copy(), moved.copy(), np.zeros((len(centers), 3, 3))
         with stage("translation"):
             for i, (time, dt) in enumerate(zip(centers, steps, strict=True)):
                 before = self._pose
-                seen[i] = self._step(Scan(time, np.zeros(3), BEARINGS, ranges[i]), dt)
+                seen[i] = self._step(Scan(time, np.zeros(3), BEARINGS, ranges[i]), dt, turning[i])
                 poses[i], rates[i], spreads[i] = self._pose, self._rate, self._spread[3:, 3:]
                 moved[i] = between(before, self._pose)
         spread = spreads * steps[:, None, None] ** 2
         return Track(centers, poses, moved, spread, rates[:, :2], spreads[:, :2, :2], seen, seen)
 
-    def _step(self, scan: Scan, dt: float) -> bool:
-        """Move on to the next scan; whether it has enough points to be matched."""
+    def _step(self, scan: Scan, dt: float, turning: Float[np.ndarray, "2"]) -> bool:
+        """Move on to the next scan, and to a rate of turning with its variance; whether there are points to match."""
         first, self._time = self._time is None, scan.time
         node = Node.gather([scan], self.settings)
         points = node.points
@@ -72,12 +80,22 @@ class ScanMatching:
         self._pose = compose(self._pose, exponential(self._rate[:2] * dt, self._rate[2] * dt))
         move = np.eye(6) + dt * np.eye(6, k=3)
         self._spread = move @ self._spread @ move.T + np.kron(wandered(1.0, dt), np.diag(_WANDER**2))
+        if np.isfinite(turning).all():
+            self._turn(*turning)
         if seen:
             self._correct(points)
         x, y, yaw = between(self._keys[-1][0], self._pose)
         if np.hypot(x, y) >= self.settings.node.distance or abs(yaw) >= self.settings.node.angle:
             self._add(node)
         return seen
+
+    def _turn(self, rate: float, variance: float) -> None:
+        """Take in a rate of turning and its variance."""
+        gain = self._spread[:, 5] / (self._spread[5, 5] + variance)
+        change = gain * (rate - self._rate[2])
+        self._rate = self._rate + change[3:]
+        self._pose = compose(self._pose, change[:3])
+        self._spread = self._spread - np.outer(gain, self._spread[5])
 
     def _correct(self, points: Float[np.ndarray, "point 2"]) -> None:
         """Fit the pose of a scan to the grid; the rate follows as much as its error goes along with the pose's."""

@@ -1,0 +1,55 @@
+"""Heat maps of a recording as pictures for eyes."""
+
+import numpy as np
+from jaxtyping import Float, Shaped, UInt8
+
+from radarize import polar
+from radarize.features.maps import MapMaker, maps_of
+from radarize.radar.array import azimuth_row
+from radarize.recording import Recording
+from radarize.report.drawings import LEAKAGE
+
+
+class ShownMaps:
+    """Range-azimuth and Doppler-azimuth maps, or what the recording holds in their place.
+
+    Attributes:
+        names: of the maps; none where a single antenna tells no azimuth.
+    """
+
+    def __init__(self, recording: Recording):
+        self.recording = recording
+        self.pictured = not recording.has_samples and recording.has(polar.PICTURE)
+        self._maker = None if self.pictured or len(azimuth_row(recording.config)) < 2 else MapMaker(recording.config)
+        self.names: tuple[str, ...] = ("range_azimuth", "doppler_azimuth") if self._maker else ()
+        self.names = ("range_azimuth",) if self.pictured else self.names
+
+    def of(self, first: int, last: int) -> dict[str, UInt8[np.ndarray, "frame row azimuth 3"]]:
+        """Of frames first...last-1, by name.
+
+        Raises:
+            InputError: see `maps_of`.
+        """
+        if self.pictured:
+            levels = self.recording.rows(polar.PICTURE, first, last).astype(np.float32)
+            return {"range_azimuth": colored(levels, np.zeros(polar.ROWS, bool))}
+        if self._maker is None:
+            return {}
+        near = {"range_azimuth": self._maker.heatmaps.ranges < LEAKAGE}
+        maps = maps_of(self.recording, first, last, self.names, self._maker)
+        return {
+            name: colored(levels.astype(np.float32), near.get(name, np.zeros(levels.shape[1], bool)))
+            for name, levels in maps.items()
+        }
+
+
+def colored(
+    levels: Float[np.ndarray, "frame row azimuth"], near: Shaped[np.ndarray, "row"]
+) -> UInt8[np.ndarray, "frame row azimuth 3"]:
+    """Maps in dB as colours, from a map's median to its strongest cell of those not `near`; far is up, left is left."""
+    from matplotlib import colormaps
+
+    top = levels[:, ~near].max(axis=(1, 2), keepdims=True)
+    low = np.median(levels, axis=(1, 2), keepdims=True)
+    shade = np.clip((levels - low) / np.maximum(top - low, 1e-6), 0, 1)[:, ::-1, ::-1]
+    return colormaps["magma"](shade, bytes=True)[..., :3]

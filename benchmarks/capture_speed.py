@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import psutil
-from jaxtyping import Bool
+from jaxtyping import Bool, Int16
 
 from benchmarks.results import Data, command_line, publish, surroundings
 from radarize.radar.config import RadarConfig
@@ -45,6 +45,23 @@ def chirps_that_arrive(config: RadarConfig, frames: int, network: Disturbance) -
     return (hit == 0).reshape(frames, loops, tx)[:, :, list(config.slot)]
 
 
+def compared(
+    path: Path, played: Int16[np.ndarray, "frame loop tx rx sample 2"], arriving: Bool[np.ndarray, "frame loop tx"]
+) -> tuple[Losses, int, int, str]:
+    """A capture of frames that were played again and again: losses, chirps mismarked, chirps wrong, warnings."""
+    losses, wrong, mismarked = Losses(), 0, 0
+    with Recording(path) as recording:
+        numbers = np.round((recording.times - recording.times[0]) / recording.config.frame_period).astype(int)
+        for where, adc in recording.batches(LOOP):
+            valid = recording.valid(where.start, where.stop)
+            losses.add(valid)
+            mismarked += int((valid != arriving[numbers[where]]).sum())
+            sent = played[numbers[where] % len(played)]
+            wrong += int((adc[valid] != sent[valid]).any(axis=(1, 2, 3)).sum())
+            wrong += int(((adc != sent) & (adc != 0))[~valid].any(axis=(1, 2, 3)).sum())
+        return losses, mismarked, wrong, recording.attributes["warnings"]
+
+
 def run(
     config: RadarConfig, preset: str, seconds: float, folder: Path, seed: int, shares: dict[str, float]
 ) -> tuple[dict[str, object], str]:
@@ -69,18 +86,7 @@ def run(
     ours = ended.children_user + ended.children_system - begun.children_user - begun.children_system
     late = re.findall(r"(\d+) of them late, ([\d.]+) s", board.said)
     arriving = chirps_that_arrive(config, frames, Disturbance(**shares, rng=np.random.default_rng(seed)))
-    losses = Losses()
-    wrong = mismarked = 0
-    with Recording(folder / "captured.h5") as recording:
-        numbers = np.round((recording.times - recording.times[0]) / config.frame_period).astype(int)
-        for where, adc in recording.batches(LOOP):
-            valid = recording.valid(where.start, where.stop)
-            losses.add(valid)
-            mismarked += int((valid != arriving[numbers[where]]).sum())
-            sent = played[numbers[where] % LOOP]
-            wrong += int((adc[valid] != sent[valid]).any(axis=(1, 2, 3)).sum())
-            wrong += int(((adc != sent) & (adc != 0))[~valid].any(axis=(1, 2, 3)).sum())
-        warnings = recording.attributes["warnings"]
+    losses, mismarked, wrong, warnings = compared(folder / "captured.h5", played, arriving)
     row = {
         "configuration": " ".join([preset, *options]),
         "frames": frames,

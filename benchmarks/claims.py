@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.results import command_line, publish
-from radarize.batch import BATCH, Intake
+from radarize.batch import Intake
 from radarize.benchmark.dataset import Case, DataSet, groups
 from radarize.benchmark.networks import Networks
 from radarize.console import progress
+from radarize.effort import BATCH
 from radarize.evaluation.scans import true_ranges
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity

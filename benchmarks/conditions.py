@@ -12,9 +12,10 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from benchmarks.results import Data, command_line, publish
-from radarize.batch import BATCH, Intake
+from radarize.batch import Intake
 from radarize.benchmark.networks import Networks
 from radarize.console import progress
+from radarize.effort import BATCH
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
 from radarize.evaluation.trajectory import trajectory
 from radarize.health import Health

@@ -61,6 +61,12 @@ def publish(
     print(results.write(FOLDER, name).read_text())
 
 
+def same(rows: Sequence[Mapping[str, object]]) -> list[dict[str, object]]:
+    """Rows with the columns of all of them."""
+    columns = dict.fromkeys(column for row in rows for column in row)
+    return [{column: row.get(column) for column in columns} for row in rows]
+
+
 def walked(scene: str, seed: int, motion: Motion) -> Walk:
     """A simulated walk of which no recording was made."""
     return Walk(scene, seed, Statistics.of(motion).distance, simulated=True)

@@ -17,8 +17,6 @@ from radarize.radar.config import RadarConfig
 from radarize.receivers import Receivers
 from radarize.stopwatch import stage
 
-#: Frames a batch: enough to vectorise over, few enough to stay in cache.
-BATCH = 16
 #: A frame with a smaller share of its chirps is left out. On a simulated walk, with the rest of each burst lost, 95 %
 #: of Doppler velocities are within 0.02 m/s from whole bursts, 0.06 m/s from an eighth, 0.21 m/s from a sixteenth.
 LEAST_SHARE = 1 / 8

@@ -262,7 +262,9 @@ def run_(
     config: Annotated[Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")] = None,
 ):
     """Estimate trajectory and map of a recording."""
+    from radarize.effort import effort
     from radarize.methods.configuration import Configuration
+    from radarize.recording import Recording
     from radarize.run import run
     from radarize.runfolder import RunFolder
 
@@ -272,6 +274,9 @@ def run_(
                 raise InputError(f"{option} is {value!r}, expected none with --settings published, which has its own")
         odometry = scans = "published"
     configuration = Configuration() if config is None else Configuration.load(config)
+    with Recording(recording) as source:
+        words = effort(source.config, len(source)) if source.has_samples else ""
+    _warn([words] if words else [])
     with progress("run", f"{output} is as it was before, and so is the recording") as report:
         written = run(
             recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from radarize.console import print_table, printable
+from radarize.effort import effort
 from radarize.recording import Recording
 
 #: Derived quantities of a configuration, with their units.
@@ -30,7 +31,8 @@ def contents(path: Path) -> dict[str, object]:
     """Everything about a recording but its samples, as JSON-ready data.
 
     Returns:
-        ``path``, ``frames``, ``duration`` (s), ``lost_chirps`` (count) and ``lost_share``, ``config``, ``derived``
+        ``path``, ``frames``, ``duration`` (s), ``lost_chirps`` (count) and ``lost_share``, ``effort`` (a sentence where
+        frames are much larger than the preset's), ``config``, ``derived``
         (name to value, units as in `DERIVED`), ``data_sets`` (path to shape, dtype, unit, about), ``attributes``.
 
     Raises:
@@ -46,6 +48,7 @@ def contents(path: Path) -> dict[str, object]:
             "start_time": float(times[0]) if len(times) else None,
             "lost_chirps": int(np.size(valid) - np.count_nonzero(valid)),
             "lost_share": float(1 - np.mean(valid)) if np.size(valid) else 0.0,
+            "effort": effort(config, len(recording)) if recording.has_samples else "",
             "config": recording.config.model_dump(mode="json"),
             "derived": {name: float(getattr(config, name)) for name in DERIVED},
             "data_sets": {name: _plain(recording.describe(name)) for name in recording.names()},
@@ -81,6 +84,8 @@ def show(found: dict) -> None:
         f"{printable(found['path'])}: {found['frames']} frames, {found['duration']:.2f} s, "
         f"{found['lost_chirps']} chirps lost ({100 * found['lost_share']:.2f} %)"
     )
+    if found["effort"]:
+        print(found["effort"])
     config = dict(found["config"])
     if all(tuple(pair) == (1.0, 0.0) for pair in config.get("channel_calibration") or ()):
         config["channel_calibration"] = "none"

@@ -57,21 +57,22 @@ class Result:
 
 
 class Pipeline:
-    """Radar SLAM as a stream: push batches, then read trajectory and map off `slam`. Memory grows with the ground that
-    is covered, not with the data.
+    """Radar SLAM as a stream: push batches, then read trajectory and map off `slam`. Memory grows with the way that is
+    covered, not with the data.
 
     Args:
         odometry, scanner: methods; pipelines that are pushed the same batches may share them.
         slam: settings of the back end.
+        endless: without trajectory, and memory grows with the ground that is covered; see `Slam`.
 
     Attributes:
         slam: the back end.
         seconds: of each stage by name, so far.
     """
 
-    def __init__(self, odometry: Follower, scanner: Scanner, slam: SlamConfig | None = None):
+    def __init__(self, odometry: Follower, scanner: Scanner, slam: SlamConfig | None = None, endless: bool = False):
         self.odometry, self.scanner = odometry, scanner
-        self.slam = Slam(slam or SlamConfig.preset("radar"))
+        self.slam = Slam(slam or SlamConfig.preset("radar"), endless)
         self._stopwatch = Stopwatch()
 
     @property

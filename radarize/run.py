@@ -5,7 +5,8 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-from radarize.batch import BATCH, Batch, Intake
+from radarize.batch import Batch, Intake
+from radarize.effort import together
 from radarize.errors import InputError
 from radarize.methods.configuration import Configuration
 from radarize.methods.method import Inputs, Weights
@@ -131,8 +132,9 @@ def run_each(
 
 def _batches(source: Recording, intake: Intake) -> Iterator[tuple[int, Batch]]:
     """A recording's batches, each with how many frames have been read."""
-    for start in range(0, len(source), BATCH):
-        stop = min(start + BATCH, len(source))
+    size = together(source.config)
+    for start in range(0, len(source), size):
+        stop = min(start + size, len(source))
         stamps = source.times[start:stop]
         if source.has_samples or not source.has(PICTURE):
             yield stop, intake.take(source.adc(start, stop), stamps, source.valid(start, stop))

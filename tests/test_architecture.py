@@ -18,7 +18,7 @@ LAYERS = (
     "errors plain files locks replacing hdf5 yamlfile jsonfile npyfile pixels pose tum extras console stopwatch jobs",
     "radar",
     "recording",
-    "heatmaps disturbance aliasing receivers points contents polar clouds walks",
+    "heatmaps disturbance aliasing receivers points effort contents polar clouds walks",
     "features",
     "batch",
     "nets",

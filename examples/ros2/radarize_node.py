@@ -55,7 +55,7 @@ class RadarizeNode(Node):
         radar, best = self.stream.config, best_methods(self.stream.config)[0]
         methods = {kind: given[kind] or best[kind] for kind in ("odometry", "scans")}
         self.inputs = prepare(Inputs(radar), methods)
-        self.pipeline = Workshop(self.inputs).pipeline(**methods)
+        self.pipeline = Workshop(self.inputs).pipeline(**methods, endless=True)
         self.scans = self.create_publisher(LaserScan, "scan", 10)
         self.odometry = self.create_publisher(Odometry, "odom", 10)
         self.transforms = self.create_publisher(TFMessage, "/tf", 10)

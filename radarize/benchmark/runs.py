@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from radarize import log
-from radarize.batch import BATCH, Intake
+from radarize.batch import Intake
 from radarize.benchmark.dataset import Case
 from radarize.benchmark.identity import of_code, of_file
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.steps import Report
+from radarize.effort import BATCH
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate, trajectory_errors
 from radarize.evaluation.scans import true_ranges

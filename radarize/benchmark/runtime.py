@@ -1,9 +1,9 @@
 """Milliseconds per frame of every stage from raw I/Q to map: the paper's table 6."""
 
-from radarize.batch import BATCH
 from radarize.benchmark.runs import TIMED, Pair
 from radarize.benchmark.study import Chosen, Study
 from radarize.benchmark.table import PAPER, Table
+from radarize.effort import BATCH
 from radarize.methods.registry import CLASSICAL
 
 #: Stages as the paper lists them, of ours.

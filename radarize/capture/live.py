@@ -44,7 +44,7 @@ class Live:
     """
 
     def __init__(self, inputs: Inputs, methods: dict[str, str], page: Page, foxglove: "Server | None" = None):
-        self.pipeline, self.page, self.foxglove = Workshop(inputs).pipeline(**methods), page, foxglove
+        self.pipeline, self.page, self.foxglove = Workshop(inputs).pipeline(**methods, endless=True), page, foxglove
         self.intake = Intake(inputs.signal)
         self.view = View(self.pipeline, inputs.signal)
         self.losses, self.health = Losses(), Health(inputs.radar)

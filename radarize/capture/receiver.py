@@ -1,5 +1,6 @@
 """Data packets of a DCA1000 from the network, put together to frames."""
 
+import math
 import socket
 import time
 from collections.abc import Iterator
@@ -17,8 +18,10 @@ SOCKET_BUFFER = 64 << 20
 _PORTS = 16
 #: s, and share of the time, by which a radar may seem to be ahead of this computer's clock.
 _AHEAD, _DRIFT = 2.0, 1e-3
-#: Packets between two looks at the clock and at whether to stop.
+#: Packets between two looks at whether to stop.
 _BLOCK = 64
+#: s after which a receiver that was stopped ends though packets still come: they are a stranger's.
+_REST = 5.0
 
 
 def enlarge(receiver: socket.socket) -> int:
@@ -98,7 +101,8 @@ class Origin:
 
 
 def receive(outlet: Outlet, receiver: socket.socket, sender: str, config: RadarConfig) -> None:
-    """A `Source`: frames from packets that `sender` sends to a bound socket, until stopped and nothing more comes."""
+    """A `Source`: frames from packets that `sender` sends to a bound socket, until stopped and what was on its way has
+    come."""
     origin = Origin(sender, config)
     receiver.settimeout(GLANCE)
     buffer = bytearray(HEADER.size + MAX_PAYLOAD + 1)
@@ -109,7 +113,10 @@ def receive(outlet: Outlet, receiver: socket.socket, sender: str, config: RadarC
         outlet.put(time_, decode(words, config)[0], valid)
 
     outlet.ready()
-    while not outlet.orphaned:
+    end = math.inf
+    while not outlet.orphaned and (now := time.monotonic()) < end:
+        if outlet.stopped:
+            end = min(end, now + _REST)
         try:
             for _ in range(_BLOCK):
                 size, address = receiver.recvfrom_into(buffer)
@@ -117,6 +124,8 @@ def receive(outlet: Outlet, receiver: socket.socket, sender: str, config: RadarC
                     outlet.counts.first = time.time()
                 for frame in origin.take(address, view[:size]):
                     put(*frame)
+                if time.monotonic() > now + GLANCE:
+                    break
         except TimeoutError:
             if outlet.stopped:
                 break

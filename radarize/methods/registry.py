@@ -67,13 +67,14 @@ class Workshop:
             self._followers[key] = method.maker(self.inputs, *taken, **method.options)
         return self._followers[key]
 
-    def pipeline(self, odometry: str, scans: str) -> Pipeline:
-        """A pipeline by the names of its methods.
+    def pipeline(self, odometry: str, scans: str, endless: bool = False) -> Pipeline:
+        """A pipeline by the names of its methods; `endless` as of `radarize.slam.backend.Slam`.
 
         Raises:
             InputError: see `odometry` and `scanner`.
         """
-        return Pipeline(self.odometry(odometry, scans), self.scanner(scans), self.inputs.configuration.slam)
+        slam = self.inputs.configuration.slam
+        return Pipeline(self.odometry(odometry, scans), self.scanner(scans), slam, endless)
 
     def _method(self, what: str, name: str, known: dict[str, Method]) -> Method:
         if name not in known:

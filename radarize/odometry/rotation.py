@@ -30,6 +30,8 @@ from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.ties import wandered
 from radarize.plain import Frozen, setting
 
+#: Range and Doppler bins at most: what a frame takes is bounded for every chirp that the chip can send.
+_RANGES, _SPEEDS = 256, 64
 #: Half widths of the high-pass over range bins and azimuth columns.
 _TEXTURE = (12, 12)
 #: Of the predicted yaw's standard deviations, how many are searched to either side.
@@ -108,7 +110,7 @@ class MapRotation:
         self._sines = np.linspace(-s.field, s.field, s.columns)
         self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(self._sines), heatmaps.settings)
         self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
-        self._ranges = heatmaps.ranges[self._first :]
+        self._ranges = heatmaps.ranges[:_RANGES][self._first :]
         self._map = LocalMap(self._ranges[-1], s.cell)
         self._compass, self._dissent = Compass(heatmaps, self._first), 0.0
         self._noise = s.yaw_noise if prior is None else s.guided_yaw_noise
@@ -122,7 +124,7 @@ class MapRotation:
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
     ) -> tuple[Float32[np.ndarray, "frame r a"], Float32[np.ndarray, "frame r a"]]:
         """Contrast of the Capon map, dB over the surroundings, and u_z (shrunk to the horizon where incoherent)."""
-        s = self.settings
+        s, spectrum = self.settings, _essence(spectrum[:, :_RANGES])
         limited = self._heatmaps.limited(spectrum, s.limit)
         capon = self._heatmaps.range_azimuth_of(limited, "capon")[:, self._first :]
         floor = capon.flatten(1).median(dim=1).values.clamp_min(1e-9)[:, None, None]
@@ -135,7 +137,7 @@ class MapRotation:
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> list[Strongest]:
         """The strongest of each frame."""
-        return [self._compass.strongest(cells) for cells in spectrum.numpy()]
+        return [self._compass.strongest(cells) for cells in spectrum[:, :_RANGES].numpy()]
 
     def _elevation(self, spectrum: torch.Tensor) -> torch.Tensor:
         if self._heatmaps.pairs is None:
@@ -246,6 +248,18 @@ class MapRotation:
         bend = left - 2 * peak + right
         slip = 0.5 * (left - right) / bend if bend < -1e-9 else 0.0
         return float(fine[best] + s.step * np.clip(slip, -1, 1)), float(peak)
+
+
+def _essence(spectrum: torch.Tensor) -> torch.Tensor:
+    """Of so many neighbouring Doppler bins that few enough are left, the strongest at each range."""
+    together = -(-spectrum.shape[2] // _SPEEDS)
+    if together == 1:
+        return spectrum
+    count = spectrum.shape[2] // together
+    groups = spectrum[:, :, : count * together].unflatten(2, (count, together))
+    few = torch.view_as_real(groups[..., :4].contiguous())  # all antennas see much the same power
+    strongest = few.square().sum(dim=(-1, -2)).argmax(dim=3)[..., None, None]
+    return groups.take_along_dim(strongest, dim=3).squeeze(3)
 
 
 def _box_mean(values: torch.Tensor, half: int) -> torch.Tensor:

@@ -22,6 +22,7 @@ from radarize.slam.odometry import FARTHEST, Drift, Odometry, Stillness
 from radarize.slam.posegraph import PoseGraph
 from radarize.slam.rows import Rows
 from radarize.slam.submap import Submap
+from radarize.slam.trimming import needless
 
 #: Nodes whose last loop searches may wait at a time.
 _AHEAD = 16
@@ -29,6 +30,8 @@ _AHEAD = 16
 _STILL = 1 / 3
 #: Scans that `Slam.trajectory` takes at a time.
 _BLOCK = 4096
+#: Submaps that an endless session forgets at a time: the graph is then solved anew.
+_TRIM = 8
 
 
 class Slam:
@@ -51,17 +54,21 @@ class Slam:
 
     Args:
         config: all parameters; the default is the preset ``lidar``.
+        endless: keep no trajectory, and forget what was seen of a place longest ago: memory and time then grow with the
+            ground that is covered, however often.
     """
 
-    def __init__(self, config: SlamConfig | None = None):
-        self.config = config or SlamConfig()
-        self.odometry = Odometry(self.config.odometry)
+    def __init__(self, config: SlamConfig | None = None, endless: bool = False):
+        self.config, self.endless = config or SlamConfig(), endless
+        self.odometry = Odometry(self.config.odometry, endless)
         self.graph = PoseGraph(self.config.loop.inlier_probability)
         self.nodes: list[Node] = []
         self.submaps: list[Submap] = []
         self.skipped = {"odometry": 0, "scans": 0}
         self._waiting: deque[tuple[float, np.ndarray, np.ndarray]] = deque()
         self._scan_times = Rows()
+        self._newest = -np.inf  # of the times of scans
+        self._azimuths = np.zeros(0)  # of the last scan
         self._open: list[Scan] = []
         self._local: list[np.ndarray] = []  # of every node in the local frame
         self._drift = Drift(self.config.odometry.scale)
@@ -108,10 +115,15 @@ class Slam:
         if not (np.abs(azimuths) <= FARTHEST).all():
             worst = azimuths[~(np.abs(azimuths) <= FARTHEST)][0]
             raise InputError(f"scan at {time}: has azimuth {worst:g} rad, expected within {FARTHEST:g} rad of ahead")
-        if len(self._scan_times) and time <= self._scan_times.values[-1]:
+        if time <= self._newest:
             self.skipped["scans"] += 1
             return
-        self._scan_times.append(float(time))
+        if np.array_equal(azimuths, self._azimuths):
+            azimuths = self._azimuths  # kept once for all nodes
+        self._azimuths = azimuths
+        self._newest = float(time)
+        if not self.endless:
+            self._scan_times.append(self._newest)
         self._waiting.append((float(time), azimuths, ranges))
         self._drain()
 
@@ -129,11 +141,12 @@ class Slam:
         self.graph.optimise()
 
     def trajectory(self) -> tuple[Float[np.ndarray, "scan"], Float[np.ndarray, "scan 3"]]:
-        """Times (s) and poses (x, y, yaw) of every scan up to the last node's, in the frame in which odometry began.
+        """Times (s) and poses (x, y, yaw) of every scan up to the last node's, in the frame in which odometry began;
+        of an endless session none.
 
         Between two nodes odometry gives the shape, and the nodes its ends.
         """
-        if not self.nodes:
+        if not self.nodes or self.endless:
             return np.zeros(0), np.zeros((0, 3))
         knots, poses = np.array([node.time for node in self.nodes]), self.graph.poses
         times = self._scan_times.values[: len(self._scan_times) - len(self._waiting) - len(self._open)].copy()
@@ -173,7 +186,8 @@ class Slam:
         """Occupancy grid of all nodes, drawn anew at their optimised poses."""
         grid = OccupancyGrid.empty(self.config.grid.map_resolution)
         for node, pose in zip(self.nodes, self.graph.poses, strict=True):
-            grid.insert(transform(pose, node.origins), transform(pose, node.ends), node.hits, self.config.grid)
+            origins, ends, hits = node.rays
+            grid.insert(transform(pose, origins), transform(pose, ends), hits, self.config.grid)
         return grid.crop(margin=4)
 
     # --- the algorithm, step by step ---------------------------------------------------------------------------------
@@ -231,17 +245,17 @@ class Slam:
 
     def _match(self, node: Node, predicted: np.ndarray, covariance: np.ndarray) -> np.ndarray:
         """Local pose of a new node: the prediction, moved to fit the older of the submaps being built."""
-        c = self.config.matcher
-        if not c.enabled or len(node.points) < self.config.node.min_points:
+        c, points = self.config.matcher, node.points
+        if not c.enabled or len(points) < self.config.node.min_points:
             return predicted
         submap = self._building[0]
         prior = between(self._local[submap.anchor], predicted)
         guess = prior
         if c.presearch_distance > 0:
-            weight = np.linalg.inv(covariance) * c.presearch_sigma**2 / len(node.points)
+            weight = np.linalg.inv(covariance) * c.presearch_sigma**2 / len(points)
             found = search(
                 Pyramid.of(submap.grid, 3, c.presearch_distance),
-                node.points,
+                points,
                 prior,
                 distance=c.presearch_distance,
                 angle=c.presearch_angle,
@@ -250,7 +264,7 @@ class Slam:
             )
             guess = prior if found is None else found[0]
         result = match(
-            submap.grid, node.points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
+            submap.grid, points, guess, sigma=c.sigma, prior=prior, covariance=covariance, iterations=c.iterations
         )
         noise = uncertainty(result, c.translation_floor, c.rotation_floor)
         self.graph.add_match(submap.anchor, len(self.nodes), result.pose, noise)
@@ -267,6 +281,26 @@ class Slam:
             submap.insert(number, node, between(self._local[submap.anchor], self._local[number]))
         if self._building[0].finished:
             self._centers.append(self._building.pop(0).center)
+            if self.endless:
+                self._trim()
+
+    def _trim(self) -> None:
+        """Forget submaps of places that were shown often enough since, and the nodes that are in no other one."""
+        gone = needless(self.submaps, self.graph.poses)
+        if len(gone) < _TRIM:
+            return
+        self._hear()
+        stay = [k for k, submap in enumerate(self.submaps) if submap not in gone]
+        self._centers = [self._centers[k] for k in stay if k < len(self._centers)]
+        self.submaps = [self.submaps[k] for k in stay]
+        kept = sorted({number for submap in self.submaps for number in submap.nodes})
+        self.graph.keep(kept, self._drift.between)
+        self._drift.keep(kept)
+        self._jury.forget()
+        self.nodes, self._local = [self.nodes[k] for k in kept], [self._local[k] for k in kept]
+        place = {number: k for k, number in enumerate(kept)}
+        for submap in self.submaps:
+            submap.anchor, submap.nodes = place[submap.anchor], [place[number] for number in submap.nodes]
 
     def _close(self, number: int) -> None:
         """Begin to search a node in the submaps near it, and take in what was found for earlier ones."""

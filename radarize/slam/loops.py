@@ -135,6 +135,10 @@ class Jury:
         self._limit = float(chi2.ppf(config.inlier_probability, 3))
         self._doubtful: deque[tuple[int, Closure]] = deque(maxlen=4 * config.support)
 
+    def forget(self) -> None:
+        """Begin anew with what is doubtful: nodes have other numbers now."""
+        self._doubtful.clear()
+
     def hear(self, closure: Closure) -> bool:
         """Enter a closure into the graph; True if poses should move for it now."""
         number = len(self.graph.closures)

@@ -1,12 +1,13 @@
 """A node of the graph: the rays of one or several consecutive scans, seen from one place."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Float32
 
 from radarize.pose import between, transform
-from radarize.slam.config import SlamConfig
+from radarize.slam.config import GridConfig, SlamConfig
 from radarize.slam.matcher import thin
 
 
@@ -27,53 +28,86 @@ class Scan:
     ranges: Float[np.ndarray, "beam"]
 
 
-@dataclass(frozen=True)
-class Node:
-    """Rays in the frame of the node's reference scan.
+class Rays(NamedTuple):
+    """Lines along which a sensor saw.
 
     Attributes:
-        time: of the reference scan, s.
-        origins, ends: of the rays, m.
+        origins, ends: m.
         hits: False for rays that saw nothing as far as their end.
-        points: ends of hits, thinned for matching.
-        fronts: places `LoopConfig.front` before the ends of hits, thinned.
     """
 
-    time: float
     origins: Float[np.ndarray, "ray 2"]
     ends: Float[np.ndarray, "ray 2"]
     hits: Bool[np.ndarray, "ray"]
-    points: Float[np.ndarray, "point 2"]
-    fronts: Float[np.ndarray, "front 2"]
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """Scans in the frame of the reference, the one in their middle.
+
+    A session keeps all of its nodes: so they hold what came, in single precision (1 um at 10 m), and make rays and
+    points, thrice as large, whenever somebody asks.
+
+    Attributes:
+        time: of the reference scan, s.
+        poses: of the scans.
+        azimuths: of the beams of each, rad; scans share them.
+        ranges: of all beams, scan by scan, m.
+        config: of the back end.
+    """
+
+    time: float
+    poses: Float[np.ndarray, "scan 3"]
+    azimuths: tuple[Float[np.ndarray, "_"], ...]
+    ranges: Float32[np.ndarray, "beam"]
+    config: SlamConfig
 
     @classmethod
     def gather(cls, scans: list[Scan], config: SlamConfig) -> "Node":
-        """Join scans by their odometry; the one in the middle gives the frame."""
+        """Join scans by their odometry."""
         count = min(len(scans), config.node.scans)
         used = [scans[i] for i in np.unique(np.linspace(0, len(scans) - 1, count).round().astype(int))]
         reference = used[len(used) // 2]
-        rays = [_rays(scan, between(reference.odometry, scan.odometry), config) for scan in used]
-        origins, ends, hits = (np.concatenate(parts) for parts in zip(*rays, strict=True))
+        with np.errstate(over="ignore"):  # so far away nothing is seen
+            ranges = np.concatenate([scan.ranges for scan in used]).astype(np.float32)
+        poses = between(reference.odometry, np.array([scan.odometry for scan in used]))
+        return cls(reference.time, poses, tuple(scan.azimuths for scan in used), ranges, config)
+
+    @property
+    def rays(self) -> Rays:
+        """Of all scans, in single precision."""
+        origins, ends, hits = self._rays()
+        return Rays(origins.astype(np.float32), ends.astype(np.float32), hits)
+
+    @property
+    def points(self) -> Float32[np.ndarray, "point 2"]:
+        """Ends of hits, thinned for matching."""
+        _, ends, hits = self._rays()
+        return thin(ends[hits], self.config.matcher.spacing).astype(np.float32)
+
+    @property
+    def fronts(self) -> Float32[np.ndarray, "front 2"]:
+        """Places `LoopConfig.front` before the ends of hits, thinned; none where nobody asks what is there."""
+        front = self.config.loop.front
+        if not front:
+            return np.zeros((0, 2), np.float32)
+        origins, ends, hits = self._rays()
         echo, way = ends[hits], ends[hits] - origins[hits]
-        share = config.loop.front / np.maximum(np.linalg.norm(way, axis=1), config.loop.front + 1e-9)
-        before = echo - share[:, None] * way if config.loop.front else echo[:0]
-        # Rays are half of what a session keeps in memory: single precision is 1 um at 10 m.
-        return cls(
-            reference.time,
-            origins.astype(np.float32),
-            ends.astype(np.float32),
-            hits,
-            thin(echo, config.matcher.spacing).astype(np.float32),
-            thin(before, config.matcher.spacing).astype(np.float32),
-        )
+        share = front / np.maximum(np.linalg.norm(way, axis=1), front + 1e-9)
+        return thin(echo - share[:, None] * way, self.config.matcher.spacing).astype(np.float32)
+
+    def _rays(self) -> Rays:
+        starts = np.cumsum([len(each) for each in self.azimuths])[:-1]
+        scans = zip(self.poses, self.azimuths, np.split(self.ranges.astype(float), starts), strict=True)
+        rays = [_trace(pose, azimuths, ranges, self.config.grid) for pose, azimuths, ranges in scans]
+        return Rays(*(np.concatenate(parts) for parts in zip(*rays, strict=True)))
 
 
-def _rays(scan: Scan, pose: np.ndarray, config: SlamConfig) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    grid = config.grid
-    hits = (scan.ranges >= grid.min_range) & (scan.ranges <= grid.max_range)
-    nothing = (scan.ranges > grid.max_range) & (grid.free_range > 0)
-    lengths = np.where(hits, scan.ranges, min(grid.free_range, grid.max_range))
+def _trace(pose: np.ndarray, azimuths: np.ndarray, ranges: np.ndarray, grid: GridConfig) -> Rays:
+    hits = (ranges >= grid.min_range) & (ranges <= grid.max_range)
+    nothing = (ranges > grid.max_range) & (grid.free_range > 0)
+    lengths = np.where(hits, ranges, min(grid.free_range, grid.max_range))
     used = hits | nothing
-    lengths, azimuths = lengths[used], scan.azimuths[used]
+    lengths, azimuths = lengths[used], azimuths[used]
     ends = transform(pose, lengths[:, None] * np.stack([np.cos(azimuths), np.sin(azimuths)], axis=-1))
-    return np.broadcast_to(pose[:2], ends.shape), ends, hits[used]
+    return Rays(np.broadcast_to(pose[:2], ends.shape), ends, hits[used])

@@ -1,6 +1,7 @@
 """Odometry as a function of time: where it says the sensor was, and how sure it is of a motion."""
 
 from collections import deque
+from collections.abc import Sequence
 from itertools import islice
 
 import numpy as np
@@ -20,10 +21,11 @@ class Odometry:
 
     Args:
         config: uncertainty of steps that come without covariance.
+        endless: keep no poses but those that motions still need.
     """
 
-    def __init__(self, config: OdometryConfig):
-        self.config = config
+    def __init__(self, config: OdometryConfig, endless: bool = False):
+        self.config, self.endless = config, endless
         self._times, self._poses = Rows(), Rows(3)
         self._covariances: deque[np.ndarray | None] = deque()  # of the last entries, those that motions still need
         self._known: tuple[float, float, np.ndarray] | None = None  # start, end and covariance of a motion
@@ -96,12 +98,17 @@ class Odometry:
 
     def release(self, start: float, until: float) -> None:
         """Forget covariances up to `until`, but for their sum since `start` (s); motions are asked for from there, or
-        from `until`, on."""
+        from `until`, on. Where poses are not kept, neither are those before `start` and between the two."""
         total = self._sum(start, until) if until > start else None
         self._known = None if total is None else (start, until, total)
         first = int(np.searchsorted(self.times, until))
         while len(self) - len(self._covariances) < first:
             self._covariances.popleft()
+        if self.endless:
+            after = int(np.searchsorted(self.times, start))
+            for low, high in ((after + 1, first - 1), (0, after - 1)):
+                self._times.drop(low, high)
+                self._poses.drop(low, high)
 
     def _sum(self, start: float, end: float) -> Float[np.ndarray, "3 3"] | None:
         """Covariance of a motion; None if one of its steps came without.
@@ -148,6 +155,11 @@ class Drift:
         self._inverse.append(np.linalg.inv(carry))
         self._sums.append((self._sums[-1] if self._sums else 0) + carry @ covariance @ carry.T)
         self._lengths.append((self._lengths[-1] if self._lengths else 0.0) + length)
+
+    def keep(self, numbers: Sequence[int]) -> None:
+        """Forget all nodes but these."""
+        for name in ("_inverse", "_sums", "_lengths"):
+            setattr(self, name, [getattr(self, name)[k] for k in numbers])
 
     def between(self, first: int, second: int) -> Float[np.ndarray, "3 3"]:
         """Covariance of the motion between two nodes, in the frame of the later one."""

@@ -6,6 +6,9 @@ closures and matches afresh (`gtsam.GncLMOptimizer`, truncated least squares). R
 some false closures and weaken true ones.
 """
 
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+
 import gtsam
 import numpy as np
 from jaxtyping import Float
@@ -75,6 +78,41 @@ class PoseGraph:
         if not self.accepted[closure]:
             self.accepted[closure] = True
             self._news.add(self._uncertain[closure])
+
+    def keep(self, numbers: Sequence[int], spread: Callable[[int, int], Float[np.ndarray, "3 3"]]) -> None:
+        """Forget all nodes but these, which then count from 0 on.
+
+        Where nodes go, their neighbours keep the motion between them as it is known now, as sure as odometry is of it.
+
+        Args:
+            numbers: of the nodes to keep, ascending.
+            spread: covariance of the motion between two nodes, by odometry.
+        """
+        place = {int(number): k for k, number in enumerate(numbers)}
+
+        def stays(factors: list) -> np.ndarray:
+            return np.array([all(key in place for key in factor.keys()) for factor in factors], bool)
+
+        def chosen(factors: list, stay: np.ndarray) -> list:
+            moved = [factor for factor, each in zip(factors, stay, strict=True) if each]
+            return [_between(*(place[k] for k in f.keys()), f.measured(), f.noiseModel()) for f in moved]
+
+        steps = {tuple(factor.keys()): factor for factor in self._certain}
+        self._certain = [
+            _between(place[a], place[b], steps[a, b].measured(), steps[a, b].noiseModel())
+            if (a, b) in steps
+            else _factor(place[a], place[b], between(self.poses[a], self.poses[b]), spread(a, b))
+            for a, b in pairwise(map(int, numbers))
+        ]
+        matches, closures = stays(self._matches), stays(self._uncertain)
+        self._matches, self._uncertain = chosen(self._matches, matches), chosen(self._uncertain, closures)
+        self._matches_kept = self._matches_kept[matches[: len(self._matches_kept)]]
+        self.accepted = self.accepted[closures]
+        self.closures = [tuple(factor.keys()) for factor in self._uncertain]
+        poses, self._poses = self.poses[list(numbers)], Rows(3)
+        for pose in poses:
+            self._poses.append(pose)
+        self._isam, self._news = None, gtsam.NonlinearFactorGraph()
 
     def update(self) -> None:
         """Move poses towards where everything believed agrees, by one step, solving anew only what changed."""
@@ -161,6 +199,9 @@ class PoseGraph:
         for k, pose in enumerate(self.poses[first:], first):
             values.insert(k, gtsam.Pose2(*pose))
         return values
+
+
+_between = gtsam.BetweenFactorPose2
 
 
 def _factor(of, to, relative, covariance) -> gtsam.BetweenFactorPose2:

@@ -24,6 +24,12 @@ class Rows:
         self._room[self._count] = row
         self._count += 1
 
+    def drop(self, first: int, end: int) -> None:
+        """Forget the rows from `first` up to `end`."""
+        left = self._count - max(end - first, 0)
+        self._room[first:left] = self.values[max(end, first) :]
+        self._count = left
+
     @property
     def values(self) -> Float[np.ndarray, "row ..."]:
         """All rows, to read and to write."""

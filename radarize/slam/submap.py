@@ -37,8 +37,8 @@ class Submap:
 
     def insert(self, number: int, node: Node, pose: Float[np.ndarray, "3"]) -> None:
         """Add a node at its pose in this submap's frame."""
-        origins, ends = transform(pose, node.origins), transform(pose, node.ends)
-        self._grid.insert(origins, ends, node.hits, self.config.grid, spread=True)
+        origins, ends, hits = node.rays
+        self._grid.insert(transform(pose, origins), transform(pose, ends), hits, self.config.grid, spread=True)
         self.nodes.append(number)
         if self.finished:
             self._finish()

@@ -1,6 +1,7 @@
 """From serial port and UDP to a recording, against the virtual sensor: what was sent is what was recorded."""
 
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -23,7 +24,7 @@ from radarize.recording import Recording
 from radarsim.emulator.disturbance import Disturbance
 from tests import virtual
 from tests.packets import packets
-from tests.virtual import SMALL, emulated, network, sensor
+from tests.virtual import COMPUTER, SMALL, emulated, network, sensor
 
 FRAMES = 100
 
@@ -160,3 +161,27 @@ def test_small_buffers_are_told():
     assert buffer_warning(64 << 20, PRESETS["radarize"]) == []
     (words,) = buffer_warning(208 << 10, PRESETS["radarize"])
     assert "holds 208 KiB, a quarter of a second needs 1080" in words and "sysctl net.core.rmem_max" in words
+
+
+def test_a_stranger_who_never_stops_does_not_keep_a_capture_from_ending(played, tmp_path):
+    """Packets from elsewhere, always within the time that a capture waits for the board's last ones."""
+    path, adc = played
+    ended = threading.Event()
+
+    def pester(port: int) -> None:
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
+            while not ended.wait(0.02) and time.monotonic() < start + 20:
+                stranger.sendto(bytes(100), (COMPUTER, port))
+
+    with emulated(path) as (board, where), sensor(board, where) as stream:
+        guest = threading.Thread(target=pester, args=(where.data_port,))
+        start = time.monotonic()
+        guest.start()
+        try:
+            record(stream, tmp_path / "captured.h5", threading.Event(), frames=10)
+        finally:
+            ended.set()
+            guest.join()
+    assert time.monotonic() - start < 12 and stream.counts.foreign > 10
+    with Recording(tmp_path / "captured.h5") as recording:
+        assert np.array_equal(recording.adc(0, 10), adc[:10])

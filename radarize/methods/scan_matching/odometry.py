@@ -75,7 +75,8 @@ class ScanMatching:
         """Move on to the next scan, and to a rate of turning with its variance; whether there are points to match."""
         first, self._time = self._time is None, scan.time
         node = Node.gather([scan], self.settings)
-        seen = len(node.points) >= self.settings.node.min_points
+        points = node.points
+        seen = len(points) >= self.settings.node.min_points
         if first:
             self._add(node)
             return seen
@@ -85,7 +86,7 @@ class ScanMatching:
         if np.isfinite(turning).all():
             self._turn(*turning)
         if seen:
-            self._correct(node)
+            self._correct(points)
         x, y, yaw = between(self._keys[-1][0], self._pose)
         if np.hypot(x, y) >= self.settings.node.distance or abs(yaw) >= self.settings.node.angle:
             self._add(node)
@@ -99,10 +100,10 @@ class ScanMatching:
         self._pose = compose(self._pose, change[:3])
         self._spread = self._spread - np.outer(gain, self._spread[5])
 
-    def _correct(self, node: Node) -> None:
-        """Fit the pose to the grid; the rate follows as much as its error goes along with the pose's."""
+    def _correct(self, points: Float[np.ndarray, "point 2"]) -> None:
+        """Fit the pose of a scan to the grid; the rate follows as much as its error goes along with the pose's."""
         prior = self._spread[:3, :3]
-        found = match(self._grid, node.points, self._pose, sigma=_SIGMA, prior=self._pose, covariance=prior)
+        found = match(self._grid, points, self._pose, sigma=_SIGMA, prior=self._pose, covariance=prior)
         fitted = np.linalg.inv(np.linalg.inv(prior) + found.information)
         along = self._spread[3:, :3] @ np.linalg.inv(prior)
         self._rate = self._rate + along @ between(self._pose, found.pose)
@@ -115,8 +116,8 @@ class ScanMatching:
         self._keys.append((self._pose, node))
         self._grid = OccupancyGrid.empty(self.settings.grid.resolution)
         for pose, key in self._keys:
-            ends = transform(pose, key.origins), transform(pose, key.ends)
-            self._grid.insert(*ends, key.hits, self.settings.grid, spread=True)
+            origins, ends, hits = key.rays
+            self._grid.insert(transform(pose, origins), transform(pose, ends), hits, self.settings.grid, spread=True)
 
 
 def odometry(inputs: Inputs, scanner: Scanner) -> ScanMatching:

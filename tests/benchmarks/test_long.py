@@ -1,0 +1,33 @@
+"""Long trials in short: a session of seconds over a bad network, an hour of SLAM at a blow, one kill."""
+
+import numpy as np
+
+from benchmarks import kills, soak
+from radarize.radar.presets import PRESETS
+from tests.virtual import record
+
+
+def test_a_session_over_a_bad_network(tmp_path, monkeypatch):
+    monkeypatch.setattr(soak, "WALK", 1.0)
+    row, warnings = soak.live(0.05, tmp_path, seed=0)
+    assert row["exit code"] == 0 and row["forged packets"] > 10
+    assert row["lost but not marked, or marked but not lost"] == row["chirps with a wrong sample"] == 0
+    assert row["chirps lost"] > 0 and "their chirps are marked" in warnings
+
+
+def test_an_hour_at_a_blow():
+    row = soak.day(1.0, seed=0)
+    assert row["frames"] == 18000 and 50 < row["nodes kept"] < 150
+    assert row["place off by, m"] < 0.15
+    assert row["MB at the end"] - row["MB after warm-up"] < 10
+
+
+def test_a_killed_run_and_a_killed_capture(tmp_path):
+    noise = tmp_path / "noise.h5"
+    record(noise, PRESETS["radarize"], 40)
+    methods = ["--odometry", "doppler", "--scans", "first-echo"]
+    case = kills.Case(["radarize.cli", "run", noise, "-o", "{out}/run", *methods], "run/*.[tp][ug]m")
+    made = kills.killed("run", case, 1, tmp_path, np.random.default_rng(0))
+    assert made["files"] == 3 and made["files that differ"] == made["exit code in the end"] == 0
+    row = kills.captures(1, tmp_path, np.random.default_rng(0))
+    assert row["frames that differ"] == 0 and row["lost, s, at most"] < 3.0

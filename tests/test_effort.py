@@ -27,7 +27,7 @@ ALLOWED = [
 
 @pytest.mark.parametrize("config", ALLOWED, ids=lambda c: f"{c.samples}-{c.loops}-{c.frame_period}")
 def test_rotation_looks_at_so_many_cells_and_no_more(config):
-    """Cells are what all its steps take time for; benchmarks/results/chirps.md has the ms."""
+    """Cells are what all its steps take time for."""
     check_limits(config)
     rotation, rng = MapRotation(Heatmaps(config)), np.random.default_rng(0)
     shape = (1, config.samples, config.loops, len(config.slot) * len(config.rx))

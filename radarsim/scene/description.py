@@ -67,12 +67,14 @@ class Custom(_Strict):
     directive: Annotated[float, Field(ge=0, le=0.5)] = 0.0  # shares of it in lobes, see Material
     backscatter: Annotated[float, Field(ge=0, le=0.5)] = 0.0
     thickness: Length | None = None
+    clear: bool = False  # light passes, too
 
     def material(self, name: str) -> Material:
         law = None if self.conductor else constant(self.permittivity, self.conductivity)
         sigma0 = decibel(self.sigma0_db)
         lobes = {"directive": self.directive, "backscatter": self.backscatter}
-        return Material(name, law, self.roughness, sigma0, self.thickness, source="scene file", **lobes)
+        told = lobes | {"clear": self.clear, "source": "scene file"}
+        return Material(name, law, self.roughness, sigma0, self.thickness, **told)
 
 
 class CustomMaterial(_Strict):

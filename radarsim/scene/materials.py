@@ -48,6 +48,7 @@ class Material:
         directive, backscatter: shares of the diffuse power in the lobes about the specular direction and back to the
             source; the rest is Lambertian.
         lobe_exponent: alpha of both lobes.
+        clear: light passes, too: cameras and lidars see what is behind.
     """
 
     name: str
@@ -60,6 +61,7 @@ class Material:
     directive: float = 0.0
     backscatter: float = 0.0
     lobe_exponent: float = 4.0
+    clear: bool = False
 
     @property
     def conductor(self) -> bool:
@@ -217,8 +219,13 @@ _LOBES = dict.fromkeys(
      "metal"], (0.4, 0.1),
 ) | dict.fromkeys(["brick", "asphalt"], (0.2, 0.3))  # fmt: skip
 
+#: Acrylic stands for black fronts of screens and machines.
+_CLEAR = {"glass"}
+
 MATERIALS: dict[str, Material] = {
-    name: Material(name, eps, rms, decibel(db), thickness, color, source, *_LOBES.get(name, (0.0, 0.0)))
+    name: Material(
+        name, eps, rms, decibel(db), thickness, color, source, *_LOBES.get(name, (0.0, 0.0)), clear=name in _CLEAR
+    )
     for name, (eps, rms, db, thickness, color, source) in _TABLE.items()
 }
 

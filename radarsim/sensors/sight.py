@@ -9,9 +9,6 @@ from numba import njit, prange
 from radarsim.physics.movingtargets import MovingTargets
 from radarsim.scene.scene import Scene
 
-#: What light passes. A scene without these panes is one pass of rays; going on from pane to pane took three times that.
-_CLEAR = ("glass", "acrylic")
-
 
 class Sight:
     """Casts rays into a scene as it is at given times.
@@ -29,8 +26,11 @@ class Sight:
 
     @cached_property
     def _behind_glass(self) -> Scene | None:
-        """The scene without its clear panes; None where nothing else is there."""
-        solid = [o for o in self._scene.objects if o.material.name not in _CLEAR]
+        """The scene without its clear panes; None where nothing else is there.
+
+        It is one pass of rays; going on from pane to pane took three times that.
+        """
+        solid = [o for o in self._scene.objects if not o.material.clear]
         if len(solid) == len(self._scene.objects):
             return self._scene
         return Scene(self._scene.name, solid) if solid else None

@@ -1,5 +1,7 @@
 """The depth camera against Open3D's ray casts, and its errors against their laws."""
 
+from dataclasses import replace
+
 import numpy as np
 import open3d as o3d
 import pytest
@@ -10,6 +12,7 @@ from radarize.radar.presets import PRESETS
 from radarsim.motion import Motion
 from radarsim.planner import plan_motion
 from radarsim.scenario import Scenario
+from radarsim.scene.description import Custom
 from radarsim.scene.movers import Person
 from radarsim.scene.scene import Scene
 from radarsim.sensors.depth import MOUNT, QUARTER, STRIP, DepthCamera, Intrinsics, Stereo
@@ -76,6 +79,17 @@ def test_glass_is_looked_through_and_people_are_seen():
     trunk = depth[50:60, 104:108]
     assert np.all((trunk > 2.7) & (trunk < 3.0))
     assert depth[60, 40] == pytest.approx(4.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("clear, seen", [(True, 4.0), (False, 2.0)])
+def test_what_light_passes_is_said_by_the_material(clear, seen):
+    """A pane of one's own is looked through where its material is clear; a screen's black front never is."""
+    own = Custom(permittivity=2.6, thickness=3e-3, clear=clear).material("own")
+    pane, wall = box("pane", [2, -3, 0], [2.01, 3, 3], "glass"), box("wall", [4, -3, 0], [4.2, 3, 3])
+    camera = DepthCamera(beside(Motion.still((0, 0, 1)), replace(pane, material=own), wall))
+    assert camera.depth(NOW)[0][60, 106] == pytest.approx(seen, abs=1e-3)
+    screen = DepthCamera(beside(Motion.still((0, 0, 1)), box("screen", [2, -3, 0], [2.01, 3, 3], "acrylic"), wall))
+    assert screen.depth(NOW)[0][60, 106] == pytest.approx(2.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("distance", [0.5, 1.0, 2.0, 4.0])

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int, Int16
 
 from radarize.errors import InputError
-from radarize.radar.config import RadarConfig
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.draws import draws
 from radarsim.motion import Motion
 from radarsim.physics.clutter import Clutter, Cluttered
@@ -28,6 +28,9 @@ from radarsim.physics.unevenness import Heights
 from radarsim.scene.scene import Scene
 from radarsim.sensors.sight import Sight
 from radarsim.threads import one_blas_thread
+
+#: Hz, of the IF amplifier (SWRS228): as far as the simulator looks for echoes where no decimation filter closes before.
+_IF_BANDWIDTH = 10e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +107,8 @@ class Scenario:
         if self.engine == "sionna":
             seed = int(self.draws("sionna").integers(2**31))
             return PathSolverFinder(self.scene, self.config, weakest, antenna, seed)
-        reach = None if band is None else band.high * self.config.max_range  # where the IF filter closes
+        closes = _IF_BANDWIDTH if band is None else band.high * self.config.sample_rate
+        reach = SPEED_OF_LIGHT * closes / (2 * self.config.slope)
         scatterers = Cluttered(Surface(self.scene, self.draws("surface")), Clutter(self.scene, self.draws("clutter")))
         return EchoFinder(
             self.scene, scatterers, Reflectors.of(self.scene, self.config), self.config, weakest, reach, antenna,

@@ -13,8 +13,8 @@ from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarsim.accompany import accompany
 from radarsim.draws import draws
-from radarsim.motion import Mounting
-from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.motion import Motion, Mounting
+from radarsim.physics.frontend_config import Band, FrontEndConfig
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
 from radarsim.sensors.suite import Suite
@@ -102,6 +102,26 @@ def test_sensors_see_the_same_in_any_batches(scenario):
         rows = [suite.observe(scenario.frames(times[k : k + size]), k) for k in reversed(range(0, COUNT, size))][::-1]
         for name, expected in once.items():
             assert np.array_equal(np.concatenate([each[name] for each in rows]), expected, equal_nan=True), name
+
+
+def test_without_a_filter_what_lies_beyond_the_range_folds():
+    """A large metal wall faces an isotropic radar from `far`: its echo falls as 1 / R, and without a decimation filter
+    it stands at the range less the unambiguous one; with one it is gone."""
+
+    def profile(range: float, **changes) -> np.ndarray:
+        wall = {"name": "wall", "shape": "rectangle", "size": [8, 8], "position": [range, 0, 0], "facing": [-1, 0, 0]}
+        scene = Scene.of({"objects": [wall | {"material": "metal"}]}, "wall")
+        board = FrontEndConfig.ideal(full_scale_dbm=-40, **changes)
+        samples = Scenario(scene, Motion.still((0, 0, 0)), CONFIG, board).frames(np.array([0.0])).samples[0]
+        beat = (samples[..., 0] + 1j * samples[..., 1])[0, 0, 0]
+        return np.abs(np.fft.fft(beat * np.hanning(len(beat)), 16 * len(beat)))
+
+    near, far = CONFIG.max_range / 2, 1.5 * CONFIG.max_range
+    direct, folded = profile(near), profile(far)
+    step = CONFIG.max_range / len(direct)
+    assert abs(direct.argmax() - folded.argmax()) * step < 0.01 and abs(folded.argmax() * step - near) < 0.01
+    assert folded.max() / direct.max() == pytest.approx(near / far, rel=0.05)
+    assert profile(far, band=Band()).max() < 0.01 * folded.max()
 
 
 def test_draws_differ_by_seed_purpose_and_instant():

@@ -137,7 +137,7 @@ class FrontEndConfig(_Strict):
             has averaged a faster converter. 12: steps of 16 counts.
         leakage, mismatch, phase_noise: null: none.
         high_pass: the two first-order stages of the radar configuration.
-        band: null: flat for ever (echoes beyond the maximum range fold).
+        band: null: flat up to the 10 MHz of the IF amplifier (echoes beyond the maximum range fold).
         image_rejection_db: of the I/Q mixer (data sheet: 30 dB); null: perfect. The image of beat frequency f is at
             -f, outside the band of complex-1x sampling, so only images of near echoes pass `band`.
     """

@@ -10,6 +10,7 @@ from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16, Shaped
 
 from radarize.aliasing import Aliases
 from radarize.disturbance import Flaws, find_flaws
+from radarize.errors import InputError
 from radarize.features.maps import MapMaker
 from radarize.heatmaps import HeatmapConfig, Heatmaps
 from radarize.points import DENSE, PointClouds
@@ -97,7 +98,13 @@ class Batch:
 
     @cached_property
     def folded(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
-        """See `Heatmaps.spectrum`; broken receivers are filled in."""
+        """See `Heatmaps.spectrum`; broken receivers are filled in.
+
+        Raises:
+            InputError: nothing but maps is known.
+        """
+        if self.samples is None:
+            raise InputError(f"frames from {self.stamps[0]:.3f} s on have no samples, only {', '.join(self._maps)}")
         with stage("spectra"):
             spectrum = self.signal.heatmaps.spectrum(self.samples, self.valid)
             return spectrum if self.flaws is None else self.signal.receivers.filled(spectrum, self.flaws.broken)

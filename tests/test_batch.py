@@ -5,6 +5,7 @@ import pytest
 import torch
 
 from radarize.batch import LEAST_SHARE, Batch, Intake, Signal
+from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.points import PointClouds
 from radarize.radar.presets import PRESETS
@@ -88,3 +89,14 @@ def test_batches_keep_their_samples(signal, adc):
     taken = Intake(signal).take(lent, np.arange(2))
     lent[:] = 1
     assert np.array_equal(taken.samples, adc[:2])
+
+
+def test_maps_alone(signal):
+    """A batch of maps gives them as they are, and says so where somebody asks for more."""
+    shown = np.arange(24.0).reshape(2, 3, 4)
+    intake = Intake(signal)
+    first, second = (intake.take_maps({"picture": shown}, np.array([t, t + 1.0])) for t in (5.0, 7.0))
+    assert first.maps(("picture",))["picture"] is shown and len(first) == 2
+    assert np.array_equal(second.numbers, [2, 3]) and second.before == 6.0 and intake.lost == 0
+    with pytest.raises(InputError, match=r"frames from 7.000 s on have no samples, only picture"):
+        _ = second.spectrum

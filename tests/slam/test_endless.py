@@ -40,7 +40,7 @@ def test_to_and_fro_in_one_room_ends_to_grow():
     walls = np.argwhere(grid.probability > 0.65)[:, ::-1] * grid.resolution + grid.origin
     x, y = np.abs(walls - [3, 2.5]).T
     outside = np.maximum(x - 3, y - 2.5)  # of the outer walls
-    assert np.quantile(outside, 0.95) < 0.3
+    assert np.quantile(outside, 0.95) < 0.33  # six cells
 
 
 def test_rooms_that_nobody_went_to_again_stay():

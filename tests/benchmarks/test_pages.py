@@ -18,8 +18,8 @@ RESULTS = ROOT / "benchmarks" / "results"
 #: Pages of a former layout, to be made again; then they leave this list.
 FORMER = {
     "ablation", "buildings", "capture_speed", "dataset_speed", "fuzzing", "live_speed", "mapping",
-    "odometry", "odometry-platforms", "runtime", "simulator_speed", "slam",
-    "slam_backend", "transfer", "twin", "uncertainty",
+    "odometry", "odometry-platforms", "runtime", "slam",
+    "slam_backend", "transfer", "uncertainty",
 }  # fmt: skip
 PAGES = sorted(path.stem for path in RESULTS.glob("*.json"))
 

@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results"
 #: Pages of a former layout, to be made again; then they leave this list.
 FORMER = {
-    "ablation", "buildings", "capture_speed", "fuzzing", "live_speed", "mapping",
+    "ablation", "buildings", "capture_speed", "fuzzing", "mapping",
     "odometry", "odometry-platforms", "runtime", "slam",
     "slam_backend", "transfer", "uncertainty",
 }  # fmt: skip

@@ -15,7 +15,7 @@ from scipy.fft import fft
 
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
-from radarize.recording import Stream
+from radarize.recording import Recording, Stream
 
 ROWS, COLUMNS, BEAMS = 256, 64, 512
 #: m, of rows; rad, of the radar's and of the lidar's columns.
@@ -99,6 +99,11 @@ def pictures(
             share = (level - level.min()) / np.ptp(level)
             np.maximum.at(picture, inside.pixel[kept], (share * 255).astype(np.uint8))
     return found.reshape(-1, ROWS, COLUMNS)
+
+
+def pictured(recording: Recording) -> bool:
+    """Whether a recording holds a radar's pictures and no samples."""
+    return not recording.has_samples and recording.has(PICTURE)
 
 
 def power(pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float32[np.ndarray, "frame range azimuth"]:

@@ -12,7 +12,7 @@ from radarize.methods.configuration import Configuration
 from radarize.methods.method import Inputs, Weights
 from radarize.methods.registry import BEST, PICTURED, Workshop, best_methods
 from radarize.pipeline import Pipeline
-from radarize.polar import PICTURE
+from radarize.polar import PICTURE, pictured
 from radarize.recording import Recording
 from radarize.runfolder import RunWriter
 
@@ -42,9 +42,9 @@ def run(
         InputError: unusable recording or unknown method.
     """
     with Recording(recording) as source:
-        pictured = not source.has_samples and source.has(PICTURE)
         best, why = (BEST, "") if weights else best_methods(source.config)
-        best, why = (PICTURED, "") if pictured else (best, why)
+        if pictured(source):
+            best, why = PICTURED, ""
     pairs = {Path(output): (odometry or best["odometry"], scans or best["scans"])}
     failed = run_each(
         recording, pairs, weights=weights, configuration=configuration,
@@ -136,7 +136,7 @@ def _batches(source: Recording, intake: Intake) -> Iterator[tuple[int, Batch]]:
     for start in range(0, len(source), size):
         stop = min(start + size, len(source))
         stamps = source.times[start:stop]
-        if source.has_samples or not source.has(PICTURE):
-            yield stop, intake.take(source.adc(start, stop), stamps, source.valid(start, stop))
-        else:
+        if pictured(source):
             yield stop, intake.take_maps({"picture": source.rows(PICTURE, start, stop)}, stamps)
+        else:
+            yield stop, intake.take(source.adc(start, stop), stamps, source.valid(start, stop))

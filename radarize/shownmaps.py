@@ -9,20 +9,16 @@ from radarize.radar.array import azimuth_row
 from radarize.recording import Recording
 from radarize.report.drawings import LEAKAGE
 
+#: Maps that are shown; of pictures the first alone, and none where a single antenna tells no azimuth.
+MAPS = ("range_azimuth", "doppler_azimuth")
+
 
 class ShownMaps:
-    """Range-azimuth and Doppler-azimuth maps, or what the recording holds in their place.
-
-    Attributes:
-        names: of the maps; none where a single antenna tells no azimuth.
-    """
+    """Range-azimuth and Doppler-azimuth maps, or what the recording holds in their place."""
 
     def __init__(self, recording: Recording):
-        self.recording = recording
-        self.pictured = not recording.has_samples and recording.has(polar.PICTURE)
-        self._maker = None if self.pictured or len(azimuth_row(recording.config)) < 2 else MapMaker(recording.config)
-        self.names: tuple[str, ...] = ("range_azimuth", "doppler_azimuth") if self._maker else ()
-        self.names = ("range_azimuth",) if self.pictured else self.names
+        self.recording, self._pictured = recording, polar.pictured(recording)
+        self._maker = None if self._pictured or len(azimuth_row(recording.config)) < 2 else MapMaker(recording.config)
 
     def of(self, first: int, last: int) -> dict[str, UInt8[np.ndarray, "frame row azimuth 3"]]:
         """Of frames first...last-1, by name.
@@ -30,13 +26,13 @@ class ShownMaps:
         Raises:
             InputError: see `maps_of`.
         """
-        if self.pictured:
+        if self._pictured:
             levels = self.recording.rows(polar.PICTURE, first, last).astype(np.float32)
             return {"range_azimuth": colored(levels, np.zeros(polar.ROWS, bool))}
         if self._maker is None:
             return {}
         near = {"range_azimuth": self._maker.heatmaps.ranges < LEAKAGE}
-        maps = maps_of(self.recording, first, last, self.names, self._maker)
+        maps = maps_of(self.recording, first, last, MAPS, self._maker)
         return {
             name: colored(levels.astype(np.float32), near.get(name, np.zeros(levels.shape[1], bool)))
             for name, levels in maps.items()

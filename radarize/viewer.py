@@ -24,10 +24,9 @@ from radarize.recording import Recording
 from radarize.replacing import replacing
 from radarize.report.page import COLORS
 from radarize.runfolder import RunFolder
-from radarize.shownmaps import ShownMaps
+from radarize.shownmaps import MAPS, ShownMaps
 
 _BATCH = 16
-_MAPS = ("range_azimuth", "doppler_azimuth")
 #: Colours of causes in the order of their labels: direct, floor or ceiling, then what is no wall.
 _CAUSES = ("#39d0d8", "#8b949e", "#e4572e", "#f2703a", "#f2a33a", "#9a6fd0", "#2e9e6b", "#5c6570")
 
@@ -93,7 +92,7 @@ def _layout():
     """What is where in the window."""
     import rerun.blueprint as rrb
 
-    pictures = [rrb.Spatial2DView(origin=f"radar/{name}", name=name.replace("_", "-")) for name in (*_MAPS, "cause")]
+    pictures = [rrb.Spatial2DView(origin=f"radar/{name}", name=name.replace("_", "-")) for name in (*MAPS, "cause")]
     depth = rrb.Spatial2DView(origin="world/truth/radar/camera/depth", name="depth")
     speeds = [rrb.TimeSeriesView(origin=f"velocity/{axis}", name=f"{axis}, m/s") for axis in ("forward", "left")]
     return rrb.Blueprint(

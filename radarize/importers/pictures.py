@@ -36,7 +36,7 @@ def import_walk(
     walk = Walk.find(data, number)
     times = stamps(walk.frames)
     streams = {
-        "maps/picture": Stream((polar.ROWS, polar.COLUMNS), "u1", "", "RadarHD's picture of one loop, 0...255"),
+        polar.PICTURE: Stream((polar.ROWS, polar.COLUMNS), "u1", "", "RadarHD's picture of one loop, 0...255"),
         "truth/scan": Stream((polar.BEAMS,), "f4", "m", "range of the lidar's first point, inf where it has none"),
         "truth/lidar": polar.LIDAR,
     }
@@ -57,7 +57,7 @@ def import_walk(
         for frames, pictures in walk.batches():
             lidar = np.stack([walk.lidar(frame) for frame in range(frames.start, frames.stop)])
             first = np.where(lidar.any(axis=1), polar.RANGES[lidar.argmax(axis=1)], np.inf)
-            rows = {"maps/picture": pictures, "truth/scan": first, "truth/lidar": np.packbits(lidar, axis=2)}
+            rows = {polar.PICTURE: pictures, "truth/scan": first, "truth/lidar": np.packbits(lidar, axis=2)}
             writer.append(None, times[frames], rows=rows)
             progress(walk.frames + frames.stop, 2 * walk.frames)
     return output

@@ -11,7 +11,7 @@ from radarize.methods.method import Inputs, Method, Weights, load
 from radarize.methods.task import Task
 from radarize.nets.weights import check
 from radarize.pipeline import Follower, Pipeline, Scanner
-from radarize.polar import PICTURE
+from radarize.polar import pictured
 from radarize.radar.config import RadarConfig
 
 _FOLDERS = (radarize, doppler, ransac, scan_matching, milliego, rnin, radarhd, pictures, published)
@@ -81,7 +81,7 @@ class Workshop:
             raise InputError(f"{what} is {name!r}, expected one of {', '.join(known)}")
         recording, method = self.inputs.recording, known[name]
         if recording is not None and not recording.has_samples and not (method.pictures or method.scans):
-            wanted = f"{what} {PICTURED[what]}" if recording.has(PICTURE) else "a recording with /radar/adc"
+            wanted = f"{what} {PICTURED[what]}" if pictured(recording) else "a recording with /radar/adc"
             raise InputError(f"{recording.path}: has no raw samples, which {what} {name} needs, expected {wanted}")
         return method
 

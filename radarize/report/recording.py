@@ -55,7 +55,7 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
             ]
         )
         shown = np.unique(np.linspace(0, len(recording) - 1, _FRAMES).astype(int))
-        if not recording.has_samples and recording.has(polar.PICTURE):
+        if polar.pictured(recording):
             _pictures(page, recording, shown)
         else:
             maps = Heatmaps(config)

@@ -158,8 +158,9 @@ class Drift:
 
     def keep(self, numbers: Sequence[int]) -> None:
         """Forget all nodes but these."""
-        for name in ("_inverse", "_sums", "_lengths"):
-            setattr(self, name, [getattr(self, name)[k] for k in numbers])
+        self._inverse, self._sums, self._lengths = (
+            [rows[k] for k in numbers] for rows in (self._inverse, self._sums, self._lengths)
+        )
 
     def between(self, first: int, second: int) -> Float[np.ndarray, "3 3"]:
         """Covariance of the motion between two nodes, in the frame of the later one."""

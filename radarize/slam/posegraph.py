@@ -95,11 +95,13 @@ class PoseGraph:
 
         def chosen(factors: list, stay: np.ndarray) -> list:
             moved = [factor for factor, each in zip(factors, stay, strict=True) if each]
-            return [_between(*(place[k] for k in f.keys()), f.measured(), f.noiseModel()) for f in moved]
+            return [
+                gtsam.BetweenFactorPose2(*(place[k] for k in f.keys()), f.measured(), f.noiseModel()) for f in moved
+            ]
 
         steps = {tuple(factor.keys()): factor for factor in self._certain}
         self._certain = [
-            _between(place[a], place[b], steps[a, b].measured(), steps[a, b].noiseModel())
+            gtsam.BetweenFactorPose2(place[a], place[b], steps[a, b].measured(), steps[a, b].noiseModel())
             if (a, b) in steps
             else _factor(place[a], place[b], between(self.poses[a], self.poses[b]), spread(a, b))
             for a, b in pairwise(map(int, numbers))
@@ -199,9 +201,6 @@ class PoseGraph:
         for k, pose in enumerate(self.poses[first:], first):
             values.insert(k, gtsam.Pose2(*pose))
         return values
-
-
-_between = gtsam.BetweenFactorPose2
 
 
 def _factor(of, to, relative, covariance) -> gtsam.BetweenFactorPose2:

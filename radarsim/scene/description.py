@@ -72,9 +72,8 @@ class Custom(_Strict):
     def material(self, name: str) -> Material:
         law = None if self.conductor else constant(self.permittivity, self.conductivity)
         sigma0 = decibel(self.sigma0_db)
-        lobes = {"directive": self.directive, "backscatter": self.backscatter}
-        told = lobes | {"clear": self.clear, "source": "scene file"}
-        return Material(name, law, self.roughness, sigma0, self.thickness, **told)
+        told = {"directive": self.directive, "backscatter": self.backscatter, "clear": self.clear}
+        return Material(name, law, self.roughness, sigma0, self.thickness, source="scene file", **told)
 
 
 class CustomMaterial(_Strict):

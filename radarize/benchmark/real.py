@@ -20,7 +20,6 @@ from radarize.benchmark.realmotion import (
     followed,
     mapped,
     network_rates,
-    network_turns,
     shifted_turns,
     smoothed,
     surface_of,
@@ -36,7 +35,6 @@ from radarize.methods.pictures.memory import Memory
 from radarize.methods.pictures.network import PictureNet
 from radarize.methods.pictures.points import first_surfaces, points
 from radarize.methods.pictures.scans import on_bearings
-from radarize.methods.pictures.turns import PictureTurnNet
 from radarize.nets.weights import Header, load
 from radarize.points import Cfar, level_around
 from radarize.radar.presets import PRESETS
@@ -105,11 +103,9 @@ def real(
     """
     machine()  # as things are now
     walks = [Walk.find(data, number) for number in options.walks] or Walk.tests(data)
-    weights = [Weights(options.weights).of(kind) for kind in ("pictures", "picture-turns")]
-    scans, turns = (
-        load(path, kind, PRESETS["radarhd"]) if path.is_file() else None
-        for path, kind in zip(weights, (PictureNet, PictureTurnNet), strict=True)
-    )
+    weights = Weights(options.weights)
+    seen, turned = (weights.of(kind) for kind in ("pictures", "picture-turns"))
+    scans = load(seen, PictureNet, PRESETS["radarhd"]) if seen.is_file() else None
     done, total = count(1), sum(walk.frames for walk in walks)
     rows, maps, errors = [], [], {}
     for walk in walks:
@@ -119,11 +115,11 @@ def real(
         found = judged.apart
         errors |= {(walk.number, name): apart for name, apart in found.items()}
         told = {"shifted pictures": shifted_turns(judged.pictures)}
-        if turns:
-            told["network"] = network_turns(turns, judged.pictures)
+        rates = network_rates(weights, judged.pictures) if turned.is_file() else None
+        if rates is not None:
+            told["network"] = SPAN * PERIOD * rates[:, 0]
         told |= {f"{name}, smoothed": smoothed(each) for name, each in told.items()}
         moved = {name: turn_errors(each, poses) for name, each in told.items()}
-        rates = network_rates(weights[1], judged.pictures) if turns else None
         drawn = _maps(walk, judged, poses, rates)
         maps += drawn
         mapped_by = {row["method"]: row for row in drawn}
@@ -138,7 +134,7 @@ def real(
         Table("Between methods", _paired(errors)),
         Table("SLAM and maps", maps, [MAP_NOTE]),
     ]
-    networks = tuple(Network.of(path) for path, net in zip(weights, (scans, turns), strict=True) if net)
+    networks = tuple(Network.of(path) for path in (seen, turned) if path.is_file())
     results = Results("In the real world", tables, data_of, networks, options.command)
     results.write(Path(output), "real")
     return results

@@ -5,10 +5,8 @@ The reference is the lidar beside the radar: its poses, and its points at these 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-import torch
 from jaxtyping import Float, UInt8
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import cKDTree
@@ -19,10 +17,9 @@ from radarize.errors import InputError
 from radarize.evaluation.mapping import agreement
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
 from radarize.evaluation.trajectory import trajectory
+from radarize.methods.method import Inputs, Weights
 from radarize.methods.pictures.odometry import PictureRates
-from radarize.methods.pictures.turns import PictureTurnNet
 from radarize.methods.scan_matching.odometry import ScanMatching
-from radarize.nets.weights import Header
 from radarize.pose import between, compose, transform, wrap
 from radarize.radar.presets import PRESETS
 from radarize.slam.backend import Slam
@@ -59,25 +56,6 @@ def turn_errors(found: Float[np.ndarray, "frame"], poses: Float[np.ndarray, "fra
         "yaw_median_deg": float(np.median(np.abs(error))),
         "turns_rms_deg": float(np.sqrt(np.mean(np.degrees(true[known]) ** 2))),
     }
-
-
-@torch.inference_mode()
-def network_turns(
-    network: tuple[PictureTurnNet, Header], pictures: UInt8[np.ndarray, "frame range azimuth"]
-) -> Float[np.ndarray, "frame"]:
-    """Turns by a network that was trained in simulation."""
-    net, header = network
-    windows, times = header.windows(PRESETS["radarhd"]), stamps(len(pictures))
-    if windows.stride != SPAN:
-        raise InputError(
-            f"picture-turns: is of frames {windows.stride * PERIOD:g} s apart, expected {SPAN * PERIOD:g} s"
-        )
-    found = np.full(len(pictures), np.nan)
-    for start in range(0, len(pictures), 64):
-        some = slice(start, start + 64)
-        shown = windows.push({"picture": pictures[some].astype(np.float16)}, times[some])[0]
-        found[some] = np.where(shown.whole, net.estimate(shown.maps)[0][:, 0].numpy(), np.nan)
-    return found
 
 
 def shifted_turns(pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float[np.ndarray, "frame"]:
@@ -146,14 +124,16 @@ class _Given:
         return self.ranges
 
 
-def network_rates(weights: Path, pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float[np.ndarray, "frame 2"]:
-    """Rates of turning (rad/s) and their variances by a network that was trained in simulation; nan: not known."""
-    radar = PRESETS["radarhd"]
-    network, signal, times = PictureRates(radar, weights), Signal(radar), stamps(len(pictures))
-    found = np.empty((len(pictures), 2))
+def network_rates(weights: Weights, pictures: UInt8[np.ndarray, "frame range azimuth"]) -> Float[np.ndarray, "frame 2"]:
+    """Rates of turning over `SPAN` frames (rad/s) and their variances by a network that was trained in simulation; nan:
+    not known."""
+    inputs, times = Inputs(PRESETS["radarhd"], weights=weights), stamps(len(pictures))
+    network, found = PictureRates(inputs), np.empty((len(pictures), 2))
+    if round(network.span / PERIOD) != SPAN:
+        raise InputError(f"picture-turns: is of frames {network.span:g} s apart, expected {SPAN * PERIOD:g} s")
     for start in range(0, len(pictures), 64):
         some = slice(start, start + 64)
-        found[some] = network.rates(Batch(signal, None, times[some], maps={"picture": pictures[some]}))
+        found[some] = network.rates(Batch(inputs.signal, None, times[some], maps={"picture": pictures[some]}))
     return found
 
 

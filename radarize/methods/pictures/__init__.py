@@ -12,7 +12,7 @@ ODOMETRY = {
 }
 SCANS = {
     "pictures": Method(
-        "network on polar pictures", "radarize.methods.pictures.scans:scanner", ("pictures",), pictures=True
+        "network on polar pictures", "radarize.methods.pictures.scans:PictureScans", ("pictures",), pictures=True
     )
 }
 TASKS = {

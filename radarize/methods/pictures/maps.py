@@ -1,8 +1,10 @@
 """Polar pictures as maps that networks see, and what they are made of."""
 
 import numpy as np
+from jaxtyping import Float16
 
 from radarize import polar
+from radarize.batch import Batch
 from radarize.features.maps import Axes, Maker
 from radarize.radar.config import RadarConfig
 
@@ -31,6 +33,12 @@ class PictureMaker(Maker):
         if name == "antennas":
             return Axes(BINS, config.range_resolution, np.arange(float(NUMBERS)))
         return Axes(polar.ROWS, polar.RANGES[1], polar.AZIMUTHS)
+
+    def of(self, batch: Batch) -> Float16[np.ndarray, "frame range azimuth"]:
+        """Pictures of a batch's frames: those that are known, or as its samples make them."""
+        known = batch.samples is None
+        pictures = batch.maps(("picture",)) if known else self(batch.samples, names=("picture",))
+        return pictures["picture"].astype(np.float16, copy=False)
 
     def __call__(self, adc, valid=None, names=None, frames=slice(None)):
         made = {}

@@ -36,7 +36,7 @@ class Provenance(IntEnum):
 
 @dataclass(frozen=True)
 class Echoes:
-    """The echoes of a frame, points first, those of movers last among them, then images.
+    """The echoes of a frame, points first, then images, what moves last among either.
 
     Attributes:
         points: a and b of point echoes, world, m, at the middle of the burst.
@@ -44,6 +44,7 @@ class Echoes:
         amplitude: square root of received over transmitted power, with phase, as in the beat signal.
         provenance: a `Provenance` each.
         moves: of the last points, how far a and b have moved at the burst's three nodes (`synthesis.NODES`), m.
+        turns: of the last images, what they are at these nodes.
     """
 
     points: Float[np.ndarray, "point 2 3"]
@@ -51,6 +52,7 @@ class Echoes:
     amplitude: Complex[np.ndarray, "echo"]
     provenance: UInt8[np.ndarray, "echo"]
     moves: Float[np.ndarray, "moving 2 3 3"] = field(default_factory=lambda: np.zeros((0, 2, 3, 3)))
+    turns: Float[np.ndarray, "turning 3 3 4"] = field(default_factory=lambda: np.zeros((0, 3, 3, 4)))
 
     def __len__(self) -> int:
         return len(self.amplitude)
@@ -65,6 +67,7 @@ class Echoes:
             self.amplitude[keep],
             self.provenance[keep],
             self.moves[keep[n - len(self.moves) : n]],
+            self.turns[keep[len(self) - len(self.turns) :]],
         )
 
     def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "echo virtual 3"]:
@@ -84,7 +87,7 @@ class Echoes:
         rx = position[:, None] + rx_positions(config) @ rotation.transpose(0, 2, 1)
         out = np.empty((len(self), tx.shape[1] * rx.shape[1], 3))
         _point_lengths(self.points, self.moves, tx, rx, out)
-        _image_lengths(self.images, tx, rx, out[len(self.points) :])
+        _image_lengths(self.images, self.turns, tx, rx, out[len(self.points) :])
         return out
 
 
@@ -119,14 +122,15 @@ def _point_lengths(points, moves, tx, rx, out):
 
 
 @njit(cache=True)
-def _image_lengths(images, tx, rx, out):
+def _image_lengths(images, turns, tx, rx, out):
     nodes, n_tx, _ = tx.shape
     n_rx = rx.shape[1]
     seen, way = np.empty((nodes, 3)), np.empty(nodes)
+    still = len(images) - len(turns)
     for e in range(len(images)):
-        m = images[e]
         for r in range(n_rx):
             for i in range(nodes):
+                m = images[e] if e < still else turns[e - still, i]
                 for d in range(3):
                     seen[i, d] = dot(vec(m[d]), vec(rx[i, r])) + m[d, 3]
             for k in range(n_tx):

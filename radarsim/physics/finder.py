@@ -6,18 +6,20 @@ Start reading at `EchoFinder.batch`.
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from radarize.radar.config import RadarConfig
-from radarsim.physics import images, roundghosts, sight
+from radarsim.physics import images, movingplates, roundghosts, sight
 from radarsim.physics.antenna import Antenna, gain_pattern
 from radarsim.physics.candidates import Candidates
 from radarsim.physics.echoes import Echoes, Provenance
 from radarsim.physics.fresnelzone import LEAST_LOSS
 from radarsim.physics.images import Images
+from radarsim.physics.movingplates import MovingPlates
 from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.obstacles import CLEARANCE, Obstacles
 from radarsim.physics.paths import OneWay, TwoWay
+from radarsim.physics.pointechoes import PointEchoes
 from radarsim.physics.reflectors import Flat, Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.search import Search
@@ -63,9 +65,12 @@ class EchoFinder:
         heights: Heights | None = None,
     ):
         self.scene, self.surface, self.reflectors, self.config = scene, surface, reflectors, config
-        self.threshold, self.moving, self.heights = threshold, moving, heights
+        self.threshold, self.heights = threshold, heights
+        self.moving = MovingTargets([], np.random.default_rng()) if moving is None else moving
+        self.plates = MovingPlates(self.moving, config, CLEARANCE)
         self.range = 1.05 * config.max_range if range is None else range
-        self.obstacles = Obstacles(scene, None if scene is None else Transmission(scene, config, CLEARANCE), moving)
+        transmission = None if scene is None else Transmission(scene, config, CLEARANCE)
+        self.obstacles = Obstacles(scene, transmission, self.moving, self.plates)
         self._pattern = gain_pattern(antenna)
 
     def __call__(
@@ -89,36 +94,30 @@ class EchoFinder:
         search = Search(*poses, self.range, self.config.wavelength, self.threshold, *self._pattern)
         targets = Targets.of(search, self.surface, self.moving)
         candidates = Candidates.of(search, targets)
-        flat, mirrors = self._mirrors(search)
+        flat, facing, mirrors = self._mirrors(search)
         straight = self._straight(search, targets, candidates)
         over_mirrors = self._over_mirrors(search, targets, candidates, straight, flat, mirrors)
         one_way = OneWay.joined([straight, over_mirrors])
         two_way = TwoWay.of(search, targets, candidates, one_way)
-        found = Images.none()
+        points, found = PointEchoes.of(candidates, one_way, two_way), Images.none()
         if self.reflectors is not None:
-            facing = Flat.joined([flat, self.reflectors.inner_near(search.position, search.range)])
             found = Images.joined([
                 images.flashes(search, facing, self.reflectors.round, self.obstacles, self.heights),
                 images.by_chains(search, flat, mirrors, self.obstacles),
             ])  # fmt: skip
-        echoes = self._echoes(search, targets, candidates, one_way, two_way, found)
-        if self.reflectors is None or not len(self.reflectors.round):
-            return echoes
-        ghosts = roundghosts.seen(search, flat, mirrors, self.reflectors.round, self.obstacles)
-        return [
-            replace(
-                e, points=np.concatenate([g.points, e.points]), amplitude=np.concatenate([g.amplitude, e.amplitude]),
-                provenance=np.concatenate([g.cause, e.provenance]),
-            )
-            for e, g in zip(echoes, ghosts, strict=True)
-        ]  # fmt: skip
+            ghosts = roundghosts.seen(search, flat, mirrors, self.reflectors.round, self.obstacles)
+            points = PointEchoes.joined([ghosts, points])
+        return self._echoes(search, targets, facing, points, found)
 
-    def _mirrors(self, search: Search) -> tuple[Flat, list[Mirrors]]:
-        """Flat reflectors in range of any frame, and those that play a part in each."""
+    def _mirrors(self, search: Search) -> tuple[Flat, Flat, list[Mirrors]]:
+        """Flat reflectors in range of any frame, those and inner ones, and which play a part in each."""
         if self.reflectors is None:
-            return Flat.none(), [Mirrors.none()] * search.frames
-        flat = self.reflectors.near(search.position, search.range)
-        return flat, sight.mirrors(search, flat, self.scene)
+            return Flat.none(), Flat.none(), [Mirrors.none()] * search.frames
+        flat, inner = (near(search.position, search.range) for near in (self.reflectors.near, self.reflectors.inner_near))
+        if len(self.plates):
+            moving, hollow = self.plates.faces(search)
+            flat, inner = Flat.joined([flat, moving]), Flat.joined([inner, hollow])
+        return flat, Flat.joined([flat, inner]), sight.mirrors(search, flat, self.scene)
 
     def _straight(self, search: Search, targets: Targets, candidates: Candidates) -> OneWay:
         """Straight paths worth an echo, through slabs last."""
@@ -171,48 +170,45 @@ class EchoFinder:
         return paths
 
     def _echoes(
-        self, search: Search, targets: Targets, candidates: Candidates, one_way: OneWay, two_way: TwoWay, found: Images
+        self, search: Search, targets: Targets, flat: Flat, points: PointEchoes, found: Images
     ) -> list[Echoes]:
-        """Two-way paths and images, by frame."""
-        first = one_way.candidate[two_way.ways[:, 0]]
-        points, moving = np.take(one_way.virtual, two_way.ways, axis=0), two_way.cause == Provenance.MOVING
-        moves = self._moves(search, targets, candidates, one_way, two_way.ways[moving])
-        frames = np.arange(search.frames + 1)
-        edges = np.searchsorted(candidates.frame[first], frames)
-        moved = np.concatenate([[0], np.cumsum(moving)])[edges]
-        found = found[np.argsort(found.frame, kind="stable")]
-        mirrored = np.searchsorted(found.frame, frames)
+        """Echoes by frame, what moves last among points and among images."""
+        moves = self.plates.moves(search)
+        if len(self.plates):
+            points.cause[movingplates.carried(flat, points.mirrors.reshape(-1, 4))] = Provenance.MOVING
+        carried = movingplates.carried(flat, found.mirrors)
+        found.cause[carried] = Provenance.MOVING
+        points = points[np.lexsort((points.cause == Provenance.MOVING, points.frame))]
+        order = np.lexsort((carried, found.frame))
+        found, carried = found[order], carried[order]
+        moving, turning = points.cause == Provenance.MOVING, found[carried]
+        offsets = self._moves(search, targets, flat, points[moving], moves)
+        turns = movingplates.turned(flat, turning.isometry, turning.mirrors, moves)
+        frames = range(search.frames + 1)
+        edges = [np.searchsorted(of, frames) for of in (points.frame, points.frame[moving], found.frame, turning.frame)]
+        spans = zip(*([slice(a, b) for a, b in zip(e, e[1:], strict=False)] for e in edges), strict=True)
         return [
             Echoes(
-                points[i:j], found.isometry[k:m],
-                np.concatenate([two_way.amplitude[i:j], found.amplitude[k:m]]),
-                np.concatenate([two_way.cause[i:j], found.cause[k:m]]), moves[a:b],
+                points.points[p], found.isometry[i], np.concatenate([points.amplitude[p], found.amplitude[i]]),
+                np.concatenate([points.cause[p], found.cause[i]]), offsets[m], turns[t],
             )
-            for i, j, k, m, a, b in zip(edges, edges[1:], mirrored, mirrored[1:], moved, moved[1:], strict=False)
+            for p, m, i, t in spans
         ]  # fmt: skip
 
     def _moves(
-        self,
-        search: Search,
-        targets: Targets,
-        candidates: Candidates,
-        one_way: OneWay,
-        ends: Int[np.ndarray, "moving 2"],
-    ) -> Float[np.ndarray, "moving 2 3 3"]:
-        """How far the virtual points of movers' echoes are from where they are in the middle, at the burst's nodes."""
-        first = one_way.candidate[ends[:, 0]]
-        owner = candidates.frame[first]
-        carried = (candidates.scatterer[first] - targets.still) % max(len(self.moving or ()), 1)
-        offsets = BurstClock.of(self.config).half * NODES
-        out = np.empty((len(ends), 2, 3, 3))
-        for frame in np.unique(owner):
-            rows = np.flatnonzero(owner == frame)
-            places = self.moving.positions(search.time[frame] + np.append(offsets, 0.0))[:, carried[rows]]
-            moved = (places[:3] - places[3]).transpose(1, 0, 2)  # echo, node, axis
-            for way in (0, 1):
-                turn = one_way[ends[rows, way]].turn(places[3])
-                out[rows, way] = np.einsum("eij,enj->eni", turn, moved)
-        return out
+        self, search: Search, targets: Targets, flat: Flat, points: PointEchoes,
+        moves: Float[np.ndarray, "frame plate 4 3 4"],
+    ) -> Float[np.ndarray, "moving 2 3 3"]:  # fmt: skip
+        """How far the virtual points of echoes that move are from where they are in the middle, at the burst's nodes."""
+        offsets = BurstClock.of(self.config).half * np.append(NODES, 0.0)
+        own = np.zeros((len(points), 3, 3))  # echo, node, axis
+        for frame in np.unique(points.frame):
+            rows = np.flatnonzero((points.frame == frame) & (points.scatterer >= targets.still))
+            which = (points.scatterer[rows] - targets.still) % max(len(self.moving), 1)
+            places = self.moving.positions(search.time[frame] + offsets)[:, which]
+            own[rows] = (places[:3] - places[3]).transpose(1, 0, 2)
+        ways = [movingplates.moved(flat, points.points[:, k], own, points.mirrors[:, k], moves) for k in (0, 1)]
+        return np.stack(ways, axis=1)
 
 
 def _strongest_echoes(candidates: Candidates, straight: OneWay, paths: OneWay) -> Float[np.ndarray, "path"]:

@@ -26,17 +26,20 @@ class Images(Table):
         isometry: matrix | offset, world.
         amplitude: square root of received over transmitted power, with phase.
         cause: a `Provenance` each.
+        mirrors: the flat reflector that it is a part of, or those that it is seen in, in order; -1: none.
     """
 
     frame: Int[np.ndarray, "image"]
     isometry: Float[np.ndarray, "image 3 4"]
     amplitude: Complex[np.ndarray, "image"]
     cause: UInt8[np.ndarray, "image"]
+    mirrors: Int[np.ndarray, "image 3"]
 
     @classmethod
     def none(cls) -> "Images":
         """No image."""
-        return cls(np.zeros(0, int), np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, np.uint8))
+        none = np.zeros(0, int), np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, np.uint8)
+        return cls(*none, np.zeros((0, 3), int))
 
 
 def flashes(
@@ -46,6 +49,7 @@ def flashes(
     found, ways = [], []
     for frame in range(search.frames):
         parts = plates.parts(flat, search, frame)
+        parts = parts[flat.present(frame)[parts.facet]]
         aim, isometry, amplitude = round_bodies.flashes(search, frame)
         cause = np.where(flat.horizontal[parts.facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
         cause = np.append(cause, np.full(len(aim), Provenance.DIRECT)).astype(np.uint8)
@@ -54,7 +58,10 @@ def flashes(
             parts = replace(parts, amplitude=parts.amplitude * uneven)
         ways += [_to_parts(search, frame, flat, parts), _to_bodies(search, frame, aim)]
         isometry = np.concatenate([parts.isometry, isometry])
-        found.append(Images(np.full(len(cause), frame), isometry, np.append(parts.amplitude, amplitude), cause))
+        mirrors = np.full((len(cause), 3), -1)
+        mirrors[: len(parts), 0] = parts.facet
+        amplitude = np.append(parts.amplitude, amplitude)
+        found.append(Images(np.full(len(cause), frame), isometry, amplitude, cause, mirrors))
     images, ways = Images.joined(found), Stretches.joined(ways)
     factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(images.amplitude))
     return _passed(search, images, factor**2, 2 * delay)  # there and back
@@ -108,7 +115,8 @@ def _passed(search: Search, images: Images, factor, delay) -> Images:
     isometry[:, :, 3] += (delay / np.linalg.norm(away, axis=1))[:, None] * away
     cause = np.where(factor == 1, images.cause, np.uint8(Provenance.THROUGH_SLAB))
     amplitude = images.amplitude * factor
-    return Images(images.frame, isometry, amplitude, cause)[np.abs(amplitude) > search.threshold]
+    passed = replace(images, isometry=isometry, amplitude=amplitude, cause=cause)
+    return passed[np.abs(amplitude) > search.threshold]
 
 
 def _along(search: Search, flat: Flat, frame: Int[np.ndarray, "chain"], chains: imagemethod.Chains) -> Stretches:
@@ -159,11 +167,13 @@ def by_chains(search: Search, flat: Flat, mirrors: list[Mirrors], obstacles: Obs
     slant += np.where(two, 0, np.abs(np.einsum("cd,cd->c", b, c)))
     cause = np.where(two, Provenance.GHOST_2, Provenance.GHOST_3).astype(np.uint8)
     cause[slant < 1e-3] = Provenance.DIRECT
-    there = Images(frame, chains.isometry, chains.amplitude, cause)
+    order = np.where(two[:, None], chains.mirrors * [1, 1, 0] - [0, 0, 1], chains.mirrors)
+    there = Images(frame, chains.isometry, chains.amplitude, cause, order)
     ways = _along(search, flat, frame, chains)
     factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(chains.amplitude).repeat(4))
     factor, delay = factor.reshape(-1, 4).prod(axis=1), delay.reshape(-1, 4).sum(axis=1)
-    back = replace(there, isometry=imagemethod.reverse(chains.isometry))
+    order = np.where(two[:, None], order[:, [1, 0, 2]], order[:, ::-1])
+    back = replace(there, isometry=imagemethod.reverse(chains.isometry), mirrors=order)
     two_ways = chains.mirrors[:, 0] != chains.mirrors[:, 2]
     return Images.joined([
         _passed(search, there, factor, delay), _passed(search, back[two_ways], factor[two_ways], delay[two_ways])

@@ -3,14 +3,16 @@
 Over a burst a scatterer's path is a parabola through three nodes. Limbs jerk: against every chirp's own place a
 walker's echoes are wrong by -40 to -60 dB for most of the step cycle and by -25 dB where shins turn (measured over
 one). Ghosts of movers go over one mirror or out and back over one each; legs over two are left out.
+
+Parts of a material scatter as its surfaces do, and are plates besides (`movingplates`).
 """
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from numba import njit, prange
 
 from radarsim.physics.scatterers import BOUNCE_STRIDE, Scatterers
-from radarsim.physics.scatteringpattern import LAMBERT
+from radarsim.physics.scatteringpattern import LAMBERT, weights
 from radarsim.scene.movers import MovingThing
 
 
@@ -23,31 +25,40 @@ class MovingTargets:
         density: scatterers per square metre of surface.
 
     Attributes:
+        parts: rigid parts of all movers.
+        opaque: indices of those that nothing passes.
         part: (scatterer,) index of the part that carries it.
         sigma, phase: (scatterer,) m^2, rad.
     """
 
     def __init__(self, movers: list[MovingThing], rng: np.random.Generator, density: float = 150.0):
         self.movers = movers
-        self._parts = [part for mover in movers for part in mover.parts()]
+        self.parts = [part for mover in movers for part in mover.parts()]
+        self.opaque = np.array([k for k, part in enumerate(self.parts) if part.material is None], int)
         place, normal, part, sigma = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, int)], [np.zeros(0)]
+        lobe = [np.zeros((0, 4))]
         number = 0
         for mover in movers:
-            # Half of an upright round body faces the radar, and there Lambert's squared cosine averages 1/2.
-            per_area = 4 * mover.cross_section / sum(p.area for p in mover.parts())
             for each in mover.parts():
+                if each.material is None:
+                    # Half of an upright round body faces the radar, and there Lambert's squared cosine averages 1/2.
+                    per_area = 4 * mover.cross_section / sum(p.area for p in mover.parts())
+                else:
+                    per_area = each.material.sigma0
                 count = max(int(round(density * each.area)), 4)
                 points, normals = each.sample(count, rng)
                 place.append(points)
                 normal.append(normals)
                 part.append(np.full(count, number))
                 sigma.append(np.full(count, per_area * each.area / count))
+                lobe.append(np.tile(LAMBERT if each.material is None else weights(each.material), (count, 1)))
                 number += 1
         self._place, self._normal = np.concatenate(place), np.concatenate(normal)
         self.part, self.sigma = np.concatenate(part), np.concatenate(sigma)
+        self._lobe = np.concatenate(lobe)
         self.phase = rng.uniform(0, 2 * np.pi, len(self.part))
-        self._half = np.array([p.half for p in self._parts]).reshape(-1, 3)
-        self._capsule = np.array([p.capsule for p in self._parts], bool)
+        self._half = np.array([p.half for p in self.parts]).reshape(-1, 3)
+        self._capsule = np.array([p.capsule for p in self.parts], bool)
 
     def __len__(self) -> int:
         return len(self.part)
@@ -82,19 +93,22 @@ class MovingTargets:
             horizontal=np.zeros(n, bool),
             bounces=np.where(every % BOUNCE_STRIDE == 0, float(BOUNCE_STRIDE), 0.0),
             bounces_twice=np.where(every % BOUNCE_STRIDE**2 == 0, float(BOUNCE_STRIDE**2), 0.0),
-            lobe=np.tile(LAMBERT, (n, 1)),
+            lobe=self._lobe,
             rank=np.full(n, -1.0),
         )
 
     def occluded(
-        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float, margin: float = 0.01
-    ) -> Bool[np.ndarray, "n"]:
-        """Whether a part stands in a segment at time t, both ends shortened by `margin`, m."""
+        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float, margin: float = 0.01,
+        parts: Int[np.ndarray, "some"] | None = None,
+    ) -> Bool[np.ndarray, "n"]:  # fmt: skip
+        """Whether a part, of some or of all, stands in a segment at time t, both ends shortened by `margin`, m."""
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
         hidden = np.zeros(len(origins), bool)
-        if len(self._parts) and len(origins):
+        some = np.arange(len(self.parts)) if parts is None else parts
+        if len(some) and len(origins):
             turn, center = self.poses(np.array([t]))
-            _hide(origins, targets, turn[0], center[0], self._half, self._capsule, margin, hidden)
+            shape = self._half[some], self._capsule[some]
+            _hide(origins, targets, turn[0, some], center[0, some], *shape, margin, hidden)
         return hidden
 
 

@@ -1,8 +1,9 @@
-"""What stands in the way of rays: opaque objects stop them, thin slabs weaken and delay them, movers stop them."""
+"""What stands in the way of rays: opaque objects and movers stop them, slabs and doors weaken and delay them."""
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
+from radarsim.physics.movingplates import MovingPlates
 from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.search import Search
 from radarsim.physics.transmission import Transmission
@@ -19,18 +20,20 @@ class Obstacles:
         scene: None where nothing can stand in the way.
         transmission: what passes through its thin objects.
         moving: what moves by itself.
+        plates: those of its parts that waves may pass.
     """
 
-    def __init__(self, scene: Scene | None, transmission: Transmission | None, moving: MovingTargets | None):
-        self.scene, self.transmission, self.moving = scene, transmission, moving
+    def __init__(
+        self, scene: Scene | None, transmission: Transmission | None, moving: MovingTargets, plates: MovingPlates
+    ):
+        self.scene, self.transmission, self.moving, self.plates = scene, transmission, moving, plates
 
     def _shadowed(self, search: Search, frame, begin, end) -> Bool[np.ndarray, "ray"]:
-        """Whether a mover stands in the way."""
+        """Whether an opaque part of a mover stands in the way."""
         hidden = np.zeros(len(frame), bool)
-        if self.moving is not None and len(self.moving):
-            for k in np.unique(frame):
-                now = frame == k
-                hidden[now] = self.moving.occluded(begin[now], end[now], search.time[k])
+        for k in np.unique(frame) if len(self.moving.opaque) else ():
+            now = frame == k
+            hidden[now] = self.moving.occluded(begin[now], end[now], search.time[k], parts=self.moving.opaque)
         return hidden
 
     def clear(
@@ -39,7 +42,10 @@ class Obstacles:
     ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
         """Whether nothing is in the way, slabs included; frames and ends as `passage` has them."""
         blocked = np.zeros(len(frame), bool) if self.scene is None else self.scene.occluded(begin, end, CLEARANCE)
-        return ~(blocked | self._shadowed(search, frame, begin, end))
+        blocked |= self._shadowed(search, frame, begin, end)
+        if len(self.plates):
+            blocked |= self.plates.passage(search, frame, begin, end, np.zeros(len(frame), bool))[0] == 0
+        return ~blocked
 
     def passage(
         self, search: Search, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
@@ -61,6 +67,9 @@ class Obstacles:
                 up = search.rotation[frame[through], :, 2]
                 factor[through], delay[through] = self.transmission.passage(begin[through], end[through], up)
         factor[self._shadowed(search, frame, begin, end)] = 0
+        if len(self.plates):
+            passed, late = self.plates.passage(search, frame, begin, end, allowed & (factor != 0))
+            factor, delay = factor * passed, delay + late
         return factor, delay
 
     def way(

@@ -36,7 +36,7 @@ class OneWay(Table):
 
     Attributes:
         candidate: row in the table of candidates: which scatterer in which frame.
-        bounces: number of mirrors, 0 to 2.
+        mirrors: in order from the sensor on, as indices of flat reflectors; -1: none.
         amplitude: see above, 1/m; phase as in the beat signal.
         virtual: the scatterer as seen through the mirrors, m.
         last: the last point before the scatterer: the sensor's, or a place of reflection, m.
@@ -44,11 +44,16 @@ class OneWay(Table):
     """
 
     candidate: Int[np.ndarray, "path"]
-    bounces: Int[np.ndarray, "path"]
+    mirrors: Int[np.ndarray, "path 2"]
     amplitude: Complex[np.ndarray, "path"]
     virtual: Float[np.ndarray, "path 3"]
     last: Float[np.ndarray, "path 3"]
     slab: Bool[np.ndarray, "path"]
+
+    @property
+    def bounces(self) -> Int[np.ndarray, "path"]:
+        """Number of mirrors, 0 to 2."""
+        return (self.mirrors >= 0).sum(axis=1)
 
     @classmethod
     def straight(
@@ -57,19 +62,10 @@ class OneWay(Table):
         """Straight paths to some candidates, not yet tested for what is in the way."""
         n = len(rows)
         return cls(
-            rows, np.zeros(n, int), candidates.straight[rows].astype(complex),
+            rows, np.full((n, 2), -1), candidates.straight[rows].astype(complex),
             np.take(targets.scatterers.position, candidates.scatterer[rows], axis=0),
             np.take(search.position, candidates.frame[rows], axis=0), np.zeros(n, bool),
         )  # fmt: skip
-
-    def turn(self, places: Float[np.ndarray, "path 3"]) -> Float[np.ndarray, "path 3 3"]:
-        """How the virtual point moves when the scatterer does: the mirror's reflection, for paths over at most one.
-
-        A mirror's normal is along the line from the scatterer to its image.
-        """
-        normal = (places - self.virtual) * (self.bounces == 1)[:, None]
-        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
-        return np.eye(3) - 2 * normal[:, :, None] * normal[:, None]
 
 
 @dataclass(frozen=True)
@@ -93,7 +89,7 @@ class TwoWay(Table):
         most = int(np.sum(np.diff(first) ** 2))
         found = cls(np.empty((most, 2), np.int64), np.empty(most, complex), np.empty(most, np.uint8))
         echoing = _Echoing(first, order, candidates.frame, candidates.scatterer, candidates.size, targets.cause,
-                           targets.weights)  # fmt: skip
+                           targets.weights, one_way.bounces)  # fmt: skip
         return found[: _join(search, echoing, targets.scatterers.columns, one_way.columns, found.columns)]
 
 
@@ -107,6 +103,7 @@ class _Echoing(NamedTuple):
     size: Float[np.ndarray, "candidate"]
     cause: UInt8[np.ndarray, "scatterer"]
     weights: Float[np.ndarray, "scatterer 3"]
+    bounces: Int[np.ndarray, "path"]
 
 
 @njit(cache=True)
@@ -144,7 +141,7 @@ def _join(search, echoing, scatterers, path, found):
                 continue
             way = length(minus(vec(path.virtual[i]), sensor))
             for j in some:
-                mirrors, passes = path.bounces[i] + path.bounces[j], path.slab[i] or path.slab[j]
+                mirrors, passes = echoing.bounces[i] + echoing.bounces[j], path.slab[i] or path.slab[j]
                 if mirrors > MOST_BOUNCES:
                     continue
                 to_j, back, way_back = to_i, there, way

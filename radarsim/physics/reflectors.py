@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Bool, Complex, Float, Int
 
 from radarize.radar.config import RadarConfig
 from radarsim.physics.bodies import recognise
@@ -31,6 +31,8 @@ class Flat(Table):
         reflection: complex reflection coefficient by (facet, polarisation TE / TM, cosine of incidence), roughness
             included, as it appears in the beat signal (conjugate of the field's).
         finish: how uneven they are over plaster, see `unevenness.FINISHES`.
+        plate, frame: the moving plate that they belong to (`movingplates`), and the frame in which they stand so;
+            -1: they stand still, in all frames.
     """
 
     corners: Float[np.ndarray, "facet 4 3"]
@@ -43,13 +45,20 @@ class Flat(Table):
     horizontal: Bool[np.ndarray, "facet"]
     reflection: Complex[np.ndarray, "facet 2 cosine"]
     finish: Float[np.ndarray, "facet"]
+    plate: Int[np.ndarray, "facet"]
+    frame: Int[np.ndarray, "facet"]
+
+    def present(self, frame: int) -> Bool[np.ndarray, "facet"]:
+        """Which are there in a frame."""
+        return (self.frame < 0) | (self.frame == frame)
 
     @classmethod
     def none(cls) -> "Flat":
         """No facet."""
-        no, empty = np.zeros(0, bool), np.zeros((0, 3))
+        no, empty, still = np.zeros(0, bool), np.zeros((0, 3)), np.zeros(0, int)
         table = np.zeros((0, 2, TABLE), complex)
-        return cls(np.zeros((0, 4, 3)), empty, empty, empty, empty, np.zeros((0, 2)), no, no, table, np.zeros(0))
+        shape = np.zeros((0, 4, 3)), empty, empty, empty, empty, np.zeros((0, 2))
+        return cls(*shape, no, no, table, np.zeros(0), still, still)
 
 
 @dataclass(frozen=True)
@@ -94,7 +103,7 @@ class Reflectors:
             bodies += [(b.center, b.axis, b.radius, b.half, tables[slab]) for b in round_]
             # physical optics holds down to about a wavelength
             found = plates(item.mesh, ~is_round, config.wavelength**2)
-            rest = (*sides, tables[slab], finish)
+            rest = (*sides, tables[slab], finish, -1, -1)
             flat += [(p.corners, p.center, p.normal, p.u, p.v, p.half, *rest) for p in found]
             if slab.thickness is not None and not (whole or item.two_sided):
                 for p in found:

@@ -14,7 +14,7 @@ its axis.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex, Float, Int, UInt8
+from jaxtyping import Complex, Float, Int
 from numba import njit
 
 from radarsim.physics.amplitudes import (
@@ -37,6 +37,7 @@ from radarsim.physics.apertures import STRIP_FAR, aperture, passes, strip
 from radarsim.physics.curved import RoundBodies
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.obstacles import Obstacles
+from radarsim.physics.pointechoes import PointEchoes
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
 from radarsim.physics.sight import Mirrors
@@ -53,25 +54,25 @@ class RoundGhosts(Table):
     Attributes:
         points: P as seen through the mirrors of its ways out and back, m.
         stops: place of reflection and P, out and back (P twice on a straight way), m.
-        bounces: mirrors on both ways, 1 or 2.
+        mirrors: out and back, as indices of flat reflectors; -1: straight.
         amplitude: square root of received over transmitted power, with phase.
     """
 
     points: Float[np.ndarray, "ghost 2 3"]
     stops: Float[np.ndarray, "ghost 2 2 3"]
-    bounces: Int[np.ndarray, "ghost"]
+    mirrors: Int[np.ndarray, "ghost 2"]
     amplitude: Complex[np.ndarray, "ghost"]
 
     @property
-    def cause(self) -> UInt8[np.ndarray, "ghost"]:
-        """A `Provenance` each."""
-        return np.where(self.bounces == 1, Provenance.GHOST_1, Provenance.GHOST_2).astype(np.uint8)
+    def bounces(self) -> Int[np.ndarray, "ghost"]:
+        """Mirrors on both ways, 1 or 2."""
+        return (self.mirrors >= 0).sum(axis=1)
 
 
 def seen(
     search: Search, flat: Flat, mirrors: list[Mirrors], bodies: RoundBodies, obstacles: Obstacles
-) -> list[RoundGhosts]:
-    """Ghosts in each frame that nothing hides; slabs are opaque to them."""
+) -> PointEchoes:
+    """Ghosts that nothing hides; slabs are opaque to them."""
     found = [find(search, k, flat, some.seen, bodies) for k, some in enumerate(mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
     n = 2 * len(every)
@@ -79,13 +80,16 @@ def seen(
         search, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), np.zeros(n, bool)
     )
     clear = (factor != 0).reshape(-1, 2).all(axis=1)
-    return [every[clear & (frame == k)] for k in range(search.frames)]
+    frame, every = frame[clear], every[clear]
+    cause = np.where(every.bounces == 1, Provenance.GHOST_1, Provenance.GHOST_2).astype(np.uint8)
+    mirrors = np.stack([every.mirrors, np.full_like(every.mirrors, -1)], axis=2)
+    return PointEchoes(frame, every.points, mirrors, np.full(len(frame), -1), every.amplitude, cause)
 
 
 def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bodies: RoundBodies) -> RoundGhosts:
     """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
     return filled(
-        lambda n: RoundGhosts(np.empty((n, 2, 3)), np.empty((n, 2, 2, 3)), np.empty(n, np.int64), np.empty(n, complex)),
+        lambda n: RoundGhosts(np.empty((n, 2, 3)), np.empty((n, 2, 2, 3)), np.empty((n, 2), np.int64), np.empty(n, complex)),
         lambda found: _find(search, frame, flat.columns, seen, bodies.columns, found.columns),
         256,
     )
@@ -116,9 +120,9 @@ def _find(search, frame, flat, seen, bodies, found):
                 for swapped in range(1 if i == j else 2):
                     if count < len(found.amplitude):
                         found.amplitude[count] = value
-                        found.bounces[count] = (mirrors[i] >= 0) + (mirrors[j] >= 0)
                         for end in range(2):
                             way, m = (out, mirrors[i]) if end == swapped else (back, mirrors[j])
+                            found.mirrors[count, end] = m
                             write(way[1], found.points[count, end])
                             write(way[0] if m >= 0 else clear, found.stops[count, end, 0])
                             write(clear, found.stops[count, end, 1])

@@ -49,14 +49,14 @@ def couples(search: Search, frame: int, flat: Flat, firsts: Int[np.ndarray, "n"]
     """Pairs with the first among some, of which light can go on to the second."""
     follows = np.zeros((len(firsts), len(flat)), bool)
     _couple(flat.columns, search, frame, firsts, follows)
+    follows &= flat.present(frame)
     first, second = np.nonzero(follows)
     return np.stack([firsts[first], second], axis=1)
 
 
 def _seen(search: Search, flat: Flat, scene: Scene | None) -> list[Int[np.ndarray, "n"]]:
     """Per frame, the reflectors in range that turn a face to the radar and of which something can be seen."""
-    index = [_turned(flat, position, rotation[:, 0], search.range)
-             for position, rotation in zip(search.position, search.rotation, strict=True)]  # fmt: skip
+    index = [_turned(flat, search, frame) for frame in range(search.frames)]
     if scene is None:
         return index
     frame, every = np.repeat(np.arange(len(index)), [len(i) for i in index]), np.concatenate(index)
@@ -69,15 +69,16 @@ def _seen(search: Search, flat: Flat, scene: Scene | None) -> list[Int[np.ndarra
     return [every[(frame == k) & found] for k in range(search.frames)]
 
 
-def _turned(flat: Flat, position, forward, reach: float) -> Int[np.ndarray, "n"]:
-    """Those with a part within reach and in front that turn their face to a position."""
+def _turned(flat: Flat, search: Search, frame: int) -> Int[np.ndarray, "n"]:
+    """Those of a frame with a part within range and in front that turn their face to the radar."""
+    position, forward = search.position[frame], search.rotation[frame, :, 0]
     height = np.einsum("md,md->m", position - flat.center, flat.normal)
     axes = np.stack([flat.u, flat.v], axis=1)
     at = np.einsum("mkd,mad->mka", flat.corners - position, axes)
     away = np.linalg.norm(np.maximum(np.maximum(at.min(axis=1), -at.max(axis=1)), 0), axis=1)
     faced = (np.abs(height) > 0.01) & (flat.two_sided | (height > 0))
     ahead = (flat.corners @ forward).max(axis=1) > position @ forward
-    return np.flatnonzero(faced & ahead & (np.hypot(height, away) < reach))
+    return np.flatnonzero(faced & ahead & (np.hypot(height, away) < search.range) & flat.present(frame))
 
 
 def _spread(flat: Flat, index, around, reach: float) -> tuple[Float[np.ndarray, "point 3"], Int[np.ndarray, "point"]]:

@@ -119,7 +119,7 @@ class SpecularCandidates:
         _strengths(search, flat.columns, chains, aims, targets.scatterers.columns, hits)
         n = hits.count.sum()
         found = OneWay(
-            np.empty(n, np.int64), np.repeat(1 + (mirrors[:, 1] >= 0), hits.count), np.empty(n, complex),
+            np.empty(n, np.int64), np.repeat(mirrors, hits.count, axis=0), np.empty(n, complex),
             np.empty((n, 3)), np.empty((n, 3)), np.zeros(n, bool),
         )  # fmt: skip
         stops = np.empty((n, 3, 3))

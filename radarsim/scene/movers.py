@@ -1,11 +1,12 @@
 """Things that move by themselves: people who walk, doors that open, fans that turn.
 
 A mover is a set of rigid parts, each a capsule or a box in a frame of its own, with a pose at any time. Its surface
-carries scatterers that move along, and the parts stand in the way of other echoes. A scene file lists them:
+carries scatterers that move along, and the parts stand in the way of other echoes; those of a material echo and let
+through as things of that material do. A scene file lists them:
 
     moving:
       - {kind: person, name: visitor, path: [[1, 0], [4, 0]], speed: 1.1}
-      - {kind: door, name: exit, hinge: [5, 1, 1], width: 0.9, height: 2, angles: [0, 80], period: 4}
+      - {kind: door, name: exit, hinge: [5, 1, 1], width: 0.9, height: 2, angles: [0, 80], period: 4, material: wood}
       - {kind: fan, name: fan, center: [2, 2, 2.2], radius: 0.5, turns_per_second: 1}
 """
 
@@ -15,8 +16,13 @@ from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
 from scipy.spatial.transform import Rotation
+
+from radarize.errors import InputError
+from radarsim.scene import shapes
+from radarsim.scene.materials import Material, material
+from radarsim.scene.scene import Scene, SceneObject
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -30,10 +36,18 @@ class Part:
     Attributes:
         half: half extents along x, y, z of a box, m; of a capsule: (radius, radius, half length of the axis, along z).
         capsule: a capsule, else a box.
+        material: of a box that is a thing like those that stand; None: scatterers of the mover's cross section.
     """
 
     half: tuple[float, float, float]
     capsule: bool
+    material: Material | None = None
+
+    @property
+    def scene(self) -> Scene:
+        """A part of a material as a scene of its own."""
+        size = tuple(2 * x for x in self.half)
+        return Scene("part", [SceneObject("part", shapes.box((0, 0, 0), size), self.material)])
 
     @property
     def area(self) -> float:
@@ -66,8 +80,6 @@ class MovingThing(BaseModel, ABC):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[str, Field(min_length=1)]
-    #: Radar cross section of the whole, spread over its surface, m^2.
-    cross_section: Length
 
     @abstractmethod
     def parts(self) -> list[Part]:
@@ -87,7 +99,7 @@ class Person(MovingThing):
     """
 
     kind: Literal["person"] = "person"
-    cross_section: Length = 0.5
+    cross_section: Length = 0.5  # of the whole, spread over its surface, m^2
     path: tuple[tuple[Number, Number], ...] = Field(min_length=1)
     speed: Annotated[float, Field(ge=0, le=3, allow_inf_nan=False)] = 1.0
     height: Annotated[float, Field(gt=0.5, lt=2.5)] = 1.75
@@ -167,20 +179,29 @@ class Person(MovingThing):
 
 
 class Door(MovingThing):
-    """A leaf that swings about a vertical hinge between two angles, as a sine."""
+    """A leaf of a material that swings about a vertical hinge between two angles, as a sine."""
 
     kind: Literal["door"] = "door"
-    cross_section: Length = 0.05
     hinge: Point  # at half its height
     width: Length = 0.9
     height: Length = 2.0
     thickness: Length = 0.04
     angles: tuple[Number, Number] = (0.0, 90.0)  # deg from the x axis
     period: Length = 4.0  # s
+    material: str = "wood"
+
+    @field_validator("material")
+    @classmethod
+    def _is_known(cls, name: str) -> str:
+        try:
+            material(name)
+        except InputError as error:
+            raise ValueError(str(error)) from error
+        return name
 
     def parts(self) -> list[Part]:
         """The leaf."""
-        return [Part((self.width / 2, self.thickness / 2, self.height / 2), False)]
+        return [Part((self.width / 2, self.thickness / 2, self.height / 2), False, material(self.material))]
 
     def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
         """Rotation and centre of the leaf."""
@@ -194,7 +215,7 @@ class Fan(MovingThing):
     """Blades that turn about an axis."""
 
     kind: Literal["fan"] = "fan"
-    cross_section: Length = 0.05
+    cross_section: Length = 0.05  # m^2, as a person's
     center: Point
     axis: Point = (0.0, 0.0, 1.0)
     radius: Length = 0.5

@@ -113,7 +113,8 @@ class EchoFinder:
         """Flat reflectors in range of any frame, those and inner ones, and which play a part in each."""
         if self.reflectors is None:
             return Flat.none(), Flat.none(), [Mirrors.none()] * search.frames
-        flat, inner = (near(search.position, search.range) for near in (self.reflectors.near, self.reflectors.inner_near))
+        flat = self.reflectors.near(search.position, search.range)
+        inner = self.reflectors.inner_near(search.position, search.range)
         if len(self.plates):
             moving, hollow = self.plates.faces(search)
             flat, inner = Flat.joined([flat, moving]), Flat.joined([inner, hollow])
@@ -169,9 +170,7 @@ class EchoFinder:
         paths.virtual[late] += offset * (delay[late] / np.linalg.norm(offset, axis=1))[:, None]
         return paths
 
-    def _echoes(
-        self, search: Search, targets: Targets, flat: Flat, points: PointEchoes, found: Images
-    ) -> list[Echoes]:
+    def _echoes(self, search: Search, targets: Targets, flat: Flat, points: PointEchoes, found: Images) -> list[Echoes]:
         """Echoes by frame, what moves last among points and among images."""
         moves = self.plates.moves(search)
         if len(self.plates):
@@ -199,7 +198,7 @@ class EchoFinder:
         self, search: Search, targets: Targets, flat: Flat, points: PointEchoes,
         moves: Float[np.ndarray, "frame plate 4 3 4"],
     ) -> Float[np.ndarray, "moving 2 3 3"]:  # fmt: skip
-        """How far the virtual points of echoes that move are from where they are in the middle, at the burst's nodes."""
+        """How far the virtual points of echoes that move have moved from the middle to the burst's nodes."""
         offsets = BurstClock.of(self.config).half * np.append(NODES, 0.0)
         own = np.zeros((len(points), 3, 3))  # echo, node, axis
         for frame in np.unique(points.frame):

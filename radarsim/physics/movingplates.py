@@ -39,16 +39,18 @@ class MovingPlates:
     def __len__(self) -> int:
         return len(self._part)
 
-    def _places(self, time: float):
-        """Rotations and centres of the plates at a time, s."""
-        turn, center = self._moving.poses(np.array([time]))
-        return turn[0, self._part], center[0, self._part]
+    def _places(self, times: Float[np.ndarray, "n"]):
+        """Rotations and centres of the plates at some times, s."""
+        # one instant at a time: sums over many at once are ordered otherwise, and a frame is to hang on no other
+        poses = [self._moving.poses(np.array([t])) for t in times]
+        turn, center = (np.concatenate(parts) for parts in zip(*poses, strict=True))
+        return turn[:, self._part], center[:, self._part]
 
     def faces(self, search: Search) -> tuple[Flat, Flat]:
         """Their faces in every frame, and the inner faces of hollow ones."""
         outer, inner = [Flat.none()], [Flat.none()]
-        for frame, time in enumerate(search.time):
-            for plate, (turn, center, own) in enumerate(zip(*self._places(time), self._reflectors, strict=True)):
+        for frame, (turns, centers) in enumerate(zip(*self._places(search.time), strict=True)):
+            for plate, (turn, center, own) in enumerate(zip(turns, centers, self._reflectors, strict=True)):
                 outer.append(_placed(own.flat, turn, center, plate, frame))
                 inner.append(_placed(own.inner, turn, center, plate, frame))
         return Flat.joined(outer), Flat.joined(inner)
@@ -60,8 +62,7 @@ class MovingPlates:
         """
         out = np.tile(np.eye(3, 4), (search.frames, len(self) + 1, 4, 1, 1))
         for frame, time in enumerate(search.time if len(self) else ()):
-            turn, center = self._moving.poses(time + self._offsets)
-            turn, center = turn[:, self._part], center[:, self._part]
+            turn, center = self._places(time + self._offsets)
             rotation = np.einsum("npij,pkj->pnik", turn, turn[3])
             out[frame, :-1, :, :, :3] = rotation
             out[frame, :-1, :, :, 3] = center.transpose(1, 0, 2) - np.einsum("pnij,pj->pni", rotation, center[3])
@@ -73,18 +74,28 @@ class MovingPlates:
     ) -> tuple[Complex[np.ndarray, "ray"], Float[np.ndarray, "ray"]]:  # fmt: skip
         """What they leave of waves between points, and by how much they delay it, as `Obstacles.passage` has it."""
         factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
-        for k in np.unique(frame) if len(self) else ():
-            now, time = np.flatnonzero(frame == k), search.time[k]
-            for part, turn, center, own in zip(self._part, *self._places(time), self._transmission, strict=True):
-                met = now[self._moving.occluded(begin[now], end[now], time, self._margin, np.array([part]))]
-                factor[met[~allowed[met]]] = 0
-                met = met[allowed[met]]
-                if len(met):
-                    ends = (begin[met] - center) @ turn, (end[met] - center) @ turn
-                    passed, late = own.passage(*ends, np.tile(search.rotation[k, :, 2] @ turn, (len(met), 1)))
-                    factor[met] *= passed
-                    delay[met] += late
+        turns, centers = self._places(search.time)
+        for plate, (part, own) in enumerate(zip(self._part, self._transmission, strict=True)):
+            met = self._met(search, frame, begin, end, part)
+            factor[met[~allowed[met]]] = 0
+            met = met[allowed[met]]
+            if len(met):
+                turn, center = turns[frame[met], plate], centers[frame[met], plate]
+                ends = (np.einsum("nij,ni->nj", turn, x[met] - center) for x in (begin, end))
+                up = np.einsum("nij,ni->nj", turn, search.rotation[frame[met], :, 2])
+                passed, late = own.passage(*ends, up)
+                factor[met] *= passed
+                delay[met] += late
         return factor, delay
+
+    def _met(self, search: Search, frame, begin, end, part: int) -> Int[np.ndarray, "met"]:
+        """Rays that one of them stands in the way of."""
+        found = [np.zeros(0, int)]
+        for k in np.unique(frame):
+            now = np.flatnonzero(frame == k)
+            hidden = self._moving.occluded(begin[now], end[now], search.time[k], self._margin, np.array([part]))
+            found.append(now[hidden])
+        return np.concatenate(found)
 
 
 def _placed(flat: Flat, turn, center, plate: int, frame: int) -> Flat:

@@ -1,4 +1,4 @@
-"""Echoes of points: scatterers and round bodies, each seen at one place on the way out and at another on the way back."""
+"""Echoes of points, of scatterers and round bodies: seen at one place on the way out, at another on the way back."""
 
 from dataclasses import dataclass
 

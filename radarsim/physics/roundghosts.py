@@ -69,9 +69,7 @@ class RoundGhosts(Table):
         return (self.mirrors >= 0).sum(axis=1)
 
 
-def seen(
-    search: Search, flat: Flat, mirrors: list[Mirrors], bodies: RoundBodies, obstacles: Obstacles
-) -> PointEchoes:
+def seen(search: Search, flat: Flat, mirrors: list[Mirrors], bodies: RoundBodies, obstacles: Obstacles) -> PointEchoes:
     """Ghosts that nothing hides; slabs are opaque to them."""
     found = [find(search, k, flat, some.seen, bodies) for k, some in enumerate(mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
@@ -89,7 +87,9 @@ def seen(
 def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bodies: RoundBodies) -> RoundGhosts:
     """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
     return filled(
-        lambda n: RoundGhosts(np.empty((n, 2, 3)), np.empty((n, 2, 2, 3)), np.empty((n, 2), np.int64), np.empty(n, complex)),
+        lambda n: RoundGhosts(
+            np.empty((n, 2, 3)), np.empty((n, 2, 2, 3)), np.empty((n, 2), np.int64), np.empty(n, complex)
+        ),
         lambda found: _find(search, frame, flat.columns, seen, bodies.columns, found.columns),
         256,
     )

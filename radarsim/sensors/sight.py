@@ -22,6 +22,7 @@ class Sight:
         parts = [part for mover in scene.movers for part in mover.parts()]
         self._half = np.array([part.half for part in parts]).reshape(-1, 3)
         self._capsule = np.array([part.capsule for part in parts], bool)
+        self._clear = np.array([part.material is not None and part.material.clear for part in parts], bool)
         self._crowd = MovingTargets(scene.movers, np.random.default_rng(0), density=0.0)  # for its poses
 
     @cached_property
@@ -63,8 +64,9 @@ class Sight:
             # One instant at a time: sums over many at once are ordered otherwise, and a frame is to hang on no other.
             poses = [self._crowd.poses(np.array([t])) for t in times]
             turn, center = (np.concatenate(parts) for parts in zip(*poses, strict=True))
-            _meet(np.asarray(origins, float), np.asarray(directions, float), turn, center, self._half, self._capsule,
-                  distance)  # fmt: skip
+            met = ~self._clear if through_glass else np.ones(len(self._half), bool)
+            parts = turn[:, met], center[:, met], self._half[met], self._capsule[met]
+            _meet(np.asarray(origins, float), np.asarray(directions, float), *parts, distance)
         return distance
 
 

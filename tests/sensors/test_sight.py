@@ -43,3 +43,13 @@ def test_movers_are_met_where_they_are(mover):
         assert np.mean(np.isfinite(found) == np.isfinite(expected)) > 0.99  # outlines of a mesh are polygons
         assert np.median(np.abs(found[hit] - expected[hit])) < 1e-3
         assert np.mean(np.abs(found[hit] - expected[hit]) < 0.01) > 0.99
+
+
+def test_cameras_look_through_a_glass_door_that_moves():
+    """As through a pane that stands; a lidar meets it, and a camera a wooden one."""
+    way, met = np.array([[[1.0, 0.0, 0.0]]]), []
+    for material, through_glass in (("glass", True), ("glass", False), ("wood", True)):
+        leaf = Door(name="d", hinge=(2.0, -0.4, 1.0), angles=(90, 90), thickness=0.02, material=material)
+        sight = beside(Motion.still((0, 0, 1)), movers=[leaf]).sight
+        met.append(sight.distance(np.array([[0, 0, 1.0]]), way, np.zeros(1), through_glass)[0, 0])
+    assert met[0] > 2.5 and met[1:] == pytest.approx([1.99, 1.99])

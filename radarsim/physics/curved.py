@@ -12,20 +12,24 @@ and one term per end that decays away from it:
     F = [G(u)] from u_1 to u_2,  G(u) = (C(u) + j S(u)) / (1 + j) = sign(u) (1/2 - E(|u|)),
     u = +-2 sqrt((L_end - L_line) / lambda), L the round trip.
 
- Paths are isometries of the
-receiver as for plates: a half turn about the nearest line of the cylinder, inversions in its ends and in the sphere's
-nearest point. The body's point or line wanders over it as the sensor moves, but is held during one burst: the path is
-then wrong by delta^2 (1 / h - 1 / (a + h)) for a step delta across, below 0.01 mm for a table leg or a lamp at walking
-pace and zero in its first derivative, so Doppler is right.
+From the middle of the arrays, paths are isometries of the receiver as for plates: a half turn about the nearest line of the
+cylinder, inversions in its ends and in the sphere's nearest point. But that line or point wanders over the body as the
+sensor moves, and is another for each pair of antennas; held through a burst it makes the path wrong by
+delta^2 (1 / h - 1 / (a + h)) for a step delta across, which is 16 deg of phase at 0.3 m. So for each pair and instant
+the path goes by the point whose normal halves the angle (`path_over`); what a few steps towards it leave of its error
+enters by the square.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, Int
 from numba import njit
 from scipy.special import fresnel
 
+from radarsim.physics.amplitudes import along as moved
+from radarsim.physics.amplitudes import dot, length, minus, mirrored, unit
+from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.antenna import amplitude_gain
 from radarsim.physics.coefficients import TABLE
 from radarsim.physics.search import Search
@@ -58,10 +62,14 @@ class RoundBodies(Table):
             return cls(none, none, np.zeros(0), np.zeros(0), np.zeros((0, 2, TABLE), complex))
         return cls(*(np.array(column) for column in zip(*rows, strict=True)))
 
-    def flashes(
-        self, search: Search, frame: int
-    ) -> tuple[Float[np.ndarray, "part 3"], Float[np.ndarray, "part 3 4"], Complex[np.ndarray, "part"]]:
-        """Flashes and ends as the radar sees them: point to aim a ray at (m), isometry of the receiver, amplitude."""
+    def arcs(self, body: Int[np.ndarray, "part"], part: Int[np.ndarray, "part"]) -> Float[np.ndarray, "part 8"]:
+        """What `path_over` takes of flashes and ends."""
+        axis, half = self.axis[body], self.half[body]
+        pivot = self.center[body] + (np.array([0, -1, 1])[part] * half)[:, None] * axis
+        return np.column_stack([pivot, axis, self.radius[body], (part == 0) & (half > 0)])
+
+    def flashes(self, search: Search, frame: int) -> "Arcs":
+        """Flashes and ends as the radar sees them."""
         position, reach, wavelength = search.position[frame], search.range, search.wavelength
         offset = position - self.center
         z = np.einsum("bd,bd->b", offset, self.axis)
@@ -90,7 +98,40 @@ class RoundBodies(Table):
         matrix = 2 * np.einsum("pd,pe->pde", turned, turned) - np.eye(3)
         shift = point - np.einsum("pde,pe->pd", matrix, point)
         inward = np.array([0.0, 1.0, -1.0])[part] * np.minimum(0.01, half[b])
-        return point + inward[:, None] * axis[b], np.concatenate([matrix, shift[:, :, None]], axis=2), amplitude
+        isometry = np.concatenate([matrix, shift[:, :, None]], axis=2)
+        return Arcs(point + inward[:, None] * axis[b], isometry, amplitude, self.arcs(near[b], part))
+
+
+@dataclass(frozen=True)
+class Arcs(Table):
+    """Flashes and ends of round bodies.
+
+    Attributes:
+        aim: a point for a ray to it to aim at, m.
+        isometry: of the receiver, from the middle of the arrays.
+        amplitude: square root of received over transmitted power, with phase.
+        shape: a point of the axis, or the centre, m; the axis; radius, m; whether the flash runs along the axis.
+    """
+
+    aim: Float[np.ndarray, "part 3"]
+    isometry: Float[np.ndarray, "part 3 4"]
+    amplitude: Complex[np.ndarray, "part"]
+    shape: Float[np.ndarray, "part 8"]
+
+
+@njit(inline="always")
+def path_over(shape, one, two):
+    """Length of the shortest way over a round body between two places beside one another, m."""
+    pivot, axis, radius = vec(shape), vec(shape[3:6]), shape[6]
+    a, b = minus(one, pivot), minus(two, pivot)
+    a, b = moved(a, -dot(a, axis), axis), moved(b, -dot(b, axis), axis)
+    n = unit(moved(unit(a), 1.0, unit(b)))
+    for _ in range(3):
+        n = unit(moved(unit(moved(a, -radius, n)), 1.0, unit(moved(b, -radius, n))))
+    place = moved(pivot, radius, n)
+    if shape[7] > 0:
+        return length(minus(one, mirrored(two, place, n)))
+    return length(minus(one, place)) + length(minus(two, place))
 
 
 def _side_terms(across, slant, h, wavelength) -> Complex[np.ndarray, "facet side part"]:

@@ -19,6 +19,7 @@ from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarsim.physics.amplitudes import dot, length, minus
 from radarsim.physics.amplitudes import vector as vec
+from radarsim.physics.curved import path_over
 from radarsim.physics.synthesis import BurstClock, parabola
 
 
@@ -36,7 +37,7 @@ class Provenance(IntEnum):
 
 @dataclass(frozen=True)
 class Echoes:
-    """The echoes of a frame, points first, then images, what moves last among either.
+    """The echoes of a frame, points first, then images; what moves is last among either, and before it round bodies'.
 
     Attributes:
         points: a and b of point echoes, world, m, at the middle of the burst.
@@ -45,6 +46,7 @@ class Echoes:
         provenance: a `Provenance` each.
         moves: of the last points, how far a and b have moved at the burst's three nodes (`synthesis.NODES`), m.
         turns: of the last images, what they are at these nodes.
+        shapes: of those before, the round bodies that these are of (`curved.Arcs`), and delays, m.
     """
 
     points: Float[np.ndarray, "point 2 3"]
@@ -53,6 +55,7 @@ class Echoes:
     provenance: UInt8[np.ndarray, "echo"]
     moves: Float[np.ndarray, "moving 2 3 3"] = field(default_factory=lambda: np.zeros((0, 2, 3, 3)))
     turns: Float[np.ndarray, "turning 3 3 4"] = field(default_factory=lambda: np.zeros((0, 3, 3, 4)))
+    shapes: Float[np.ndarray, "round 9"] = field(default_factory=lambda: np.zeros((0, 9)))
 
     def __len__(self) -> int:
         return len(self.amplitude)
@@ -60,14 +63,15 @@ class Echoes:
     def of(self, provenance: Provenance) -> "Echoes":
         """The echoes of one cause."""
         keep = self.provenance == provenance
-        n = len(self.points)
+        n, turning = len(self.points), len(self) - len(self.turns)
         return Echoes(
             self.points[keep[:n]],
             self.images[keep[n:]],
             self.amplitude[keep],
             self.provenance[keep],
             self.moves[keep[n - len(self.moves) : n]],
-            self.turns[keep[len(self) - len(self.turns) :]],
+            self.turns[keep[turning:]],
+            self.shapes[keep[turning - len(self.shapes) : turning]],
         )
 
     def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "echo virtual 3"]:
@@ -88,6 +92,8 @@ class Echoes:
         out = np.empty((len(self), tx.shape[1] * rx.shape[1], 3))
         _point_lengths(self.points, self.moves, tx, rx, out)
         _image_lengths(self.images, self.turns, tx, rx, out[len(self.points) :])
+        turning = len(self) - len(self.turns)
+        _arc_lengths(self.shapes, tx, rx, out[turning - len(self.shapes) : turning])
         return out
 
 
@@ -136,5 +142,19 @@ def _image_lengths(images, turns, tx, rx, out):
             for k in range(n_tx):
                 for i in range(nodes):
                     way[i] = length(minus(vec(tx[i, k]), vec(seen[i])))
+                fit = out[e, k * n_rx + r]
+                fit[0], fit[1], fit[2] = parabola(way[0], way[1], way[2])
+
+
+@njit(cache=True)
+def _arc_lengths(shapes, tx, rx, out):
+    nodes, n_tx, _ = tx.shape
+    n_rx = rx.shape[1]
+    way = np.empty(nodes)
+    for e in range(len(shapes)):
+        for k in range(n_tx):
+            for r in range(n_rx):
+                for i in range(nodes):
+                    way[i] = path_over(shapes[e], vec(tx[i, k]), vec(rx[i, r])) + shapes[e, 8]
                 fit = out[e, k * n_rx + r]
                 fit[0], fit[1], fit[2] = parabola(way[0], way[1], way[2])

@@ -178,20 +178,23 @@ class EchoFinder:
         carried = movingplates.carried(flat, found.mirrors)
         found.cause[carried] = Provenance.MOVING
         points = points[np.lexsort((points.cause == Provenance.MOVING, points.frame))]
-        order = np.lexsort((carried, found.frame))
-        found, carried = found[order], carried[order]
+        arcs = found.shape[:, 6] > 0
+        order = np.lexsort((arcs + 2 * carried, found.frame))
+        found, carried, arcs = found[order], carried[order], arcs[order]
         moving, turning = points.cause == Provenance.MOVING, found[carried]
         offsets = self._moves(search, targets, flat, points[moving], moves)
         turns = movingplates.turned(flat, turning.isometry, turning.mirrors, moves)
         frames = range(search.frames + 1)
-        edges = [np.searchsorted(of, frames) for of in (points.frame, points.frame[moving], found.frame, turning.frame)]
+        round_ = found[arcs]
+        owners = points.frame, points.frame[moving], found.frame, turning.frame, round_.frame
+        edges = [np.searchsorted(of, frames) for of in owners]
         spans = zip(*([slice(a, b) for a, b in zip(e, e[1:], strict=False)] for e in edges), strict=True)
         return [
             Echoes(
                 points.points[p], found.isometry[i], np.concatenate([points.amplitude[p], found.amplitude[i]]),
-                np.concatenate([points.cause[p], found.cause[i]]), offsets[m], turns[t],
+                np.concatenate([points.cause[p], found.cause[i]]), offsets[m], turns[t], round_.shape[a],
             )
-            for p, m, i, t in spans
+            for p, m, i, t, a in spans
         ]  # fmt: skip
 
     def _moves(

@@ -27,6 +27,7 @@ class Images(Table):
         amplitude: square root of received over transmitted power, with phase.
         cause: a `Provenance` each.
         mirrors: the flat reflector that it is a part of, or those that it is seen in, in order; -1: none.
+        shape: of the round body that it is a part of, see `curved.Arcs`, and the delay by slabs, m; else nought.
     """
 
     frame: Int[np.ndarray, "image"]
@@ -34,12 +35,13 @@ class Images(Table):
     amplitude: Complex[np.ndarray, "image"]
     cause: UInt8[np.ndarray, "image"]
     mirrors: Int[np.ndarray, "image 3"]
+    shape: Float[np.ndarray, "image 9"]
 
     @classmethod
     def none(cls) -> "Images":
         """No image."""
         none = np.zeros(0, int), np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, np.uint8)
-        return cls(*none, np.zeros((0, 3), int))
+        return cls(*none, np.zeros((0, 3), int), np.zeros((0, 9)))
 
 
 def flashes(
@@ -50,18 +52,18 @@ def flashes(
     for frame in range(search.frames):
         parts = plates.parts(flat, search, frame)
         parts = parts[flat.present(frame)[parts.facet]]
-        aim, isometry, amplitude = round_bodies.flashes(search, frame)
+        arcs = round_bodies.flashes(search, frame)
         cause = np.where(flat.horizontal[parts.facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
-        cause = np.append(cause, np.full(len(aim), Provenance.DIRECT)).astype(np.uint8)
+        cause = np.append(cause, np.full(len(arcs), Provenance.DIRECT)).astype(np.uint8)
         if heights is not None:
             uneven = _uneven(search, frame, flat[parts.facet], parts.aim, heights)
             parts = replace(parts, amplitude=parts.amplitude * uneven)
-        ways += [_to_parts(search, frame, flat, parts), _to_bodies(search, frame, aim)]
-        isometry = np.concatenate([parts.isometry, isometry])
-        mirrors = np.full((len(cause), 3), -1)
-        mirrors[: len(parts), 0] = parts.facet
-        amplitude = np.append(parts.amplitude, amplitude)
-        found.append(Images(np.full(len(cause), frame), isometry, amplitude, cause, mirrors))
+        ways += [_to_parts(search, frame, flat, parts), _to_bodies(search, frame, arcs.aim)]
+        isometry = np.concatenate([parts.isometry, arcs.isometry])
+        mirrors, shape = np.full((len(cause), 3), -1), np.zeros((len(cause), 9))
+        mirrors[: len(parts), 0], shape[len(parts) :, :8] = parts.facet, arcs.shape
+        amplitude = np.append(parts.amplitude, arcs.amplitude)
+        found.append(Images(np.full(len(cause), frame), isometry, amplitude, cause, mirrors, shape))
     images, ways = Images.joined(found), Stretches.joined(ways)
     factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(images.amplitude))
     return _passed(search, images, factor**2, 2 * delay)  # there and back
@@ -115,7 +117,9 @@ def _passed(search: Search, images: Images, factor, delay) -> Images:
     isometry[:, :, 3] += (delay / np.linalg.norm(away, axis=1))[:, None] * away
     cause = np.where(factor == 1, images.cause, np.uint8(Provenance.THROUGH_SLAB))
     amplitude = images.amplitude * factor
-    passed = replace(images, isometry=isometry, amplitude=amplitude, cause=cause)
+    shape = images.shape.copy()
+    shape[:, 8] = delay
+    passed = replace(images, isometry=isometry, amplitude=amplitude, cause=cause, shape=shape)
     return passed[np.abs(amplitude) > search.threshold]
 
 
@@ -168,7 +172,7 @@ def by_chains(search: Search, flat: Flat, mirrors: list[Mirrors], obstacles: Obs
     cause = np.where(two, Provenance.GHOST_2, Provenance.GHOST_3).astype(np.uint8)
     cause[slant < 1e-3] = Provenance.DIRECT
     order = np.where(two[:, None], chains.mirrors * [1, 1, 0] - [0, 0, 1], chains.mirrors)
-    there = Images(frame, chains.isometry, chains.amplitude, cause, order)
+    there = Images(frame, chains.isometry, chains.amplitude, cause, order, np.zeros((len(frame), 9)))
     ways = _along(search, flat, frame, chains)
     factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(chains.amplitude).repeat(4))
     factor, delay = factor.reshape(-1, 4).prod(axis=1), delay.reshape(-1, 4).sum(axis=1)

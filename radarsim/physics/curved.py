@@ -12,9 +12,9 @@ and one term per end that decays away from it:
     F = [G(u)] from u_1 to u_2,  G(u) = (C(u) + j S(u)) / (1 + j) = sign(u) (1/2 - E(|u|)),
     u = +-2 sqrt((L_end - L_line) / lambda), L the round trip.
 
-From the middle of the arrays, paths are isometries of the receiver as for plates: a half turn about the nearest line of the
-cylinder, inversions in its ends and in the sphere's nearest point. But that line or point wanders over the body as the
-sensor moves, and is another for each pair of antennas; held through a burst it makes the path wrong by
+From the middle of the arrays, paths are isometries of the receiver as for plates: a half turn about the nearest line of
+the cylinder, inversions in its ends and in the sphere's nearest point. But that line or point wanders over the body as
+the sensor moves, and is another for each pair of antennas; held through a burst it makes the path wrong by
 delta^2 (1 / h - 1 / (a + h)) for a step delta across, which is 16 deg of phase at 0.3 m. So for each pair and instant
 the path goes by the point whose normal halves the angle (`path_over`); what a few steps towards it leave of its error
 enters by the square.

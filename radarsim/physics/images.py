@@ -112,15 +112,16 @@ def _uneven(
 
 def _passed(search: Search, images: Images, factor, delay) -> Images:
     """What is left of images on whose way obstacles leave a factor, and slabs a delay (m), which moves them away."""
+    amplitude = images.amplitude * factor
+    kept = np.abs(amplitude) > search.threshold
+    images, amplitude, factor, delay = images[kept], amplitude[kept], factor[kept], delay[kept]
     isometry, begin = images.isometry.copy(), search.position[images.frame]
     away = np.einsum("pij,pj->pi", isometry[:, :, :3], begin) + isometry[:, :, 3] - begin
     isometry[:, :, 3] += (delay / np.linalg.norm(away, axis=1))[:, None] * away
     cause = np.where(factor == 1, images.cause, np.uint8(Provenance.THROUGH_SLAB))
-    amplitude = images.amplitude * factor
     shape = images.shape.copy()
     shape[:, 8] = delay
-    passed = replace(images, isometry=isometry, amplitude=amplitude, cause=cause, shape=shape)
-    return passed[np.abs(amplitude) > search.threshold]
+    return replace(images, isometry=isometry, amplitude=amplitude, cause=cause, shape=shape)
 
 
 def _along(search: Search, flat: Flat, frame: Int[np.ndarray, "chain"], chains: imagemethod.Chains) -> Stretches:

@@ -19,18 +19,18 @@ from radarsim.physics.echoes import Echoes
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.physics.interference import Interference
 from radarsim.physics.movingtargets import MovingTargets
+from radarsim.physics.obstacles import CLEARANCE, Obstacles
 from radarsim.physics.pathsolver import PathSolverFinder
 from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
+from radarsim.physics.transmission import Transmission
 from radarsim.physics.unevenness import Heights
 from radarsim.scene.scene import Scene
 from radarsim.sensors.sight import Sight
 from radarsim.threads import one_blas_thread
-
-#: Hz, of the IF amplifier (SWRS228): as far as the simulator looks for echoes where no decimation filter closes before.
-_IF_BANDWIDTH = 10e6
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,18 +103,27 @@ class Scenario:
     @cached_property
     def finder(self) -> EchoFinder | PathSolverFinder:
         """Finds the echoes of a pose."""
-        weakest, antenna, band = self.board.weakest, self.front_end.pattern, self.front_end.band
+        weakest, antenna = self.board.weakest, self.front_end.pattern
         if self.engine == "sionna":
             seed = int(self.draws("sionna").integers(2**31))
             return PathSolverFinder(self.scene, self.config, weakest, antenna, seed)
-        closes = _IF_BANDWIDTH if band is None else band.high * self.config.sample_rate
-        reach = SPEED_OF_LIGHT * closes / (2 * self.config.slope)
+        reach = SPEED_OF_LIGHT * self.board.passband[1] / (2 * self.config.slope)
         scatterers = Cluttered(Surface(self.scene, self.draws("surface")), Clutter(self.scene, self.draws("clutter")))
         return EchoFinder(
             self.scene, scatterers, Reflectors.of(self.scene, self.config), self.config, weakest, reach, antenna,
-            MovingTargets(self.scene.movers, self.draws("movers")),
+            self._moving,
             Heights.of(self.scene, self.draws("unevenness")),
         )  # fmt: skip
+
+    @cached_property
+    def _moving(self) -> MovingTargets:
+        return MovingTargets(self.scene.movers, self.draws("movers"))
+
+    @cached_property
+    def interference(self) -> Interference:
+        """Makes the signal of the scene's other radars."""
+        through = Transmission(self.scene, self.config, CLEARANCE)
+        return Interference(self.scene.interferers, self.board, Obstacles(self.scene, through, self._moving))
 
     @cached_property
     def synthesize(self) -> Synthesizer:
@@ -174,10 +183,18 @@ class Frames:
 
     @cached_property
     @one_blas_thread
+    def interference(self) -> list[Complex[np.ndarray, "loop tx rx sample"]]:
+        """What the scene's other radars add to each frame's signal behind the IF filters."""
+        return [self.scenario.interference(self.scenario.motion, t) for t in self.times]
+
+    @cached_property
+    @one_blas_thread
     def samples(self) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
         """I/Q as the converter gives it."""
         board, draws = self.scenario.board, self.scenario.draws
         signals = map(self.scenario.synthesize, self.lengths, self.received)
+        if self.scenario.scene.interferers:
+            signals = map(np.add, signals, self.interference)
         return np.stack([board.digitize(s, draws("noise", t)) for t, s in zip(self.times, signals, strict=True)])
 
     def ticks(self, rate: float) -> Int[np.ndarray, "tick"]:

@@ -1,5 +1,6 @@
 """Recordings of scenarios: frame after frame to a file, and on from where a killed run stopped."""
 
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -144,6 +145,7 @@ def _require_echoes(scenario: Scenario, times: Float[np.ndarray, "frame"]) -> No
 def facts(scenario: Scenario) -> dict[str, object]:
     """What a recording says of its scenario. The same on the same kind of processor is the same to the bit; on another,
     compiled loops add up in another order."""
+    others = [each.model_dump(mode="json") for each in scenario.scene.interferers]
     return {
         "source": "radarsim simulate",
         "scene": scenario.scene.name,
@@ -154,7 +156,7 @@ def facts(scenario: Scenario) -> dict[str, object]:
         "motion": Statistics.of(scenario.motion, scenario.scene).json(),
         "warnings": crossings(scenario.motion, scenario.scene),
         "processor": get_host_cpu_name(),
-    }
+    } | ({"interferers": json.dumps(others)} if others else {})
 
 
 @contextmanager

@@ -26,3 +26,8 @@ class TurnConfig(Frozen):
         np.radians(66.0), "rad/s^1.5, by how much the turning rate of a handheld radar wanders in 1 s", gt=0
     )
     fastest: float = setting(np.radians(60.0), "rad/s, standard deviation of a rate not known at all", gt=0)
+    alike: float = setting(
+        4.0, "by how much more the variance of a long turn grows than the network says of each short one, whose errors "
+        "are alike; chosen on seven walks of 60 s (by hand in A to D of seeds 301 to 304, by cart in A, and two in the "
+        "office), where what it said of 10 s had NEES of 0.7 to 5", ge=1
+    )  # fmt: skip

@@ -4,7 +4,7 @@
     seed: 1
     buildings:
       A: {kind: A, seed: 3}            # as `building` in a scene file; `floors` below picks a floor
-      B: {kind: B, seed: 3, clutter: 1, unevenness: 1}                  # both as in a scene file, too
+      B: {kind: B, seed: 3, clutter: 1, unevenness: 1}                  # both as in a scene file, and interferers too
       shop: shop.yaml                  # a scene of the project, or a scene file beside this one
     recordings:
       - {building: A, floors: [0, 1], platform: handheld, count: 15, duration: 60}
@@ -50,7 +50,7 @@ from radarsim.dataset.variant import Attributes, Strict, Variant
 from radarsim.scene.description import Description, described, find, shipped, split_level
 
 #: What a building here may say of itself that stands beside `building` in a scene file.
-LIFE = "clutter", "unevenness"
+LIFE = "clutter", "unevenness", "interferers"
 Platform = Literal["handheld", "cart", "robot"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 

@@ -23,6 +23,8 @@ from radarsim.physics.phasenoise import Skirts
 
 BOLTZMANN = 1.380649e-23
 ROOM_TEMPERATURE = 290.0
+#: Hz, of the IF amplifier (SWRS228): as far as the receiver hears where no decimation filter closes before.
+_IF_BANDWIDTH = 10e6
 
 
 class FrontEnd:
@@ -107,6 +109,12 @@ class FrontEnd:
         return float(np.sqrt(0.1 * self.noise_power / (loops * tx * rx * samples) / self.tx_power))
 
     # --- filters -----------------------------------------------------------------------------------------------------
+    @property
+    def passband(self) -> tuple[float, float]:
+        """Beat frequencies between which anything passes, Hz."""
+        band, rate = self.settings.band, self.config.sample_rate
+        return (-_IF_BANDWIDTH, _IF_BANDWIDTH) if band is None else (band.low * rate, band.high * rate)
+
     def if_response(self, path_length: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
         """Response of the IF chain to an echo of a path length (out and back, m)."""
         return self.beat_response(self.config.slope * np.asarray(path_length) / SPEED_OF_LIGHT)

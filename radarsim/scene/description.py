@@ -23,7 +23,8 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
 ``clutter`` and ``unevenness`` say how far the place is from its drawing (see `scene.Life`): 1 as in rooms that are
-lived in; left out, 0: not at all.
+lived in; left out, 0: not at all. ``interferers`` are other radars that send there (see `interferers`); levels change
+and add them, too.
 """
 
 import re
@@ -41,6 +42,7 @@ from radarize.yamlfile import read_yaml
 from radarsim.complaint import complaint
 from radarsim.scene import shapes
 from radarsim.scene.buildings import Building
+from radarsim.scene.interferers import Interferer
 from radarsim.scene.materials import Material, constant, decibel, material
 from radarsim.scene.movers import Mover
 from radarsim.scene.office import Office
@@ -50,6 +52,7 @@ Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=10)]
 Vector = tuple[Number, Number, Number]
+Parts = tuple[str, list[SceneObject], list[Mover], Life, list[Interferer]]
 
 
 class _Strict(BaseModel):
@@ -162,6 +165,7 @@ class Level(_Strict):
 
     objects: list[_Change] = []
     moving: list[_Change] = []
+    interferers: list[_Change] = []
 
 
 class Description(_Strict):
@@ -174,6 +178,7 @@ class Description(_Strict):
     levels: list[Level] = []
     clutter: Share = 0.0
     unevenness: Share = 0.0
+    interferers: list[Interferer] = []
 
     @property
     def life(self) -> Life:
@@ -233,8 +238,8 @@ def meshes(path: Path) -> list[Path]:
     return [path.parent / name for name in sorted(found)]
 
 
-def read(path: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover], Life]:
-    """Name, objects, movers and life of a scene file at one of its levels.
+def read(path: Path, level: int = 0) -> Parts:
+    """Name, objects, movers, life and interferers of a scene file at one of its levels.
 
     Raises:
         InputError: unreadable, malformed YAML, unknown key, value, material, mesh file or level.
@@ -244,8 +249,8 @@ def read(path: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover
     return (f"{name}@{level}" if level else name), *parts
 
 
-def built(data: object, source: str, folder: Path, level: int = 0) -> tuple[str, list[SceneObject], list[Mover], Life]:
-    """Name ("" where it has none), objects, movers and life of a description as read from YAML.
+def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
+    """Name ("" where it has none), objects, movers, life and interferers of a description as read from YAML.
 
     Args:
         data: the description.
@@ -265,7 +270,7 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> tuple[str,
         raise InputError(f"{source}: {error}") from error
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
-    return description.name, objects, description.moving, description.life
+    return description.name, objects, description.moving, description.life, description.interferers
 
 
 def described(data: object, source: str, level: int = 0) -> Description:
@@ -290,7 +295,7 @@ def described(data: object, source: str, level: int = 0) -> Description:
 def _laid_upon(data: dict, changes: Level) -> dict:
     """A description with the changes of a level."""
     parts = {}
-    for part in ("objects", "moving"):
+    for part in ("objects", "moving", "interferers"):
         parts[part] = entries = [dict(entry) for entry in data.get(part, [])]
         for change in (item.model_dump() for item in getattr(changes, part)):
             known = [entry for entry in entries if fnmatchcase(entry["name"], change["name"])]

@@ -72,6 +72,7 @@ class Scene:
         objects: with unique names.
         movers: things that move by themselves (`movers`); ray tests know the objects only.
         life: how lived-in the place is.
+        interferers: other radars that send (`interferers`).
 
     Attributes:
         triangles: (T, 3, 3) corners of all triangles, in the order of the objects, m.
@@ -82,8 +83,16 @@ class Scene:
         InputError: no object, a name twice, a mesh without triangles or too far away.
     """
 
-    def __init__(self, name: str, objects: list[SceneObject], movers: Sequence = (), life: Life = Life()):
+    def __init__(
+        self,
+        name: str,
+        objects: list[SceneObject],
+        movers: Sequence = (),
+        life: Life = Life(),
+        interferers: Sequence = (),
+    ):
         self.name, self.objects, self.movers, self.life = name, list(objects), list(movers), life
+        self.interferers = list(interferers)
         if not self.objects:
             raise InputError(f"scene {name}: has no objects, expected at least one")
         seen: set[str] = set()

@@ -10,7 +10,7 @@ from radarsim.sensors.sensor import Sensor
 from radarsim.threads import one_blas_thread
 
 _NAMES = ", ".join(p.name.lower() for p in Provenance)
-#: Parts of /truth/adc_by_cause, in this order.
+#: Parts of /truth/adc_by_cause, in this order; where other radars send, interference comes before the leakage.
 CAUSES = (*(p.name.lower() for p in Provenance), "leakage")
 
 
@@ -34,22 +34,24 @@ class AdcByCause(Sensor):
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
-        about = "I/Q before noise and converter, by cause, which add up: " + ", ".join(CAUSES)
-        shape = (len(CAUSES), *scenario.config.frame_shape)
+        names = CAUSES if not scenario.scene.interferers else (*CAUSES[:-1], "interference", CAUSES[-1])
+        about = "I/Q before noise and converter, by cause, which add up: " + ", ".join(names)
+        shape = (len(names), *scenario.config.frame_shape)
         self.streams = {"truth/adc_by_cause": Stream(shape, "f2", "ADC counts", about)}
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The parts."""
-        parts = np.stack(
-            [self._split(*each) for each in zip(frames.lengths, frames.received, frames.echoes, strict=True)]
-        )
+        others = [frames.interference] if self.scenario.scene.interferers else []
+        each = zip(frames.lengths, frames.received, frames.echoes, *others, strict=True)
+        parts = np.stack([self._split(*one) for one in each])
         return {"truth/adc_by_cause": np.stack([parts.real, parts.imag], axis=-1).astype(np.float16)}
 
     @one_blas_thread
     def _split(
-        self, lengths: Float[np.ndarray, "echo virtual 3"], amplitudes: Complex[np.ndarray, "echo"], echoes: Echoes
-    ) -> Complex[np.ndarray, "cause loop tx rx sample"]:
-        """Counts of each cause in a frame."""
+        self, lengths: Float[np.ndarray, "echo virtual 3"], amplitudes: Complex[np.ndarray, "echo"], echoes: Echoes,
+        *others: Complex[np.ndarray, "loop tx rx sample"],
+    ) -> Complex[np.ndarray, "cause loop tx rx sample"]:  # fmt: skip
+        """Counts of each cause in a frame, and of signals that are no echoes."""
         masks = [echoes.provenance == cause for cause in Provenance]
         signals = [self.scenario.synthesize(lengths[mask], amplitudes[mask]) for mask in masks]
-        return np.stack(self.scenario.board.by_cause(signals))
+        return np.stack(self.scenario.board.by_cause([*signals, *others]))

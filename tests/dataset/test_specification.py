@@ -48,10 +48,13 @@ def test_recordings_of_a_specification(tmp_path):
 
 
 def test_buildings_say_how_lived_in_they_are(tmp_path):
-    """Clutter and unevenness stand beside the building in its scene, and change neither seed nor walk."""
+    """Clutter, unevenness and other radars stand beside the building in its scene, and change neither seed nor walk."""
     lived = load(tmp_path, buildings=PLAIN["buildings"] | {"old": {"kind": "B", "seed": 3, "clutter": 2}})
     assert lived.tasks[1].scene == {"building": {"kind": "B", "seed": 3, "floor": 2}, "clutter": 2}
     assert [task.seed for task in lived.tasks] == [task.seed for task in load(tmp_path).tasks]
+    radars = [{"name": "robot", "radar": "long-range", "position": [4, 2, 1]}]
+    heard = load(tmp_path, buildings=PLAIN["buildings"] | {"old": {"kind": "B", "seed": 3, "interferers": radars}})
+    assert heard.tasks[1].scene == {"building": {"kind": "B", "seed": 3, "floor": 2}, "interferers": radars}
     with pytest.raises(InputError, match=r"buildings\.old: clutter is -1"):
         load(tmp_path, buildings={"old": {"kind": "B", "seed": 3, "clutter": -1}, "office": "office"})
 

@@ -24,7 +24,8 @@ objects:
   - {name: pipe, shape: cylinder, radius: 0.05, height: 2, position: [2, -1, 1], rotation: [0, 0, 9], material: metal}
   - {name: odd, shape: sphere, radius: 1, material: {custom: {permittivity: 4, conductivity: 0.2}}}
 moving: [{kind: person, name: visitor, path: [[1, 0], [4, 0]], speed: 1.1}]
-levels: [{objects: [{name: wall, material: glass}]}]
+interferers: [{name: robot, radar: {slope: 60e12}, position: [4, 0, 1], yaw: 180, velocity: [-0.5, 0, 0], start: 0.1}]
+levels: [{objects: [{name: wall, material: glass}], interferers: [{name: robot, radar: two-tx}]}]
 clutter: 1
 """
 _DATASET = """name: d

@@ -12,7 +12,7 @@ from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
 from radarize.nets.weights import Header, build, example, load, save
 from radarize.odometry.doppler import Velocities
-from radarize.odometry.settings import FusionConfig
+from radarize.odometry.settings import FusionConfig, TurnConfig
 from radarize.radar.presets import PRESETS
 from tests.batches import of_spectrum, parts
 
@@ -119,7 +119,7 @@ def test_turns_of_several_spacings_make_one_yaw(tmp_path):
     path = weights(tmp_path, "rotation")
     for seed in range(40):
         rng = np.random.default_rng(seed)
-        rotation = LearnedRotation(CONFIG, path)
+        rotation = LearnedRotation(CONFIG, path, TurnConfig(alike=1))  # the oracle's errors are not
         rotation._net = Oracle(times, truth, noise, rng)
         found = rotation.estimate(numbered(np.arange(count), times), nowhere(count))
         error = np.cumsum(found.yaw)[-1] - (truth[-1] - truth[0])
@@ -128,6 +128,20 @@ def test_turns_of_several_spacings_make_one_yaw(tmp_path):
         chained.append(np.sqrt(count / (stride * 4)) * noise * rng.normal())
     assert np.std(ends) < np.std(chained)
     assert 0.3 < np.mean(honest) < 1.2  # below 1, for it began without knowing its rate
+
+
+def test_errors_that_are_alike_add_up(tmp_path):
+    """A network that sees a fiftieth too little of each turn: what is claimed of ten seconds knows of it."""
+    count, noise = 300, np.radians(0.5)
+    times = np.arange(count) * CONFIG.frame_period
+    claims = []
+    for alike in (1, 4):
+        rotation = LearnedRotation(CONFIG, weights(tmp_path, "rotation"), TurnConfig(alike=alike))
+        rotation._net = Oracle(times, 0.98 * np.radians(60) * times, noise, np.random.default_rng(0))
+        found = rotation.estimate(numbered(np.arange(count), times), nowhere(count))
+        error = found.yaw.sum() - np.radians(60) * (times[-1] - times[0])
+        claims.append(error**2 / found.variance[4:].sum())
+    assert claims[0] / claims[1] == pytest.approx(4) and claims[0] > 4
 
 
 @pytest.mark.parametrize("rate", np.radians([40, -70]))

@@ -62,6 +62,7 @@ class LearnedRotation:
         self._longest = (size - 0.5) * radar.frame_period
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
         self._yaws = Ties(size, settings.wander, settings.fastest)
+        self._alike = settings.alike
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
@@ -80,7 +81,9 @@ class LearnedRotation:
                 self._yaws.tie(int(ago), turn, noise)
             yaw[i] = self._yaws.values[-1] - last
             growth[i] = max(self._yaws.covariance[-2, -2] - known, 1e-8)
-        return Rotations(yaw, growth, (back > 0).any(axis=0))
+        told = (back > 0).any(axis=0)
+        growth[told] *= self._alike
+        return Rotations(yaw, growth, told)
 
     @property
     def stride(self) -> int:

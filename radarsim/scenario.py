@@ -20,6 +20,7 @@ from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.physics.interference import Interference
+from radarsim.physics.movingplates import MovingPlates
 from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.obstacles import CLEARANCE, Obstacles
 from radarsim.physics.pathsolver import PathSolverFinder
@@ -123,7 +124,8 @@ class Scenario:
     def interference(self) -> Interference:
         """Makes the signal of the scene's other radars."""
         through = Transmission(self.scene, self.config, CLEARANCE)
-        return Interference(self.scene.interferers, self.board, Obstacles(self.scene, through, self._moving))
+        plates = MovingPlates(self._moving, self.config, CLEARANCE)
+        return Interference(self.scene.interferers, self.board, Obstacles(self.scene, through, self._moving, plates))
 
     @cached_property
     def synthesize(self) -> Synthesizer:

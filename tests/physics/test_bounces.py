@@ -7,6 +7,8 @@ import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics import images, sight
+from radarsim.physics.movingplates import MovingPlates
+from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.obstacles import CLEARANCE, Obstacles
 from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.transmission import Transmission
@@ -35,7 +37,9 @@ def by_chains(office, position, axis, spread, bounces):
     level = axis * [1, 1, 0] / np.hypot(axis[0], axis[1])
     search = isotropic(position, LAMBDA, looking(level), 7.0)
     flat = reflectors.near(search.position, search.range)
-    obstacles = Obstacles(scene, Transmission(scene, CONFIG, CLEARANCE), None)
+    nobody = MovingTargets([], np.random.default_rng(0))
+    plates = MovingPlates(nobody, CONFIG, CLEARANCE)
+    obstacles = Obstacles(scene, Transmission(scene, CONFIG, CLEARANCE), nobody, plates)
     found = images.by_chains(search, flat, sight.mirrors(search, flat, scene), obstacles)
     away = np.einsum("pij,j->pi", found.isometry[:, :, :3], position) + found.isometry[:, :, 3] - position
     path, ahead = np.linalg.norm(away, axis=1), away @ axis

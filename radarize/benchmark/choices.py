@@ -80,12 +80,23 @@ ODOMETRY = {
     "B201_0": (6188719661804238459, 5385831122607816562, 3985246152463333794),
 }
 
+#: 60 s by hand in buildings of styles A to D with seeds 301 to 304, and by cart in A; in the office 20 s by cart, and
+#: the demo's 40 s by hand.
+TURNS = {
+    "A_0": (2117315051042397337, 5685118323643141256),
+    "B_0": (8563469454355660152,),
+    "C_0": (8841798845398845653,),
+    "D_0": (1781852632830259480,),
+    "office": (0, 9502),
+}
+
 #: RadarHD's training walks, one by one and all together.
 PICTURES = {f"radarhd {number}": (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
 
 CHOICES = (
     Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),
     Choice("what odometry claims of its errors, and its fusion with the network", ODOMETRY),
+    Choice("how long the map of turns remembers, and what the network's turns count for", TURNS),
     Choice("the compass and what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),

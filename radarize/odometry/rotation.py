@@ -43,6 +43,9 @@ _INDEPENDENT = 50
 _ASTRAY = np.radians(45.0)
 #: Probability from which on an echo is a wall's flash to the map, and m to either side of it, where it hides the rest.
 _FLASH, _RING = 0.9, 0.1
+#: Of the variance of the yaw in the map, what stays in the sum of steps: the next frames, matched with the same map,
+#: take back the rest, and the more the longer it remembers. Chosen with `memory`, on the same walks.
+_LASTING = 0.2
 #: rad: standard deviation of the compass from which on it tells the turn even where no match does.
 _SURE = np.radians(0.3)
 #: s over which what is predicted may contradict the compass before it is believed less.
@@ -198,9 +201,7 @@ class MapRotation:
         gain = self._spread[:, 0] / (self._spread[0, 0] + (self._noise / correlation) ** 2)
         self._heading = self._heading + gain * offset
         self._spread = self._spread - np.outer(gain, self._spread[0])
-        # The spread is that of the yaw in the map. Half of it cancels in the sum of steps: the next frame, matched with
-        # the same map, takes it back.
-        return self._heading[0] - start, self._spread[0, 0] / 2, True
+        return self._heading[0] - start, _LASTING * self._spread[0, 0], True
 
     def _predict(self, dt: float, told: tuple[float, float] | None) -> None:
         """Yaw and rate `dt` s later: by the rate, or by what another estimator says of the turn and its variance."""

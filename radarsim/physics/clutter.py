@@ -53,10 +53,9 @@ class Clutter:
         off = NEAREST + rng.exponential(STANDOFF, len(on))
         place = corners[on, 0] + np.einsum("nk,nkd->nd", share, sides[on]) + off[:, None] * normals[on]
         size = rng.exponential(1.0, len(on))
-        flat = np.array([item.is_floor_or_ceiling for item in scene.objects], bool)
         self._points = replace(
             Scatterers.points(place, cross_section(size), rng.uniform(0, 2 * np.pi, len(on))),
-            horizontal=flat[scene.triangle_object[on]],
+            horizontal=scene.floors_and_ceilings[on],
             bounces=_strongest(size, BOUNCE_STRIDE),
             bounces_twice=_strongest(size, BOUNCE_STRIDE**2),
         )

@@ -98,15 +98,16 @@ class Reflectors:
             if slab not in tables:
                 tables[slab] = reflection(slab, config)
             round_, is_round = recognise(item.mesh)
-            sides = item.two_sided, item.is_floor_or_ceiling
             finish = FINISHES.get(item.material.name, 0.0)
             bodies += [(b.center, b.axis, b.radius, b.half, tables[slab]) for b in round_]
             # physical optics holds down to about a wavelength
             found = plates(item.mesh, ~is_round, config.wavelength**2)
-            rest = (*sides, tables[slab], finish, -1, -1)
-            flat += [(p.corners, p.center, p.normal, p.u, p.v, p.half, *rest) for p in found]
-            if slab.thickness is not None and not (whole or item.two_sided):
-                for p in found:
+            hollow = slab.thickness is not None and not (whole or item.two_sided)
+            for p in found:
+                lying = item.floors_and_ceilings(p.corners.mean(axis=0)[None], p.normal[None])[0]
+                rest = (item.two_sided, lying, tables[slab], finish, -1, -1)
+                flat.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *rest))
+                if hollow:
                     inwards = -slab.thickness * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))

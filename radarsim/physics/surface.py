@@ -55,13 +55,17 @@ class Surface:
         self._normals = cross / np.maximum(double, 1e-300)[:, None]
         self._areas = np.cumsum(double / 2)
         self._tile_areas = np.add.reduceat(double / 2, self._first[:-1]) if len(tile) else np.zeros(0)
+        self._horizontal = np.zeros(len(owner), bool)
+        edges = np.searchsorted(owner, np.arange(len(used) + 1))  # tiles are in the order of objects
+        for item, begin, end in zip(used, edges, edges[1:], strict=False):
+            here = self._triangles[begin:end].mean(axis=1), self._normals[begin:end]
+            self._horizontal[begin:end] = item.floors_and_ceilings(*here)
         corners = self._triangles.reshape(-1, 3)
         starts = 3 * self._first[:-1]
         self._grid = Grid(*(f.reduceat(corners, starts) if len(tile) else corners for f in (np.minimum, np.maximum)))
         self._owner = owner[self._first[:-1]]
         self._sigma = np.array([o.material.sigma0 for o in used]) / density
         self._two_sided = np.array([o.two_sided for o in used], bool)
-        self._horizontal = np.array([o.is_floor_or_ceiling for o in used], bool)
         self._lobe = np.array([weights(o.material) for o in used]).reshape(-1, 4)
 
     def __len__(self) -> int:
@@ -92,7 +96,7 @@ class Surface:
         owner = np.repeat(self._owner[tiles], counts)
         return Scatterers(
             position, self._normals[triangle], self._sigma[owner], phase, self._two_sided[owner],
-            self._horizontal[owner], *bounces, self._lobe[owner], rank,
+            self._horizontal[triangle], *bounces, self._lobe[owner], rank,
         )  # fmt: skip
 
 

@@ -20,6 +20,9 @@ from radarsim.scene.materials import EPS0, Material
 
 FREQUENCY = 77e9  # at which Sionna RT's own solvers start out
 _REACH = 1000.0
+#: m: a mesh that is lower is no room; and as near to its bottom and top are floor and ceiling, which face up and down
+#: by more than this cosine in a scan, too.
+_ROOM, _LEVEL, _FLAT = 1.8, 0.15, 0.95
 #: Entries of four bytes that a processor's widest instruction takes at a time.
 _PACKET = 16
 
@@ -49,6 +52,18 @@ class SceneObject:
     def is_floor_or_ceiling(self) -> bool:
         """Whether it has horizontal faces only."""
         return bool(np.all(np.abs(self.mesh.face_normals[:, 2]) > 0.999))
+
+    def floors_and_ceilings(
+        self, place: Float[np.ndarray, "face 3"], normal: Float[np.ndarray, "face 3"]
+    ) -> Bool[np.ndarray, "face"]:
+        """Which of its faces, with centres (m) and normals, are floor or ceiling: all, if it has no others; of a room
+        in one mesh, drawn or scanned, those at its bottom that face up and those at its top that face down."""
+        (low, high), up = self.mesh.bounds[:, 2], normal[:, 2]
+        seen_from_within = self.two_sided or (self.mesh.is_watertight and self.mesh.volume < 0)
+        if self.is_floor_or_ceiling or high - low < _ROOM or not seen_from_within:
+            return np.full(len(place), self.is_floor_or_ceiling)
+        bottom, top = place[:, 2] < low + _LEVEL, place[:, 2] > high - _LEVEL
+        return (bottom & (up > _FLAT)) | (top & (up < -_FLAT))
 
 
 @dataclass(frozen=True)
@@ -233,6 +248,14 @@ class Scene:
         """Distance along each ray to the first object (inf: none) and its index into `objects` (-1: none)."""
         distance, triangle = self.hit(origins, directions, coherent)
         return distance, np.where(triangle < 0, -1, self.triangle_object[triangle])
+
+    @cached_property
+    def floors_and_ceilings(self) -> Bool[np.ndarray, "triangle"]:
+        """Which of its triangles are floor or ceiling."""
+        edges = np.cumsum([0, *(len(item.mesh.faces) for item in self.objects)])
+        parts = zip(self.objects, edges, edges[1:], strict=False)
+        middle = self.triangles.mean(axis=1)
+        return np.concatenate([o.floors_and_ceilings(middle[a:b], self.normals[a:b]) for o, a, b in parts])
 
     def floor_plan(self, height: float) -> Float[np.ndarray, "n 4"]:
         """Everything cut by the plane z = `height`, as segments x0 y0 x1 y1 in m; collinear pieces are joined."""

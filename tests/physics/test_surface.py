@@ -8,12 +8,14 @@ from scipy import stats
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import amplitude_gain, gain_pattern
+from radarsim.physics.clutter import Clutter
 from radarsim.physics.detail import detail, share
 from radarsim.physics.finder import EchoFinder
+from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.surface import DENSITY, Surface
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.scene import Life, Scene, SceneObject
 from tests.physics.rigs import Rig, burst
 
 CONFIG = PRESETS["radarize"]
@@ -226,3 +228,15 @@ def test_cost_does_not_depend_on_the_building():
     assert near[0] == pytest.approx(near[1], rel=0.03)
     held = sum(a.nbytes for a in vars(world).values() if isinstance(a, np.ndarray))
     assert held < 0.05 * 100 * len(world)  # a scatterer in memory takes more than 100 bytes
+
+
+def test_a_room_in_one_mesh_has_the_floor_of_one_in_parts():
+    """As in a scan: scatterers, flat parts and small things on floor and ceiling are told from those on walls."""
+    parts = [item.mesh for item in SCENE.objects]
+    whole = Scene("scan", [SceneObject("room", shapes.joined(*parts), MATERIALS["concrete"])], life=Life(clutter=1.0))
+    found = Surface(whole, np.random.default_rng(0)).all()
+    assert (found.horizontal == (np.abs(np.abs(found.position[:, 2]) - 1.3) < 1e-6)).all()
+    flat = Reflectors.of(whole, CONFIG).flat
+    assert (flat.horizontal == (np.abs(flat.normal[:, 2]) > 0.9)).all() and flat.horizontal.sum() == 2
+    small = Clutter(whole, np.random.default_rng(0)).near(np.zeros((1, 3)), 10.0)
+    assert small.horizontal.any() and (np.abs(small.position[small.horizontal, 2]) > 0.9).all()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 
 from radarize.errors import InputError
 from radarsim.scene import shapes
@@ -136,6 +137,34 @@ def test_two_sidedness_and_floors():
     lidless = SceneObject("lidless", shapes.box((0, 0, 0), (1, 1, 1), without=("-z",)), METAL, solid=True)
     assert sheet.two_sided and not block.two_sided and not lidless.two_sided
     assert sheet.is_floor_or_ceiling and not block.is_floor_or_ceiling
+
+
+def lying(*objects: SceneObject) -> np.ndarray:
+    """Heights of the triangles that are floor or ceiling."""
+    scene = Scene("place", list(objects))
+    return np.unique(scene.triangles[scene.floors_and_ceilings].mean(axis=1)[:, 2].round(6))
+
+
+def test_floor_and_ceiling_of_a_room_in_one_mesh():
+    """A scan knows faces alone: those at the bottom that face up, and those at the top that face down."""
+    room, table = shapes.box((0, 0, 1.3), (5, 4, 2.6)), shapes.box((0, 0, 0.7), (1, 1, 0.04))
+    room.invert()
+    cabinet = shapes.box((2, 0, 1.05), (0.5, 0.5, 2.1))
+    whole = shapes.joined(room, table, cabinet)
+    assert lying(SceneObject("room", whole, METAL)) == pytest.approx([0, 2.6])
+    tilted = whole.copy().apply_transform(trimesh.transformations.rotation_matrix(np.radians(1), (1, 0, 0)))
+    assert len(lying(SceneObject("tilted", tilted, METAL)))
+    scan = whole.submesh([np.arange(len(whole.faces) - 2)], append=True)  # with a hole
+    assert lying(SceneObject("scan", scan, METAL)) == pytest.approx([0, 2.6])
+    assert not len(lying(SceneObject("cabinet", cabinet, METAL), SceneObject("table", table, METAL)))
+    assert not len(lying(SceneObject("body", scan, METAL, solid=True)))
+
+
+@pytest.mark.parametrize("name", ["office", "buildings/a", "floor"])
+def test_drawn_places_have_whole_floors(name):
+    scene = Scene.load(name)
+    whole = np.array([item.is_floor_or_ceiling for item in scene.objects])[scene.triangle_object]
+    assert whole.any() and (scene.floors_and_ceilings == whole).all()
 
 
 @pytest.mark.parametrize("shape", [shapes.box((1, 2, 3), (1, 2, 3)), shapes.cylinder((1, 0, 0), 0.5, 2, 8),

@@ -16,10 +16,7 @@ from radarsim import cli as radarsim
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results"
 #: Pages of a former layout, to be made again; then they leave this list.
-FORMER = {
-    "ablation", "buildings", "capture_speed", "fuzzing", "odometry", "odometry-platforms", "slam_backend", "transfer",
-    "uncertainty",
-}  # fmt: skip
+FORMER = {"ablation", "capture_speed", "fuzzing", "slam_backend", "transfer"}
 PAGES = sorted(path.stem for path in RESULTS.glob("*.json"))
 
 

@@ -20,14 +20,12 @@ from radarsim.physics.finder import EchoFinder
 from radarsim.physics.frontend import FrontEnd
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.physics.interference import Interference
-from radarsim.physics.movingplates import MovingPlates
 from radarsim.physics.movingtargets import MovingTargets
-from radarsim.physics.obstacles import CLEARANCE, Obstacles
+from radarsim.physics.obstacles import Obstacles
 from radarsim.physics.pathsolver import PathSolverFinder
 from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
-from radarsim.physics.transmission import Transmission
 from radarsim.physics.unevenness import Heights
 from radarsim.scene.scene import Scene
 from radarsim.sensors.sight import Sight
@@ -112,8 +110,7 @@ class Scenario:
         scatterers = Cluttered(Surface(self.scene, self.draws("surface")), Clutter(self.scene, self.draws("clutter")))
         return EchoFinder(
             self.scene, scatterers, Reflectors.of(self.scene, self.config), self.config, weakest, reach, antenna,
-            self._moving,
-            Heights.of(self.scene, self.draws("unevenness")),
+            self._moving, Heights.of(self.scene, self.draws("unevenness")),
         )  # fmt: skip
 
     @cached_property
@@ -123,9 +120,8 @@ class Scenario:
     @cached_property
     def interference(self) -> Interference:
         """Makes the signal of the scene's other radars."""
-        through = Transmission(self.scene, self.config, CLEARANCE)
-        plates = MovingPlates(self._moving, self.config, CLEARANCE)
-        return Interference(self.scene.interferers, self.board, Obstacles(self.scene, through, self._moving, plates))
+        obstacles = Obstacles.of(self.scene, self._moving, self.config)
+        return Interference(self.scene.interferers, self.board, obstacles)
 
     @cached_property
     def synthesize(self) -> Synthesizer:

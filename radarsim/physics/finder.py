@@ -15,9 +15,8 @@ from radarsim.physics.candidates import Candidates
 from radarsim.physics.echoes import Echoes, Provenance
 from radarsim.physics.fresnelzone import LEAST_LOSS
 from radarsim.physics.images import Images
-from radarsim.physics.movingplates import MovingPlates
 from radarsim.physics.movingtargets import MovingTargets
-from radarsim.physics.obstacles import CLEARANCE, Obstacles
+from radarsim.physics.obstacles import Obstacles
 from radarsim.physics.paths import OneWay, TwoWay
 from radarsim.physics.pointechoes import PointEchoes
 from radarsim.physics.reflectors import Flat, Reflectors
@@ -28,7 +27,6 @@ from radarsim.physics.specular import SpecularCandidates
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import NODES, BurstClock
 from radarsim.physics.targets import Targets
-from radarsim.physics.transmission import Transmission
 from radarsim.physics.unevenness import Heights
 from radarsim.scene.scene import Scene
 
@@ -67,10 +65,9 @@ class EchoFinder:
         self.scene, self.surface, self.reflectors, self.config = scene, surface, reflectors, config
         self.threshold, self.heights = threshold, heights
         self.moving = MovingTargets([], np.random.default_rng()) if moving is None else moving
-        self.plates = MovingPlates(self.moving, config, CLEARANCE)
         self.range = 1.05 * config.max_range if range is None else range
-        transmission = None if scene is None else Transmission(scene, config, CLEARANCE)
-        self.obstacles = Obstacles(scene, transmission, self.moving, self.plates)
+        self.obstacles = Obstacles.of(scene, self.moving, config)
+        self.plates = self.obstacles.plates
         self._pattern = gain_pattern(antenna)
 
     def __call__(

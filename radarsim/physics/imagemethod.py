@@ -49,8 +49,8 @@ from radarsim.physics.table import Table, filled
 class Chains(Table):
     """Ways over mirrors that lead from the sensor back to it, each in one of its two directions.
 
-    The other direction (`reverse`) has the same amplitude and the inverse isometry; a chain with the same mirror at
-    either end is its own reverse.
+    The other direction has the same amplitude and the inverse isometry (`isometry.inverse`); a chain with the same
+    mirror at either end is its own reverse.
 
     Attributes:
         mirrors: of two, the second one twice.
@@ -95,12 +95,6 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], search: Search, frame: 
         lambda found: _search(search, frame, flat.columns, orders, found.columns),
         1024,
     )
-
-
-def reverse(isometry: Float[np.ndarray, "image 3 4"]) -> Float[np.ndarray, "image 3 4"]:
-    """Isometries of chains taken the other way round: the inverse."""
-    back = isometry[:, :, :3].transpose(0, 2, 1)
-    return np.concatenate([back, -back @ isometry[:, :, 3:]], axis=2)
 
 
 @njit(cache=True)

@@ -9,6 +9,7 @@ from radarsim.physics import fresnelzone, imagemethod, plates
 from radarsim.physics.curved import RoundBodies
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.fresnelzone import AT_RADAR, Stretches
+from radarsim.physics.isometry import inverse
 from radarsim.physics.obstacles import Obstacles
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
@@ -178,7 +179,7 @@ def by_chains(search: Search, flat: Flat, mirrors: list[Mirrors], obstacles: Obs
     factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(chains.amplitude).repeat(4))
     factor, delay = factor.reshape(-1, 4).prod(axis=1), delay.reshape(-1, 4).sum(axis=1)
     order = np.where(two[:, None], order[:, [1, 0, 2]], order[:, ::-1])
-    back = replace(there, isometry=imagemethod.reverse(chains.isometry), mirrors=order)
+    back = replace(there, isometry=inverse(chains.isometry), mirrors=order)
     two_ways = chains.mirrors[:, 0] != chains.mirrors[:, 2]
     return Images.joined([
         _passed(search, there, factor, delay), _passed(search, back[two_ways], factor[two_ways], delay[two_ways])

@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
 from radarize.radar.config import RadarConfig
+from radarsim.physics.isometry import after, inverse
 from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.reflectors import Flat, Reflectors
 from radarsim.physics.search import Search
@@ -172,16 +173,3 @@ def turned(
     chain = isometries(flat, mirrors, moves)
     chain = after(after(chain[:, :3], inverse(chain[:, 3:])), image[:, None])
     return np.where((mirrors[:, 1] < 0)[:, None, None, None], part, chain)
-
-
-def after(second: Float[np.ndarray, "*n 3 4"], first: Float[np.ndarray, "*m 3 4"]) -> Float[np.ndarray, "*k 3 4"]:
-    """One isometry after another."""
-    out = second[..., :3] @ first
-    out[..., 3] += second[..., 3]
-    return out
-
-
-def inverse(isometry: Float[np.ndarray, "*n 3 4"]) -> Float[np.ndarray, "*n 3 4"]:
-    """What undoes an isometry."""
-    back = np.swapaxes(isometry[..., :3], -1, -2)
-    return np.concatenate([back, -back @ isometry[..., 3:]], axis=-1)

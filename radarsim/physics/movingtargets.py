@@ -33,16 +33,18 @@ class MovingTargets:
 
     def __init__(self, movers: list[MovingThing], rng: np.random.Generator, density: float = 150.0):
         self.movers = movers
-        self.parts = [part for mover in movers for part in mover.parts()]
+        own = [mover.parts() for mover in movers]
+        self.parts = [part for parts in own for part in parts]
         self.opaque = np.array([k for k, part in enumerate(self.parts) if part.material is None], int)
         place, normal, part, sigma = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, int)], [np.zeros(0)]
         lobe = [np.zeros((0, 4))]
         number = 0
-        for mover in movers:
-            for each in mover.parts():
+        for mover, parts in zip(movers, own, strict=True):
+            area = sum(each.area for each in parts)
+            for each in parts:
                 if each.material is None:
                     # Half of an upright round body faces the radar, and there Lambert's squared cosine averages 1/2.
-                    per_area = 4 * mover.cross_section / sum(p.area for p in mover.parts())
+                    per_area = 4 * mover.cross_section / area
                 else:
                     per_area = each.material.sigma0
                 count = max(int(round(density * each.area)), 4)

@@ -3,6 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
+from radarize.radar.config import RadarConfig
 from radarsim.physics.movingplates import MovingPlates
 from radarsim.physics.movingtargets import MovingTargets
 from radarsim.physics.search import Search
@@ -27,6 +28,12 @@ class Obstacles:
         self, scene: Scene | None, transmission: Transmission | None, moving: MovingTargets, plates: MovingPlates
     ):
         self.scene, self.transmission, self.moving, self.plates = scene, transmission, moving, plates
+
+    @classmethod
+    def of(cls, scene: Scene | None, moving: MovingTargets, config: RadarConfig) -> "Obstacles":
+        """All that there is in a place for a radar."""
+        transmission = None if scene is None else Transmission(scene, config, CLEARANCE)
+        return cls(scene, transmission, moving, MovingPlates(moving, config, CLEARANCE))
 
     def _shadowed(self, search: Search, frame, begin, end) -> Bool[np.ndarray, "ray"]:
         """Whether an opaque part of a mover stands in the way."""

@@ -103,9 +103,10 @@ class Reflectors:
             # physical optics holds down to about a wavelength
             found = plates(item.mesh, ~is_round, config.wavelength**2)
             hollow = slab.thickness is not None and not (whole or item.two_sided)
-            for p in found:
-                lying = item.floors_and_ceilings(p.corners.mean(axis=0)[None], p.normal[None])[0]
-                rest = (item.two_sided, lying, tables[slab], finish, -1, -1)
+            middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
+            lying = item.floors_and_ceilings(middles, np.reshape([p.normal for p in found], (-1, 3)))
+            for p, horizontal in zip(found, lying, strict=True):
+                rest = (item.two_sided, horizontal, tables[slab], finish, -1, -1)
                 flat.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *rest))
                 if hollow:
                     inwards = -slab.thickness * p.normal

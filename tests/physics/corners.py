@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics import imagemethod, sight
+from radarsim.physics.isometry import inverse
 from tests.physics.rigs import conductors, isotropic
 
 LAMBDA = PRESETS["radarize"].wavelength
@@ -52,7 +53,7 @@ def both_ways(mirrors, search):
     both = found.mirrors[:, 0] != found.mirrors[:, 2]
     return (
         np.concatenate([found.mirrors, found.mirrors[both]]),
-        np.concatenate([found.isometry, imagemethod.reverse(found.isometry[both])]),
+        np.concatenate([found.isometry, inverse(found.isometry[both])]),
         np.concatenate([found.amplitude, found.amplitude[both]]),
     )
 

@@ -1,0 +1,17 @@
+"""Isometries of the world, 3 x 4, matrix and offset in m: reflections, half turns, rigid motions, their products."""
+
+import numpy as np
+from jaxtyping import Float
+
+
+def after(second: Float[np.ndarray, "*n 3 4"], first: Float[np.ndarray, "*m 3 4"]) -> Float[np.ndarray, "*k 3 4"]:
+    """One after another."""
+    out = second[..., :3] @ first
+    out[..., 3] += second[..., 3]
+    return out
+
+
+def inverse(isometry: Float[np.ndarray, "*n 3 4"]) -> Float[np.ndarray, "*n 3 4"]:
+    """What undoes it: of a chain of mirrors, the chain taken the other way round."""
+    back = np.swapaxes(isometry[..., :3], -1, -2)
+    return np.concatenate([back, -back @ isometry[..., 3:]], axis=-1)

@@ -64,15 +64,27 @@ def kirchhoff(polygon, corners):
         size = np.hypot(x1 - x0, y1 - y0)
         if size < 1e-12:
             continue
-        dx, dy = (x1 - x0) / size, (y1 - y0) / size
-        s = x0 * dy - y0 * dx  # the origin's distance inside the edge
-        low, high = x0 * dx + y0 * dy, x1 * dx + y1 * dy
+        s, low, high = side(x0, y0, x1, y1, size)
         if s != 0:
             total += np.arctan(high / s) - np.arctan(low / s)
-        weight = min(max((FAR - abs(s)) / (FAR - FADE), 0.0), 1.0)
-        if weight > 0:
-            total -= weight * weight * (3 - 2 * weight) * _edge(s, max(low, -FAR), min(high, FAR))
+        total -= diffracted(s, low, high)
     return total / (2 * np.pi)
+
+
+@njit(inline="always")
+def side(x0, y0, x1, y1, size):
+    """How far the origin is on the left of a side of this size, and where along it the side begins and ends."""
+    dx, dy = (x1 - x0) / size, (y1 - y0) / size
+    return x0 * dy - y0 * dx, x0 * dx + y0 * dy, x1 * dx + y1 * dy
+
+
+@njit(cache=True)
+def diffracted(s, low, high):
+    """What a side takes from 2 pi times `kirchhoff`, but for the angle that it fills; far ones fade."""
+    weight = min(max((FAR - abs(s)) / (FAR - FADE), 0.0), 1.0)
+    if weight <= 0:
+        return 0j
+    return weight * weight * (3 - 2 * weight) * _edge(s, max(low, -FAR), min(high, FAR))
 
 
 @njit(cache=True)

@@ -28,12 +28,15 @@ from numba import njit
 from scipy.special import fresnel
 
 from radarsim.physics.amplitudes import along as moved
-from radarsim.physics.amplitudes import dot, length, minus, mirrored, unit
+from radarsim.physics.amplitudes import cross, dot, length, minus, mirrored, unit
 from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.antenna import amplitude_gain
 from radarsim.physics.coefficients import TABLE
 from radarsim.physics.search import Search
 from radarsim.physics.table import Table
+
+#: What a flash goes over: a sphere or an end of a cylinder, a cylinder lengthwise, a piece of a smooth surface.
+POINT, LINE, QUADRIC = 1.0, 2.0, 3.0
 
 
 @dataclass(frozen=True)
@@ -62,11 +65,12 @@ class RoundBodies(Table):
             return cls(none, none, np.zeros(0), np.zeros(0), np.zeros((0, 2, TABLE), complex))
         return cls(*(np.array(column) for column in zip(*rows, strict=True)))
 
-    def arcs(self, body: Int[np.ndarray, "part"], part: Int[np.ndarray, "part"]) -> Float[np.ndarray, "part 8"]:
+    def arcs(self, body: Int[np.ndarray, "part"], part: Int[np.ndarray, "part"]) -> Float[np.ndarray, "part 13"]:
         """What `path_over` takes of flashes and ends."""
         axis, half = self.axis[body], self.half[body]
         pivot = self.center[body] + (np.array([0, -1, 1])[part] * half)[:, None] * axis
-        return np.column_stack([pivot, axis, self.radius[body], (part == 0) & (half > 0)])
+        kind = np.where((part == 0) & (half > 0), LINE, POINT)
+        return np.column_stack([kind, pivot, axis, self.radius[body], np.zeros((len(body), 5))])
 
     def flashes(self, search: Search, frame: int) -> "Arcs":
         """Flashes and ends as the radar sees them."""
@@ -110,28 +114,69 @@ class Arcs(Table):
         aim: a point for a ray to it to aim at, m.
         isometry: of the receiver, from the middle of the arrays.
         amplitude: square root of received over transmitted power, with phase.
-        shape: a point of the axis, or the centre, m; the axis; radius, m; whether the flash runs along the axis.
+        shape: `POINT`, a sphere or an end of a cylinder, or `LINE`, along a cylinder: a point of the axis, or the
+            centre, m; the axis; radius, m; nought. Or `QUADRIC`: its point in the middle, m; a principal direction;
+            nought; the normal; the curvatures along that direction and across, 1/m.
     """
 
     aim: Float[np.ndarray, "part 3"]
     isometry: Float[np.ndarray, "part 3 4"]
     amplitude: Complex[np.ndarray, "part"]
-    shape: Float[np.ndarray, "part 8"]
+    shape: Float[np.ndarray, "part 13"]
 
 
 @njit(inline="always")
 def path_over(shape, one, two):
     """Length of the shortest way over a round body between two places beside one another, m."""
-    pivot, axis, radius = vec(shape), vec(shape[3:6]), shape[6]
+    pivot, axis, radius = vec(shape[1:4]), vec(shape[4:7]), shape[7]
+    if shape[0] == QUADRIC:
+        return stationary((pivot, axis, vec(shape[8:11]), shape[11], shape[12]), one, two)[1]
     a, b = minus(one, pivot), minus(two, pivot)
     a, b = moved(a, -dot(a, axis), axis), moved(b, -dot(b, axis), axis)
     n = unit(moved(unit(a), 1.0, unit(b)))
     for _ in range(3):
         n = unit(moved(unit(moved(a, -radius, n)), 1.0, unit(moved(b, -radius, n))))
     place = moved(pivot, radius, n)
-    if shape[7] > 0:
+    if shape[0] == LINE:
         return length(minus(one, mirrored(two, place, n)))
     return length(minus(one, place)) + length(minus(two, place))
+
+
+@njit(inline="always")
+def stationary(quadric, one, two):
+    """Where a way between two places over a quadric is stationary, by Newton's steps.
+
+    Args:
+        quadric: point, principal direction, normal, curvatures along the direction and across it (1/m).
+
+    Returns:
+        the place there, m; the way's length, m; its Hessian over the two directions, 1/m, as h11, h22, h12; and that of
+        an endless plane.
+    """
+    point, axis, normal, bend1, bend2 = quadric
+    across = cross(normal, axis)
+    u1, u2 = 0.0, 0.0
+    for step in range(4):
+        s1, s2 = bend1 * u1, bend2 * u2
+        place = moved(moved(moved(point, u1, axis), u2, across), -0.5 * (s1 * u1 + s2 * u2), normal)
+        along1, along2 = moved(axis, -s1, normal), moved(across, -s2, normal)
+        there, back = minus(one, place), minus(two, place)
+        r1, r2 = length(there), length(back)
+        there, back = (there[0] / r1, there[1] / r1, there[2] / r1), (back[0] / r2, back[1] / r2, back[2] / r2)
+        a1, a2, b1, b2 = dot(there, along1), dot(there, along2), dot(back, along1), dot(back, along2)
+        sum_, slope = 1 / r1 + 1 / r2, dot(there, normal) + dot(back, normal)
+        p11 = (1 + s1 * s1) * sum_ - a1 * a1 / r1 - b1 * b1 / r2
+        p22 = (1 + s2 * s2) * sum_ - a2 * a2 / r1 - b2 * b2 / r2
+        p12 = s1 * s2 * sum_ - a1 * a2 / r1 - b1 * b2 / r2
+        h11, h22, h12 = p11 + slope * bend1, p22 + slope * bend2, p12
+        # near a caustic the place hardly matters
+        det = h11 * h22 - h12 * h12
+        if step == 3 or abs(det) < 0.01 * p11 * p22:
+            break
+        g1, g2 = a1 + b1, a2 + b2
+        u1 += (h22 * g1 - h12 * g2) / det
+        u2 += (h11 * g2 - h12 * g1) / det
+    return place, r1 + r2, (h11, h22, h12), (p11, p22, p12)
 
 
 def _side_terms(across, slant, h, wavelength) -> Complex[np.ndarray, "facet side part"]:

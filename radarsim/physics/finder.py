@@ -99,7 +99,7 @@ class EchoFinder:
         points, found = PointEchoes.of(candidates, one_way, two_way), Images.none()
         if self.reflectors is not None:
             found = Images.joined([
-                images.flashes(search, facing, self.reflectors.round, self.obstacles, self.heights),
+                images.flashes(search, facing, self.reflectors, self.obstacles, self.heights),
                 images.by_chains(search, flat, mirrors, self.obstacles),
             ])  # fmt: skip
             ghosts = roundghosts.seen(search, flat, mirrors, self.reflectors.round, self.obstacles)
@@ -175,7 +175,7 @@ class EchoFinder:
         carried = movingplates.carried(flat, found.mirrors)
         found.cause[carried] = Provenance.MOVING
         points = points[np.lexsort((points.cause == Provenance.MOVING, points.frame))]
-        arcs = found.shape[:, 6] > 0
+        arcs = found.shape[:, 0] > 0
         order = np.lexsort((arcs + 2 * carried, found.frame))
         found, carried, arcs = found[order], carried[order], arcs[order]
         moving, turning = points.cause == Provenance.MOVING, found[carried]

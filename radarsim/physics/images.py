@@ -5,13 +5,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Complex, Float, Int, UInt8
 
-from radarsim.physics import fresnelzone, imagemethod, plates
-from radarsim.physics.curved import RoundBodies
+from radarsim.physics import fresnelzone, imagemethod, patches, plates
+from radarsim.physics.curved import Arcs
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.fresnelzone import AT_RADAR, Stretches
 from radarsim.physics.isometry import inverse
 from radarsim.physics.obstacles import Obstacles
-from radarsim.physics.reflectors import Flat
+from radarsim.physics.reflectors import Flat, Reflectors
 from radarsim.physics.search import Search
 from radarsim.physics.sight import Mirrors
 from radarsim.physics.table import Table
@@ -36,24 +36,24 @@ class Images(Table):
     amplitude: Complex[np.ndarray, "image"]
     cause: UInt8[np.ndarray, "image"]
     mirrors: Int[np.ndarray, "image 3"]
-    shape: Float[np.ndarray, "image 9"]
+    shape: Float[np.ndarray, "image 14"]
 
     @classmethod
     def none(cls) -> "Images":
         """No image."""
         none = np.zeros(0, int), np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, np.uint8)
-        return cls(*none, np.zeros((0, 3), int), np.zeros((0, 9)))
+        return cls(*none, np.zeros((0, 3), int), np.zeros((0, 14)))
 
 
 def flashes(
-    search: Search, flat: Flat, round_bodies: RoundBodies, obstacles: Obstacles, heights: Heights | None = None
+    search: Search, flat: Flat, reflectors: Reflectors, obstacles: Obstacles, heights: Heights | None = None
 ) -> Images:
-    """Plates, as even as `heights` says, and round bodies that face the radar."""
+    """Plates, as even as `heights` says, and curved reflectors that face the radar."""
     found, ways = [], []
     for frame in range(search.frames):
         parts = plates.parts(flat, search, frame)
         parts = parts[flat.present(frame)[parts.facet]]
-        arcs = round_bodies.flashes(search, frame)
+        arcs = Arcs.joined([reflectors.round.flashes(search, frame), patches.flashes(search, frame, reflectors.smooth)])
         cause = np.where(flat.horizontal[parts.facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
         cause = np.append(cause, np.full(len(arcs), Provenance.DIRECT)).astype(np.uint8)
         if heights is not None:
@@ -61,8 +61,8 @@ def flashes(
             parts = replace(parts, amplitude=parts.amplitude * uneven)
         ways += [_to_parts(search, frame, flat, parts), _to_bodies(search, frame, arcs.aim)]
         isometry = np.concatenate([parts.isometry, arcs.isometry])
-        mirrors, shape = np.full((len(cause), 3), -1), np.zeros((len(cause), 9))
-        mirrors[: len(parts), 0], shape[len(parts) :, :8] = parts.facet, arcs.shape
+        mirrors, shape = np.full((len(cause), 3), -1), np.zeros((len(cause), 14))
+        mirrors[: len(parts), 0], shape[len(parts) :, :13] = parts.facet, arcs.shape
         amplitude = np.append(parts.amplitude, arcs.amplitude)
         found.append(Images(np.full(len(cause), frame), isometry, amplitude, cause, mirrors, shape))
     images, ways = Images.joined(found), Stretches.joined(ways)
@@ -121,7 +121,7 @@ def _passed(search: Search, images: Images, factor, delay) -> Images:
     isometry[:, :, 3] += (delay / np.linalg.norm(away, axis=1))[:, None] * away
     cause = np.where(factor == 1, images.cause, np.uint8(Provenance.THROUGH_SLAB))
     shape = images.shape.copy()
-    shape[:, 8] = delay
+    shape[:, 13] = delay
     return replace(images, isometry=isometry, amplitude=amplitude, cause=cause, shape=shape)
 
 
@@ -174,7 +174,7 @@ def by_chains(search: Search, flat: Flat, mirrors: list[Mirrors], obstacles: Obs
     cause = np.where(two, Provenance.GHOST_2, Provenance.GHOST_3).astype(np.uint8)
     cause[slant < 1e-3] = Provenance.DIRECT
     order = np.where(two[:, None], chains.mirrors * [1, 1, 0] - [0, 0, 1], chains.mirrors)
-    there = Images(frame, chains.isometry, chains.amplitude, cause, order, np.zeros((len(frame), 9)))
+    there = Images(frame, chains.isometry, chains.amplitude, cause, order, np.zeros((len(frame), 14)))
     ways = _along(search, flat, frame, chains)
     factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(chains.amplitude).repeat(4))
     factor, delay = factor.reshape(-1, 4).prod(axis=1), delay.reshape(-1, 4).sum(axis=1)

@@ -11,7 +11,9 @@ from radarsim.physics.bodies import recognise
 from radarsim.physics.coefficients import TABLE, as_slab, reflection
 from radarsim.physics.curved import RoundBodies
 from radarsim.physics.grid import Grid
+from radarsim.physics.patches import Patches
 from radarsim.physics.planes import plates
+from radarsim.physics.smooth import pieces
 from radarsim.physics.table import Table
 from radarsim.physics.unevenness import FINISHES
 from radarsim.scene.materials import Material
@@ -68,12 +70,14 @@ class Reflectors:
     Attributes:
         flat: quadrilaterals that cover its flat regions.
         round: its spheres and cylinders.
+        smooth: pieces of its other curved surfaces.
         inner: the inner faces of hollow bodies, which are seen through outer ones: they flash, but mirror nothing else.
     """
 
     flat: Flat
     round: RoundBodies
     inner: Flat = Flat.none()
+    smooth: Patches = Patches.of([])
 
     @cached_property
     def _grids(self) -> tuple[Grid, Grid]:
@@ -91,7 +95,7 @@ class Reflectors:
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig) -> "Reflectors":
         """The reflectors of a scene."""
-        flat, inner, bodies = [], [], []
+        flat, inner, bodies, smooth = [], [], [], []
         tables: dict[Material, np.ndarray] = {}
         for item in scene.objects:
             slab, whole = as_slab(item)
@@ -101,7 +105,9 @@ class Reflectors:
             finish = FINISHES.get(item.material.name, 0.0)
             bodies += [(b.center, b.axis, b.radius, b.half, tables[slab]) for b in round_]
             # physical optics holds down to about a wavelength
-            found = plates(item.mesh, ~is_round, config.wavelength**2)
+            curved, is_curved = pieces(item.mesh, ~is_round, config.wavelength**2)
+            smooth += [(piece, item.two_sided, tables[slab]) for piece in curved]
+            found = plates(item.mesh, ~(is_round | is_curved), config.wavelength**2)
             hollow = slab.thickness is not None and not (whole or item.two_sided)
             middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
             lying = item.floors_and_ceilings(middles, np.reshape([p.normal for p in found], (-1, 3)))
@@ -112,7 +118,7 @@ class Reflectors:
                     inwards = -slab.thickness * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
-        return cls(_table(flat), RoundBodies.of(bodies), _table(inner))
+        return cls(_table(flat), RoundBodies.of(bodies), _table(inner), Patches.of(smooth))
 
 
 def _table(rows: list[tuple]) -> Flat:

@@ -102,7 +102,7 @@ class EchoFinder:
                 images.flashes(search, facing, self.reflectors, self.obstacles, self.heights),
                 images.by_chains(search, flat, mirrors, self.obstacles),
             ])  # fmt: skip
-            ghosts = roundghosts.seen(search, flat, mirrors, self.reflectors.round, self.obstacles)
+            ghosts = roundghosts.seen(search, flat, mirrors, self.reflectors, self.obstacles)
             points = PointEchoes.joined([ghosts, points])
         return self._echoes(search, targets, facing, points, found)
 

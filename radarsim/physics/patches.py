@@ -1,4 +1,4 @@
-"""The coherent echo of smooth curved surfaces: geometric optics at the specular point, Fresnel's integral up to borders.
+"""The coherent echo of smooth curved surfaces: geometric optics at specular points, Fresnel's integral up to borders.
 
 Where the way from the radar over a surface and back is stationary, physical optics is the wall's echo times what the
 way's Hessians have in common (Deschamps, Proc. IEEE 60(9), 1972), with the principal radii a_1 and a_2 there
@@ -33,8 +33,11 @@ from radarsim.physics.search import Search
 from radarsim.physics.smooth import Piece
 from radarsim.physics.table import filled
 
-#: Triangles from the best corner to the one that holds the specular point, at most.
-STEPS = 64
+#: About so many of a piece's corners are where the search for its specular point may begin, and so many triangles, at
+#: most, are from there to the one that holds it.
+STARTS, STEPS = 64, 512
+#: Square of an angle between normals, rad^2, that is nothing where no border is near.
+BESIDE = 1e-4
 
 
 class Patches(NamedTuple):
@@ -138,7 +141,7 @@ def strength(search, patches, of, one, two):
         that an isotropic antenna gets from one place to the other.
     """
     k, turn = of
-    face, weights = _foot(patches, k, turn, one, two)
+    face, weights, inside = _foot(patches, k, turn, one, two)
     aim, quadric = _surface(patches, face, turn, weights)
     place, way, hessian, plane = stationary(quadric, one, two)
     size = patches.ball[k, 3]
@@ -152,7 +155,7 @@ def strength(search, patches, of, one, two):
     across, elliptic = cross(quadric[2], quadric[1]), high * low > 0
     first = _mixed(np.cos(angle), quadric[1], np.sin(angle), across, np.sqrt(2 * abs(high) / search.wavelength))
     second = _mixed(-np.sin(angle), quadric[1], np.cos(angle), across, np.sqrt(2 * abs(low) / search.wavelength))
-    value = _fresnel(patches, of, (place, first, second, elliptic), (one, two, way, search.wavelength))
+    value = _fresnel(patches, of, (place, first, second, elliptic, inside), (one, two, way, search.wavelength))
     if not elliptic:
         value = -1j * abs(value)
     elif high < 0:
@@ -187,35 +190,44 @@ def _off(patches, corner, turn, one, two):
 
 @njit(inline="always")
 def _foot(patches, k, turn, one, two):
-    """The triangle of a piece, and the weights of its corners, where the normal best halves the angle: from the best
-    corner on, across sides."""
-    most, best = -2.0, 0
-    for corner in range(patches.begin[k, 0], patches.begin[k + 1, 0]):
+    """The triangle of a piece, and the weights of its corners, where the normal best halves the angle, and whether it
+    does: from the best of some corners on, across sides."""
+    nearest, best, begin, end = 9.0, 0, patches.begin[k, 0], patches.begin[k + 1, 0]
+    for corner in range(begin, end, (end - begin) // STARTS + 1):
         off = _off(patches, corner, turn, one, two)
-        near = -dot(off, off)
-        if near > most or most == -2.0:
-            most, best = near, corner
-    face, came = patches.home[best], -1
-    least, weights = _nearest(patches, face, turn, one, two)
-    for _ in range(STEPS):
-        if least < 1e-18:
-            break
-        to, lower, then = -1, least + 1e-15, weights
-        for side_ in range(3):
-            other = patches.across[face, side_]
-            if other >= 0 and other != came:
-                there, others = _nearest(patches, other, turn, one, two)
-                if there < lower:
-                    to, lower, then = other, there, others
+        if dot(off, off) < nearest:
+            nearest, best = dot(off, off), corner
+    face = patches.home[best]
+    least, weights, shares = _nearest(patches, face, turn, one, two)
+    holds, came = face, -1
+    circles = False
+    for step in range(STEPS):
+        low, to, back = 0.0, -1, False
+        for corner in range(3):  # across the side beyond which it is, most of all
+            other = patches.across[face, corner]
+            if shares[corner] < low and other >= 0:
+                low, to, back = shares[corner], other, other == came
         if to < 0:
             break
-        came, face, least, weights = face, to, lower, then
-    return face, weights
+        circles = back or step == STEPS - 1
+        if circles:
+            break
+        came, face = face, to
+        off, others, shares = _nearest(patches, face, turn, one, two)
+        if off < least:
+            least, weights, holds = off, others, face
+    if circles and least > 0:
+        for face in range(patches.begin[k, 1], patches.begin[k + 1, 1]):
+            off, others, _ = _nearest(patches, face, turn, one, two)
+            if off < least:
+                least, weights, holds = off, others, face
+    return holds, weights, least < BESIDE
 
 
 @njit(inline="always")
 def _nearest(patches, face, turn, one, two):
-    """Where on a triangle the normal best halves the angle: the square of what it is off, and weights of corners."""
+    """Where on a triangle the normal best halves the angle: the square of what it is off; weights of corners; and those
+    where it would halve it if the triangle went on for ever."""
     a, b, c = patches.faces[face]
     m = unit(along(along(vec(patches.normal[a]), 1.0, vec(patches.normal[b])), 1.0, vec(patches.normal[c])))
     wa, wb, wc = (
@@ -224,14 +236,16 @@ def _nearest(patches, face, turn, one, two):
     wa, wb, wc = along(wa, -dot(wa, m), m), along(wb, -dot(wb, m), m), along(wc, -dot(wc, m), m)
     ka, kb, kc = dot(cross(wb, wc), m), dot(cross(wc, wa), m), dot(cross(wa, wb), m)
     total = ka + kb + kc
-    if total * ka > 0 and total * kb > 0 and total * kc > 0:
-        return 0.0, (ka / total, kb / total, kc / total)
+    total = total if abs(total) > 1e-300 else 1e-300
+    shares = ka / total, kb / total, kc / total
+    if min(shares) >= 0:
+        return 0.0, shares, shares
     ab, bc, ca = _on_side(wa, wb), _on_side(wb, wc), _on_side(wc, wa)
     if ab[0] <= bc[0] and ab[0] <= ca[0]:
-        return ab[0], (1 - ab[1], ab[1], 0.0)
+        return ab[0], (1 - ab[1], ab[1], 0.0), shares
     if bc[0] <= ca[0]:
-        return bc[0], (0.0, 1 - bc[1], bc[1])
-    return ca[0], (ca[1], 0.0, 1 - ca[1])
+        return bc[0], (0.0, 1 - bc[1], bc[1]), shares
+    return ca[0], (ca[1], 0.0, 1 - ca[1]), shares
 
 
 @njit(inline="always")
@@ -284,11 +298,11 @@ def _fresnel(patches, of, zones, way):
     Args:
         patches, of: see `strength`.
         zones: the specular point, m; axes in which places about it are Fresnel units, 1/m; whether the way is shortest
-            or longest there.
+            or longest there; and whether it is inside, where no border is near.
         way: from where, to where, how long, and the wavelength, m.
     """
     k, turn = of
-    total, nearest, left = 0j, 1e30, 1.0
+    total, nearest, left = 0j, FAR * FAR, 1.0 if zones[4] else -1.0
     for edge in range(patches.begin[k, 2], patches.begin[k + 1, 2]):
         a, b = patches.border[edge]
         if turn < 0:
@@ -304,11 +318,12 @@ def _fresnel(patches, of, zones, way):
         s = s if abs(s) > 1e-6 else 1e-6
         beyond = max(begin, -end, 0.0)
         far = s * s + beyond * beyond
+        if far >= FAR * FAR:
+            continue
         # of two sides that meet at the nearest corner, the one that is farther from being passed
         if far < nearest - 1e-9 * nearest or (far < nearest + 1e-9 * nearest and abs(s) > abs(left)):
             nearest, left = far, s
-        if far < FAR * FAR:
-            total -= diffracted(s, begin, end)
+        total -= diffracted(s, begin, end)
     inside = 1.0 if left > 0 else 0.0
     return inside + total / (2 * np.pi)
 
@@ -321,7 +336,7 @@ def _hidden(patches, corner, turn, way):
 @njit(inline="always")
 def _units(place, zones, way):
     """Fresnel units from the specular point: the direction as over its quadric, as far as the way is longer."""
-    middle, first, second, elliptic = zones
+    middle, first, second, elliptic, _ = zones
     one, two, least, wavelength = way
     offset = minus(place, middle)
     x, y = dot(offset, first), dot(offset, second)

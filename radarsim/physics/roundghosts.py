@@ -1,4 +1,4 @@
-"""Spheres and cylinders seen over mirrors: specular ghosts of round bodies, out on one way and back on another.
+"""Curved reflectors seen over mirrors: specular ghosts of theirs, out on one way and back on another.
 
 Seen through the mirrors of its two ways, the radar sends from one image and receives at another. Between the two, light
 takes the shortest way over the body, by the point P whose normal halves the angle. Its strength follows from how the
@@ -8,7 +8,7 @@ H_0 = (1 / r_1 + 1 / r_2) (1 - t t'), t the tangential part of the direction; a 
     1 / (r_1 + r_2) sqrt(det H_0 / det H),  H = H_0 + 2 cos(theta) C,
 
 geometric optics with its caustics (Deschamps, Proc. IEEE 60(9), 1972). A cylinder's ends cut Fresnel's integral along
-its axis.
+its axis, and borders that of other smooth surfaces (`patches`).
 """
 
 from dataclasses import dataclass
@@ -34,11 +34,11 @@ from radarsim.physics.amplitudes import (
 )
 from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.apertures import STRIP_FAR, aperture, passes, strip
-from radarsim.physics.curved import RoundBodies
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.obstacles import Obstacles
+from radarsim.physics.patches import strength
 from radarsim.physics.pointechoes import PointEchoes
-from radarsim.physics.reflectors import Flat
+from radarsim.physics.reflectors import Flat, Reflectors
 from radarsim.physics.search import Search
 from radarsim.physics.sight import Mirrors
 from radarsim.physics.table import Table, filled
@@ -69,9 +69,11 @@ class RoundGhosts(Table):
         return (self.mirrors >= 0).sum(axis=1)
 
 
-def seen(search: Search, flat: Flat, mirrors: list[Mirrors], bodies: RoundBodies, obstacles: Obstacles) -> PointEchoes:
+def seen(
+    search: Search, flat: Flat, mirrors: list[Mirrors], reflectors: Reflectors, obstacles: Obstacles
+) -> PointEchoes:
     """Ghosts that nothing hides; slabs are opaque to them."""
-    found = [find(search, k, flat, some.seen, bodies) for k, some in enumerate(mirrors)]
+    found = [find(search, k, flat, some.seen, reflectors) for k, some in enumerate(mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
     n = 2 * len(every)
     factor, _ = obstacles.way(
@@ -84,57 +86,85 @@ def seen(search: Search, flat: Flat, mirrors: list[Mirrors], bodies: RoundBodies
     return PointEchoes(frame, every.points, mirrors, np.full(len(frame), -1), every.amplitude, cause)
 
 
-def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], bodies: RoundBodies) -> RoundGhosts:
+def find(search: Search, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], reflectors: Reflectors) -> RoundGhosts:
     """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
+    curved = reflectors.round.columns, reflectors.smooth
     return filled(
         lambda n: RoundGhosts(
             np.empty((n, 2, 3)), np.empty((n, 2, 2, 3)), np.empty((n, 2), np.int64), np.empty(n, complex)
         ),
-        lambda found: _find(search, frame, flat.columns, seen, bodies.columns, found.columns),
+        lambda found: _find(search, frame, flat.columns, seen, curved, found.columns),
         256,
     )
 
 
 @njit(cache=True)
-def _find(search, frame, flat, seen, bodies, found):
+def _find(search, frame, flat, seen, curved, found):
     """Returns how many there are, of which as many as fit are written."""
     p, count = vec(search.position[frame]), 0
     mirrors, images = np.empty(len(seen) + 1, np.int64), np.empty((len(seen) + 1, 3))
+    bodies, patches = curved
     for b in range(len(bodies.radius)):
-        ways = _ways(search, p, flat, seen, bodies, b, (mirrors, images))
+        ball = vec(bodies.center[b]), bodies.radius[b] + bodies.half[b]
+        ways = _ways(search, p, flat, seen, ball, (mirrors, images))
         for i in range(ways):
             for j in range(max(i, 1), ways):
                 place, n, size = _strength(search, bodies, b, vec(images[i]), vec(images[j]))
-                if abs(size) * search.peak_gain**2 <= search.threshold:
-                    continue
-                out = _over(search, frame, flat, mirrors[i], vec(images[i]), place)
-                back = _over(search, frame, flat, mirrors[j], vec(images[j]), place)
-                value = size * out[2] * back[2]
-                if abs(value) <= search.threshold:
-                    continue
-                ends = (mirrors[i], out[0]), (mirrors[j], back[0])
-                value *= _polarisation(search, frame, flat, ends, place, n, bodies.reflection[b])
-                if abs(value) <= search.threshold:
-                    continue
-                clear = along(place, 2e-3, n)
-                for swapped in range(1 if i == j else 2):
-                    if count < len(found.amplitude):
-                        found.amplitude[count] = value
-                        for end in range(2):
-                            way, m = (out, mirrors[i]) if end == swapped else (back, mirrors[j])
-                            found.mirrors[count, end] = m
-                            write(way[1], found.points[count, end])
-                            write(way[0] if m >= 0 else clear, found.stops[count, end, 0])
-                            write(clear, found.stops[count, end, 1])
-                    count += 1
+                way = mirrors[i], vec(images[i]), mirrors[j], vec(images[j])
+                count += _add(search, frame, flat, way, (place, place, n, size, bodies.reflection[b]), (found, count))
+    for k in range(len(patches.ball)):
+        ways = _ways(search, p, flat, seen, (vec(patches.ball[k]), patches.ball[k, 3]), (mirrors, images))
+        for i in range(ways):
+            for j in range(max(i, 1), ways):
+                for turn in range(2 if patches.two_sided[k] else 1):
+                    of, way = (k, 1.0 - 2.0 * turn), (mirrors[i], vec(images[i]), mirrors[j], vec(images[j]))
+                    aim, quadric, place, size = strength(search, patches, of, way[1], way[3])
+                    echo = place, aim, quadric[2], size, patches.reflection[k]
+                    count += _add(search, frame, flat, way, echo, (found, count))
     return count
 
 
 @njit(inline="always")
-def _ways(search, p, flat, seen, bodies, b, ways):
-    """Mirrors (-1: none, the first) and images of the radar of all ways that may lead to a body; returns how many."""
+def _add(search, frame, flat, way, echo, found):
+    """Write an echo, either way round, if it is strong enough; how many that makes.
+
+    Args:
+        search, frame, flat: of `_find`.
+        way: mirrors and images of the radar out and back.
+        echo: place, a point for rays to aim at, normal, amplitude from image to image, reflection.
+        found: ghosts so far, and how many.
+    """
+    one, source, two, sink = way
+    place, aim, n, size, reflection = echo
+    ghosts, count = found
+    if abs(size) * search.peak_gain**2 <= search.threshold:
+        return 0
+    out, back = _over(search, frame, flat, one, source, place), _over(search, frame, flat, two, sink, place)
+    value = size * out[2] * back[2]
+    if abs(value) <= search.threshold:
+        return 0
+    value *= _polarisation(search, frame, flat, ((one, out[0]), (two, back[0])), place, n, reflection)
+    if abs(value) <= search.threshold:
+        return 0
+    clear, ways = along(aim, 2e-3, n), 1 if one == two else 2
+    for swapped in range(ways):
+        row = count + swapped
+        if row < len(ghosts.amplitude):
+            ghosts.amplitude[row] = value
+            for end in range(2):
+                leg, m = (out, one) if end == swapped else (back, two)
+                ghosts.mirrors[row, end] = m
+                write(leg[1], ghosts.points[row, end])
+                write(leg[0] if m >= 0 else clear, ghosts.stops[row, end, 0])
+                write(clear, ghosts.stops[row, end, 1])
+    return ways
+
+
+@njit(inline="always")
+def _ways(search, p, flat, seen, ball, ways):
+    """Mirrors (-1: none, the first) and images of the radar of all ways that may lead into a ball; returns how many."""
     mirrors, images = ways
-    center, size = vec(bodies.center[b]), bodies.radius[b] + bodies.half[b]
+    center, size = ball
     if length(minus(center, p)) - size > search.range:
         return 0
     mirrors[0], count = -1, 1

@@ -22,7 +22,7 @@ def ghosts(body, wall=WALL):
     """Ghosts of a metal body as seen from the origin."""
     found = Reflectors.of(Scene("ghosts", [wall, SceneObject("body", body, MATERIALS["metal"])]), CONFIG)
     facing = np.flatnonzero(np.abs(found.flat.normal[:, 1]) > 0.99)[:1]
-    return roundghosts.find(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found.round)
+    return roundghosts.find(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found)
 
 
 def summed(points, normals, areas, one, two, image):

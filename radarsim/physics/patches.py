@@ -233,11 +233,14 @@ def _nearest(patches, face, turn, one, two):
     wa, wb, wc = (
         _off(patches, a, turn, one, two), _off(patches, b, turn, one, two), _off(patches, c, turn, one, two)
     )  # fmt: skip
+    seen = dot(wa, m) * turn > -1  # from behind, it is halved as well
     wa, wb, wc = along(wa, -dot(wa, m), m), along(wb, -dot(wb, m), m), along(wc, -dot(wc, m), m)
     ka, kb, kc = dot(cross(wb, wc), m), dot(cross(wc, wa), m), dot(cross(wa, wb), m)
     total = ka + kb + kc
     total = total if abs(total) > 1e-300 else 1e-300
     shares = ka / total, kb / total, kc / total
+    if not seen:
+        return 4.0, (1 / 3, 1 / 3, 1 / 3), shares
     if min(shares) >= 0:
         return 0.0, shares, shares
     ab, bc, ca = _on_side(wa, wb), _on_side(wb, wc), _on_side(wc, wa)

@@ -45,10 +45,14 @@ class Images(Table):
         return cls(*none, np.zeros((0, 3), int), np.zeros((0, 14)))
 
 
-def flashes(
-    search: Search, flat: Flat, reflectors: Reflectors, obstacles: Obstacles, heights: Heights | None = None
-) -> Images:
-    """Plates, as even as `heights` says, and curved reflectors that face the radar."""
+def flashes(search: Search, flat: Flat, reflectors: Reflectors, obstacles: Obstacles) -> Images:
+    """Plates, as even as they are, and curved reflectors that face the radar.
+
+    Args:
+        search, obstacles: the frames, and what is in the way.
+        flat: those in range, and those that move.
+        reflectors: of the scene; its curved ones and its unevenness count.
+    """
     found, ways = [], []
     for frame in range(search.frames):
         parts = plates.parts(flat, search, frame)
@@ -56,8 +60,8 @@ def flashes(
         arcs = Arcs.joined([reflectors.round.flashes(search, frame), patches.flashes(search, frame, reflectors.smooth)])
         cause = np.where(flat.horizontal[parts.facet], Provenance.FLOOR_CEILING, Provenance.DIRECT)
         cause = np.append(cause, np.full(len(arcs), Provenance.DIRECT)).astype(np.uint8)
-        if heights is not None:
-            uneven = _uneven(search, frame, flat[parts.facet], parts.aim, heights)
+        if reflectors.heights is not None:
+            uneven = _uneven(search, frame, flat[parts.facet], parts.aim, reflectors.heights)
             parts = replace(parts, amplitude=parts.amplitude * uneven)
         ways += [_to_parts(search, frame, flat, parts), _to_bodies(search, frame, arcs.aim)]
         isometry = np.concatenate([parts.isometry, arcs.isometry])

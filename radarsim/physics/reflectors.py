@@ -12,11 +12,11 @@ from radarsim.physics.coefficients import TABLE, as_slab, reflection
 from radarsim.physics.curved import RoundBodies
 from radarsim.physics.grid import Grid
 from radarsim.physics.patches import Patches
-from radarsim.physics.planes import plates
 from radarsim.physics.smooth import pieces
 from radarsim.physics.table import Table
-from radarsim.physics.unevenness import FINISHES
+from radarsim.physics.unevenness import FINISHES, Heights
 from radarsim.scene.materials import Material
+from radarsim.scene.planes import plates
 from radarsim.scene.scene import Scene
 
 
@@ -72,12 +72,14 @@ class Reflectors:
         round: its spheres and cylinders.
         smooth: pieces of its other curved surfaces.
         inner: the inner faces of hollow bodies, which are seen through outer ones: they flash, but mirror nothing else.
+        heights: how uneven the flat ones are; None: not at all.
     """
 
     flat: Flat
     round: RoundBodies
     inner: Flat = Flat.none()
     smooth: Patches = Patches.of([])
+    heights: Heights | None = None
 
     @cached_property
     def _grids(self) -> tuple[Grid, Grid]:
@@ -93,7 +95,7 @@ class Reflectors:
         return self.inner[self._grids[1].near(positions, distance)[0]] if len(self.inner) else self.inner
 
     @classmethod
-    def of(cls, scene: Scene, config: RadarConfig) -> "Reflectors":
+    def of(cls, scene: Scene, config: RadarConfig, heights: Heights | None = None) -> "Reflectors":
         """The reflectors of a scene."""
         flat, inner, bodies, smooth = [], [], [], []
         tables: dict[Material, np.ndarray] = {}
@@ -118,7 +120,7 @@ class Reflectors:
                     inwards = -slab.thickness * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
-        return cls(_table(flat), RoundBodies.of(bodies), _table(inner), Patches.of(smooth))
+        return cls(_table(flat), RoundBodies.of(bodies), _table(inner), Patches.of(smooth), heights)
 
 
 def _table(rows: list[tuple]) -> Flat:

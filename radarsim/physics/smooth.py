@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.sparse.linalg import lsmr
 from scipy.spatial import cKDTree
 
-from radarsim.physics.planes import STRAIGHT, regions
+from radarsim.scene.planes import STRAIGHT, regions
 
 #: Neighbouring triangles that turn by less are of one surface, rad: the step of a column of 18 sides and more.
 CREASE = np.deg2rad(21)

@@ -68,7 +68,7 @@ def grid(first, second, sizes):
     return x, y, (b - a) * (d - c) / (n * m)
 
 
-def ellipsoid(axes, fine=1400):
+def ellipsoid(axes, fine=1200):
     """Places, normals and areas."""
     theta, phi, cell = grid((0, np.pi), (0, 2 * np.pi), (fine // 2, fine))
     way = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
@@ -77,7 +77,7 @@ def ellipsoid(axes, fine=1400):
     return way * axes, gradient / size[:, None], np.prod(axes) * size * np.sin(theta) * cell
 
 
-def tube(radius, half, begin, end, fine=(800, 1500)):
+def tube(radius, half, begin, end, fine=(600, 1200)):
     phi, z, cell = grid((begin, end), (-half, half), fine)
     normal = np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=1)
     return radius * normal + z[:, None] * [0, 0, 1], normal, np.full(len(z), radius * cell)
@@ -116,7 +116,7 @@ def stretched(axes, subdivisions=3):
     return shapes.exact(ball.vertices * axes, ball.faces)
 
 
-PLACES = [(-0.7, 0, 0), (0, 0.8, 0.4), (-1, 1.2, 0.7), (0.3, 0.2, 1.0), (2.0, -1, 3)]
+PLACES = [(-0.7, 0, 0), (0, 0.8, 0.4), (0.3, 0.2, 1.0), (2.0, -1, 3)]
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -138,7 +138,7 @@ def test_far_away_an_ellipsoid_has_pi_a1_a2():
     assert section == pytest.approx(np.pi * 0.15**2 * 0.2**2 / 0.3**2, rel=0.03)
 
 
-@pytest.mark.parametrize("subdivisions", [3, 5])
+@pytest.mark.parametrize("subdivisions", [3, 4])
 @pytest.mark.parametrize("noise", [3e-5, 2e-4])
 def test_noisy_meshes(subdivisions, noise):
     """Corners rounded to a tenth of a millimetre, and a scan's: still one body, 1 dB from all around."""
@@ -151,8 +151,7 @@ def test_noisy_meshes(subdivisions, noise):
         assert decibels_and_degrees(field(found, place), field(clean, place))[0] == pytest.approx(0, abs=1)
 
 
-@pytest.mark.parametrize("back", [True, False])
-@pytest.mark.parametrize("sides", [9, 12, 24])
+@pytest.mark.parametrize(("sides", "back"), [(9, True), (24, False)])
 @pytest.mark.parametrize(
     "place",
     [
@@ -210,7 +209,7 @@ def sheet(bend, half, count=10, fine=900):
     return mesh, (np.stack([(k1 * y**2 + k2 * z**2) / 2, y, z], axis=1), normal / size[:, None], size * cell)
 
 
-@pytest.mark.parametrize("place", [(-0.5, 0, 0), (-0.58, 0, 0), (-1, 0, 0), (-2, 0, 0), (-4, 0.1, 0.1)])
+@pytest.mark.parametrize("place", [(-0.5, 0, 0), (-0.58, 0, 0), (-1, 0, 0), (-4, 0.1, 0.1)])
 @pytest.mark.parametrize(
     ("bend", "half"),
     [((-1 / 0.6, -1 / 0.6), (0.15, 0.15)), ((0, -1 / 0.6), (0.08, 0.2)), ((1 / 0.3, -1 / 0.3), (0.1, 0.1)),
@@ -241,7 +240,7 @@ HALF = (CONFIG.chirp_times.max() - CONFIG.chirp_times.min()) / 2
 
 
 @pytest.mark.parametrize("speed", [0.0, 1.0])
-@pytest.mark.parametrize("gap", [0.3, 0.5, 1.0])
+@pytest.mark.parametrize("gap", [0.3, 1.0])
 @pytest.mark.parametrize("kind", ["ellipsoid", "half cylinder"])
 def test_path_by_antenna(kind, gap, speed):
     """Within 2 deg of the shortest way over the true body, for every antenna, at rest and passing by at 1 m/s."""

@@ -189,9 +189,9 @@ def smooth_surfaces(axis) -> str:
     the bodies that coarse meshes stand for: an ellipsoid (15, 20, 30 cm) from a circle of 1.5 m, a half cylinder of 12
     sides and a capsule from a line 2 m away that passes their ends."""
     tracks = {
-        "ellipsoid": 1.5 * np.array([polar(1, a, 20) for a in np.linspace(0, 90, 19)]),
-        "half cylinder": np.array([(-2.0, 0.1, z) for z in np.linspace(0, 0.57, 20)]),
-        "capsule": np.array([(-2.0, 0.0, z) for z in np.linspace(0, 0.3, 21)]),
+        "ellipsoid": 1.5 * np.array([polar(1, a, 20) for a in np.linspace(0, 90, 10)]),
+        "half cylinder": np.array([(-2.0, 0.1, z) for z in np.linspace(0, 0.57, 11)]),
+        "capsule": np.array([(-2.0, 0.0, z) for z in np.linspace(0, 0.3, 11)]),
     }
     bodies = {
         "ellipsoid": (stretched((0.15, 0.2, 0.3)), ellipsoid((0.15, 0.2, 0.3))),

@@ -127,7 +127,7 @@ def _flashes(search, frame, patches, found):
     return count
 
 
-@njit(inline="always")
+@njit(cache=True)
 def strength(search, patches, of, one, two):
     """The echo of one side of a piece between two places.
 
@@ -188,7 +188,7 @@ def _off(patches, corner, turn, one, two):
     return along(unit(along(unit(minus(one, place)), 1.0, unit(minus(two, place)))), -turn, normal)
 
 
-@njit(inline="always")
+@njit(cache=True)
 def _foot(patches, k, turn, one, two):
     """The triangle of a piece, and the weights of its corners, where the normal best halves the angle, and whether it
     does: from the best of some corners on, across sides."""
@@ -224,7 +224,7 @@ def _foot(patches, k, turn, one, two):
     return holds, weights, least < BESIDE
 
 
-@njit(inline="always")
+@njit(cache=True)
 def _nearest(patches, face, turn, one, two):
     """Where on a triangle the normal best halves the angle: the square of what it is off; weights of corners; and those
     where it would halve it if the triangle went on for ever."""
@@ -260,7 +260,7 @@ def _on_side(one, two):
     return dot(off, off), t
 
 
-@njit(inline="always")
+@njit(cache=True)
 def _surface(patches, face, turn, weights):
     """A point of a triangle for rays to aim at, m, and the surface there, as `curved.stationary` takes it.
 
@@ -294,7 +294,7 @@ def _surface(patches, face, turn, weights):
     return along(q, 0.02, minus(middle, q)), quadric
 
 
-@njit(inline="always")
+@njit(cache=True)
 def _fresnel(patches, of, zones, way):
     """What the borders of a piece leave of its echo.
 

@@ -207,8 +207,8 @@ def smooth_surfaces(axis) -> str:
         axis.plot(along, found, "o", ms=3.5, color=color, label=name)
         worst.append(f"{name} {np.abs(found - theory).max():.1f} dB")
     return (
-        f"Worst: {', '.join(worst)}. Borders farther off than three to five Fresnel units fade from the sum; a piece of "
-        "like curvature has one specular point; triangles that turn by more than 21 deg are creases."
+        f"Worst: {', '.join(worst)}. Borders farther off than three to five Fresnel units fade from the sum; a piece "
+        "of like curvature has one specular point; triangles that turn by more than 21 deg are creases."
     )
 
 

@@ -94,7 +94,7 @@ class Material:
             return np.full(cos.shape, -1.0 + 0j), np.full(cos.shape, 1.0 + 0j)
         eps = self.permittivity_at(frequency)
         root = np.sqrt(eps - (1.0 - cos**2))  # principal branch: decays into the medium under e^{+jwt}
-        return (cos - root) / (cos + root), (eps * cos - root) / (eps * cos + root)
+        return np.asarray((cos - root) / (cos + root)), np.asarray((eps * cos - root) / (eps * cos + root))
 
     def slab(
         self, cos_theta: Float[np.ndarray, "*n"], frequency: float

@@ -55,7 +55,8 @@ def import_(
     config: Annotated[str | None, typer.Option(help="A .cfg, a .mmwave.json or a preset's name.")] = None,
     poses: Annotated[Path | None, typer.Option(help="True poses of the sensor (TUM).")] = None,
     shape: Annotated[
-        str | None, typer.Option(metavar="AXES", help="Of an array: frame,loop,tx,rx,sample in its order, or lengths.")
+        str | None,
+        typer.Option(metavar="AXES", help="Of an array: frame, loop, tx, rx, sample in its order, or lengths."),
     ] = None,
     variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
     latency: Annotated[
@@ -75,7 +76,10 @@ def import_(
     ] = "signed",
     layout: Annotated[
         Literal["pairs", "interleaved", "real"],
-        typer.Option(help="Of a .bin's words: I and Q in pairs, receivers by turns (four lanes), or real samples."),
+        typer.Option(
+            metavar="LAYOUT",
+            help="Of a .bin's words: pairs (I and Q), interleaved (receivers by turns, four lanes), or real samples.",
+        ),
     ] = "pairs",
     board: Annotated[str | None, typer.Option(help="Antenna layout, e.g. iwr1843boost.")] = None,
     start_frequency: Annotated[float | None, typer.Option(help="Hz.")] = None,

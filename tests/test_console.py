@@ -4,6 +4,7 @@ import json
 
 import pytest
 import trimesh
+import typer
 
 import radarize.cli
 import radarsim.cli
@@ -96,3 +97,17 @@ def test_attributes_written_as_json_break_between_figures(terminal, capsys):
     show(found | {"attributes": {"front_end": json.dumps({"dbc_hz": figures}, separators=(",", ":"))}})
     out = capsys.readouterr().out
     assert {f"{figure}," for figure in figures[1:-1]} <= set(out.split()) and max(map(len, out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("app", [radarize.cli.app, radarsim.cli.app], ids=["radarize", "radarsim"])
+def test_help_cuts_no_word(app, printed):
+    """Nothing is shortened, and choices stand in one piece."""
+
+    def check(command, path: tuple[str, ...]) -> None:
+        words = printed(app, *path, "--help")
+        cut = [word for word in words if "…" in word or word.startswith("<") and "|" in word and word[-1] != ">"]
+        assert not cut, path
+        for name, below in getattr(command, "commands", {}).items():
+            check(below, (*path, name))
+
+    check(typer.main.get_command(app), ())

@@ -73,6 +73,15 @@ def test_what_is_imported_is_declared_and_the_other_way_round():
     assert (optional | extras["sim"]) - both <= {"mapbox-earcut", "rtree", "onnx"}  # trimesh's, and torch's
 
 
+def test_what_tests_and_benchmarks_import_is_declared():
+    folders = ("tests", "benchmarks", "docs")  # and a module that a test writes
+    own = {*folders, "own_method", *(path.stem for folder in folders for path in (ROOT / folder).rglob("*.py"))}
+    declared = names(
+        *PROJECT["dependencies"], *(line for each in PROJECT["optional-dependencies"].values() for line in each)
+    )
+    assert distributions(imported(*folders) - own) <= declared
+
+
 def test_every_extras_modules_are_known():
     """So that a command that misses one says which extra it is of."""
     for extra, modules in EXTRAS.items():

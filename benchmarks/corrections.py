@@ -21,7 +21,7 @@ from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarsim.scene.scene import Scene
 from radarsim.sensors.scan import AZIMUTHS, level_rays
-from radarsim.sensors.sight import Sight
+from radarsim.sight import Sight
 from radarsim.simulate import simulate
 from radarsim.walk import Walk
 from tests.echoes import record

@@ -34,8 +34,10 @@ from radarsim.physics.search import Search
 from radarsim.physics.surface import Surface
 from radarsim.physics.unevenness import SCALES, Heights
 from radarsim.scene import shapes
+from radarsim.scene.life import Life
 from radarsim.scene.materials import MATERIALS, material
-from radarsim.scene.scene import Life, Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from tests.physics.brute_force import kirchhoff_mirror, transfer_matrix
 from tests.physics.corners import corner, cross_section, direction, seen_by_all, seen_by_both
 from tests.physics.rigs import Rig, burst, field, locate, polar

@@ -12,7 +12,7 @@ from radarsim.scene.materials import MATERIALS
 from radarsim.scene.scene import Scene
 from radarsim.simulate import simulate
 from radarsim.twin.comparison import FIGURES, Comparison, compare
-from radarsim.twin.twin import make_twin
+from radarsim.twin.twin import Options, make_twin
 from tests.twin.poses import Change, altered, shaken
 
 #: Of `radarsim.twin.comparison.FIGURES`.
@@ -58,7 +58,7 @@ def main() -> None:
         real = simulate("office", folder / "real.h5", platform="cart", duration=options.duration, seed=options.seed)
         for k, (name, scene, change, seed) in enumerate(twins):
             source = altered(real, folder / f"poses{k}.h5", change) if change else real
-            made = make_twin(source, scene, folder / f"twin{k}.h5", every=3, seed=seed)
+            made = make_twin(source, scene, folder / f"twin{k}.h5", Options(every=3, seed=seed))
             rows.append(row(name, compare(real, made)))
             report(k + 1, len(twins))
         data = Data.of("a walk in the place of the real one, and twins", [real, *folder.glob("twin*.h5")], options.seed)

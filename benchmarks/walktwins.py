@@ -25,7 +25,7 @@ from radarize.walks import PERIOD, Walk
 from radarize.yamlfile import read_yaml
 from radarsim.motion import motion_from_tum
 from radarsim.scenario import Scenario
-from radarsim.scene.importers import import_scene
+from radarsim.scene.importers import Options, import_scene
 from radarsim.scene.scene import Scene
 from radarsim.simulate import TOGETHER
 from radarsim.twin.likeness import DEPTH, correlation, similarity
@@ -75,7 +75,7 @@ def lidar_log(walk: Walk, poses: Float[np.ndarray, "frame 3"], folder: Path) -> 
 
 def scene(log: Path, assumed: Assumed) -> Path:
     """The scene that a lidar saw."""
-    path = import_scene(log, log.with_name(log.name.replace(".scans.npz", ".yaml")), height=assumed.room).path
+    path = import_scene(log, log.with_name(log.name.replace(".scans.npz", ".yaml")), Options(height=assumed.room)).path
     found = read_yaml(path)
     for part in found["objects"]:
         part["material"] = assumed.walls if part["name"] == "walls" else part["material"]

@@ -136,13 +136,14 @@ def twin(
     from radarize.recording import Recording, keeping
     from radarsim.motion import Mounting
     from radarsim.twin.report import report_twin
-    from radarsim.twin.twin import make_twin
+    from radarsim.twin.twin import Options, make_twin
 
     places = [Mounting.parse(text) if text else None for text in (origin, mounting, at)]
     with keeping(output), progress("twin") as report:
         made = make_twin(
-            recording, scene, output, origin=places[0], mounting=places[1], at=places[2], frontend=frontend,
-            fit=calibrate, every=every, duration=duration, seed=seed, progress=lambda *done: report("simulate", *done),
+            recording, scene, output,
+            Options(*places, frontend, calibrate, every, duration, seed),
+            progress=lambda *done: report("simulate", *done),
         )  # fmt: skip
         page, sentences = report_twin(recording, made, progress=lambda *done: report("compare", *done))
     with Recording(made) as opened:
@@ -224,12 +225,12 @@ def import_(
     resolution: Annotated[float, typer.Option(help="Cells of a log, m.")] = 0.05,
 ):
     """Make a scene of a mesh, a Mitsuba scene, a ROS map or a lidar log."""
-    from radarsim.scene.importers import import_scene
+    from radarsim.scene.importers import Options, import_scene
 
     with progress(f"import {source.stem}") as report:
         done = import_scene(
-            source, output, materials=materials, default=default, units=units, up=up, floor=floor, budget=budget,
-            height=height, thickness=thickness, resolution=resolution, progress=report,
+            source, output, Options(materials, default, units, up, floor, budget, height, thickness, resolution),
+            progress=report,
         )  # fmt: skip
     shown = sorted(done.rows, key=lambda row: -row.area)
     rows = [(row.part, row.material, row.chosen_by, row.triangles, f"{row.area:.2f}") for row in shown[:40]]
@@ -286,6 +287,7 @@ def emulate(
     import numpy as np
     from rich.console import Console
 
+    from radarsim.emulator.board import Addresses
     from radarsim.emulator.disturbance import Disturbance
     from radarsim.emulator.emulator import Emulator
 
@@ -301,7 +303,7 @@ def emulate(
     disturbance = Disturbance(loss, duplicate, reorder, delay, np.random.default_rng(seed))
     console = Console(stderr=True)
     with Emulator(
-        given, board=board, computer=host, command_port=command_port, data_port=data_port, port_link=port_link,
+        given, addresses=Addresses(board, host, command_port, data_port), port_link=port_link,
         disturbance=disturbance, ahead=ahead, say=lambda line: print(line, flush=True),
     ) as emulator:  # fmt: skip
         print(f"serial port {port_link or emulator.port}, 115200 baud", flush=True)

@@ -28,7 +28,7 @@ from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import Synthesizer
 from radarsim.physics.unevenness import Heights
 from radarsim.scene.scene import Scene
-from radarsim.sensors.sight import Sight
+from radarsim.sight import Sight
 from radarsim.threads import one_blas_thread
 
 
@@ -108,10 +108,8 @@ class Scenario:
             return PathSolverFinder(self.scene, self.config, weakest, antenna, seed)
         reach = SPEED_OF_LIGHT * self.board.passband[1] / (2 * self.config.slope)
         scatterers = Cluttered(Surface(self.scene, self.draws("surface")), Clutter(self.scene, self.draws("clutter")))
-        return EchoFinder(
-            self.scene, scatterers, Reflectors.of(self.scene, self.config), self.config, weakest, reach, antenna,
-            self._moving, Heights.of(self.scene, self.draws("unevenness")),
-        )  # fmt: skip
+        reflectors = Reflectors.of(self.scene, self.config, Heights.of(self.scene, self.draws("unevenness")))
+        return EchoFinder(self.scene, scatterers, reflectors, self.config, weakest, reach, antenna, self._moving)
 
     @cached_property
     def _moving(self) -> MovingTargets:

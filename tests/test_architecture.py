@@ -33,6 +33,21 @@ LAYERS = (
     "importers exporters foxglove capture shownmaps viewer mcap",
     "cli",
 )
+#: The same of `radarsim`.
+SIMULATOR = (
+    "complaint llvm draws waypoints threads",
+    "scene",
+    "motion platforms band",
+    "tour drive statistics",
+    "planner walk",
+    "physics",
+    "calibrate sight",
+    "scenario",
+    "sensors",
+    "simulate",
+    "accompany dataset emulator twin webpreview doctor",
+    "cli",
+)
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are
 #: compared by what the pipeline makes of them, too.
 SHARED = {*" ".join(LAYERS[:3]).split(), "heatmaps", "points", "polar", "features", "runfolder", "report", "exporters"}
@@ -63,17 +78,18 @@ def imported(package: str) -> dict[str, set[str]]:
 
 
 def part(module: str) -> str:
-    """The package or module of `radarize` that a module belongs to."""
+    """The package or module of `radarize` or `radarsim` that a module belongs to."""
     return module.split(".")[1] if "." in module else ""
 
 
-def test_layers():
-    level = {name: k for k, layer in enumerate(LAYERS) for name in layer.split()}
-    unknown = {part(name) for name in imported("radarize")} - level.keys() - {""}
-    assert not unknown, "expected a place in LAYERS"
+@pytest.mark.parametrize(("package", "layers"), [("radarize", LAYERS), ("radarsim", SIMULATOR)])
+def test_layers(package, layers):
+    level = {name: k for k, layer in enumerate(layers) for name in layer.split()}
+    unknown = {part(name) for name in imported(package)} - level.keys() - {""}
+    assert not unknown, "expected a place in the layers"
     upward, beside = set(), {}
-    for name, others in imported("radarize").items():
-        for other in {part(each) for each in others if each.startswith("radarize.")} - {part(name), ""}:
+    for name, others in imported(package).items():
+        for other in {part(each) for each in others if each.startswith(f"{package}.")} - {part(name), ""}:
             if not part(name):
                 continue
             if level[other] > level[part(name)]:
@@ -83,8 +99,9 @@ def test_layers():
     assert not cycle(beside)
 
 
-def test_no_circles_of_files():
-    circle = cycle(imported("radarize"))
+@pytest.mark.parametrize("package", ["radarize", "radarsim"])
+def test_no_circles_of_files(package):
+    circle = cycle(imported(package))
     assert not circle, " -> ".join(circle)
 
 
@@ -117,7 +134,7 @@ def test_the_simulator_takes_only_sensor_and_files_from_the_pipeline():
 def test_functions_take_at_most_eight():
     """Compiled kernels included, which take named tuples; the command line's options are another matter."""
     found = set()
-    for path in (*modules("radarize").values(), *(ROOT / "benchmarks").rglob("*.py")):
+    for path in (*modules("radarize").values(), *modules("radarsim").values(), *(ROOT / "benchmarks").rglob("*.py")):
         if path.name == "cli.py":
             continue
         for node in ast.walk(ast.parse(path.read_text())):

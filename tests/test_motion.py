@@ -13,7 +13,8 @@ from radarsim.planner import plan_motion
 from radarsim.platforms import PLATFORMS
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 
 SEEDS = range(3)
 DURATION = 40.0

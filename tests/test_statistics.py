@@ -6,7 +6,8 @@ import pytest
 from radarsim.motion import Motion
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from radarsim.statistics import Statistics, crossings
 
 

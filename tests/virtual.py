@@ -17,6 +17,7 @@ from radarize.capture.sensor import Sensor
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.recording import RecordingWriter
+from radarsim.emulator.board import Addresses
 from radarsim.emulator.emulator import Emulator
 from radarsim.emulator.source import Playback, Source
 
@@ -77,10 +78,7 @@ def emulated(source: Path | Source, **options: object) -> Iterator[tuple[Emulato
     where = network()
     with Emulator(
         Playback(source) if isinstance(source, Path) else source,
-        board=where.dca,
-        computer=where.host,
-        command_port=where.command_port,
-        data_port=where.data_port,
+        addresses=Addresses(where.dca, where.host, where.command_port, where.data_port),
         **{"say": lambda words: None} | options,
     ) as emulator:
         while not emulator.ready:

@@ -90,6 +90,14 @@ TURNS = {
     "office": (0, 9502),
 }
 
+#: 60 s by hand in A to D, seeds 301 to 304, and by cart in A to C.
+LASTING = {
+    "A_0": (2117315051042397337, 5685118323643141256),
+    "B_0": (8563469454355660152, 439907299986115612),
+    "C_0": (8841798845398845653, 161484493570950127),
+    "D_0": (1781852632830259480,),
+}
+
 #: RadarHD's training walks, one by one and all together.
 PICTURES = {f"radarhd {number}": (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
 
@@ -97,6 +105,7 @@ CHOICES = (
     Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),
     Choice("what odometry claims of its errors, and its fusion with the network", ODOMETRY),
     Choice("how long the map of turns remembers, and what the network's turns count for", TURNS),
+    Choice("how long errors of velocities are claimed to last", LASTING),
     Choice("the compass and what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),

@@ -8,10 +8,12 @@ lanes and 16 bit, packets out of range, unknown codes, a second start.
 import socket
 import threading
 from collections.abc import Callable
+from typing import NamedTuple
 
 from radarize.errors import InputError
-from radarize.radar.dca1000 import MAX_PAYLOAD
+from radarize.radar.dca1000 import DATA_PORT, MAX_PAYLOAD
 from radarize.radar.dca1000_commands import (
+    COMMAND_PORT,
     RAW_TWO_LANES,
     VERSION_2_8,
     Command,
@@ -92,6 +94,15 @@ class Board:
         return _DONE
 
 
+class Addresses(NamedTuple):
+    """Of the DCA1000 and of the machine that records (192.168.33.180 and .30 in reality), and their UDP ports."""
+
+    board: str = "127.0.0.2"
+    computer: str = "127.0.0.1"
+    command_port: int = COMMAND_PORT
+    data_port: int = DATA_PORT
+
+
 class BoardSockets:
     """The board's network interface.
 
@@ -99,22 +110,22 @@ class BoardSockets:
     listens elsewhere, or connects its socket to the command port, fails here as it would there.
 
     Args:
-        board, command_port: where requests are taken.
-        computer, data_port: where packets go; replies go to its `command_port`.
+        at: requests are taken at its `board` and `command_port`; packets go to its `computer` and `data_port`, replies
+            to its `command_port`.
         say: tells the user what happened.
 
     Raises:
         InputError: the address is in use, or not one of this machine.
     """
 
-    def __init__(self, board: str, computer: str, command_port: int, data_port: int, say: Callable[[str], None]):
+    def __init__(self, at: Addresses, say: Callable[[str], None]):
         self._say, self._unheard = say, False
-        self._replies_to, self._data_to = (computer, command_port), (computer, data_port)
-        self._commands = _bound(board, command_port)
+        self._replies_to, self._data_to = (at.computer, at.command_port), (at.computer, at.data_port)
+        self._commands = _bound(at.board, at.command_port)
         try:
-            self._out = _bound(board, 1024)
+            self._out = _bound(at.board, 1024)
         except InputError:
-            self._out = _bound(board, 0)  # another emulator has it
+            self._out = _bound(at.board, 0)  # another emulator has it
         self._out.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 20)
         self._closed = threading.Event()
         self._thread: threading.Thread | None = None

@@ -11,9 +11,7 @@ from pathlib import Path
 
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000 import DATA_PORT
-from radarize.radar.dca1000_commands import COMMAND_PORT
-from radarsim.emulator.board import Board, BoardSockets
+from radarsim.emulator.board import Addresses, Board, BoardSockets
 from radarsim.emulator.commandline import CommandLine
 from radarsim.emulator.disturbance import Disturbance
 from radarsim.emulator.feed import Feed
@@ -35,8 +33,7 @@ class Emulator:
 
     Args:
         source: of the samples.
-        board, computer: addresses of the DCA1000 and of the machine that records (192.168.33.180 and .30 in reality).
-        command_port, data_port: UDP ports.
+        addresses: of the board and of the machine that records.
         port_link: symbolic link to the serial port.
         disturbance: of the packets on their way.
         ahead: s, how much of the source is made ahead of time.
@@ -56,10 +53,7 @@ class Emulator:
         self,
         source: Source,
         *,
-        board: str = "127.0.0.2",
-        computer: str = "127.0.0.1",
-        command_port: int = COMMAND_PORT,
-        data_port: int = DATA_PORT,
+        addresses: Addresses = Addresses(),  # noqa: B008
         port_link: Path | None = None,
         disturbance: Disturbance | None = None,
         ahead: float = 10.0,
@@ -73,7 +67,7 @@ class Emulator:
         self._left = self._resets = 0
         self._lock = threading.Lock()  # resets and starts come from different threads
         expected = source.expected()
-        self._sockets = BoardSockets(board, computer, command_port, data_port, say)
+        self._sockets = BoardSockets(addresses, say)
         self.link = Link(self._sockets.data, self._sockets.report, disturbance)
         try:
             self._uart = Uart(lambda: CommandLine(self).execute, port_link)

@@ -13,7 +13,7 @@ from jaxtyping import Complex, Float
 
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.scene.materials import Material
-from radarsim.scene.scene import SceneObject
+from radarsim.scene.objects import SceneObject
 
 #: Entries of the tables.
 TABLE = 65

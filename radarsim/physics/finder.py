@@ -27,7 +27,6 @@ from radarsim.physics.specular import SpecularCandidates
 from radarsim.physics.surface import Surface
 from radarsim.physics.synthesis import NODES, BurstClock
 from radarsim.physics.targets import Targets
-from radarsim.physics.unevenness import Heights
 from radarsim.scene.scene import Scene
 
 #: Paths to scatterers over two mirrors are looked for over those of this area and more, m^2: at 2 m a Fresnel zone
@@ -47,7 +46,6 @@ class EchoFinder:
         range: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
         antenna: the elements' pattern; default: the IWR1843BOOST's.
         moving: what moves by itself.
-        heights: how uneven walls are; default: flat.
     """
 
     def __init__(
@@ -60,10 +58,9 @@ class EchoFinder:
         range: float | None = None,
         antenna: Antenna | None = None,
         moving: MovingTargets | None = None,
-        heights: Heights | None = None,
     ):
         self.scene, self.surface, self.reflectors, self.config = scene, surface, reflectors, config
-        self.threshold, self.heights = threshold, heights
+        self.threshold = threshold
         self.moving = MovingTargets([], np.random.default_rng()) if moving is None else moving
         self.range = 1.05 * config.max_range if range is None else range
         self.obstacles = Obstacles.of(scene, self.moving, config)
@@ -99,7 +96,7 @@ class EchoFinder:
         points, found = PointEchoes.of(candidates, one_way, two_way), Images.none()
         if self.reflectors is not None:
             found = Images.joined([
-                images.flashes(search, facing, self.reflectors.round, self.obstacles, self.heights),
+                images.flashes(search, facing, self.reflectors.round, self.obstacles, self.reflectors.heights),
                 images.by_chains(search, flat, mirrors, self.obstacles),
             ])  # fmt: skip
             ghosts = roundghosts.seen(search, flat, mirrors, self.reflectors.round, self.obstacles)

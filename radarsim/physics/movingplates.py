@@ -18,6 +18,7 @@ from radarsim.physics.reflectors import Flat, Reflectors
 from radarsim.physics.search import Search
 from radarsim.physics.synthesis import NODES, BurstClock
 from radarsim.physics.transmission import Transmission
+from radarsim.scene.scene import Scene
 
 
 class MovingPlates:
@@ -33,7 +34,7 @@ class MovingPlates:
         self._moving, self._margin = moving, margin
         self._offsets = BurstClock.of(config).half * np.append(NODES, 0.0)
         self._part = np.array([k for k, part in enumerate(moving.parts) if part.material is not None], int)
-        scenes = [moving.parts[k].scene for k in self._part]
+        scenes = [Scene("part", [moving.parts[k].object]) for k in self._part]
         self._reflectors = [Reflectors.of(scene, config) for scene in scenes]
         self._transmission = [Transmission(scene, config, margin) for scene in scenes]
 

@@ -11,10 +11,10 @@ from radarsim.physics.bodies import recognise
 from radarsim.physics.coefficients import TABLE, as_slab, reflection
 from radarsim.physics.curved import RoundBodies
 from radarsim.physics.grid import Grid
-from radarsim.physics.planes import plates
 from radarsim.physics.table import Table
-from radarsim.physics.unevenness import FINISHES
+from radarsim.physics.unevenness import FINISHES, Heights
 from radarsim.scene.materials import Material
+from radarsim.scene.planes import plates
 from radarsim.scene.scene import Scene
 
 
@@ -69,11 +69,13 @@ class Reflectors:
         flat: quadrilaterals that cover its flat regions.
         round: its spheres and cylinders.
         inner: the inner faces of hollow bodies, which are seen through outer ones: they flash, but mirror nothing else.
+        heights: how uneven the flat ones are; None: not at all.
     """
 
     flat: Flat
     round: RoundBodies
     inner: Flat = Flat.none()
+    heights: Heights | None = None
 
     @cached_property
     def _grids(self) -> tuple[Grid, Grid]:
@@ -89,7 +91,7 @@ class Reflectors:
         return self.inner[self._grids[1].near(positions, distance)[0]] if len(self.inner) else self.inner
 
     @classmethod
-    def of(cls, scene: Scene, config: RadarConfig) -> "Reflectors":
+    def of(cls, scene: Scene, config: RadarConfig, heights: Heights | None = None) -> "Reflectors":
         """The reflectors of a scene."""
         flat, inner, bodies = [], [], []
         tables: dict[Material, np.ndarray] = {}
@@ -112,7 +114,7 @@ class Reflectors:
                     inwards = -slab.thickness * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
-        return cls(_table(flat), RoundBodies.of(bodies), _table(inner))
+        return cls(_table(flat), RoundBodies.of(bodies), _table(inner), heights)
 
 
 def _table(rows: list[tuple]) -> Flat:

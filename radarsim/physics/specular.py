@@ -291,13 +291,13 @@ def _courses(search, flat, chains, aims, scatterers, hits, found, stops):
     """The paths that exist, in a row."""
     ends = np.cumsum(hits.count)
     for k in prange(len(chains.frame)):
-        _course(search, flat, chains, aims, scatterers, hits, (k, ends[k] - hits.count[k]), found, stops)
+        _course(search, flat, chains, aims, scatterers, hits, (k, ends[k] - hits.count[k]), (found, stops))
 
 
 @njit(cache=True)
-def _course(search, flat, chains, aims, scatterers, hits, where, found, stops):
+def _course(search, flat, chains, aims, scatterers, hits, where, rows):
     """Those over one chain, from a row on."""
-    k, first = where
+    (k, first), (found, stops) = where, rows
     p, one, two = vec(search.position[chains.frame[k]]), chains.mirrors[k, 0], chains.mirrors[k, 1]
     c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
     source = mirrored(p, c1, n1)

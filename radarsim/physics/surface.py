@@ -8,6 +8,7 @@ and speckle is still a property of the world. Within a tile, scatterers follow a
 """
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -87,12 +88,11 @@ class Surface:
         totals, counts = _counts(self.seed, tiles, self._tile_areas * self.density, highest)
         ends = np.cumsum(counts)
         total = int(ends[-1]) if len(ends) else 0
-        position, triangle = np.empty((total, 3)), np.empty(total, np.int64)
-        phase, rank, bounces = np.empty(total), np.empty(total), np.empty((2, total))
-        _place(
-            self.seed, tiles, totals, counts, ends, self._first, self._areas, self._triangles, position, triangle,
-            phase, rank, bounces,
-        )  # fmt: skip
+        drawn = _Drawn(
+            np.empty((total, 3)), np.empty(total, np.int64), np.empty(total), np.empty(total), np.empty((2, total))
+        )
+        _place(self.seed, tiles, totals, counts, ends, _Ground(self._first, self._areas, self._triangles), drawn)
+        position, triangle, phase, rank, bounces = drawn
         owner = np.repeat(self._owner[tiles], counts)
         return Scatterers(
             position, self._normals[triangle], self._sigma[owner], phase, self._two_sided[owner],
@@ -113,6 +113,24 @@ def _split(triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "m 3 3"]:
         middle = (a + b) / 2
         triangles = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
     return np.concatenate(done) if done else triangles
+
+
+class _Ground(NamedTuple):
+    """Triangles by tile: the first one of each, areas up to each one's end (m^2), corners."""
+
+    first: Int[np.ndarray, "tile"]
+    areas: Float[np.ndarray, "n"]
+    triangles: Float[np.ndarray, "n 3 3"]
+
+
+class _Drawn(NamedTuple):
+    """Scatterers: places, triangles that they lie on, phases, ranks, and weights over one mirror and two."""
+
+    position: Float[np.ndarray, "scatterer 3"]
+    triangle: Int[np.ndarray, "scatterer"]
+    phase: Float[np.ndarray, "scatterer"]
+    rank: Float[np.ndarray, "scatterer"]
+    bounces: Float[np.ndarray, "2 scatterer"]
 
 
 @njit(inline="always")
@@ -142,9 +160,9 @@ def _counts(seed, tiles, expected, highest):
 
 
 @njit(parallel=True, cache=True)
-def _place(
-    seed, tiles, totals, counts, ends, first, areas, triangles, position, triangle, phase, rank, bounces
-):  # fmt: skip
+def _place(seed, tiles, totals, counts, ends, ground, drawn):
+    first, areas, triangles = ground
+    position, triangle, phase, rank, bounces = drawn
     for i in prange(len(tiles)):
         tile = tiles[i]
         key = _hash(seed, np.uint64(tile))

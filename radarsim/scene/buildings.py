@@ -16,8 +16,8 @@ from pydantic import BaseModel, ConfigDict, Field
 from radarsim.scene import furniture, joinery, shapes, walls
 from radarsim.scene.floorplan import FloorPlan
 from radarsim.scene.furnishing import furnish
+from radarsim.scene.objects import SceneObject
 from radarsim.scene.rooms import Room, Site
-from radarsim.scene.scene import SceneObject
 from radarsim.scene.skeleton import Skeleton, skeleton
 from radarsim.scene.styles import STYLES, Style
 

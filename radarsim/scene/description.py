@@ -22,7 +22,7 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
-``clutter`` and ``unevenness`` say how far the place is from its drawing (see `scene.Life`): 1 as in rooms that are
+``clutter`` and ``unevenness`` say how far the place is from its drawing (see `life.Life`): 1 as in rooms that are
 lived in; left out, 0: not at all. ``interferers`` are other radars that send there (see `interferers`); levels change
 and add them, too.
 """
@@ -43,10 +43,11 @@ from radarsim.complaint import complaint
 from radarsim.scene import shapes
 from radarsim.scene.buildings import Building
 from radarsim.scene.interferers import Interferer
+from radarsim.scene.life import Life
 from radarsim.scene.materials import Material, constant, decibel, material
 from radarsim.scene.movers import Mover
+from radarsim.scene.objects import SceneObject
 from radarsim.scene.office import Office
-from radarsim.scene.scene import Life, SceneObject
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from radarize.errors import InputError
 from radarsim.scene import shapes
 from radarsim.scene.materials import Material, material
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -44,10 +44,10 @@ class Part:
     material: Material | None = None
 
     @property
-    def scene(self) -> Scene:
-        """A part of a material as a scene of its own."""
+    def object(self) -> SceneObject:
+        """A part of a material as a thing that stands at the origin."""
         size = tuple(2 * x for x in self.half)
-        return Scene("part", [SceneObject("part", shapes.box((0, 0, 0), size), self.material)])
+        return SceneObject("part", shapes.box((0, 0, 0), size), self.material)
 
     @property
     def area(self) -> float:

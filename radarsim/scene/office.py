@@ -13,8 +13,8 @@ from shapely.geometry import box as area
 
 from radarsim.scene import furniture, shapes, walls
 from radarsim.scene.furniture import Piece
+from radarsim.scene.objects import SceneObject
 from radarsim.scene.rooms import Room, Site, footprint, sorted_box
-from radarsim.scene.scene import SceneObject
 
 OUTER, INNER = 0.30, 0.12  # wall thickness, m
 DOOR_WIDTH, DOOR_HEIGHT, LEAF = 1.0, 2.1, 0.04

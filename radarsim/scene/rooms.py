@@ -12,7 +12,7 @@ from shapely.geometry import box as area
 from radarsim.scene import furniture, shapes
 from radarsim.scene.furniture import Piece
 from radarsim.scene.materials import material
-from radarsim.scene.scene import SceneObject
+from radarsim.scene.objects import SceneObject
 
 
 @dataclass

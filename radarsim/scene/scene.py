@@ -5,7 +5,6 @@ within a kilometre of the origin, which is checked, positions are good to 0.06 m
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
@@ -16,67 +15,16 @@ from jaxtyping import Bool, Float, Float32, Int
 from numba import njit
 
 from radarize.errors import InputError
+from radarsim import llvm
+from radarsim.scene.description import built, find, read, split_level
+from radarsim.scene.life import DRAWN, Life
 from radarsim.scene.materials import EPS0, Material
+from radarsim.scene.objects import SceneObject
 
 FREQUENCY = 77e9  # at which Sionna RT's own solvers start out
 _REACH = 1000.0
-#: m: a mesh that is lower is no room; and as near to its bottom and top are floor and ceiling, which face up and down
-#: by more than this cosine in a scan, too.
-_ROOM, _LEVEL, _FLAT = 1.8, 0.15, 0.95
 #: Entries of four bytes that a processor's widest instruction takes at a time.
 _PACKET = 16
-
-
-@dataclass(frozen=True)
-class SceneObject:
-    """One thing of one material.
-
-    Attributes:
-        name: unique in its scene.
-        mesh: float64 triangles in world coordinates, normals outward (either side reflects).
-        material: of all its triangles.
-        solid: part of the surface of a body, though perhaps an open mesh: seen from its outside only.
-    """
-
-    name: str
-    mesh: trimesh.Trimesh
-    material: Material
-    solid: bool = False
-
-    @cached_property
-    def two_sided(self) -> bool:
-        """Whether it is a sheet, which reflects on both sides."""
-        return not (self.solid or self.mesh.is_watertight)
-
-    @cached_property
-    def is_floor_or_ceiling(self) -> bool:
-        """Whether it has horizontal faces only."""
-        return bool(np.all(np.abs(self.mesh.face_normals[:, 2]) > 0.999))
-
-    def floors_and_ceilings(
-        self, place: Float[np.ndarray, "face 3"], normal: Float[np.ndarray, "face 3"]
-    ) -> Bool[np.ndarray, "face"]:
-        """Which of its faces, with centres (m) and normals, are floor or ceiling: all, if it has no others; of a room
-        in one mesh, drawn or scanned, those at its bottom that face up and those at its top that face down."""
-        (low, high), up = self.mesh.bounds[:, 2], normal[:, 2]
-        seen_from_within = self.two_sided or (self.mesh.is_watertight and self.mesh.volume < 0)
-        if self.is_floor_or_ceiling or high - low < _ROOM or not seen_from_within:
-            return np.full(len(place), self.is_floor_or_ceiling)
-        bottom, top = place[:, 2] < low + _LEVEL, place[:, 2] > high - _LEVEL
-        return (bottom & (up > _FLAT)) | (top & (up < -_FLAT))
-
-
-@dataclass(frozen=True)
-class Life:
-    """What tells a place from its drawing, as shares of what is usual; none: the drawing itself.
-
-    Attributes:
-        clutter: small things on walls, desks and shelves and under ceilings (`radarsim.physics.clutter`).
-        unevenness: how far walls, floors and ceilings are from their planes (`radarsim.physics.unevenness`).
-    """
-
-    clutter: float = 0.0
-    unevenness: float = 0.0
 
 
 class Scene:
@@ -103,7 +51,7 @@ class Scene:
         name: str,
         objects: list[SceneObject],
         movers: Sequence = (),
-        life: Life = Life(),
+        life: Life = DRAWN,
         interferers: Sequence = (),
     ):
         self.name, self.objects, self.movers, self.life = name, list(objects), list(movers), life
@@ -138,8 +86,6 @@ class Scene:
         Raises:
             InputError: missing file, malformed YAML, unknown key, material or level, missing mesh; with file and field.
         """
-        from radarsim.scene.description import find, read, split_level
-
         return cls(*read(find(path), split_level(path)[1]))
 
     @classmethod
@@ -153,8 +99,6 @@ class Scene:
         Raises:
             InputError: unknown key, value, material or mesh file; with the field.
         """
-        from radarsim.scene.description import built
-
         _, *parts = built(description, f"scene {name}", Path())
         return cls(name, *parts)
 
@@ -176,8 +120,6 @@ class Scene:
     @cached_property
     def _geometry(self):
         """The Sionna scene, and the first triangle of the shape that has each Mitsuba registry number."""
-        from radarsim import llvm
-
         llvm.require()
         import drjit as dr
         import mitsuba as mi
@@ -242,13 +184,6 @@ class Scene:
         triangle = first[np.where(missed, 0, number)] + found.prim_index.numpy()
         return np.where(missed, np.inf, distance), np.where(missed, -1, triangle)
 
-    def cast(
-        self, origins: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"], coherent: bool = False
-    ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
-        """Distance along each ray to the first object (inf: none) and its index into `objects` (-1: none)."""
-        distance, triangle = self.hit(origins, directions, coherent)
-        return distance, np.where(triangle < 0, -1, self.triangle_object[triangle])
-
     @cached_property
     def floors_and_ceilings(self) -> Bool[np.ndarray, "triangle"]:
         """Which of its triangles are floor or ceiling."""
@@ -277,32 +212,6 @@ class Scene:
             points = shapely.get_coordinates(line)
             pieces.append(np.hstack([points[:-1], points[1:]]))
         return np.concatenate(pieces)
-
-    def planar_scan(
-        self,
-        position: Float[np.ndarray, "*f 3"],
-        yaw: Float[np.ndarray, "*f"] | float,
-        azimuths: Float[np.ndarray, "a"],
-        max_range: float,
-    ) -> Float[np.ndarray, "*f a"]:
-        """True horizontal ranges at the sensor's height, one scan or one per frame.
-
-        Args:
-            position: sensor in the world, m, (3,) or (frame, 3).
-            yaw: heading, rad, scalar or (frame,).
-            azimuths: of the beams against the heading, rad, positive to the left.
-            max_range: m.
-
-        Returns:
-            Horizontal distance to the first surface, inf beyond `max_range`.
-        """
-        position, yaw = np.asarray(position, float), np.asarray(yaw, float)
-        bearing = yaw[..., None] + np.asarray(azimuths, float)
-        directions = np.stack([np.cos(bearing), np.sin(bearing), np.zeros_like(bearing)], axis=-1)
-        origins = np.broadcast_to(position[..., None, :], directions.shape)
-        distance, _ = self.hit(origins.reshape(-1, 3), directions.reshape(-1, 3))
-        distance = distance.reshape(bearing.shape)
-        return np.where(distance <= max_range, distance, np.inf)
 
 
 def _lent_rays(

@@ -8,8 +8,10 @@ channel mismatch, which calibration removes; and without the smear over azimuth 
 `RadarConfig.max_velocity`, whose delays between transmitters the map takes out at the wrong speed.
 """
 
+from typing import NamedTuple
+
 import numpy as np
-from jaxtyping import Complex, Float, UInt8
+from jaxtyping import Complex, Float, Float32, Int, UInt8
 from numba import njit, prange
 from scipy.signal import windows
 
@@ -79,6 +81,25 @@ class Ghosts(Sensor):
         return np.where(every.sum(axis=0) > 10 ** (self._floor / 10), every.argmax(axis=0), NOISE).astype(np.uint8)
 
 
+class _Tones(NamedTuple):
+    """What `_spread` puts echoes into spectra by.
+
+    Attributes:
+        row: antennas.
+        instants: of the burst, -1...1.
+        kernel: of a tone between two bins.
+        per_metre, per_rate: bins by path length and by its change over half a burst.
+        wavenumber: cycles by metre.
+    """
+
+    row: Int[np.ndarray, "antenna"]
+    instants: Float[np.ndarray, "instant"]
+    kernel: Float32[np.ndarray, "offset"]
+    per_metre: float
+    per_rate: float
+    wavenumber: float
+
+
 class CauseMaps:
     """Range-azimuth power of each cause straight from the echoes.
 
@@ -98,17 +119,17 @@ class CauseMaps:
         steering = np.exp(2j * np.pi / config.wavelength * y[:, None] * np.sin(AZIMUTHS))
         self._steering = (steering * self.taper[:, None]).astype(np.complex64)
         clock, n = BurstClock.of(config), config.samples
-        self._per_metre = 1 / (2 * config.range_resolution)
-        self._per_rate = config.center_frequency / SPEED_OF_LIGHT * n / config.sample_rate / clock.half
         window = windows.hann(n)
         offset = np.arange(-_WIDTH * _FINE, _WIDTH * _FINE + 1) / _FINE
         turns = np.cos(2 * np.pi * offset[:, None] * (np.arange(n) - (n - 1) / 2) / n)
-        self._kernel = (turns @ window / window.sum()).astype(np.float32)
+        kernel = (turns @ window / window.sum()).astype(np.float32)
         # Loops count by the square of their weight: instants that split it evenly stand for all of them.
         share = np.cumsum(windows.hamming(max(config.loops, 2)) ** 2)
-        self._instants = np.interp(
-            (np.arange(_INSTANTS) + 0.5) / _INSTANTS, share / share[-1], np.linspace(-1, 1, len(share))
-        )
+        even = (np.arange(_INSTANTS) + 0.5) / _INSTANTS
+        instants = np.interp(even, share / share[-1], np.linspace(-1, 1, len(share)))
+        wavenumber = config.center_frequency / SPEED_OF_LIGHT
+        per_rate = wavenumber * n / config.sample_rate / clock.half
+        self._tones = _Tones(self.row, instants, kernel, 1 / (2 * config.range_resolution), per_rate, wavenumber)
 
     def __call__(
         self,
@@ -119,8 +140,7 @@ class CauseMaps:
         """Power of each cause in the square of the amplitudes' unit."""
         n = self.config.samples
         spectra = np.zeros((_INSTANTS, len(Provenance), n, 2, len(self.row)), np.float32)
-        _spread(spectra, lengths, amplitudes, provenance, self.row, self._instants, self._kernel, self._per_metre,
-                self._per_rate, self.config.center_frequency / SPEED_OF_LIGHT)  # fmt: skip
+        _spread(spectra, lengths, amplitudes, provenance, self._tones)
         return self.beams(spectra[..., 0, :] + 1j * spectra[..., 1, :])
 
     def beams(self, spectra: Complex[np.ndarray, "instant *cell antenna"]) -> Float[np.ndarray, "*cell azimuth"]:
@@ -130,26 +150,27 @@ class CauseMaps:
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def _spread(spectra, lengths, amplitudes, provenance, row, instants, kernel, per_metre, per_rate, wavenumber):
+def _spread(spectra, lengths, amplitudes, provenance, tones):
     """spectra[instant, cause, bin, (re, im), antenna] += A exp(j phase) K(tone - bin).
 
     Phase and tone are those of `synthesis`. The tone is taken to be the same for all antennas: across the array it
     changes by less than a fifth of a bin.
     """
+    row, kernel = tones.row, tones.kernel
     antennas, n = len(row), spectra.shape[2]
-    for i in prange(len(instants)):
-        s = instants[i]
+    for i in prange(len(tones.instants)):
+        s = tones.instants[i]
         re, im = np.empty(antennas, np.float32), np.empty(antennas, np.float32)
         for e in range(len(amplitudes)):
             c0, c1, c2 = lengths[e, row[antennas // 2]]
-            tone = (c0 + s * (c1 + s * c2)) * per_metre + (c1 + 2 * s * c2) * per_rate
+            tone = (c0 + s * (c1 + s * c2)) * tones.per_metre + (c1 + 2 * s * c2) * tones.per_rate
             below = int(np.floor(tone))
             size = np.float32(abs(amplitudes[e]))
             # A tone N bins higher has turned (N - 1) / 2 cycles more between the middle and the first sample.
             turn = np.arctan2(amplitudes[e].imag, amplitudes[e].real) / (2 * np.pi) - below // n * ((n - 1) / 2)
             for a in range(antennas):
                 c0, c1, c2 = lengths[e, row[a]]
-                cycles = turn + wavenumber * (c0 + s * (c1 + s * c2))
+                cycles = turn + tones.wavenumber * (c0 + s * (c1 + s * c2))
                 sine, cosine = _sincos_cycles(np.float32(cycles - np.floor(cycles + 0.5)))
                 re[a] = size * cosine
                 im[a] = size * sine

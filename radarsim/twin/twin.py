@@ -30,28 +30,11 @@ from radarsim.statistics import crossings
 GAP = 0.5
 
 
-def make_twin(
-    recording: Path,
-    scene: str | Path | Scene,
-    output: Path,
-    *,
-    origin: Mounting | None = None,
-    mounting: Mounting | None = None,
-    at: Mounting | None = None,
-    frontend: Path | None = None,
-    fit: bool = False,
-    every: int = 1,
-    duration: float | None = None,
-    seed: int = 0,
-    sensors: Sequence[str] = (),
-    progress: Callable[[int, int], None] | None = None,
-) -> Path:
-    """Simulate the twin of a recording.
+@dataclass(frozen=True)
+class Options:
+    """How a twin is made.
 
-    Args:
-        recording: of a real radar, or of a simulated one that plays it, with poses.
-        scene: model of the place: a scene, its YAML file, or the name of one that comes with the project.
-        output: recording to write.
+    Attributes:
         origin: where the poses' origin is in the scene; default: they are the scene's own coordinates.
         mounting: of the radar on the body that the poses are of; default: they are the radar's own.
         at: the place of a radar at rest, instead of poses.
@@ -62,26 +45,59 @@ def make_twin(
         duration: s of the recording, from its first frame; default: all of it.
         seed: of speckle, noise and whatever differs from board to board.
         sensors: see `simulate`.
+
+    Raises:
+        InputError: options that do not go together, or an unusable one.
+    """
+
+    origin: Mounting | None = None
+    mounting: Mounting | None = None
+    at: Mounting | None = None
+    frontend: Path | None = None
+    fit: bool = False
+    every: int = 1
+    duration: float | None = None
+    seed: int = 0
+    sensors: Sequence[str] = ()
+
+    def __post_init__(self):
+        if self.frontend is not None and self.fit:
+            raise InputError(f"--frontend {self.frontend} is given with --calibrate, expected one of the two")
+        if self.every < 1:
+            raise InputError(f"every is {self.every}, expected at least 1")
+
+
+def make_twin(
+    recording: Path,
+    scene: str | Path | Scene,
+    output: Path,
+    options: Options = Options(),  # noqa: B008
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Simulate the twin of a recording.
+
+    Args:
+        recording: of a real radar, or of a simulated one that plays it, with poses.
+        scene: model of the place: a scene, its YAML file, or the name of one that comes with the project.
+        output: recording to write.
+        options: how.
         progress: called with (frames done, frames in all).
 
     Returns:
         The path written. Its attribute ``warnings`` says what is doubtful.
 
     Raises:
-        InputError: unusable recording or scene; no poses, or poses outside the scene; unusable options.
+        InputError: unusable recording or scene; no poses, or poses outside the scene.
     """
-    if frontend is not None and fit:
-        raise InputError(f"--frontend {frontend} is given with --calibrate, expected one of the two")
-    if every < 1:
-        raise InputError(f"every is {every}, expected at least 1")
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
-    walk = _Walk.of(Path(recording), world, origin, mounting, at, every, duration)
-    if fit:
+    walk = _Walk.of(Path(recording), world, options)
+    frontend = options.frontend
+    if options.fit:
         frontend = Path(output).with_suffix(".yaml")
         calibrate(recording, frontend)
     config = walk.config
     settings = FrontEndConfig.load(frontend) if frontend else _calibrated(config)
-    scenario = Scenario(world, walk.motion, config, settings, seed, tuple(chosen(sensors)))
+    scenario = Scenario(world, walk.motion, config, settings, options.seed, tuple(chosen(options.sensors)))
     crossed = crossings(walk.motion, world)
     about = {
         "source": "radarsim twin",
@@ -117,15 +133,16 @@ class _Walk:
     left_out: str
 
     @classmethod
-    def of(cls, path: Path, world: Scene, origin, mounting, at, every: int, duration: float | None) -> "_Walk":
-        """From a recording; arguments as for `make_twin`."""
+    def of(cls, path: Path, world: Scene, options: Options) -> "_Walk":
+        """From a recording."""
+        at = options.at
         with Recording(path) as recording:
             if not len(recording):
                 raise InputError(f"{path}: has no whole frame, expected at least one")
             config, start = recording.config, float(recording.times[0])
-            wanted = np.arange(0, len(recording), every)
-            if duration is not None:
-                wanted = wanted[recording.times[wanted] - start < duration]
+            wanted = np.arange(0, len(recording), options.every)
+            if options.duration is not None:
+                wanted = wanted[recording.times[wanted] - start < options.duration]
             middles = recording.times[wanted] + config.burst_center
             if at is not None:
                 span = float(recording.times[-1] - start) + config.frame_period
@@ -133,8 +150,8 @@ class _Walk:
                 motion, known = Motion.still(at.lever_arm, *turn, duration=span), np.ones(len(wanted), bool)
             else:
                 stamps, poses = _poses(recording, config.burst_time)
-                poses = _moved(poses, origin)
-                motion = motion_through(stamps, poses, start, mounting, f"{path}: /truth/pose")
+                poses = _moved(poses, options.origin)
+                motion = motion_through(stamps, poses, start, options.mounting, f"{path}: /truth/pose")
                 known = _between(middles, stamps)
             left = len(wanted) - int(known.sum())
             if left == len(wanted):

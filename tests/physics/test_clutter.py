@@ -22,8 +22,10 @@ from radarsim.physics.clutter import (
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.surface import Surface
 from radarsim.scene import shapes
+from radarsim.scene.life import Life
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Life, Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 
 CONFIG = PRESETS["radarize"]
 K = 2 * np.pi / CONFIG.wavelength

@@ -15,7 +15,8 @@ from radarsim.physics.reflectors import Flat, Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from tests.physics.rigs import Rig, burst, isotropic, locate
 
 CONFIG = PRESETS["radarize"]

@@ -17,7 +17,8 @@ from radarsim.physics.surface import Surface
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.movers import Door
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from tests.physics.rigs import Rig, field
 
 CONFIG = PRESETS["radarize"]

@@ -12,7 +12,8 @@ from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from tests.physics.brute_force import transfer_matrix
 
 CONFIG = PRESETS["radarize"]

@@ -15,7 +15,8 @@ from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.synthesis import BurstClock, Synthesizer
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.movers import Door, Fan, Person
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from radarsim.scene.shapes import rectangle
 from tests.physics.rigs import Rig, polar
 

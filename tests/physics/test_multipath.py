@@ -18,7 +18,8 @@ from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.surface import Surface
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from radarsim.scene.shapes import box, rectangle
 from tests.physics.brute_force import kirchhoff_mirror, transfer_matrix
 from tests.physics.rigs import Rig, burst

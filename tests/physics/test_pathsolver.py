@@ -9,7 +9,8 @@ from radarsim.physics.antenna import ISOTROPIC
 from radarsim.physics.pathsolver import PathSolverFinder
 from radarsim.physics.synthesis import Synthesizer
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from radarsim.scene.shapes import rectangle
 from tests.physics.rigs import Rig, locate, polar
 

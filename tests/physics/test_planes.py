@@ -6,13 +6,13 @@ import shapely
 import trimesh
 
 from radarize.radar.presets import PRESETS
-from radarsim.physics import planes
 from radarsim.physics.finder import EchoFinder
 from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
-from radarsim.scene import shapes
+from radarsim.scene import planes, shapes
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from tests.physics.rigs import field
 
 CONFIG = PRESETS["radarize"]

@@ -10,7 +10,8 @@ from radarsim.physics import plates
 from radarsim.physics.reflectors import Reflectors
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from tests.physics.rigs import conductors, isotropic
 
 CONFIG = PRESETS["radarize"]

@@ -14,8 +14,10 @@ from radarsim.physics.finder import EchoFinder
 from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.surface import DENSITY, Surface
 from radarsim.scene import shapes
+from radarsim.scene.life import Life
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Life, Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from tests.physics.rigs import Rig, burst
 
 CONFIG = PRESETS["radarize"]

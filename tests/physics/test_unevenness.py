@@ -10,8 +10,10 @@ from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.physics.unevenness import SCALES, Heights
 from radarsim.scene import shapes
+from radarsim.scene.life import Life
 from radarsim.scene.materials import material
-from radarsim.scene.scene import Life, Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -101,7 +103,7 @@ def test_heights_are_as_rough_as_they_say():
 
 def finder(scene):
     field = Heights.of(scene, np.random.default_rng(0))
-    return EchoFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC, heights=field)
+    return EchoFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG, field), CONFIG, antenna=ISOTROPIC)
 
 
 def flash(scene, place):

@@ -6,7 +6,8 @@ import pytest
 from radarsim.scene import shapes
 from radarsim.scene.clearance import Clearance, ground_level, nearest
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 
 
 def scene(**meshes) -> Scene:

@@ -5,7 +5,8 @@ import pytest
 
 from radarize.errors import InputError
 from radarsim.scene import shapes
-from radarsim.scene.scene import Life, Scene
+from radarsim.scene.life import Life
+from radarsim.scene.scene import Scene
 
 WALL = "{name: wall, shape: rectangle, size: [4, 3], position: [3, 0, 1], facing: [-1, 0, 0], material: concrete}"
 

@@ -7,9 +7,10 @@ from PIL import Image
 
 from radarsim.scene import shapes
 from radarsim.scene.materials import material
+from radarsim.scene.objects import SceneObject
 from radarsim.scene.preview import preview
 from radarsim.scene.rendering import render
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.scene import Scene
 from radarsim.scene.section import Section
 
 

@@ -7,7 +7,9 @@ import trimesh
 from radarize.errors import InputError
 from radarsim.scene import shapes
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject, _lent
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene, _lent
+from tests.beams import level_beams
 
 WOOD, METAL = MATERIALS["wood"], MATERIALS["metal"]
 
@@ -46,18 +48,18 @@ def brute_force(scene: Scene, origins, directions):
     return best, index
 
 
-def test_cast_and_occlusion_match_brute_force(clutter):
+def test_rays_and_occlusion_match_brute_force(clutter):
     rng = np.random.default_rng(1)
     origins, targets = rng.uniform(-1, 6, (2, 400, 3))
     lengths = np.linalg.norm(targets - origins, axis=1)
     directions = (targets - origins) / lengths[:, None]
     expected, index = brute_force(clutter, origins, directions)
-    distance, found = clutter.cast(origins, directions * 3)  # length of a direction does not matter
+    distance, triangle = clutter.hit(origins, directions * 3)  # length of a direction does not matter
     assert np.array_equal(np.isfinite(distance), np.isfinite(expected))
     hit = np.isfinite(expected)
     assert hit.sum() > 100
     assert np.abs(distance[hit] - expected[hit]).max() < 1e-5
-    assert np.array_equal(found, index)
+    assert np.array_equal(np.where(triangle < 0, -1, clutter.triangle_object[triangle]), index)
     clear_of_ends = (np.abs(expected - lengths) > 2e-3) & (expected > 2e-3)
     assert np.array_equal(clutter.occluded(origins, targets)[clear_of_ends], (expected < lengths)[clear_of_ends])
 
@@ -70,33 +72,18 @@ def test_margin_ignores_the_surfaces_at_both_ends(clutter):
     assert not sheet.occluded(np.zeros((0, 3)), np.zeros((0, 3))).size
 
 
-def test_planar_scan_matches_open3d(office):
+def test_rays_match_open3d(office):
     o3d = pytest.importorskip("open3d")
     world = o3d.t.geometry.RaycastingScene()
     for item in office.objects:
         world.add_triangles(
             o3d.core.Tensor(item.mesh.vertices.astype(np.float32)), o3d.core.Tensor(item.mesh.faces.astype(np.uint32))
         )
-    positions = np.array([[9.0, 6.0, 1.13], [3.0, 5.6, 0.2], [11.0, 8.5, 1.3]])
-    yaws = np.array([0.0, 1.0, -2.5])
-    azimuths = np.deg2rad(np.arange(-89, 90, 2.0))
-    scan = office.planar_scan(positions, yaws, azimuths, 8.0)
-    bearing = yaws[:, None] + azimuths
-    rays = np.concatenate(
-        [np.broadcast_to(positions[:, None], (*bearing.shape, 3)),
-         np.stack([np.cos(bearing), np.sin(bearing), 0 * bearing], axis=-1)], axis=-1
-    )  # fmt: skip
-    expected = world.cast_rays(o3d.core.Tensor(rays.astype(np.float32)))["t_hit"].numpy()
-    expected = np.where(expected <= 8.0, expected, np.inf)
-    agree = np.isclose(scan, expected, rtol=0, atol=1e-4)
+    origins, directions = level_beams(np.array([9.0, 6.0, 1.13]), np.arange(-180, 180, 2.0))
+    rays = o3d.core.Tensor(np.hstack([origins, directions]).astype(np.float32))
+    expected = world.cast_rays(rays)["t_hit"].numpy()
+    agree = np.isclose(office.hit(origins, directions)[0], expected, rtol=0, atol=1e-4)
     assert agree.mean() > 0.995  # rays through the very edge of something may fall on either side
-    assert np.array_equal(office.planar_scan(positions[1], yaws[1], azimuths, 8.0), scan[1])
-
-
-def test_scan_columns_run_to_the_left():
-    wall = Scene("wall", [SceneObject("left", shapes.rectangle((0, 2, 0), (50, 2), (0, -1, 0)), METAL)])
-    scan = wall.planar_scan(np.zeros(3), 0.0, np.deg2rad([-45.0, 0.0, 45.0, 90.0]), 10.0)
-    assert scan == pytest.approx([np.inf, np.inf, 2 * np.sqrt(2), 2.0], rel=1e-6)
 
 
 def test_floor_plan_of_a_box_is_its_outline():
@@ -112,9 +99,8 @@ def test_floor_plan_of_a_box_is_its_outline():
 def test_floor_plan_agrees_with_the_scan(office):
     """Every beam's end lies on a segment of the plan."""
     height, position = 1.2, np.array([5.0, 6.0, 1.2])
-    azimuths = np.deg2rad(np.arange(-180, 180, 3.0))
-    scan = office.planar_scan(position, 0.0, azimuths, 30.0)
-    ends = position[:2] + scan[:, None] * np.stack([np.cos(azimuths), np.sin(azimuths)], axis=1)
+    origins, directions = level_beams(position, np.arange(-180, 180, 3.0))
+    ends = (origins + office.hit(origins, directions)[0][:, None] * directions)[:, :2]
     plan = office.floor_plan(height)
     a, along = plan[:, :2], plan[:, 2:] - plan[:, :2]
     t = np.einsum("nsk,sk->ns", ends[:, None] - a, along) / np.sum(along**2, axis=1)

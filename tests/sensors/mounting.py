@@ -9,7 +9,8 @@ from radarize.radar.presets import PRESETS
 from radarsim.motion import Motion
 from radarsim.scenario import Scenario
 from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene, SceneObject
+from radarsim.scene.objects import SceneObject
+from radarsim.scene.scene import Scene
 from radarsim.sensors.sensor import Sensor
 
 CONFIG = PRESETS["radarize"]

@@ -20,7 +20,7 @@ from radarsim.scene.scene import Scene
 from radarsim.simulate import simulate
 from radarsim.twin.comparison import compare
 from radarsim.twin.report import report_twin
-from radarsim.twin.twin import make_twin
+from radarsim.twin.twin import Options, make_twin
 from tests.importers.public import captures
 from tests.twin.poses import altered, shaken
 
@@ -89,7 +89,7 @@ def compared(real, tmp_path_factory):
     metal = Scene("place", [replace(thing, material=MATERIALS["metal"]) for thing in PLACE.objects])
 
     def twin(name, scene=PLACE, recording=real, seed=9):
-        return compare(real, make_twin(recording, scene, folder / f"{name}.h5", seed=seed))
+        return compare(real, make_twin(recording, scene, folder / f"{name}.h5", Options(seed=seed)))
 
     return {
         "itself": compare(real, real),
@@ -151,8 +151,10 @@ def test_the_twin_takes_stamps_and_losses(real, tmp_path):
         file["radar/valid"][3, 5:9] = False
         return poses
 
-    made = make_twin(altered(real, tmp_path / "real.h5", change), PLACE, tmp_path / "twin.h5", every=2, seed=3)
-    lost = make_twin(altered(real, tmp_path / "odd.h5", change), PLACE, tmp_path / "odd_twin.h5", every=3, duration=1.2)
+    made = make_twin(altered(real, tmp_path / "real.h5", change), PLACE, tmp_path / "twin.h5", Options(every=2, seed=3))
+    lost = make_twin(
+        altered(real, tmp_path / "odd.h5", change), PLACE, tmp_path / "odd_twin.h5", Options(every=3, duration=1.2)
+    )
     with Recording(tmp_path / "real.h5") as one, Recording(made) as other, Recording(lost) as third:
         assert other.times == pytest.approx(one.times[::2], abs=1e-5)
         assert other.read("truth/time") == pytest.approx(one.read("truth/time")[::2], abs=1e-5)
@@ -172,12 +174,12 @@ def test_a_wrong_clock_and_a_wrong_heading_are_told(real, tmp_path):
         turn = Rotation.from_quat(poses[:, 3:]) * Rotation.from_euler("z", 9, degrees=True)
         return np.hstack([poses[:, :3], turn.as_quat()])
 
-    first = make_twin(altered(real, tmp_path / "late.h5", late), PLACE, tmp_path / "t.h5", seed=9)
+    first = make_twin(altered(real, tmp_path / "late.h5", late), PLACE, tmp_path / "t.h5", Options(seed=9))
     with Recording(first) as recording:
         assert "2 of 15 frames have no pose" in recording.attributes["warnings"]
     found = compare(tmp_path / "late.h5", first).misfits()
     assert found["time"][0] == pytest.approx(-0.4) and found["time"][1] > 0.1
-    second = make_twin(altered(real, tmp_path / "turned.h5", turned), PLACE, tmp_path / "u.h5", seed=9)
+    second = make_twin(altered(real, tmp_path / "turned.h5", turned), PLACE, tmp_path / "u.h5", Options(seed=9))
     # The twin looks too far to the left, so that all it sees is too far to the right.
     found = compare(real, second).misfits()
     assert np.degrees(found["azimuth"][0]) == pytest.approx(9, abs=1.6) and "time" not in found
@@ -199,7 +201,7 @@ def test_poses_of_another_body_in_another_frame(real, tmp_path, compared):
         return np.hstack([back.apply(place - origin.lever_arm), (back * turn).as_quat()])
 
     recording = altered(real, tmp_path / "cart.h5", change)
-    made = make_twin(recording, PLACE, tmp_path / "twin.h5", origin=origin, mounting=mounting, seed=3)
+    made = make_twin(recording, PLACE, tmp_path / "twin.h5", Options(origin=origin, mounting=mounting, seed=3))
     found = medians(compare(recording, made))
     assert found["correlation_range_azimuth"] == pytest.approx(
         medians(compared["same seed"])["correlation_range_azimuth"], abs=0.02
@@ -226,14 +228,14 @@ def test_a_board_with_calibration_and_bias(real, tmp_path):
     with h5py.File(path, "r+") as file:
         for name, rows in streams.items():
             file[name] = rows
-    found = compare(path, make_twin(path, PLACE, tmp_path / "twin.h5", seed=9))
+    found = compare(path, make_twin(path, PLACE, tmp_path / "twin.h5", Options(seed=9)))
     assert medians(found)["correlation_range_azimuth"] > 0.75 and not found.misfits()
 
 
 def test_what_is_missing_is_said_in_a_sentence(real, tmp_path):
     def refused(recording=real, scene=PLACE, **options):
         with pytest.raises(InputError) as caught:
-            make_twin(recording, scene, tmp_path / "x.h5", **options)
+            make_twin(recording, scene, tmp_path / "x.h5", Options(**options))
         assert "\n" not in str(caught.value) and not (tmp_path / "x.h5").exists()
         return str(caught.value)
 
@@ -273,7 +275,9 @@ def test_real_captures(recordings, tmp_path):
     for name, path in captures(recordings, tmp_path).items():
         with pytest.raises(InputError, match="has no poses"):
             make_twin(path, PLACE, tmp_path / "x.h5")
-        made = make_twin(path, PLACE, tmp_path / f"{name}.twin.h5", at=Mounting.of((-2, 0, 1), (0, 0, 0)), fit=True)
+        made = make_twin(
+            path, PLACE, tmp_path / f"{name}.twin.h5", Options(at=Mounting.of((-2, 0, 1), (0, 0, 0)), fit=True)
+        )
         found = compare(path, made)
         assert medians(found)["noise"] == pytest.approx(0, abs=2.0), name
         page, sentences = report_twin(path, made)

@@ -54,27 +54,11 @@ class Imported:
     remarks: list[str] = field(default_factory=list)
 
 
-def import_scene(
-    source: Path,
-    output: Path,
-    *,
-    materials: Path | None = None,
-    default: str | None = None,
-    units: str | None = None,
-    up: str | None = None,
-    floor: bool = True,
-    budget: int = 300_000,
-    height: float = 2.7,
-    thickness: float = 0.1,
-    resolution: float = 0.05,
-    progress: Callable[..., None] | None = None,
-) -> Imported:
-    """Write a scene file from a mesh, a Mitsuba scene, a ROS map or a lidar log.
+@dataclass(frozen=True)
+class Options:
+    """How a foreign file is read.
 
-    Args:
-        source: ``.glb .gltf .obj .ply .stl``, a Mitsuba or Sionna ``.xml``, a ROS map's ``.yaml`` or picture, a CARMEN
-            ``.log`` or ``.log.gz``, or ``.scans.npz`` with its ``.truth.tum``.
-        output: scene file (.yaml), or a folder for one with the source's name. Its meshes go to `NAME.meshes` beside.
+    Attributes:
         materials: YAML file of patterns, see `MaterialMap`.
         default: material of parts whose names say nothing; default: plasterboard, and concrete of whole rooms.
         units: of a mesh or XML scene, one of `UNITS`; default: m, but of a mesh what makes a building of it.
@@ -84,6 +68,46 @@ def import_scene(
         height: of the walls of a map or log, m.
         thickness: of its thinnest walls, m.
         resolution: of a log's cells, m.
+
+    Raises:
+        InputError: an unusable one.
+    """
+
+    materials: Path | None = None
+    default: str | None = None
+    units: str | None = None
+    up: str | None = None
+    floor: bool = True
+    budget: int = 300_000
+    height: float = 2.7
+    thickness: float = 0.1
+    resolution: float = 0.05
+
+    def __post_init__(self):
+        for name, low, high in (
+            ("height", 1.0, 20.0), ("thickness", 0.02, 1.0), ("resolution", 0.01, 0.5), ("budget", 100, 5_000_000),
+        ):  # fmt: skip
+            if not low <= (value := getattr(self, name)) <= high:
+                raise InputError(f"--{name} is {value:g}, expected {low:g} to {high:g}")
+        if self.units not in (None, *UNITS):
+            raise InputError(f"--units is {self.units!r}, expected one of: {', '.join(UNITS)}")
+        if self.up not in (None, "y", "z"):
+            raise InputError(f"--up is {self.up!r}, expected y or z")
+
+
+def import_scene(
+    source: Path,
+    output: Path,
+    options: Options = Options(),  # noqa: B008
+    progress: Callable[..., None] | None = None,
+) -> Imported:
+    """Write a scene file from a mesh, a Mitsuba scene, a ROS map or a lidar log.
+
+    Args:
+        source: ``.glb .gltf .obj .ply .stl``, a Mitsuba or Sionna ``.xml``, a ROS map's ``.yaml`` or picture, a CARMEN
+            ``.log`` or ``.log.gz``, or ``.scans.npz`` with its ``.truth.tum``.
+        output: scene file (.yaml), or a folder for one with the source's name. Its meshes go to `NAME.meshes` beside.
+        options: how to read it.
         progress: called with a stage's name, steps done, steps in all.
 
     Raises:
@@ -92,17 +116,7 @@ def import_scene(
     source, output = Path(source), Path(output)
     if not source.is_file():
         raise InputError(f"{source}: no such file, expected a mesh, a Mitsuba scene, a ROS map or a lidar log")
-    for name, value, low, high in (
-        ("height", height, 1.0, 20.0), ("thickness", thickness, 0.02, 1.0), ("resolution", resolution, 0.01, 0.5),
-        ("budget", budget, 100, 5_000_000),
-    ):  # fmt: skip
-        if not low <= value <= high:
-            raise InputError(f"--{name} is {value:g}, expected {low:g} to {high:g}")
-    if units not in (None, *UNITS):
-        raise InputError(f"--units is {units!r}, expected one of: {', '.join(UNITS)}")
-    if up not in (None, "y", "z"):
-        raise InputError(f"--up is {up!r}, expected y or z")
-    chosen = MaterialMap.read(materials, default)
+    chosen = MaterialMap.read(options.materials, options.default)
     path = output if output.suffix.lower() in (".yaml", ".yml") else output / f"{_stem(source)}.yaml"
     if path.resolve() == source.resolve():
         raise InputError(f"{path}: is the source itself, expected another output file")
@@ -110,20 +124,20 @@ def import_scene(
     remarks: list[str] = []
     kind = _kind(source)
     if kind in ("map", "log"):
-        grid = rosmap.grid(source) if kind == "map" else carmen.grid(source, resolution, progress)
-        parts = floorplan.parts(grid, height, thickness, str(source), progress)
+        grid = rosmap.grid(source) if kind == "map" else carmen.grid(source, options.resolution, progress)
+        parts = floorplan.parts(grid, options.height, options.thickness, str(source), progress)
     else:
         parts = mitsuba.parts(source) if kind == "mitsuba" else meshes.parts(source)
-        up = up or _up(parts, source, remarks)
-        units = units or ("m" if kind == "mitsuba" else _guess(parts, remarks))
-        parts = _fit(parts, source, units, up, floor, budget, remarks, progress)
+        up = options.up or _up(parts, source, remarks)
+        units = options.units or ("m" if kind == "mitsuba" else _guess(parts, remarks))
+        parts = _fit(parts, source, replace(options, up=up, units=units), remarks, progress)
     rows = []
     for part in parts:
         part.material, why = chosen.choose(part)
         name = part.material if isinstance(part.material, str) else "custom"
         rows.append(Row(part.name, name, why, len(part.mesh.faces), float(part.mesh.area)))
     if unsure := sum(row.chosen_by == "default" for row in rows):
-        which = default or " or ".join(sorted({row.material for row in rows if row.chosen_by == "default"}))
+        which = options.default or " or ".join(sorted({row.material for row in rows if row.chosen_by == "default"}))
         remarks.append(f"{unsure} of {len(rows)} parts got the default material {which}; --materials can name theirs")
     with explained(f"{path}: cannot be written", OSError):
         _write(path, parts, source)
@@ -153,8 +167,9 @@ def _kind(source: Path) -> str:
     )
 
 
-def _fit(parts, source, units, up, floor, budget, remarks, progress) -> list[Part]:
+def _fit(parts, source, options: Options, remarks, progress) -> list[Part]:
     """Clean, scale, turn and place the parts of a mesh."""
+    units, up = options.units, options.up
     if up == "y":
         for part in parts:
             part.mesh.vertices = np.asarray(part.mesh.vertices)[:, [0, 2, 1]] * [1, -1, 1]
@@ -183,10 +198,10 @@ def _fit(parts, source, units, up, floor, budget, remarks, progress) -> list[Par
     parts, rooms = turned_to_rooms(parts)
     if rooms:
         remarks.append(f"{', '.join(rooms)}: closed around all else, taken for a room, its faces turned inwards")
-    _place(parts, floor, remarks)
+    _place(parts, options.floor, remarks)
     total = sum(len(part.mesh.faces) for part in parts)
-    if total > budget:
-        parts, moved = decimate(parts, budget, str(source), progress)
+    if total > options.budget:
+        parts, moved = decimate(parts, options.budget, str(source), progress)
         left = sum(len(part.mesh.faces) for part in parts)
         remarks.append(f"decimated from {total} to {left} triangles; 99 % of the surface moved less than {moved:.4f} m")
     return parts

@@ -1,7 +1,7 @@
 """Planes of noisy scans: walls that a scanner saw a few millimetres rough are made flat again.
 
 A radar at 77 GHz sees a wall as a mirror; the same wall with 5 mm of scanner noise would sparkle like gravel (the
-residual is the scanner's, true roughness is the material's: `physics.planes`). That module finds planes up to half a
+residual is the scanner's, true roughness is the material's: `scene.planes`). That module finds planes up to half a
 millimetre of noise. Here they are found on a smoothed copy, and the corners of the scan near a plane are put onto it.
 """
 
@@ -12,7 +12,7 @@ import trimesh
 from jaxtyping import Float
 from scipy import sparse
 
-from radarsim.physics.planes import regions
+from radarsim.scene.planes import regions
 
 #: Only meshes as fine as scans are looked at: median edge, m, and number of triangles.
 FINE, MANY = 0.12, 2000

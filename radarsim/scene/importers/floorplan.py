@@ -14,6 +14,7 @@ from radarsim.scene import shapes
 from radarsim.scene.importers.faces import Face, faces, rooms
 from radarsim.scene.importers.grid import OccupancyGrid
 from radarsim.scene.importers.part import Part
+from radarsim.scene.planes import trapezoids
 
 #: Things that are no walls (chair legs, boxes, people who stood still) are this high, m.
 CLUTTER = 1.0
@@ -154,8 +155,6 @@ def _placed(area, grid: OccupancyGrid):
 
 def _tiles(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Polygon]:
     """Few rectangles that cover the free ground and a little of what bounds it."""
-    from radarsim.physics.planes import trapezoids
-
     size = max(1, round(_TILE / grid.resolution))
     around = np.pad(inside, [(0, -n % size) for n in inside.shape])
     coarse = around.reshape(around.shape[0] // size, size, around.shape[1] // size, size).any(axis=(1, 3))

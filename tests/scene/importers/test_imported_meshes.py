@@ -11,10 +11,10 @@ import yaml
 from radarize.console import run
 from radarize.errors import InputError
 from radarsim.cli import app
-from radarsim.physics.planes import regions
 from radarsim.scene import shapes
-from radarsim.scene.importers import import_scene
+from radarsim.scene.importers import Options, import_scene
 from radarsim.scene.importers.naming import meaning
+from radarsim.scene.planes import regions
 from radarsim.scene.scene import Scene
 
 
@@ -47,7 +47,7 @@ def test_gltf_stands_up_and_names_its_materials(tmp_path):
         scene.add_geometry(mesh, node_name=name, transform=back)
     scene.export(tmp_path / "room.glb")
     (tmp_path / "map.yaml").write_text("'cab*': metal\n")
-    done = import_scene(tmp_path / "room.glb", tmp_path / "out", materials=tmp_path / "map.yaml")
+    done = import_scene(tmp_path / "room.glb", tmp_path / "out", Options(materials=tmp_path / "map.yaml"))
     assert rows(done) == {
         "outer wall": ("brick", 54.0), "floor": ("floorboard", 24.0), "Cabinet.001": ("metal", 3.04),
     }  # fmt: skip
@@ -68,7 +68,7 @@ def test_obj_groups_and_materials(tmp_path):
         "o shell\ng north\nusemtl glazing\nf 1 2 3 4\ng east\nusemtl grey\nf 2 5 6 3\no slab\nusemtl grey\nf 1 2 5 7\n"
     )
     (tmp_path / "map.yaml").write_text("'*slab*': marble\ngrey: {custom: {permittivity: 4, conductivity: 0.1}}\n")
-    done = import_scene(tmp_path / "room.obj", tmp_path / "room.yaml", materials=tmp_path / "map.yaml")
+    done = import_scene(tmp_path / "room.obj", tmp_path / "room.yaml", Options(materials=tmp_path / "map.yaml"))
     found = {material: area for _, (material, area) in rows(done).items()}
     assert found == {"glass": 12.0, "custom": 15.0, "marble": 20.0}
     loaded = Scene.load(done.path)
@@ -105,13 +105,13 @@ def test_stl_in_millimetres(tmp_path):
     mesh.apply_translation([0, 0, 1.0])
     mesh.apply_scale(1000)
     mesh.export(tmp_path / "room.stl")
-    done = import_scene(tmp_path / "room.stl", tmp_path, default="concrete")
+    done = import_scene(tmp_path / "room.stl", tmp_path, Options(default="concrete"))
     assert rows(done) == {"room": ("concrete", 81.04)}
     assert any("taken as mm (6 m)" in remark for remark in done.remarks)
     loaded = Scene.load(done.path)
     assert loaded.bounds == pytest.approx(np.array([[0, 0, 0], [6, 4, 2.7]]), abs=1e-4)
     assert len(regions(loaded.objects[0].mesh)) == 11  # four walls, the floor, six sides
-    kept = import_scene(tmp_path / "room.stl", tmp_path / "kept", units="mm", floor=False)
+    kept = import_scene(tmp_path / "room.stl", tmp_path / "kept", Options(units="mm", floor=False))
     assert Scene.load(kept.path).bounds[0, 2] == pytest.approx(1.0)
 
 
@@ -119,7 +119,7 @@ def test_stl_in_millimetres(tmp_path):
 def test_units(tmp_path, unit, metres):
     mesh = shapes.box((0, 0, 0), (5 / metres, 4 / metres, 3 / metres))
     mesh.export(tmp_path / "box.ply")
-    done = import_scene(tmp_path / "box.ply", tmp_path, units=unit)
+    done = import_scene(tmp_path / "box.ply", tmp_path, Options(units=unit))
     assert np.ptp(Scene.load(done.path).bounds, axis=0) == pytest.approx([5, 4, 3], rel=1e-5)
 
 
@@ -128,7 +128,7 @@ def test_cleaning(tmp_path):
     corners = np.array([[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 2], [4, 0, 1e-7]], float)
     faces = [[0, 1, 2], [0, 2, 3], [2, 1, 0], [0, 5, 2], [0, 1, 5], [0, 2, 4], [1, 1, 2]]
     trimesh.Trimesh(corners, faces, process=False).export(tmp_path / "a.ply")
-    done = import_scene(tmp_path / "a.ply", tmp_path / "out", default="wood")
+    done = import_scene(tmp_path / "a.ply", tmp_path / "out", Options(default="wood"))
     (row,) = done.rows
     assert row.triangles == 3 and row.area == pytest.approx(16 + np.sqrt(8) * 2)
     text = " ".join(done.remarks)
@@ -154,7 +154,7 @@ def test_a_noisy_scan_gets_flat_walls(tmp_path):
     rough = scan(0.005, np.random.default_rng(0))
     assert max(rough.area_faces[faces].sum() for faces in regions(rough)) < 0.3
     rough.export(tmp_path / "scan.ply")
-    done = import_scene(tmp_path / "scan.ply", tmp_path, budget=4000, default="concrete")
+    done = import_scene(tmp_path / "scan.ply", tmp_path, Options(budget=4000, default="concrete"))
     mesh = Scene.load(done.path).objects[0].mesh
     assert len(mesh.faces) <= 4000 < len(rough.faces)
     large = [faces for faces in regions(mesh) if mesh.area_faces[faces].sum() > 5]
@@ -174,7 +174,7 @@ def test_a_noisy_scan_gets_flat_walls(tmp_path):
 def test_a_budget_that_cannot_be_met(tmp_path):
     trimesh.creation.icosphere(5, radius=3).export(tmp_path / "ball.ply")
     with pytest.raises(InputError, match="would move 1 % of its surface by more than .* raise --budget"):
-        import_scene(tmp_path / "ball.ply", tmp_path, budget=100)
+        import_scene(tmp_path / "ball.ply", tmp_path, Options(budget=100))
 
 
 @pytest.mark.parametrize(
@@ -240,7 +240,7 @@ def test_mistakes_get_one_sentence(tmp_path, name, text, options, complaint):
         (tmp_path / "map.yaml").write_text(options["materials"])
         options = {"materials": tmp_path / "map.yaml"}
     with pytest.raises(InputError, match=complaint) as caught:
-        import_scene(tmp_path / name, tmp_path / "out", **options)
+        import_scene(tmp_path / name, tmp_path / "out", Options(**options))
     assert "\n" not in str(caught.value) and not (tmp_path / "out").exists()
 
 

@@ -16,9 +16,10 @@ from radarsim.motion import Motion
 from radarsim.physics.reflectors import Reflectors
 from radarsim.planner import plan_motion
 from radarsim.scenario import Scenario
-from radarsim.scene.importers import import_scene
+from radarsim.scene.importers import Options, import_scene
 from radarsim.scene.importers.carmen import scans_of
 from radarsim.scene.scene import Scene
+from tests.beams import level_beams
 
 RADISH = Path(__file__).parents[3] / ".." / "shared" / "recordings" / "radish"
 #: Two rooms with a doorway between them: faces at x = 0, 5, 5.2, 9 and y = 0, 4; a door from y = 1 to 2.
@@ -51,14 +52,14 @@ def turned(points, yaw: float) -> np.ndarray:
 @pytest.mark.parametrize("yaw", [0.0, 0.5])
 @pytest.mark.parametrize("keys", [{}, {"negate": 1}])
 def test_a_ros_map_becomes_its_rooms(tmp_path, yaw, keys):
-    scene = Scene.load(import_scene(draw_map(tmp_path, yaw, **keys), tmp_path / "out", height=2.5).path)
+    scene = Scene.load(import_scene(draw_map(tmp_path, yaw, **keys), tmp_path / "out", Options(height=2.5)).path)
     assert scene.bounds[:, 2] == pytest.approx([0, 2.5])
     eye = np.append(turned([2.5, 3.0], yaw), 1.2)
-    right, left, forward, back = scene.planar_scan(eye, yaw, np.deg2rad([-90, 90, 0, 180]), 20)
-    assert [right, left, forward, back] == pytest.approx([3, 1, 2.5, 2.5], abs=0.03)
+    distance, _ = scene.hit(*level_beams(eye, np.rad2deg(yaw) + [-90.0, 90, 0, 180]))
+    assert distance == pytest.approx([3, 1, 2.5, 2.5], abs=0.03)
     # Through the doorway into the other room, to its far wall.
     eye = np.append(turned([2.5, 1.5], yaw), 1.2)
-    assert scene.planar_scan(eye, yaw, np.zeros(1), 20) == pytest.approx([6.5], abs=0.03)
+    assert scene.hit(*level_beams(eye, np.rad2deg([yaw])))[0] == pytest.approx([6.5], abs=0.03)
     # Nothing but the eight faces, the door's reveals, and the outer sides.
     walls = next(item for item in scene.objects if item.name == "walls")
     assert len(walls.mesh.faces) // 2 <= 24
@@ -98,7 +99,7 @@ def test_echoes_of_imported_walls_are_those_of_native_ones(tmp_path):
     scan.merge_vertices()
     scan.vertices = scan.vertices + np.random.default_rng(1).normal(0, 0.003, scan.vertices.shape)
     scan.export(tmp_path / "scan.ply")
-    scanned = Scene.load(import_scene(tmp_path / "scan.ply", tmp_path / "out", default="plasterboard").path)
+    scanned = Scene.load(import_scene(tmp_path / "scan.ply", tmp_path / "out", Options(default="plasterboard")).path)
     for position, yaw in (((3.2, 2.7, 1.2), np.pi), ((3.0, 2.5, 1.2), -np.pi / 2 + 0.3)):
         expected = peak(Scene("native", native.objects), position, yaw)
         for scene in (plan, scanned):
@@ -125,11 +126,11 @@ def carmen_log(count: int = 181) -> str:
 
 def test_a_carmen_log_becomes_its_rooms(tmp_path):
     (tmp_path / "two.log.gz").write_bytes(gzip.compress(carmen_log(361).encode()))
-    done = import_scene(tmp_path / "two.log.gz", tmp_path, resolution=0.04)
+    done = import_scene(tmp_path / "two.log.gz", tmp_path, Options(resolution=0.04))
     scene = Scene.load(done.path)
     assert done.path.name == "two.yaml"
-    scan = scene.planar_scan(np.array([2.0, 2.0, 1.2]), 0.0, np.deg2rad([90, 180, -90]), 20)
-    assert scan == pytest.approx([2, 2, 2], abs=0.06)
+    distance, _ = scene.hit(*level_beams(np.array([2.0, 2.0, 1.2]), np.array([90.0, 180, -90])))
+    assert distance == pytest.approx([2, 2, 2], abs=0.06)
     motion = plan_motion(scene, "cart", 5.0, np.random.default_rng(0))
     inside = ROOMS.buffer(-0.2)
     assert shapely.contains_xy(inside, *motion.position(np.linspace(0, 5, 50))[:, :2].T).all()
@@ -215,4 +216,4 @@ def test_mistakes_get_one_sentence(tmp_path, name, text, complaint):
 def test_options_out_of_range(tmp_path):
     for option in ({"height": 0.1}, {"thickness": 3.0}, {"resolution": 0.0}):
         with pytest.raises(InputError, match=f"--{next(iter(option))} is "):
-            import_scene(draw_map(tmp_path), tmp_path / "out", **option)
+            import_scene(draw_map(tmp_path), tmp_path / "out", Options(**option))

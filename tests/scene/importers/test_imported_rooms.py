@@ -14,7 +14,7 @@ from radarsim.physics.reflectors import Reflectors
 from radarsim.physics.scatterers import Scatterers
 from radarsim.planner import plan_motion
 from radarsim.scene import shapes
-from radarsim.scene.importers import import_scene
+from radarsim.scene.importers import Options, import_scene
 from radarsim.scene.scene import Scene
 from tests.physics.rigs import field
 
@@ -29,7 +29,7 @@ def inside_out(mesh):
 def brought(tmp_path, *meshes, **options):
     """Meshes imported from one PLY file."""
     shapes.joined(*meshes).export(tmp_path / "place.ply")
-    return import_scene(tmp_path / "place.ply", tmp_path / "out", **options)
+    return import_scene(tmp_path / "place.ply", tmp_path / "out", Options(**options))
 
 
 @pytest.mark.parametrize("inwards", [False, True])
@@ -90,10 +90,12 @@ def lying(mesh, up):
 )
 def test_the_mesh_says_which_way_is_up(tmp_path, suffix, up, place, why):
     lying(place, up).export(tmp_path / f"place.{suffix}")
-    done = import_scene(tmp_path / f"place.{suffix}", tmp_path / "out", units="m")
+    done = import_scene(tmp_path / f"place.{suffix}", tmp_path / "out", Options(units="m"))
     assert np.ptp(Scene.load(done.path).bounds, axis=0) == pytest.approx(np.ptp(place.bounds, axis=0), abs=1e-5)
     assert any(f"{up} is taken for up" in remark and why in remark for remark in done.remarks)
-    other = import_scene(tmp_path / f"place.{suffix}", tmp_path / "other", units="m", up="z" if up == "y" else "y")
+    other = import_scene(
+        tmp_path / f"place.{suffix}", tmp_path / "other", Options(units="m", up="z" if up == "y" else "y")
+    )
     size = np.ptp(Scene.load(other.path).bounds, axis=0)
     assert size == pytest.approx(np.ptp(place.bounds, axis=0)[[0, 2, 1]], abs=1e-5)
 

@@ -7,7 +7,7 @@ import pytest
 
 from radarize.errors import InputError
 from radarsim.scene import shapes
-from radarsim.scene.importers import import_scene
+from radarsim.scene.importers import Options, import_scene
 from radarsim.scene.scene import Scene
 
 
@@ -30,7 +30,7 @@ def test_sionna_scenes(tmp_path, name, materials):
     """Same extent, shapes and materials as Sionna RT itself loads."""
     import sionna.rt
 
-    done = import_scene(shipped(name), tmp_path, floor=False)
+    done = import_scene(shipped(name), tmp_path, Options(floor=False))
     loaded = Scene.load(done.path)
     theirs = sionna.rt.load_scene(str(shipped(name)), merge_shapes=False)
     box = theirs.mi_scene.bbox()
@@ -73,7 +73,7 @@ def test_shapes_and_transforms(tmp_path):
   <point name="p1" x="0" y="-3" z="2"/></shape>
 <shape type="disk" id="lid"><transform name="to_world"><translate x="9" z="2"/></transform></shape>""")
     )
-    done = import_scene(tmp_path / "a.xml", tmp_path / "out", floor=False, default="wood")
+    done = import_scene(tmp_path / "a.xml", tmp_path / "out", Options(floor=False, default="wood"))
     items = {item.name: item for item in Scene.load(done.path).objects}
     assert items["pane"].material.name == "glass" and items["unit"].material.name == "brick"
     assert items["block"].material.permittivity_at(77e9).real == pytest.approx(3.5)

@@ -1,0 +1,168 @@
+"""Walks on which nothing was chosen: `unseen.yaml`, in five buildings of the generator and two real floor plans.
+
+The plans are made of lidar logs (`radarsim scene import`), which `benchmarks.slam_backend` reads, too; the back end's
+preset `lidar` was chosen on their scans, but nothing of the radar's was.
+"""
+
+import shutil
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from jaxtyping import Float
+
+from benchmarks.results import FOLDER, SHARED, command_line
+from radarize.benchmark.dataset import DataSet
+from radarize.benchmark.followed import Followed, joined
+from radarize.benchmark.results import command, machine
+from radarize.benchmark.study import Benchmark, Chosen, Options, Study, carry_out
+from radarize.benchmark.table import Table
+from radarize.console import progress
+from radarize.evaluation.motion import velocity_errors
+from radarize.methods.registry import BEST
+from radarize.pose import Pose, adjoint, between, inverse
+from radarize.runfolder import RunFolder
+from radarize.tum import planar
+from radarsim.dataset.run import make
+from radarsim.dataset.specification import Specification
+from radarsim.scene.importers import import_scene
+
+SPECIFICATION = Path(__file__).with_suffix(".yaml")
+#: Lidar logs by the name of the building that is made of them.
+PLANS = {name: SHARED / "radish" / f"{name}-corrected.log.gz" for name in ("intel", "orebro")}
+#: s: spans over which claims of poses are followed; the longest that a walk of a minute has a few of.
+SPANS = (1, 10, 50)
+#: m: no walk is to be off by more; and as a share of odometry's error, no SLAM.
+LOST, WORSE = 0.30, 1.05
+
+
+def recorded(folder: Path, workers: int | None) -> DataSet:
+    """The recordings, made as far as they are not there."""
+    plans = folder / "plans"
+    plans.mkdir(parents=True, exist_ok=True)
+    for name, log in PLANS.items():
+        if not (plans / f"{name}.yaml").is_file():
+            import_scene(log, plans)
+    specification = Specification.load(shutil.copy(SPECIFICATION, plans))
+    with progress("recordings") as report:
+        make(specification, folder, workers=workers, progress=report)
+    return DataSet.load(folder)
+
+
+def pose_nees(
+    poses: Pose, true: Pose, steps: Float[np.ndarray, "frame 3 3"], starts: range, length: int
+) -> Float[np.ndarray, "window"]:
+    """Squared error of a motion over windows of some frames over what it claims, per dimension.
+
+    Args:
+        poses, true: of each frame.
+        steps: claimed covariance of each step since the frame before, in the frame of the pose.
+        starts: of the windows.
+        length: of each, frames.
+    """
+    first = np.array(starts)
+    claimed = np.zeros((len(first), 3, 3))
+    for k in range(1, length + 1):
+        # What was claimed so far, carried into the frame of the pose after this step.
+        back = np.stack([adjoint(inverse(between(poses[s + k - 1], poses[s + k]))) for s in starts])
+        claimed = back @ claimed @ np.swapaxes(back, 1, 2) + steps[first + k]
+    moved, truly = (between(some[first], some[first + length]) for some in (poses, true))
+    error = between(truly, moved)
+    return np.einsum("wi,wij,wj->w", error, np.linalg.inv(claimed), error) / 3
+
+
+def row(runs: pd.DataFrame) -> dict[str, object]:
+    """Figures of some walks; means with standard errors over walks."""
+    odometry, slam = runs["odometry.ate.position.mean"], runs["slam.ate.position.mean"]
+    paths = list(runs["path"])
+    frames = joined([_followed(path) for path in paths])
+    velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
+    return {
+        "odometry m": f"{odometry.mean():.3f} +- {odometry.sem():.3f}",
+        "odometry rad": runs["odometry.ate.rotation.mean"].mean(),
+        "SLAM m": f"{slam.mean():.3f} +- {slam.sem():.3f}",
+        "SLAM rad": runs["slam.ate.rotation.mean"].mean(),
+        "worst SLAM m": slam.max(),
+        f"over {LOST:g} m": int((slam > LOST).sum()),
+        f"SLAM over {WORSE:g} x odometry": int((slam > WORSE * odometry).sum()),
+        "map F1 %": 100 * runs["map.f1"].mean(),
+        "NEES velocity (median)": f"{velocity['nees']:.2f} ({velocity['nees_median']:.2f})",
+        **{f"NEES pose {span} s (median)": "{:.2f} ({:.2f})".format(*_mean_and_median(paths, span)) for span in SPANS},
+    }
+
+
+@cache
+def _followed(run: Path) -> Followed:
+    return Followed.read(run)
+
+
+@cache
+def _nees(run: Path, span: float) -> np.ndarray:
+    """Of odometry, a window a second."""
+    folder = RunFolder(run)
+    times, poses = folder.odometry
+    true = planar(folder.scans["truth/pose"])[np.abs(folder.scans["truth/time"][:, None] - times).argmin(axis=0)]
+    rate = 1 / np.median(np.diff(times))
+    starts = range(0, len(times) - round(span * rate), round(rate))
+    return pose_nees(planar(poses), true, folder.scans["step_covariance"], starts, round(span * rate))
+
+
+def _mean_and_median(runs: list[Path], span: float) -> tuple[float, float]:
+    """Of `pose_nees`; the median over that of honest claims, 2.366 of three dimensions."""
+    found = np.concatenate([_nees(run, span) for run in runs])
+    return float(found.mean()), float(np.median(found) / (2.366 / 3))
+
+
+def tables(study: Study) -> list[Table]:
+    """By platform, building and of all; then walk by walk."""
+    groups, walks = [], []
+    for _, group, runs in study.by_group():
+        runs = runs.assign(path=[study.output / run.place for run in runs["run"]])
+        groups.append({**group, **row(runs)})
+        if group["on"] == "all":
+            walks = [
+                {
+                    "walk": one["recording"],
+                    "seed": one["run"].case.walk.seed,
+                    "walked m": one["odometry.distance"],
+                    "odometry m": one["odometry.ate.position.mean"],
+                    "odometry rad": one["odometry.ate.rotation.mean"],
+                    "SLAM m": one["slam.ate.position.mean"],
+                    "SLAM rad": one["slam.ate.rotation.mean"],
+                    "map F1 %": 100 * one["map.f1"],
+                }
+                for one in runs.to_dict("records")
+            ]
+    notes = [
+        "Mean error after alignment, mean over walks +- its standard error. NEES: squared error over the claimed "
+        "variance, per dimension, of all frames and windows, 1 if that is right; in brackets the median over its "
+        "expectation.",
+        f"To reach: odometry 0.20 m, 0.04 rad, by hand 0.30 m; SLAM 0.08 m, 0.02 rad, no walk over {LOST:g} m, none "
+        f"over {WORSE:g} x odometry; map F1 85 %; NEES 0.9 to 1.1 of velocities, 0.8 to 1.25 of poses.",
+    ]
+    return [Table("Walks never looked at, by platform and building", groups, notes), Table("Walk by walk", walks, [])]
+
+
+PARSER = command_line(
+    __doc__,
+    folder=(Path("unseen"), "of the recordings, which are made if they are not there"),
+    output=(Path("unseen-runs"), "folder of the runs"),
+    workers=(2, "processes"),
+)
+
+
+def main() -> None:
+    options = PARSER.parse_args()
+    machine()
+    data = recorded(options.folder, options.workers)
+    benchmark = Benchmark("Walks never looked at", "", Chosen.by_odometry, tables)
+    chosen = Options(tuple(BEST.values()), workers=options.workers, command=command("python -m benchmarks.unseen"))
+    study = Study.plan(benchmark, data, options.output, chosen)
+    with progress("runs") as report:
+        carry_out([study], report)
+    print(study.publish().write(FOLDER, "unseen").read_text())
+
+
+if __name__ == "__main__":
+    main()

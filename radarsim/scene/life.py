@@ -1,0 +1,20 @@
+"""How lived-in a place is."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Life:
+    """What tells a place from its drawing, as shares of what is usual; none: the drawing itself.
+
+    Attributes:
+        clutter: small things on walls, desks and shelves and under ceilings (`radarsim.physics.clutter`).
+        unevenness: how far walls, floors and ceilings are from their planes (`radarsim.physics.unevenness`).
+    """
+
+    clutter: float = 0.0
+    unevenness: float = 0.0
+
+
+#: The drawing itself.
+DRAWN = Life()

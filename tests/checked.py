@@ -6,7 +6,8 @@ arrays, and numba takes them as they are.
 
 import ast
 from collections.abc import Callable
-from typing import get_args
+from types import UnionType
+from typing import Union, get_args, get_origin
 
 import jaxtyping._import_hook as hook
 from beartype import beartype
@@ -33,7 +34,10 @@ def arrays(function: Callable) -> Callable:
 
 
 def _has_array(hint: object) -> bool:
-    return (isinstance(hint, type) and issubclass(hint, AbstractArray)) or any(map(_has_array, get_args(hint)))
+    """An array, one among others, or several; those of a list or mapping may have any shapes."""
+    if get_origin(hint) in (tuple, Union, UnionType):
+        return any(map(_has_array, get_args(hint)))
+    return isinstance(hint, type) and issubclass(hint, AbstractArray)
 
 
 def _compiles(decorator: ast.expr) -> bool:

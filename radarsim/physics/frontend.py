@@ -115,7 +115,7 @@ class FrontEnd:
         band, rate = self.settings.band, self.config.sample_rate
         return (-_IF_BANDWIDTH, _IF_BANDWIDTH) if band is None else (band.low * rate, band.high * rate)
 
-    def if_response(self, path_length: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
+    def if_response(self, path_length: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"] | complex:
         """Response of the IF chain to an echo of a path length (out and back, m)."""
         return self.beat_response(self.config.slope * np.asarray(path_length) / SPEED_OF_LIGHT)
 

@@ -2,12 +2,13 @@
 # make bounds: tests of compiled loops, which then look whether they index within bounds
 # make docs: builds the pages of documentation, with an environment of its own (requirements-docs.lock)
 # make lint: style, and types of what other programs import
+# make lowest: tests, in an environment of their own, with the lowest versions that pyproject.toml allows
 # make documents: types every command of docs, too, as `make test` does of README, and where nothing is compiled yet
 RUN := runs/demo
 # A file's tests share what it makes; files begin in the order of tests/conftest.py.
 PYTEST := .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
-.PHONY: setup demo test bounds documents docs lint clean
+.PHONY: setup demo test bounds documents docs lowest lint clean
 
 setup:
 	@./setup.sh
@@ -37,6 +38,13 @@ docs: setup
 	@.venv/bin/python docs/pages.py
 	@NO_MKDOCS_2_WARNING=1 build/docs/bin/mkdocs build --strict --quiet
 	@echo build/site/index.html
+
+lowest:
+	@$(or $(PYTHON),python3) -m venv --clear build/lowest && build/lowest/bin/python -m pip install -qq uv
+	@build/lowest/bin/uv pip install -q --python build/lowest --resolution lowest-direct '.[test]'
+	@NUMBA_CACHE_DIR=build/kernels build/lowest/bin/python -m pytest $(or $(TESTS),tests/radar tests/importers tests/exporters \
+		tests/scene tests/slam tests/nets tests/evaluation tests/report tests/test_recording.py tests/test_hdf5.py tests/test_cli.py \
+		tests/test_foxglove.py tests/test_viewer.py tests/test_pipeline.py tests/test_simulate.py)
 
 lint: setup
 	@.venv/bin/ruff check .

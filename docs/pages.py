@@ -6,8 +6,8 @@ import re
 import shutil
 from pathlib import Path
 
-import click
 import typer
+from typer.core import TyperCommand
 
 from radarize import cli as radarize
 from radarsim import cli as radarsim
@@ -38,7 +38,7 @@ def lay_out() -> None:
     (PAGES / "docs" / "reference" / "commands.md").write_text("\n".join(reference))
 
 
-def described(name: str, command: click.Command) -> list[str]:
+def described(name: str, command: TyperCommand) -> list[str]:
     """Markdown of a command, or of all below it."""
     if hasattr(command, "commands"):
         return [line for below in command.commands.values() for line in described(f"{name} {below.name}", below)]

@@ -6,7 +6,7 @@ from typing import TypeVar, cast
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16, Shaped
+from jaxtyping import Bool, Complex64, Float, Int, Int16, Shaped
 
 from radarize.aliasing import Aliases
 from radarize.disturbance import Flaws, find_flaws
@@ -120,7 +120,7 @@ class Batch:
         """`folded`, with the antennas of each bin as if sampled at once at the speed that it means."""
         return self.signal.heatmaps.unfolded(self.folded, self.aliases)
 
-    def maps(self, names: tuple[str, ...]) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
+    def maps(self, names: tuple[str, ...]) -> dict[str, Shaped[np.ndarray, "frame row azimuth"]]:
         """Maps that networks see, dB, see `radarize.features.maps`."""
         missing = tuple(name for name in names if name not in self._maps)
         if missing:

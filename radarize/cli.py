@@ -55,7 +55,8 @@ def import_(
     config: Annotated[str | None, typer.Option(help="A .cfg, a .mmwave.json or a preset's name.")] = None,
     poses: Annotated[Path | None, typer.Option(help="True poses of the sensor (TUM).")] = None,
     shape: Annotated[
-        str | None, typer.Option(metavar="AXES", help="Of an array: frame,loop,tx,rx,sample in its order, or lengths.")
+        str | None,
+        typer.Option(metavar="AXES", help="Of an array: frame, loop, tx, rx, sample in its order, or lengths."),
     ] = None,
     variable: Annotated[str | None, typer.Option(help="Name of the array in an .npz or .mat.")] = None,
     latency: Annotated[
@@ -75,7 +76,10 @@ def import_(
     ] = "signed",
     layout: Annotated[
         Literal["pairs", "interleaved", "real"],
-        typer.Option(help="Of a .bin's words: I and Q in pairs, receivers by turns (four lanes), or real samples."),
+        typer.Option(
+            metavar="LAYOUT",
+            help="Of a .bin's words: pairs (I and Q), interleaved (receivers by turns, four lanes), or real samples.",
+        ),
     ] = "pairs",
     board: Annotated[str | None, typer.Option(help="Antenna layout, e.g. iwr1843boost.")] = None,
     start_frequency: Annotated[float | None, typer.Option(help="Hz.")] = None,
@@ -463,11 +467,9 @@ def benchmark(
     from radarize.benchmark.registry import BENCHMARKS
 
     if name == "list":
-        width = max(map(len, BENCHMARKS))
-        for each, about in BENCHMARKS.items():
-            print(f"{each:<{width}}  {about.about}")
-        print(f"{'real':<{width}}  Points, turns and maps of real walks against a lidar (RadarHD's repository).")
-        return
+        listed = [(each, about.about) for each, about in BENCHMARKS.items()]
+        real = ("real", "Points, turns and maps of real walks against a lidar (RadarHD's repository).")
+        return print_table(("benchmark", "what it compares"), [*listed, real])
     for option, value in (("--data", data), ("--out", out)):
         if value is None:
             raise InputError(f"{option} is missing, expected a folder")
@@ -488,7 +490,7 @@ def benchmark(
 def _benchmark_real(
     data: Path, out: Path, weights: Path | None, walks: str | None, predictions: list[str], poses: Path | None
 ) -> None:
-    from radarize.benchmark.real import Options, real
+    from radarize.benchmark.real import SHOWN, Options, real
 
     numbers = [number.strip() for number in walks.split(",")] if walks else []
     if wrong := [number for number in numbers if not number.isdecimal()]:
@@ -501,7 +503,7 @@ def _benchmark_real(
     options = Options([int(number) for number in numbers], others, weights, poses)
     with progress("real") as report:
         results = real(data, out, options, progress=report)
-    print(results.tables[0].markdown())
+    print_table(*results.tables[0].in_terminal(SHOWN))
     print(out / "real.md")
 
 

@@ -22,7 +22,7 @@ class Apart:
     hausdorff: float
 
     @classmethod
-    def of(cls, found: Float[np.ndarray, "point 2"], true: Float[np.ndarray, "point 2"]) -> "Apart":
+    def of(cls, found: Float[np.ndarray, "found 2"], true: Float[np.ndarray, "true 2"]) -> "Apart":
         """Not-a-number where one has no points."""
         if not len(found) or not len(true):
             return cls(np.nan, np.nan)
@@ -30,6 +30,6 @@ class Apart:
         return cls((there.mean() + back.mean()) / 2, max(np.median(there), np.median(back)))
 
     @classmethod
-    def of_pictures(cls, found: Bool[np.ndarray, "range azimuth"], true: Bool[np.ndarray, "range azimuth"]) -> "Apart":
+    def of_pictures(cls, found: Bool[np.ndarray, "range one"], true: Bool[np.ndarray, "range other"]) -> "Apart":
         """Of polar pictures with any numbers of columns (`radarize.polar`)."""
         return cls.of(polar.cartesian(found), polar.cartesian(true))

@@ -134,7 +134,7 @@ def printable(value: object) -> str:
 def print_table(head: Sequence[str], rows: Iterable[Sequence[object]], numbers: Collection[int] = ()) -> None:
     """Print a table that is no wider than the terminal; cells are data, never markup.
 
-    Lines break between words; a word of up to `_WORD` letters stays whole.
+    Lines break between words; a word of up to `_WORD` letters stays whole, unless there are too many such columns.
 
     Args:
         head: of the columns.
@@ -152,7 +152,10 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[object]], numbers: 
     widths = [min(max(len(word) for cell in column for word in cell.split() or [""]), _WORD) for column in columns]
     # Heads of figures may break; of the others, and of all cells, the one that breaks most gets the room that is left.
     wanted = [max(map(len, column[k in numbers :]), default=0) for k, column in enumerate(columns)]
-    for _ in range(console.width - 2 * len(head) - sum(widths)):
+    room = console.width - 2 * (len(head) - 1)
+    while sum(widths) > room and max(widths) > 1:
+        widths[widths.index(max(widths))] -= 1
+    for _ in range(room - sum(widths)):
         most = max(range(len(head)), key=lambda k: wanted[k] / max(widths[k], 1))
         widths[most] += wanted[most] > widths[most]
     for k, name in enumerate(head):

@@ -78,6 +78,11 @@ def data_sets(found: dict) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     return ("data set", "shape", "type", "unit", "about"), rows
 
 
+def _spaced(value: object) -> object:
+    """An attribute, with a space after each comma where it is JSON, so that a line of a table may end there."""
+    return json.dumps(json.loads(value)) if isinstance(value, str) and value.startswith("{") else value
+
+
 def show(found: dict) -> None:
     """Print what `contents` found."""
     print(
@@ -93,4 +98,4 @@ def show(found: dict) -> None:
     derived = [(name, *_readable(value, DERIVED[name])) for name, value in found["derived"].items()]
     print_table(("derived", "value", "unit"), derived, numbers=(1,))
     print_table(*data_sets(found))
-    print_table(("attribute", "value"), found["attributes"].items())
+    print_table(("attribute", "value"), ((name, _spaced(value)) for name, value in found["attributes"].items()))

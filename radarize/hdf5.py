@@ -15,6 +15,8 @@ import h5py
 from radarize.errors import InputError
 from radarize.files import DEFLATE
 
+#: Version of the format that is written: the oldest that can be read while it grows, and so read by most.
+FORMAT = "v110"
 #: Bytes that a packed chunk takes at least.
 _PACKED_CHUNK = 16
 #: Bytes and chunks that a data set may declare before they are on disk: frames of a growing file that are not flushed
@@ -34,7 +36,7 @@ def open_hdf5(path: Path, content: BinaryIO | None = None, mode: str = "r") -> I
         InputError: some of it lies in other files.
         OSError: it cannot be opened.
     """
-    with h5py.File(content or path, mode, **({"libver": "latest"} if mode == "r+" else {})) as file:
+    with h5py.File(content or path, mode, **({"libver": FORMAT} if mode == "r+" else {})) as file:
         foreign = file.id.links.visit(lambda name: _elsewhere(file, name), info=False)
         if foreign:
             raise InputError(f"{path}: /{foreign} in other files, expected all of it in this one")

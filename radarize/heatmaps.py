@@ -159,7 +159,7 @@ class Heatmaps:
 
     def covariance(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"], antennas: np.ndarray
-    ) -> Complex64[torch.Tensor, "frame range antenna antenna"]:
+    ) -> Complex64[torch.Tensor, "frame range chosen chosen"]:
         """Spatial covariance per range bin, summed over Doppler: an echo of amplitude A has the diagonal A^2."""
         x = spectrum[..., torch.as_tensor(antennas)]
         return x.transpose(-1, -2) @ x.conj() / self._loop_energy

@@ -13,7 +13,7 @@ The steps of the mmWave SDK 3.x demo (`Mmwave demo data processing chain`), with
 import numpy as np
 import scipy.fft
 import torch
-from jaxtyping import Bool, Complex64, Float, Int, Int16
+from jaxtyping import Bool, Complex, Complex64, Float, Int, Int16
 from pydantic import Field
 from scipy.ndimage import maximum_filter
 from scipy.signal import windows
@@ -212,7 +212,7 @@ class PointClouds:
         return level, noise, found
 
     def _directions(
-        self, x: Float[np.ndarray, "detection antenna"]
+        self, x: Complex[np.ndarray, "detection antenna"]
     ) -> tuple[Int[np.ndarray, "point"], Float[np.ndarray, "point"], Float[np.ndarray, "point"]]:
         """Direction cosines to the left and up of one or two peaks per detection, and whose they are."""
         beams = x[:, self._row] @ self._steering

@@ -143,7 +143,7 @@ def gridded(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "cell 2"]
     inside = (points[:, 0] >= 0) & (points[:, 0] <= REACH) & (np.abs(points[:, 1]) <= REACH)
     places = [np.searchsorted(axis, values) for axis, values in zip(GRID, points[inside].T, strict=True)]
     cells = np.unique(np.stack(places, axis=1), axis=0)
-    return on_grid(cells.T)
+    return on_grid(tuple(cells.T))
 
 
 def on_grid(cells: Sequence[Int[np.ndarray, "cell"]]) -> Float[np.ndarray, "cell 2"]:

@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Float
 
-Pose = Float[np.ndarray, "*batch 3"]
+Pose = Float[np.ndarray, "*#batch 3"]
 
 
 def wrap(angle: np.ndarray | float) -> np.ndarray | float:

@@ -10,6 +10,9 @@
 Everything is sent column-wise, in batches of frames.
 """
 
+import os
+import sys
+import sysconfig
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -46,7 +49,7 @@ def view(
         progress: called with (frames done, frames in all).
 
     Raises:
-        InputError: unusable source, or the file cannot be written.
+        InputError: unusable source, the file cannot be written, or there is no screen for a window.
     """
     import rerun
 
@@ -56,7 +59,7 @@ def view(
             if part:
                 stream.save(part, default_blueprint=_layout())
             else:
-                stream.spawn(default_blueprint=_layout())
+                _open_window(stream)
             screen = Screen(stream)
             if recording is not None:
                 screen.start = float(recording.times[0])
@@ -67,6 +70,14 @@ def view(
             stream.flush()
             stream.disconnect()
     return Path(save) if save else None
+
+
+def _open_window(stream) -> None:
+    """Start the viewer, which is looked for where this Python's programs are, too."""
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+        raise InputError("a window needs a screen, but DISPLAY and WAYLAND_DISPLAY are not set; --save writes a file")
+    os.environ["PATH"] = os.pathsep.join([os.environ.get("PATH", os.defpath), sysconfig.get_path("scripts")])
+    stream.spawn(default_blueprint=_layout())
 
 
 @contextmanager

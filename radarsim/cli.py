@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from radarize.console import new_app, progress, run, working
+from radarize.console import new_app, print_table, progress, run, working
 from radarize.errors import InputError
 
 app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as raw int16 I/Q.")
@@ -161,20 +161,16 @@ def info(scene: SceneName):
 
     with working("loading the scene"):
         loaded = Scene.load(scene)
-    from rich.console import Console
-    from rich.table import Column, Table
-
     low, high = loaded.bounds
     print(f"{loaded.name}: {len(loaded.objects)} objects, {len(loaded.triangles)} triangles")
     for axis, start, end in zip("xyz", low, high, strict=True):
         print(f"  {axis}: {start:.2f} to {end:.2f} m")
-    right = {"justify": "right"}
-    table = Table("material", Column("objects", **right), Column("triangles", **right), Column("area, m2", **right))
+    rows = []
     for name in sorted({item.material.name for item in loaded.objects}):
         meshes = [item.mesh for item in loaded.objects if item.material.name == name]
         area = sum(mesh.area for mesh in meshes)
-        table.add_row(name, str(len(meshes)), str(sum(len(mesh.faces) for mesh in meshes)), f"{area:.2f}")
-    Console().print(table)
+        rows.append((name, len(meshes), sum(len(mesh.faces) for mesh in meshes), f"{area:.2f}"))
+    print_table(("material", "objects", "triangles", "area, m2"), rows, numbers=(1, 2, 3))
 
 
 @scene_app.command()
@@ -236,19 +232,13 @@ def import_(
             source, output, Options(materials, default, units, up, floor, budget, height, thickness, resolution),
             progress=report,
         )  # fmt: skip
-    from rich.console import Console
-    from rich.table import Column, Table
-
-    right = {"justify": "right"}
-    table = Table("part", "material", "by", Column("triangles", **right), Column("area, m2", **right))
     shown = sorted(done.rows, key=lambda row: -row.area)
-    for row in shown[:40]:
-        table.add_row(row.part, row.material, row.chosen_by, str(row.triangles), f"{row.area:.2f}")
+    rows = [(row.part, row.material, row.chosen_by, row.triangles, f"{row.area:.2f}") for row in shown[:40]]
     for name in sorted({row.material for row in shown[40:]}):
         rest = [row for row in shown[40:] if row.material == name]
         triangles, area = sum(row.triangles for row in rest), sum(row.area for row in rest)
-        table.add_row(f"{len(rest)} more", name, "", str(triangles), f"{area:.2f}")
-    Console().print(table)
+        rows.append((f"{len(rest)} more", name, "", triangles, f"{area:.2f}"))
+    print_table(("part", "material", "by", "triangles", "area, m2"), rows, numbers=(3, 4))
     for remark in done.remarks:
         print(f"note: {remark}")
     print(done.path)

@@ -205,18 +205,11 @@ def describe() -> str:
 
 def examine() -> bool:
     """Print the findings as a table; whether everything that is needed is there."""
-    from rich.console import Console
-    from rich.table import Column, Table
-
-    from radarize.console import working
+    from radarize.console import print_table, working
 
     with working("examining this machine"):
         found = findings()
-    marks = {"ok": "[green]ok[/]", "missing": "[red]missing[/]", "optional": "[yellow]optional[/]"}
-    table = Table("what", "state", Column("found", overflow="fold"), header_style="bold")
-    for finding in found:
-        table.add_row(finding.what, marks[finding.state], finding.detail)
-    Console().print(table)
+    print_table(("what", "state", "found"), [(each.what, each.state, each.detail) for each in found])
     # Outside of the table, whole, so that they can be copied.
     for finding in found:
         if finding.remedy:

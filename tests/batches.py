@@ -16,10 +16,17 @@ def batch(radar: RadarConfig | Signal, adc: np.ndarray, times: np.ndarray, valid
 
 def of_spectrum(signal: Signal, spectrum: torch.Tensor, times: np.ndarray) -> Batch:
     """Of a spectrum that no samples were made into, or of what stands for one."""
-    found = Batch(signal, np.zeros((len(spectrum), 0)), times)
+    found = Batch(signal, np.zeros((len(spectrum), 0, 0, 0, 0, 2), np.int16), np.asarray(times, float))
     found.folded = found.spectrum = spectrum
     if not isinstance(spectrum, torch.Tensor):
         found.aliases = np.zeros((len(spectrum), signal.radar.loops), int)
+    return found
+
+
+def of_scans(signal: Signal, scans: np.ndarray, times: np.ndarray) -> Batch:
+    """Of scans in the place of samples, for who makes scans of them."""
+    found = Batch(signal, None, times)
+    found.samples = scans
     return found
 
 

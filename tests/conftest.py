@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from tests import checked
+
+checked.install()
 # A suite that a script starts in the background ignores Ctrl-C, and so would every program that it starts.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 

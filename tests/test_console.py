@@ -1,8 +1,16 @@
 """Tables in a terminal of 80 columns."""
 
-import pytest
+import json
 
-from radarize.console import print_table
+import pytest
+import trimesh
+import typer
+
+import radarize.cli
+import radarsim.cli
+from radarize.console import print_table, run
+from radarize.contents import show
+from radarsim import doctor
 
 METHODS = ("scan-matching + segmentation", "published + published", "doppler + radarhd")
 
@@ -42,3 +50,64 @@ def test_what_is_longer_than_a_line_is_broken(terminal, capsys):
 def test_an_empty_table_is_its_head(terminal, capsys):
     print_table(("attribute", "value"), [])
     assert capsys.readouterr().out.split()[:2] == ["attribute", "value"]
+
+
+@pytest.fixture
+def printed(terminal, capsys):
+    """Words of what a command prints; none of its lines is too long."""
+
+    def call(app, *arguments: object) -> list[str]:
+        with pytest.raises(SystemExit) as exit_:
+            run(app, "command", [*map(str, arguments)])
+        out = capsys.readouterr().out
+        assert exit_.value.code == 0 and max(map(len, out.splitlines())) <= 80
+        return out.split()
+
+    return call
+
+
+def test_an_imported_part_keeps_its_name_whole(printed, tmp_path, monkeypatch):
+    """Names of a modelling program are long; so is the pattern that chose the material."""
+    monkeypatch.chdir(tmp_path)
+    part, pattern = "Storey2:CupboardDoor:Handle", "Storey2:Cupboard*"
+    scene = trimesh.Scene()
+    scene.add_geometry(trimesh.creation.box((4, 4, 1)), node_name=part)
+    scene.export("house.glb")
+    (tmp_path / "map.yaml").write_text(f"'{pattern}': metal\n")
+    words = printed(radarsim.cli.app, "scene", "import", "house.glb", "-o", "house.yaml", "--materials", "map.yaml")
+    assert part in words and {"triangles", "pattern", pattern} <= set(words)
+
+
+def test_a_scene_and_the_list_of_benchmarks(printed):
+    assert {"plasterboard", "triangles", "objects"} <= set(printed(radarsim.cli.app, "scene", "info", "office"))
+    assert {"odometry-platforms", "(RadarHD's", "repository)."} <= set(printed(radarize.cli.app, "benchmark", "list"))
+
+
+def test_the_doctor_cuts_no_path(printed, monkeypatch):
+    path = "/usr/lib/x86_64-linux-gnu/libLLVM.so.19.1"
+    found = [doctor.Finding("LLVM", "ok", f"19, in the folder of the system's own libraries: {path}")]
+    monkeypatch.setattr(doctor, "findings", lambda: found)
+    assert path in printed(radarsim.cli.app, "doctor")
+
+
+def test_attributes_written_as_json_break_between_figures(terminal, capsys):
+    figures = [round(-1000.25 - k, 2) for k in range(100)]
+    found = {"path": "walk.h5", "frames": 0, "duration": 0.0, "lost_chirps": 0, "lost_share": 0.0, "effort": "",
+             "config": {}, "derived": {}, "data_sets": {}}  # fmt: skip
+    show(found | {"attributes": {"front_end": json.dumps({"dbc_hz": figures}, separators=(",", ":"))}})
+    out = capsys.readouterr().out
+    assert {f"{figure}," for figure in figures[1:-1]} <= set(out.split()) and max(map(len, out.splitlines())) <= 80
+
+
+@pytest.mark.parametrize("app", [radarize.cli.app, radarsim.cli.app], ids=["radarize", "radarsim"])
+def test_help_cuts_no_word(app, printed):
+    """Nothing is shortened, and choices stand in one piece."""
+
+    def check(command, path: tuple[str, ...]) -> None:
+        words = printed(app, *path, "--help")
+        cut = [word for word in words if "…" in word or word.startswith("<") and "|" in word and word[-1] != ">"]
+        assert not cut, path
+        for name, below in getattr(command, "commands", {}).items():
+            check(below, (*path, name))
+
+    check(typer.main.get_command(app), ())

@@ -13,7 +13,7 @@ import pytest
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
-from radarize.recording import Product, Recording, RecordingWriter, Stream
+from radarize.recording import Product, Recording, RecordingWriter, Stream, add
 from radarize.recording.growing import lookup3
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 4})
@@ -62,6 +62,34 @@ def test_what_is_written_is_read(tmp_path):
         assert [(s.start, s.stop, len(adc)) for s, adc in recording.batches(2)] == [(0, 2, 2), (2, 4, 2), (4, 5, 1)]
         with pytest.raises(InputError, match="has no /truth/scan; there are"):
             recording.read("truth/scan")
+
+
+def messages(data: bytes, kind: int) -> list[int]:
+    """First bytes of all messages of a kind in a file's object headers (HDF5 file format specification, IV.A.1.b)."""
+    found, at = [], data.find(b"OHDR")
+    while at >= 0:
+        flags = data[at + 5]
+        size = 1 << (flags & 3)
+        start = at + 6 + (16 if flags & 32 else 0) + (4 if flags & 16 else 0)
+        end = start + size + int.from_bytes(data[start : start + size], "little")
+        at = start + size
+        while at + 4 < end:
+            body = at + (6 if flags & 4 else 4)
+            found += [data[body]] if data[at] == kind else []
+            at = body + int.from_bytes(data[at + 1 : at + 3], "little")
+        at = data.find(b"OHDR", end)
+    return found
+
+
+def test_other_software_can_read_it(tmp_path):
+    """HDF5 1.10 knows layouts to version 4 and types to 3; HDF5 2.0 writes newer ones, which older ones do not read."""
+    path = tmp_path / "a.h5"
+    with RecordingWriter(path, CONFIG, products={"truth/floor_plan": Product(np.eye(4), "m", "walls")}) as writer:
+        writer.append(frames(0, 3), np.arange(3.0))
+    add(path, {}, {}, {"truth/late": Product(np.ones(3, bool), "", "added")})
+    layouts, types = (messages(path.read_bytes(), kind) for kind in (8, 3))
+    assert len(layouts) == 5 and set(layouts) <= {3, 4}
+    assert len(types) == 5 and {first >> 4 for first in types} <= {1, 2, 3}
 
 
 def test_frames_of_another_shape_are_refused(tmp_path):

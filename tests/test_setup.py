@@ -73,10 +73,19 @@ def test_what_is_imported_is_declared_and_the_other_way_round():
     assert (optional | extras["sim"]) - both <= {"mapbox-earcut", "rtree", "onnx"}  # trimesh's, and torch's
 
 
+def test_what_tests_and_benchmarks_import_is_declared():
+    folders = ("tests", "benchmarks", "docs")  # and a module that a test writes
+    own = {*folders, "own_method", *(path.stem for folder in folders for path in (ROOT / folder).rglob("*.py"))}
+    declared = names(
+        *PROJECT["dependencies"], *(line for each in PROJECT["optional-dependencies"].values() for line in each)
+    )
+    assert distributions(imported(*folders) - own) <= declared
+
+
 def test_every_extras_modules_are_known():
     """So that a command that misses one says which extra it is of."""
     for extra, modules in EXTRAS.items():
-        declared = names(*PROJECT["optional-dependencies"][extra])
+        declared = names(*PROJECT["optional-dependencies"][extra]) - names(*PROJECT["dependencies"])
         assert all(declared & distributions({module}) for module in modules)
         assert declared <= distributions(modules)
 
@@ -95,7 +104,7 @@ def test_the_lock_pins_everything_and_names_nothing_else():
 
 
 def test_the_lock_is_complete():
-    extras = ("sim", "ray", "viewer", "onnx", "dev")
+    extras = ("sim", "ray", "viewer", "onnx", "test", "dev")
     lines = [*PROJECT["dependencies"], *(line for extra in extras for line in PROJECT["optional-dependencies"][extra])]
     wanted = [Requirement(line) for line in lines if not line.startswith("radarize[")]
     for name in LOCK:

@@ -1,6 +1,9 @@
 """What the viewer is sent, read back from an .rrd file and compared with the recording and the run."""
 
+import shutil
 import sys
+import sysconfig
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from radarize.tum import read_tum
 from radarize.viewer import view
 from tests.evaluation.fake_run import write_run
 
+rerun = pytest.importorskip("rerun", reason="rerun-sdk is not installed (pip install 'radarize[viewer]')")
 rrd = pytest.importorskip("rerun.chunk", reason="rerun-sdk is not installed (pip install 'radarize[viewer]')")
 
 # The library turns its own errors into warnings.
@@ -199,3 +203,20 @@ def test_one_antenna_has_no_maps(tmp_path):
         writer.append(np.ones((2, *config.frame_shape), np.int16), np.arange(2) * config.frame_period)
     shown = Entities(view(tmp_path / "one.h5", save=tmp_path / "one.rrd"))
     assert not [path for path in shown.found if path.startswith("/radar/")]
+
+
+def test_a_window_needs_a_screen(recording, monkeypatch):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(InputError, match="DISPLAY are not set; --save writes a file"):
+        view(recording)
+
+
+def test_the_viewer_is_found_without_an_activated_environment(recording, monkeypatch):
+    """Typed as .venv/bin/radarize, with nothing of .venv on the path."""
+    found = []
+    monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.setenv("PATH", "/usr/bin")
+    monkeypatch.setattr(rerun.RecordingStream, "spawn", lambda *_, **__: found.append(shutil.which("rerun")))
+    view(recording)
+    assert Path(found[0]).parent == Path(sysconfig.get_path("scripts"))

@@ -60,6 +60,9 @@ MAP_NOTE = (
     "the lidar's points at its poses, of which three frames have seen a cell of 5 cm. `odometry`: its ATE without SLAM."
 )
 
+#: Columns that a terminal shows.
+SHOWN = ("walk", "method", "chamfer_m", "mod_hausdorff_m", "yaw_rmse_deg", "turns_rms_deg", "ate_m", "map_f1")
+
 Cells = Bool[np.ndarray, "range column"]
 Ranges = Float[np.ndarray, "bearing"]
 

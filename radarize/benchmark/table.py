@@ -1,5 +1,6 @@
 """Tables: named columns, as Markdown, as JSON and on a page."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -71,6 +72,15 @@ class Table:
         lines = [f"{'#' * level} {self.title}", "", "| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
         lines += ["| " + " | ".join(map(cell, row)) + " |" for row in self.frame.itertuples(index=False)]
         return "\n".join([*lines, "", *(f"- {note}" for note in self.notes)]) + "\n"
+
+    def in_terminal(self, columns: Sequence[str]) -> tuple[list[str], list[list[str]], range]:
+        """Head, rows and columns of figures, of the named columns, as `radarize.console.print_table` takes them.
+
+        Args:
+            columns: names; what says which row it is, then figures from the third on.
+        """
+        rows = [[cell(row.get(column)) for column in columns] for row in self.rows]
+        return [column.replace("_", " ") for column in columns], rows, range(2, len(columns))
 
     def numbers(self) -> tuple[int, ...]:
         """Columns that hold figures."""

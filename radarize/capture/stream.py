@@ -171,7 +171,9 @@ def _read(kind: type, values: list[float]):
 
 
 def _fill(source: Source, arguments: tuple, shared: tuple, failure) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the main process ends this one, when everything has been received
+    # A terminal's signals come here, too; but the main process ends this one, when everything has been received.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     outlet = Outlet(*shared)
     try:
         source(outlet, *arguments)

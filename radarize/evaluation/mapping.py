@@ -133,7 +133,7 @@ def free_space_iou(
     row, column = np.nonzero((truth.probability > 0) & (truth.probability < 0.5))
     points = truth.origin + (np.column_stack([column, row]) + 0.5) * truth.resolution
     there = (np.column_stack([points, np.zeros(len(points))]) - shift) @ turn
-    at = np.floor(transform(inverse(grid.origin), there[:, :2]) / grid.resolution).astype(int)
+    at = np.floor(transform(inverse(np.array(grid.origin)), there[:, :2]) / grid.resolution).astype(int)
     rows, columns = grid.free.shape
     inside = (at >= 0).all(axis=1) & (at[:, 0] < columns) & (at[:, 1] < rows)
     both = grid.free[rows - 1 - at[inside, 1], at[inside, 0]].sum()

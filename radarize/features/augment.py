@@ -8,7 +8,7 @@ what they do to powers.
 import math
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Shaped
 from torch import Generator, Tensor
 
 from radarize.features.maps import FLOOR, Maps
@@ -36,7 +36,7 @@ def receding(maps: Maps) -> Maps:
     return maps.flip(3).roll(1 - maps.shape[3] % 2, dims=3)
 
 
-def mirrored_columns(label: Float[Tensor, "item row bearing"], unknown: int) -> Tensor:
+def mirrored_columns(label: Shaped[Tensor, "item row bearing"], unknown: int) -> Tensor:
     """A label of bearings -44...+43 deg, mirrored: bearing +44, which -44 becomes, was never labelled."""
     return torch.cat([torch.full_like(label[..., :1], unknown), label[..., 1:].flip(-1)], dim=-1)
 

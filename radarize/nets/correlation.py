@@ -73,7 +73,7 @@ class Correlation(nn.Module):
         both = torch.full((columns + 1, 1), 2.0).index_fill(0, torch.tensor([0, columns]), 1.0)  # signs of frequency
         self.shift *= both / (2 * columns) / columns**0.5
 
-    def forward(self, maps: Maps) -> Float[Tensor, "twice channel row shift"]:
+    def forward(self, maps: Maps) -> Float[Tensor, "twice channel band shift"]:
         """Correlation by step in range (channel), range (row, of four bins) and shift in azimuth, of all windows, then
         of all windows reversed."""
         found = self.features(maps.flatten(0, 1))

@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
 from radarize.errors import InputError, explained, reason
-from radarize.hdf5 import open_hdf5
+from radarize.hdf5 import FORMAT, open_hdf5
 from radarize.locks import hold
 from radarize.radar.config import RadarConfig
 from radarize.recording.captured import spare
@@ -112,7 +112,7 @@ class RecordingWriter:
             self._require_space(sum(product.data.nbytes for product in (products or {}).values()))
             if self.part.exists():
                 os.close(hold(self.part))  # of one who died, or refused
-            self._file = h5py.File(self.part, "w", libver="latest")
+            self._file = h5py.File(self.part, "w", libver=FORMAT)
             self._create(cfg_text, attributes or {}, streams or {}, products or {})
             self._held = hold(self.part)  # HDF5 itself does so until readers may follow
         except OSError as error:

@@ -137,6 +137,8 @@ def recordings(folder: str | Path, split: str | None = None, part: str = "train"
             raise InputError(f"{folder}: holds no recordings, expected *.h5")
         return found
     index = folder / "dataset.json"
+    if not index.is_file():
+        raise InputError(f"{index}: no such file, expected a data set with splits, as `radarsim dataset` makes it")
     with explained(f"{index}: is no readable data set, needed for a split"):
         splits = read_json(index)["splits"]
     if split not in splits:

@@ -115,11 +115,11 @@ class FrontEnd:
         band, rate = self.settings.band, self.config.sample_rate
         return (-_IF_BANDWIDTH, _IF_BANDWIDTH) if band is None else (band.low * rate, band.high * rate)
 
-    def if_response(self, path_length: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
+    def if_response(self, path_length: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"] | complex:
         """Response of the IF chain to an echo of a path length (out and back, m)."""
         return self.beat_response(self.config.slope * np.asarray(path_length) / SPEED_OF_LIGHT)
 
-    def beat_response(self, beat: Float[np.ndarray, "*n"]) -> Complex[np.ndarray, "*n"]:
+    def beat_response(self, beat: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"] | complex:
         """Response at beat frequencies, Hz: two first-order high-pass stages, then the decimation filter."""
         response = np.asarray(self._decimation(beat), complex)
         if self.settings.high_pass:

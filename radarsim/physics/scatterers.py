@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
 
 from radarsim.physics.scatteringpattern import LAMBERT
 from radarsim.physics.table import Table
@@ -48,11 +49,11 @@ class Scatterers(Table):
     @classmethod
     def points(
         cls,
-        position: Float[np.ndarray, "n 3"],
-        sigma: Float[np.ndarray, "n"],
+        position: ArrayLike,
+        sigma: ArrayLike,
         phase: Float[np.ndarray, "n"] | None = None,
     ) -> "Scatterers":
-        """Isotropic scatterers of given cross sections, m^2."""
+        """Isotropic scatterers at (n, 3) or (3,) places, m, of given cross sections, m^2."""
         position = np.atleast_2d(np.asarray(position, float))
         n = len(position)
         zeros = np.zeros(n, bool)

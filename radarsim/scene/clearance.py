@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 from jaxtyping import Bool, Float, Int
+from numpy.typing import ArrayLike
 from PIL import Image, ImageDraw
 from scipy import ndimage
 
@@ -55,8 +56,8 @@ class Clearance:
         distance = ndimage.distance_transform_edt(free) * RESOLUTION - RESOLUTION
         return cls(origin, np.maximum(distance, 0.0))
 
-    def at(self, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n"]:
-        """Clearance at points in the world, m; zero off the grid."""
+    def at(self, points: ArrayLike) -> Float[np.ndarray, "n"]:
+        """Clearance at (n, 2) points in the world, m; zero off the grid."""
         cells = (np.asarray(points) - self.origin) / RESOLUTION
         return ndimage.map_coordinates(self.distance, cells.T, order=1, mode="constant")
 

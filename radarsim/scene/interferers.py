@@ -56,7 +56,7 @@ class Interferer(BaseModel):
             raise ValueError(f"expected one of the presets {', '.join(PRESETS)}, or fields of a configuration")
         return PRESETS[radar] if isinstance(radar, str) else radar
 
-    def places(self, times: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n 3"]:
+    def places(self, times: Float[np.ndarray, "*n"] | float) -> Float[np.ndarray, "*n 3"]:
         """Where the board is at times, s; m."""
         return np.asarray(self.position) + np.multiply.outer(times, self.velocity)
 

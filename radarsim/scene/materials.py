@@ -94,7 +94,7 @@ class Material:
             return np.full(cos.shape, -1.0 + 0j), np.full(cos.shape, 1.0 + 0j)
         eps = self.permittivity_at(frequency)
         root = np.sqrt(eps - (1.0 - cos**2))  # principal branch: decays into the medium under e^{+jwt}
-        return (cos - root) / (cos + root), (eps * cos - root) / (eps * cos + root)
+        return np.asarray((cos - root) / (cos + root)), np.asarray((eps * cos - root) / (eps * cos + root))
 
     def slab(
         self, cos_theta: Float[np.ndarray, "*n"], frequency: float
@@ -122,7 +122,7 @@ class Material:
     def coherent_factor(self, cos_theta: Float[np.ndarray, "*n"], frequency: float) -> Float[np.ndarray, "*n"]:
         """Amplitude factor exp(-8 (pi sigma_h cos / lambda)^2) that roughness leaves to specular reflection."""
         wavelength = SPEED_OF_LIGHT / frequency
-        return np.exp(-8 * (np.pi * self.roughness * np.asarray(cos_theta) / wavelength) ** 2)
+        return np.asarray(np.exp(-8 * (np.pi * self.roughness * np.asarray(cos_theta) / wavelength) ** 2))
 
 
 def itu_permittivity(name: str, frequency: float) -> complex:

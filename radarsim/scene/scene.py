@@ -145,8 +145,8 @@ class Scene:
         return scene, first
 
     def occluded(
-        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], margin: float = 1e-3
-    ) -> Bool[np.ndarray, "n"]:
+        self, origins: Float[np.ndarray, "*#n 3"], targets: Float[np.ndarray, "*#n 3"], margin: float = 1e-3
+    ) -> Bool[np.ndarray, "*#n"]:
         """Whether anything lies on the segment from origin to target, both ends shortened by `margin` (m)."""
         geometry = self.sionna.mi_scene  # before Dr.Jit is loaded: it looks at the machine's LLVM
         import mitsuba as mi
@@ -160,8 +160,8 @@ class Scene:
         return geometry.ray_test(ray).numpy().astype(bool)
 
     def hit(
-        self, origins: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"], coherent: bool = False
-    ) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
+        self, origins: Float[np.ndarray, "*#n 3"], directions: Float[np.ndarray, "*#n 3"], coherent: bool = False
+    ) -> tuple[Float[np.ndarray, "*#n"], Int[np.ndarray, "*#n"]]:
         """Distance along each ray to the first triangle (inf: none) and that triangle's index (-1: none).
 
         `coherent` says that neighbours in the list are neighbours in space, as a picture's rays are: twice as fast.

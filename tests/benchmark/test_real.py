@@ -45,7 +45,8 @@ def predictions(folder, row: int):
         np.savez(file, prediction=np.packbits(cells, axis=-1), frame=np.arange(40, FRAMES))
 
 
-def test_every_walk_and_method_has_a_row(clone, tmp_path):
+def test_every_walk_and_method_has_a_row(clone, tmp_path, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
     predictions(tmp_path / "others", 71)
     done = CliRunner().invoke(app, [
         "benchmark", "real", "--data", str(clone), "--out", str(tmp_path / "out"), "--walks", "7",
@@ -56,6 +57,9 @@ def test_every_walk_and_method_has_a_row(clone, tmp_path):
     found = {row["method"]: row for row in rows}
     methods = {"picture", "cfar", "first-echo", "others", "shifted pictures", "shifted pictures, smoothed", "lidar"}
     assert {row["walk"] for row in rows} == {7} and methods == found.keys()
+    shown = done.output.splitlines()[:-1]
+    assert max(map(len, shown)) <= 80 and f" {found['picture']['mod_hausdorff_m']:.4g} " in done.output
+    assert {"hausdorff", "chamfer", "smoothed"} <= {word for line in shown for word in line.split()}
     # Who stands has not moved, and nothing turned; maps of the wall agree as its scans do.
     assert found["lidar"]["ate_m"] < 0.02 and found["shifted pictures"]["yaw_rmse_deg"] < 0.1
     assert found["lidar"]["map_f1"] > 0.9 and found["others"]["map_f1"] > 0.9 > found["first-echo"]["map_f1"]

@@ -1,5 +1,8 @@
 """Frames between processes: all of them in order, or whole ones dropped and counted."""
 
+import multiprocessing
+import os
+import signal
 import threading
 import time
 
@@ -59,6 +62,16 @@ def test_the_user_and_the_number_of_frames_end_it():
     with Stream(SMALL, sources.count, SMALL, 20, slots=64) as stream:
         found = list(follow(stream, threading.Event(), most=3, frames=7))
         assert np.concatenate(found)["number"].tolist() == list(range(7))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_what_a_terminal_sends_to_all_its_processes_loses_no_frame(number):
+    """A closed terminal and `timeout` do so; the main process stops as the user does."""
+    with Stream(SMALL, sources.count, SMALL, 50, 0.01) as stream:
+        (receiver,) = multiprocessing.active_children()
+        os.kill(receiver.pid, number)
+        found = [number for batch in follow(stream, threading.Event(), most=16) for number in batch["number"]]
+        assert found == list(range(50))
 
 
 def test_failures_are_sentences():

@@ -10,6 +10,7 @@ from radarize.methods.scan_matching.odometry import ScanMatching
 from radarize.pose import between
 from radarize.radar.presets import PRESETS
 from radarize.slam.config import SlamConfig
+from tests.batches import of_scans
 from tests.slam.world import ate, box, scan, walk
 
 CONFIG = PRESETS["radarize"]
@@ -42,7 +43,7 @@ def way():
 def test_follows_walls(way):
     poses, times, scans = way
     matching = ScanMatching(Says(), FAR)
-    parts = [matching.follow(Batch(SIGNAL, scans[i : i + 16], times[i : i + 16])) for i in range(0, len(times), 16)]
+    parts = [matching.follow(of_scans(SIGNAL, scans[i : i + 16], times[i : i + 16])) for i in range(0, len(times), 16)]
     pose, rate = (np.concatenate([getattr(part, name) for part in parts]) for name in ("pose", "velocity"))
     assert ate(poses, pose) < 0.03
     assert abs(np.rad2deg(between(poses[0], poses[-1])[2] - pose[-1, 2])) < 2
@@ -63,7 +64,7 @@ def test_rates_of_turning_are_believed_where_nothing_is_seen(way):
 
     def track(doubt: float):
         told = np.column_stack([np.full(frames, 0.4), np.full(frames, doubt**2)])
-        return ScanMatching(Says(), FAR, lambda batch: told).follow(Batch(SIGNAL, nothing, times))
+        return ScanMatching(Says(), FAR, lambda batch: told).follow(of_scans(SIGNAL, nothing, times))
 
     sure, unsure = track(0.01), track(1000.0)
     assert abs(sure.pose[-1, 2] - 0.4 * times[-1]) < 0.02 * 0.4 * times[-1]
@@ -73,9 +74,9 @@ def test_rates_of_turning_are_believed_where_nothing_is_seen(way):
 
 def test_batches_do_not_matter(way):
     _, times, scans = way
-    whole = ScanMatching(Says()).follow(Batch(SIGNAL, scans[:50], times[:50]))
+    whole = ScanMatching(Says()).follow(of_scans(SIGNAL, scans[:50], times[:50]))
     matching = ScanMatching(Says())
-    parts = [matching.follow(Batch(SIGNAL, scans[i : i + 7], times[i : i + 7])).pose for i in range(0, 50, 7)]
+    parts = [matching.follow(of_scans(SIGNAL, scans[i : i + 7], times[i : i + 7])).pose for i in range(0, 50, 7)]
     assert np.array_equal(np.concatenate(parts)[:50], whole.pose)
 
 
@@ -83,8 +84,8 @@ def test_nothing_to_see_keeps_the_motion(way):
     """Blind for half a second: motion goes on as it was, and is known less well."""
     poses, times, scans = way
     matching = ScanMatching(Says(), FAR)
-    before = matching.follow(Batch(SIGNAL, scans[:100], times[:100]))
-    blind = matching.follow(Batch(SIGNAL, np.full_like(scans[100:115], np.inf), times[100:115]))
+    before = matching.follow(of_scans(SIGNAL, scans[:100], times[:100]))
+    blind = matching.follow(of_scans(SIGNAL, np.full_like(scans[100:115], np.inf), times[100:115]))
     assert np.allclose(blind.velocity, before.velocity[-1])
     assert blind.covariance[-1, 0, 0] > before.covariance[-1, 0, 0]
     assert np.allclose(between(before.pose[-1], blind.pose[-1])[:2], [15 * 0.025, 0], atol=0.05)
@@ -93,4 +94,4 @@ def test_nothing_to_see_keeps_the_motion(way):
 def test_stamps_must_ascend(way):
     _, _, scans = way
     with pytest.raises(InputError, match="expected ascending times"):
-        ScanMatching(Says()).follow(Batch(SIGNAL, scans[:3], np.array([0.0, 0.1, 0.1])))
+        ScanMatching(Says()).follow(of_scans(SIGNAL, scans[:3], np.array([0.0, 0.1, 0.1])))

@@ -103,7 +103,9 @@ def test_what_a_blind_second_claims_does_not_depend_on_the_frame_rate(rate):
     rotation.features = lambda frames: (np.zeros((len(frames), *shape), np.float32),) * 2
     rotation.echoes = lambda frames: [Strongest(0.0, 0.0, 0.0, clear=False)] * len(frames)
     count = rate + 1
-    nothing = Velocities(np.zeros((count, 2)), np.tile(np.eye(2), (count, 1, 1)), np.zeros(count, int), np.zeros(count))
+    nothing = Velocities(
+        np.zeros((count, 2)), np.tile(np.eye(2), (count, 1, 1)), np.zeros(count, int), np.zeros(count, bool)
+    )
     rotation._spread[1, 1] = np.radians(5) ** 2
     found = rotation.estimate(of_spectrum(SIGNAL, np.arange(count), np.arange(count) / rate), nothing)
     s = rotation.settings

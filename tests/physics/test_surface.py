@@ -71,7 +71,7 @@ def test_the_same_scatterers_from_everywhere():
 def test_nothing_in_reach_is_missing():
     """Every scatterer that `detail` gives a weight from a position is drawn there."""
     world, position = surface(), np.array([1.3, -0.4, 0.1])
-    drawn, ranked = world.near(position[None], 3.0), world.near(np.array([[x, 0, 0] for x in range(7)]), 10.0)
+    drawn, ranked = world.near(position[None], 3.0), world.near(np.array([[x, 0.0, 0] for x in range(7)]), 10.0)
     distance = np.linalg.norm(ranked.position - position, axis=1)
     used = (distance < 3.0) & (weights(ranked, position) > 0)
     keys = table(drawn)

@@ -113,7 +113,7 @@ def test_folders_that_are_no_data_set(folder, maps_folder, tmp_path):
     with pytest.raises(InputError, match="real.h5: has no /truth/velocity"):
         Frames(tmp_path)
     assert Frames(tmp_path, fields=("range_azimuth",))[0]["range_azimuth"].shape == (2, 96, 80)
-    with pytest.raises(InputError, match="dataset.json: is no readable data set"):
+    with pytest.raises(InputError, match="dataset.json: no such file, expected a data set with splits"):
         Frames(tmp_path, "random-0")
     splits = {"random-0": {"train": ["real", "x", "y"]}}
     (tmp_path / "dataset.json").write_text(json.dumps({"splits": splits}))

@@ -230,7 +230,7 @@ def test_the_command(tmp_path):
         ({"kind": "rotation", "settings": replace(TINY, frames=1)}, "frames is 1, expected at least two"),
         ({"options": Options(device="abacus")}, "device is 'abacus', expected cpu or cuda"),
         ({"output": Path("net.pt")}, "output is net.pt, expected a file NAME.safetensors"),
-        ({"options": Options("random-0")}, "dataset.json: is no readable data set"),
+        ({"options": Options("random-0")}, "dataset.json: no such file, expected a data set"),
         ({"data": Path("nowhere")}, "nowhere: holds no recordings"),
     ],
 )

@@ -39,7 +39,7 @@ Draw = Callable[..., Tensor]
 Heard = Complex64[Tensor, "item frame range antenna"]
 
 
-def rough(antennas: Maps, generator: Generator) -> Maps:
+def rough(antennas: Maps, generator: Generator) -> Float[Tensor, "item frame 1 range column"]:
     """Pictures as another room and another board might have made them.
 
     Args:

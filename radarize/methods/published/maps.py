@@ -15,7 +15,7 @@ and the elevation-aware array is averaged from channels of one loop (zeros would
 
 import numpy as np
 import torch
-from jaxtyping import Complex64, Float, Float16, Int, Int16
+from jaxtyping import Complex, Complex64, Float, Float16, Int, Int16
 
 from radarize.batch import Batch
 from radarize.errors import InputError
@@ -151,8 +151,8 @@ class PublishedMaps(Maker):
 
 
 def capon(
-    covariance: Complex64[torch.Tensor, "*item block antenna antenna"],
-    beams: Complex64[torch.Tensor, "block antenna azimuth"],
+    covariance: Complex[torch.Tensor, "*item block antenna antenna"],
+    beams: Complex[torch.Tensor, "block antenna azimuth"],
 ) -> Float[torch.Tensor, "*item azimuth"]:
     """Capon's power of an array whose covariance is made of blocks: 1 / sum of a^H R^-1 a over them."""
     # A millionth of a squared count: nothing beside an ADC's rounding, and silence stays regular.

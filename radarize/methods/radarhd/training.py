@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Generator, Tensor, nn
 from torch.nn.functional import adaptive_max_pool2d, binary_cross_entropy_with_logits
 
@@ -70,7 +70,7 @@ class RadarHd(Task):
         near, told, there = counts.T
         net.least.fill_(choices[(2 * near / (told + there).clamp_min(1)).argmax()])
 
-    def _counts(self, logits: Tensor, label: Tensor, least: Tensor) -> Float[Tensor, "item 3"]:
+    def _counts(self, logits: Tensor, label: Tensor, least: Tensor) -> Int[Tensor, "item 3"]:
         """Bearings with a range that is right, with any, and that should have one."""
         rows, bearings = logits.shape[1], len(BEARINGS)
         found = first_cell(adaptive_max_pool2d(logits, (rows, bearings)) > torch.logit(least))

@@ -85,7 +85,7 @@ class MaterialMap:
         # A material's name tells more than an object's.
         for name in (*part.labels, part.name):
             if guess := meaning(name):
-                return guess, f"name {name}"
+                return guess, "name" if name == part.name else f"label {name}"
         return self.default or ("concrete" if part.room else "plasterboard"), "default"
 
 

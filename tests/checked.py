@@ -1,0 +1,44 @@
+"""Shapes and kinds of arrays, as annotations have them, checked in every call while tests run.
+
+Whatever else is annotated is duck-typed: tests put simpler things in its place. Compiled kernels have no annotations of
+arrays, and numba takes them as they are.
+"""
+
+import ast
+from collections.abc import Callable
+from types import UnionType
+from typing import Union, get_args, get_origin
+
+import jaxtyping._import_hook as hook
+from beartype import beartype
+from jaxtyping import AbstractArray, install_import_hook
+
+
+def install() -> None:
+    """From now on, in whatever is imported of both packages."""
+    plain = hook._is_no_type_check
+    hook._is_no_type_check = lambda decorator: plain(decorator) or _compiles(decorator)
+    install_import_hook(["radarize", "radarsim"], "tests.checked.arrays")
+
+
+def arrays(function: Callable) -> Callable:
+    """A function whose arrays are checked."""
+    hints = dict(function.__annotations__)
+    function.__annotations__ = {name: hint for name, hint in hints.items() if _has_array(hint)}
+    if not function.__annotations__:
+        function.__annotations__ = hints
+        return function
+    found = beartype(function)
+    found.__annotations__ = hints
+    return found
+
+
+def _has_array(hint: object) -> bool:
+    """An array, one among others, or several; those of a list or mapping may have any shapes."""
+    if get_origin(hint) in (tuple, Union, UnionType):
+        return any(map(_has_array, get_args(hint)))
+    return isinstance(hint, type) and issubclass(hint, AbstractArray)
+
+
+def _compiles(decorator: ast.expr) -> bool:
+    return ast.unparse(decorator).startswith(("njit", "numba."))

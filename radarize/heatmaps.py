@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Complex64, Float32, Int, Int16
+from jaxtyping import Bool, Complex64, Float32, Int, Real
 from scipy.signal import windows
 
 from radarize.errors import InputError
@@ -87,7 +87,7 @@ class Heatmaps:
 
     def spectrum(
         self,
-        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        adc: Real[np.ndarray, "frame loop tx rx sample 2"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
     ) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
         """Range-Doppler spectrum of every virtual antenna, flat (tx, rx), TDM delays compensated.

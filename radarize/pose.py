@@ -37,7 +37,7 @@ def between(a: Pose, b: Pose) -> Pose:
     return compose(inverse(a), b)
 
 
-def transform(pose: Pose, points: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+def transform(pose: Pose, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray, "*n 2"]:
     """Points of the pose's frame in the frame that the pose is given in."""
     cos, sin = np.cos(pose[2]), np.sin(pose[2])
     return points @ np.array([[cos, sin], [-sin, cos]]) + pose[:2]

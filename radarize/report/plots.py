@@ -36,7 +36,7 @@ def plain(name: str) -> str:
 
 def line(
     figure: go.Figure,
-    points: Float[np.ndarray, "point 2"] | tuple[np.ndarray, np.ndarray],
+    points: Float[np.ndarray, "point column"] | tuple[np.ndarray, np.ndarray],
     name: str,
     color: str,
     width: float = 2.0,

@@ -96,13 +96,13 @@ class Slam:
         else:
             self.skipped["odometry"] += 1
 
-    def add_scan(self, time: float, azimuths: Float[np.ndarray, "beam"], ranges: Float[np.ndarray, "beam"]) -> None:
+    def add_scan(self, time: float, azimuths: Float[np.ndarray, "beam"], ranges: Float[np.ndarray, "_"]) -> None:
         """Say what the sensor saw.
 
         Args:
             time: s.
             azimuths: of the beams, rad, positive to the left.
-            ranges: m; inf: nothing seen on this beam; nan: not known.
+            ranges: one for each, m; inf: nothing seen on this beam; nan: not known.
 
         Raises:
             InputError: the time is not finite, an azimuth not within `FARTHEST`, or the lengths differ.

@@ -278,7 +278,7 @@ def test_standing_still_takes_no_nodes_and_hardly_any_memory():
     spread = slam.odometry.motion(slam.nodes[0].time, 1499 / 30)[1]
     assert spread[0, 0] == pytest.approx(1500e-6, rel=0.05)  # no step's covariance is forgotten
     for k in range(1500, 1560):
-        push(k, [0.02, 0, 0])
+        push(k, np.array([0.02, 0, 0]))
     slam.finish()
     times, poses = slam.trajectory()
     assert len(times) == 1560 and len(slam.nodes) > 3

@@ -35,7 +35,9 @@ class Pictures(PictureTask):
     network, truth = PictureNet, (Reading("lidar", "truth/lidar"),)
     defaults = Settings(width=12, frames=5, epochs=20, batch=64, rate=2e-3, schedule="cosine")
 
-    def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
+    def augment(
+        self, maps: Maps, label: Tensor, generator: Generator
+    ) -> tuple[Float[Tensor, "item frame 1 range column"], Tensor]:
         pictures, label = elsewhere(roughening.rough(maps, generator), unpacked(label), generator)
         return biased(pictures[:, :, 0], uniform(generator, *BIAS, len(maps))), label
 

@@ -107,7 +107,7 @@ class Oracle:
 
 
 def nowhere(count: int) -> Velocities:
-    return Velocities(np.zeros((count, 2)), np.zeros((count, 2, 2)), np.zeros(count), np.ones(count, bool))
+    return Velocities(np.zeros((count, 2)), np.zeros((count, 2, 2)), np.zeros(count, int), np.ones(count, bool))
 
 
 def test_turns_of_several_spacings_make_one_yaw(tmp_path):

@@ -225,11 +225,11 @@ def sheet(bend, half, count=10, fine=900):
      ((1 / 0.3, 1 / 0.3), (0.1, 0.1))],
 )  # fmt: skip
 def test_bowls_troughs_saddles_and_domes(bend, half, place):
-    """Before, at and beyond the caustic of a hollow mirror: 2.1 dB and 15 deg, and finite throughout."""
+    """Before, at and beyond the caustic of a hollow mirror: 2.1 dB and 20 deg, and finite throughout."""
     mesh, surface = sheet(bend, half)
     off, turn = decibels_and_degrees(field(reflectors(mesh), place), physical_optics(surface, place, soft=0.02))
     assert off == pytest.approx(0, abs=2.1)
-    assert turn == pytest.approx(0, abs=15)
+    assert turn == pytest.approx(0, abs=20)
 
 
 def test_nothing_switches():

@@ -8,9 +8,11 @@ import shutil
 from functools import cache
 from pathlib import Path
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from jaxtyping import Float
+from matplotlib.figure import Figure
 
 from benchmarks.results import FOLDER, SHARED, command_line
 from radarize.benchmark.dataset import DataSet
@@ -19,9 +21,11 @@ from radarize.benchmark.results import command, machine
 from radarize.benchmark.study import Benchmark, Chosen, Options, Study, carry_out
 from radarize.benchmark.table import Table
 from radarize.console import progress
+from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.evaluation.motion import velocity_errors
+from radarize.evaluation.trajectory import trajectory, yaws
 from radarize.methods.registry import BEST
-from radarize.pose import Pose, adjoint, between, inverse
+from radarize.pose import Pose, adjoint, between, inverse, wrap
 from radarize.runfolder import RunFolder
 from radarize.tum import planar
 from radarsim.dataset.run import make
@@ -33,6 +37,7 @@ SPECIFICATION = Path(__file__).with_suffix(".yaml")
 PLANS = {name: SHARED / "radish" / f"{name}-corrected.log.gz" for name in ("intel", "orebro")}
 #: s: spans over which claims of poses are followed; the longest that a walk of a minute has a few of.
 SPANS = (1, 10, 50)
+WORST = "![The worst walk of each platform, its headings, and how many bearings see anything](unseen.png)"
 #: m: no walk is to be off by more; and as a share of odometry's error, no SLAM.
 LOST, WORSE = 0.30, 1.05
 
@@ -144,6 +149,34 @@ def tables(study: Study) -> list[Table]:
     return [Table("Walks never looked at, by platform and building", groups, notes), Table("Walk by walk", walks, [])]
 
 
+def draw(study: Study) -> Figure:
+    """The walk of each platform on which SLAM is worst: its plan, and how far headings are off."""
+    _, _, runs = list(study.by_group())[-1]
+    worst = runs.loc[runs.groupby(runs["run"].map(lambda run: run.case.platform))["slam.ate.position.mean"].idxmax()]
+    figure, axes = plt.subplots(2, len(worst), figsize=(6 * len(worst), 8), height_ratios=(2, 1), squeeze=False)
+    for (plan, below), run in zip(axes.T, worst["run"], strict=True):
+        folder = RunFolder(study.output / run.place)
+        truth = trajectory(folder.scans["truth/time"], folder.scans["truth/pose"])
+        for x0, y0, x1, y1 in folder.scans["truth/floor_plan"]:
+            plan.plot((x0, x1), (y0, y1), color="0.6", lw=0.5)
+        for name, path, color in (("odometry", folder.odometry, "C1"), ("SLAM", folder.trajectory, "C0")):
+            errors = evaluate_trajectory(trajectory(*path), truth)
+            plan.plot(*errors.estimate.positions_xyz[:, :2].T, color, label=name)
+            off = yaws(errors.estimate) - yaws(errors.reference)
+            below.plot(errors.time - errors.time[0], np.degrees(wrap(off)), color)
+        true = planar(folder.scans["truth/pose"])[:, :2]
+        plan.plot(*true.T, "k--", label="true")
+        (left, low), (right, high) = true.min(axis=0) - 3, true.max(axis=0) + 3
+        plan.set(title=run.case.name, xlim=(left, right), ylim=(low, high), aspect="equal")
+        below.set(xlabel="s", ylabel="heading off, deg")
+        seen = below.twinx()
+        seen.plot(folder.scans["time"] - errors.time[0], 100 * np.isfinite(folder.scans["ranges"]).mean(axis=1), "0.7")
+        seen.set(ylabel="bearings that see anything, %", ylim=(0, 300))
+    axes[0, 0].legend()
+    figure.tight_layout()
+    return figure
+
+
 PARSER = command_line(
     __doc__,
     folder=(Path("unseen"), "of the recordings, which are made if they are not there"),
@@ -161,7 +194,10 @@ def main() -> None:
     study = Study.plan(benchmark, data, options.output, chosen)
     with progress("runs") as report:
         carry_out([study], report)
-    print(study.publish().write(FOLDER, "unseen").read_text())
+    draw(study).savefig(FOLDER / "unseen.png", dpi=70)
+    results = study.publish()
+    results.notes.append(WORST)
+    print(results.write(FOLDER, "unseen").read_text())
 
 
 if __name__ == "__main__":

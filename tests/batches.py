@@ -11,7 +11,7 @@ from radarize.radar.config import RadarConfig
 
 def batch(radar: RadarConfig | Signal, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None = None) -> Batch:
     """Of samples."""
-    return Batch(radar if isinstance(radar, Signal) else Signal(radar), adc, times, valid)
+    return Batch(radar if isinstance(radar, Signal) else Signal(radar), adc, np.asarray(times, float), valid)
 
 
 def of_spectrum(signal: Signal, spectrum: torch.Tensor, times: np.ndarray) -> Batch:

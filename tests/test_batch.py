@@ -86,7 +86,7 @@ def test_gaps_are_since_the_frame_before_whatever_was_lost(signal, adc, size):
 def test_batches_keep_their_samples(signal, adc):
     """A reader may use its memory again."""
     lent = adc[:2].copy()
-    taken = Intake(signal).take(lent, np.arange(2))
+    taken = Intake(signal).take(lent, np.arange(2.0))
     lent[:] = 1
     assert np.array_equal(taken.samples, adc[:2])
 

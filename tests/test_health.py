@@ -39,7 +39,7 @@ def result(start=1.7e9, fast=(), empty=(), no_turn=(), hit=(), dead=(), rx=0):
     flaws = Flaws(np.zeros((COUNT, 32, 3), bool), np.zeros((COUNT, 4), bool), np.zeros((COUNT, 4), bool))
     flaws.disturbed[list(hit), 3, 1] = True
     flaws.dead[list(dead), rx] = True
-    return Result(frames, track, ranges, flaws)
+    return Result(frames, track, ranges.astype(np.float32), flaws)
 
 
 def health(radar=CONFIG, **conditions):

@@ -78,7 +78,7 @@ def patch_statistics(maps: Float[np.ndarray, "frame row column"]) -> Float[np.nd
     return np.stack([*quantiles, *steps], axis=-1)
 
 
-def frechet_distance(one: Float[np.ndarray, "sample feature"], other: Float[np.ndarray, "sample feature"]) -> float:
+def frechet_distance(one: Float[np.ndarray, "sample feature"], other: Float[np.ndarray, "another feature"]) -> float:
     """Fréchet's distance of the normal distributions with two sets' means and covariances, in the features' unit:
     d^2 = |m1 - m2|^2 + tr(S1 + S2 - 2 (S1^1/2 S2 S1^1/2)^1/2) (Dowson and Landau, J. Multivariate Anal. 12, 1982).
     """

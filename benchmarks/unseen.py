@@ -16,8 +16,8 @@ from matplotlib.figure import Figure
 
 from benchmarks.results import FOLDER, SHARED, command_line
 from radarize.benchmark.dataset import DataSet
-from radarize.benchmark.followed import Followed, joined
-from radarize.benchmark.results import command, machine
+from radarize.benchmark.followed import Followed, joined, true_poses
+from radarize.benchmark.results import command
 from radarize.benchmark.study import Benchmark, Chosen, Options, Study, carry_out
 from radarize.benchmark.table import Table
 from radarize.console import progress
@@ -25,8 +25,9 @@ from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.evaluation.motion import velocity_errors
 from radarize.evaluation.trajectory import trajectory, yaws
 from radarize.methods.registry import BEST
-from radarize.pose import Pose, adjoint, between, inverse, wrap
+from radarize.pose import Pose, between, wrap
 from radarize.runfolder import RunFolder
+from radarize.slam.odometry import Drift
 from radarize.tum import planar
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
@@ -66,21 +67,18 @@ def pose_nees(
         starts: of the windows.
         length: of each, frames.
     """
-    first = np.array(starts)
-    claimed = np.zeros((len(first), 3, 3))
-    for k in range(1, length + 1):
-        # What was claimed so far, carried into the frame of the pose after this step.
-        back = np.stack([adjoint(inverse(between(poses[s + k - 1], poses[s + k]))) for s in starts])
-        claimed = back @ claimed @ np.swapaxes(back, 1, 2) + steps[first + k]
+    first, drift = np.array(starts), Drift(0.0)
+    for pose, step in zip(poses, steps, strict=True):
+        drift.add(pose, step, 0.0)
+    claimed = np.stack([drift.between(start, start + length) for start in starts])
     moved, truly = (between(some[first], some[first + length]) for some in (poses, true))
     error = between(truly, moved)
     return np.einsum("wi,wij,wj->w", error, np.linalg.inv(claimed), error) / 3
 
 
-def row(runs: pd.DataFrame) -> dict[str, object]:
-    """Figures of some walks; means with standard errors over walks."""
+def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:
+    """Figures of some walks and of their runs' folders; means with standard errors over walks."""
     odometry, slam = runs["odometry.ate.position.mean"], runs["slam.ate.position.mean"]
-    paths = list(runs["path"])
     frames = joined([_followed(path) for path in paths])
     velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
     return {
@@ -107,10 +105,9 @@ def _nees(run: Path, span: float) -> np.ndarray:
     """Of odometry, a window a second."""
     folder = RunFolder(run)
     times, poses = folder.odometry
-    true = planar(folder.scans["truth/pose"])[np.abs(folder.scans["truth/time"][:, None] - times).argmin(axis=0)]
     rate = 1 / np.median(np.diff(times))
     starts = range(0, len(times) - round(span * rate), round(rate))
-    return pose_nees(planar(poses), true, folder.scans["step_covariance"], starts, round(span * rate))
+    return pose_nees(planar(poses), true_poses(folder), folder.scans["step_covariance"], starts, round(span * rate))
 
 
 def _mean_and_median(runs: list[Path], span: float) -> tuple[float, float]:
@@ -121,24 +118,22 @@ def _mean_and_median(runs: list[Path], span: float) -> tuple[float, float]:
 
 def tables(study: Study) -> list[Table]:
     """By platform, building and of all; then walk by walk."""
-    groups, walks = [], []
-    for _, group, runs in study.by_group():
-        runs = runs.assign(path=[study.output / run.place for run in runs["run"]])
-        groups.append({**group, **row(runs)})
-        if group["on"] == "all":
-            walks = [
-                {
-                    "walk": one["recording"],
-                    "seed": one["run"].case.walk.seed,
-                    "walked m": one["odometry.distance"],
-                    "odometry m": one["odometry.ate.position.mean"],
-                    "odometry rad": one["odometry.ate.rotation.mean"],
-                    "SLAM m": one["slam.ate.position.mean"],
-                    "SLAM rad": one["slam.ate.rotation.mean"],
-                    "map F1 %": 100 * one["map.f1"],
-                }
-                for one in runs.to_dict("records")
-            ]
+    groups = [
+        {**group, **row(runs, [study.output / run.place for run in runs["run"]])} for _, group, runs in study.by_group()
+    ]
+    walks = [
+        {
+            "walk": one["recording"],
+            "seed": one["run"].case.walk.seed,
+            "walked m": one["odometry.distance"],
+            "odometry m": one["odometry.ate.position.mean"],
+            "odometry rad": one["odometry.ate.rotation.mean"],
+            "SLAM m": one["slam.ate.position.mean"],
+            "SLAM rad": one["slam.ate.rotation.mean"],
+            "map F1 %": 100 * one["map.f1"],
+        }
+        for one in study.of(study.chosen.partner).to_dict("records")
+    ]
     notes = [
         "Mean error after alignment, mean over walks +- its standard error. NEES: squared error over the claimed "
         "variance, per dimension, of all frames and windows, 1 if that is right; in brackets the median over its "
@@ -151,7 +146,7 @@ def tables(study: Study) -> list[Table]:
 
 def draw(study: Study) -> Figure:
     """The walk of each platform on which SLAM is worst: its plan, and how far headings are off."""
-    _, _, runs = list(study.by_group())[-1]
+    runs = study.of(study.chosen.partner)
     worst = runs.loc[runs.groupby(runs["run"].map(lambda run: run.case.platform))["slam.ate.position.mean"].idxmax()]
     figure, axes = plt.subplots(2, len(worst), figsize=(6 * len(worst), 8), height_ratios=(2, 1), squeeze=False)
     for (plan, below), run in zip(axes.T, worst["run"], strict=True):
@@ -187,7 +182,6 @@ PARSER = command_line(
 
 def main() -> None:
     options = PARSER.parse_args()
-    machine()
     data = recorded(options.folder, options.workers)
     benchmark = Benchmark("Walks never looked at", "", Chosen.by_odometry, tables)
     chosen = Options(tuple(BEST.values()), workers=options.workers, command=command("python -m benchmarks.unseen"))

@@ -9,7 +9,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from radarize.evaluation.motion import turn_errors
-from radarize.pose import wrap
+from radarize.pose import Pose, wrap
 from radarize.runfolder import RunFolder
 from radarize.tum import planar
 
@@ -42,16 +42,14 @@ class Followed:
         """
         folder = RunFolder(run)
         scans, (times, poses) = folder.scans, folder.odometry
-        yaw, true_times = planar(poses)[:, 2], scans["truth/time"]
-        # Truth has a pose for every frame, a run one for every frame that was not lost.
-        rows = ... if len(times) == len(true_times) else np.abs(true_times[:, None] - times).argmin(axis=0)
+        yaw = planar(poses)[:, 2]
         return cls(
             scans["velocity"],
             scans["velocity_covariance"],
             scans["truth/velocity"][:, :2],
             wrap(np.diff(yaw, prepend=yaw[0])),
             scans["step_covariance"][:, 2, 2],
-            planar(scans["truth/pose"])[rows, 2],
+            true_poses(folder)[:, 2],
             float(np.median(np.diff(times))),
         )
 
@@ -62,6 +60,12 @@ class Followed:
         window = max(round(seconds / self.period), 1)
         claimed = np.concatenate([[0.0], np.cumsum(self.variance[1:])])
         return turn_errors(self.turns, self.true_yaw, window), claimed[window:] - claimed[:-window]
+
+
+def true_poses(run: RunFolder) -> Pose:
+    """True poses of a run's frames: truth has one for every frame, a run one for every frame that was not lost."""
+    true, true_times, times = planar(run.scans["truth/pose"]), run.scans["truth/time"], run.odometry[0]
+    return true if len(times) == len(true) else true[np.abs(true_times[:, None] - times).argmin(axis=0)]
 
 
 def joined(found: Sequence[Followed]) -> dict[str, np.ndarray]:

@@ -37,6 +37,8 @@ from radarsim.physics.table import Table
 
 #: What a flash goes over: a sphere or an end of a cylinder, a cylinder lengthwise, a piece of a smooth surface.
 POINT, LINE, QUADRIC = 1.0, 2.0, 3.0
+#: Columns of `Arcs.shape`.
+SHAPE = 13
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ class RoundBodies(Table):
         axis, half = self.axis[body], self.half[body]
         pivot = self.center[body] + (np.array([0, -1, 1])[part] * half)[:, None] * axis
         kind = np.where((part == 0) & (half > 0), LINE, POINT)
-        return np.column_stack([kind, pivot, axis, self.radius[body], np.zeros((len(body), 5))])
+        return np.column_stack([kind, pivot, axis, self.radius[body], np.zeros((len(body), SHAPE - 8))])
 
     def flashes(self, search: Search, frame: int) -> "Arcs":
         """Flashes and ends as the radar sees them."""

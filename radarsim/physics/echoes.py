@@ -19,7 +19,7 @@ from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarsim.physics.amplitudes import dot, length, minus
 from radarsim.physics.amplitudes import vector as vec
-from radarsim.physics.curved import path_over
+from radarsim.physics.curved import SHAPE, path_over
 from radarsim.physics.synthesis import BurstClock, parabola
 
 
@@ -55,7 +55,7 @@ class Echoes:
     provenance: UInt8[np.ndarray, "echo"]
     moves: Float[np.ndarray, "moving 2 3 3"] = field(default_factory=lambda: np.zeros((0, 2, 3, 3)))
     turns: Float[np.ndarray, "turning 3 3 4"] = field(default_factory=lambda: np.zeros((0, 3, 3, 4)))
-    shapes: Float[np.ndarray, "round 14"] = field(default_factory=lambda: np.zeros((0, 14)))
+    shapes: Float[np.ndarray, "round 14"] = field(default_factory=lambda: np.zeros((0, SHAPE + 1)))
 
     def __len__(self) -> int:
         return len(self.amplitude)
@@ -155,6 +155,6 @@ def _arc_lengths(shapes, tx, rx, out):
         for k in range(n_tx):
             for r in range(n_rx):
                 for i in range(nodes):
-                    way[i] = path_over(shapes[e], vec(tx[i, k]), vec(rx[i, r])) + shapes[e, 13]
+                    way[i] = path_over(shapes[e], vec(tx[i, k]), vec(rx[i, r])) + shapes[e, SHAPE]
                 fit = out[e, k * n_rx + r]
                 fit[0], fit[1], fit[2] = parabola(way[0], way[1], way[2])

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int, UInt8
 
 from radarsim.physics import fresnelzone, imagemethod, patches, plates
-from radarsim.physics.curved import Arcs
+from radarsim.physics.curved import SHAPE, Arcs
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.fresnelzone import AT_RADAR, Stretches
 from radarsim.physics.isometry import inverse
@@ -42,7 +42,7 @@ class Images(Table):
     def none(cls) -> "Images":
         """No image."""
         none = np.zeros(0, int), np.zeros((0, 3, 4)), np.zeros(0, complex), np.zeros(0, np.uint8)
-        return cls(*none, np.zeros((0, 3), int), np.zeros((0, 14)))
+        return cls(*none, np.zeros((0, 3), int), np.zeros((0, SHAPE + 1)))
 
 
 def flashes(search: Search, flat: Flat, reflectors: Reflectors, obstacles: Obstacles) -> Images:
@@ -65,8 +65,8 @@ def flashes(search: Search, flat: Flat, reflectors: Reflectors, obstacles: Obsta
             parts = replace(parts, amplitude=parts.amplitude * uneven)
         ways += [_to_parts(search, frame, flat, parts), _to_bodies(search, frame, arcs.aim)]
         isometry = np.concatenate([parts.isometry, arcs.isometry])
-        mirrors, shape = np.full((len(cause), 3), -1), np.zeros((len(cause), 14))
-        mirrors[: len(parts), 0], shape[len(parts) :, :13] = parts.facet, arcs.shape
+        mirrors, shape = np.full((len(cause), 3), -1), np.zeros((len(cause), SHAPE + 1))
+        mirrors[: len(parts), 0], shape[len(parts) :, :SHAPE] = parts.facet, arcs.shape
         amplitude = np.append(parts.amplitude, arcs.amplitude)
         found.append(Images(np.full(len(cause), frame), isometry, amplitude, cause, mirrors, shape))
     images, ways = Images.joined(found), Stretches.joined(ways)
@@ -125,7 +125,7 @@ def _passed(search: Search, images: Images, factor, delay) -> Images:
     isometry[:, :, 3] += (delay / np.linalg.norm(away, axis=1))[:, None] * away
     cause = np.where(factor == 1, images.cause, np.uint8(Provenance.THROUGH_SLAB))
     shape = images.shape.copy()
-    shape[:, 13] = delay
+    shape[:, SHAPE] = delay
     return replace(images, isometry=isometry, amplitude=amplitude, cause=cause, shape=shape)
 
 
@@ -178,7 +178,7 @@ def by_chains(search: Search, flat: Flat, mirrors: list[Mirrors], obstacles: Obs
     cause = np.where(two, Provenance.GHOST_2, Provenance.GHOST_3).astype(np.uint8)
     cause[slant < 1e-3] = Provenance.DIRECT
     order = np.where(two[:, None], chains.mirrors * [1, 1, 0] - [0, 0, 1], chains.mirrors)
-    there = Images(frame, chains.isometry, chains.amplitude, cause, order, np.zeros((len(frame), 14)))
+    there = Images(frame, chains.isometry, chains.amplitude, cause, order, np.zeros((len(frame), SHAPE + 1)))
     ways = _along(search, flat, frame, chains)
     factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(chains.amplitude).repeat(4))
     factor, delay = factor.reshape(-1, 4).prod(axis=1), delay.reshape(-1, 4).sum(axis=1)

@@ -28,7 +28,7 @@ from radarsim.physics.amplitudes import along, cross, dot, gain_towards, length,
 from radarsim.physics.amplitudes import vector as vec
 from radarsim.physics.apertures import FAR, diffracted, side
 from radarsim.physics.coefficients import TABLE
-from radarsim.physics.curved import QUADRIC, Arcs, stationary
+from radarsim.physics.curved import QUADRIC, SHAPE, Arcs, stationary
 from radarsim.physics.search import Search
 from radarsim.physics.smooth import Piece
 from radarsim.physics.table import filled
@@ -93,7 +93,7 @@ class Patches(NamedTuple):
 def flashes(search: Search, frame: int, patches: Patches) -> Arcs:
     """Those of all pieces above the threshold in one frame."""
     return filled(
-        lambda n: Arcs(np.empty((n, 3)), np.zeros((n, 3, 4)), np.empty(n, complex), np.zeros((n, 13))),
+        lambda n: Arcs(np.empty((n, 3)), np.zeros((n, 3, 4)), np.empty(n, complex), np.zeros((n, SHAPE))),
         lambda found: _flashes(search, frame, patches, found.columns),
         2 * len(patches.ball) + 1,
     )

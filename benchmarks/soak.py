@@ -8,6 +8,8 @@ import tempfile
 import threading
 import time
 import urllib.request
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -18,17 +20,21 @@ from benchmarks.results import Data, command_line, memory_mb, publish, same, sur
 from radarize.mapping.scans import BEARINGS
 from radarize.pose import between, compose
 from radarize.radar.dca1000 import MAX_PAYLOAD
+from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarsim.emulator.disturbance import Disturbance
 from radarsim.simulate import simulate
+from tests.disk import fill
 from tests.slam.world import box, scan, walk
 from tests.virtual import BOARD, COMPUTER, emulator
 
 NETWORK = {"loss": 0.01, "duplicate": 0.01, "reorder": 0.01}
 #: s of the walk that is played again and again; s between looks at memory; share of a session that warms up.
 WALK, LOOK, WARM = 5.0, 1.0, 0.2
+#: s between a disk that fills and the next time that it does, and how long it stays full; bytes of it for a frame.
+FULL_EVERY, FULL_FOR, ROOM_FOR_A_FRAME = 120.0, 3.0, 400_000
 #: A room, m, and a way through it that is walked for so many s of each hour, scans coming at so many Hz.
 ROOM = np.concatenate([box(0, 0, 8, 6), box(3, 2.5, 3.6, 3.1), box(7, 0, 8, 0.6), box(0, 5, 0.5, 6)])
 ROUND, WALKED, RATE = [[1, 1], [6, 1], [6, 4.5], [1, 4.5], [1, 1]], 60.0, 5.0
@@ -59,27 +65,56 @@ def look_on(url: str, ended: threading.Event, counts: dict[str, int]) -> None:
         counts["visits"] += 1
 
 
+@contextmanager
+def disk(folder: Path, size: int) -> Iterator[Path]:
+    """A file system of so many bytes, which lies in a file."""
+    image, place = folder / "image.ext4", folder / "recorded"
+    place.mkdir()
+    with image.open("wb") as file:
+        file.truncate(size)
+    subprocess.run(["mkfs.ext4", "-q", "-m", "0", image], check=True)
+    subprocess.run(["mount", "-o", "loop", image, place], check=True)
+    try:
+        yield place
+    finally:
+        subprocess.run(["umount", place], check=True)
+
+
+def crowd_out(place: Path, ended: threading.Event, counts: dict[str, int]) -> None:
+    """Somebody whose files fill a disk now and then."""
+    while not ended.wait(FULL_EVERY):
+        fill(place / "large")
+        counts["full"] += 1
+        ended.wait(FULL_FOR)
+        (place / "large").unlink()
+
+
 def live(minutes: float, folder: Path, seed: int) -> tuple[dict[str, object], str]:
     """A session at the virtual radar: a row of the table, and what its recording warns of."""
+    frames = round(60 * minutes / PRESETS["radarize"].frame_period)
+    with disk(folder, (64 << 20) + frames * ROOM_FOR_A_FRAME) as place:
+        return _live(frames, folder, place / "live.h5", seed)
+
+
+def _live(frames: int, folder: Path, output: Path, seed: int) -> tuple[dict[str, object], str]:
     simulate("office", folder / "walk.h5", duration=WALK, seed=seed)
     with Recording(folder / "walk.h5") as source:
         config, played = source.config, source.adc(0, len(source))
-    frames = round(60 * minutes / config.frame_period)
-    ended, counts, memory = threading.Event(), {"forged": 0, "visits": 0}, []
+    ended, counts, memory = threading.Event(), {"forged": 0, "visits": 0, "full": 0}, []
     options = [word for name, share in NETWORK.items() for word in (f"--{name}", str(share))]
     with emulator(folder / "walk.h5", folder, "--loop", *options, "--seed", seed) as board:
         time.sleep(3)  # frames are made ahead
         command = [
             sys.executable, "-m", "radarize.cli", "live", "--config", "radarize", "--port", board.port, "--host",
             COMPUTER, "--dca", BOARD, "--command-port", board.command_port, "--data-port", board.data_port, "--frames",
-            frames, "--odometry", "doppler", "--scans", "first-echo", "--address", "127.0.0.1:0", "-o",
-            folder / "live.h5",
+            frames, "--odometry", "doppler", "--scans", "first-echo", "--address", "127.0.0.1:0", "-o", output,
         ]  # fmt: skip
         with subprocess.Popen([*map(str, command)], stdout=subprocess.PIPE, text=True) as session:
             url = re.match(r"page: (\S+)", session.stdout.readline())[1]
             guests = [
                 threading.Thread(target=pester, args=(board.data_port, ended, counts)),
                 threading.Thread(target=look_on, args=(url, ended, counts)),
+                threading.Thread(target=crowd_out, args=(output.parent, ended, counts)),
             ]
             for guest in guests:
                 guest.start()
@@ -91,10 +126,10 @@ def live(minutes: float, folder: Path, seed: int) -> tuple[dict[str, object], st
             for guest in guests:
                 guest.join()
     arriving = chirps_that_arrive(config, frames, Disturbance(**NETWORK, rng=np.random.default_rng(seed)))
-    losses, mismarked, wrong, warnings = compared(folder / "live.h5", played, arriving)
+    losses, mismarked, wrong, warnings = compared(output, played, arriving)
     memory = np.array(memory[:-2])  # while it ends, the graph is optimised
     return {
-        "case": f"live, {minutes:g} min, " + " ".join(options),
+        "case": f"live, {frames * config.frame_period / 60:.3g} min, " + " ".join(options),
         "exit code": session.returncode,
         "frames": frames,
         "frames not written": frames - losses.frames,
@@ -103,6 +138,7 @@ def live(minutes: float, folder: Path, seed: int) -> tuple[dict[str, object], st
         "chirps with a wrong sample": wrong,
         "forged packets": counts["forged"],
         "visits of a browser": counts["visits"],
+        "times the disk was full": counts["full"],
         "MB after warm-up": float(memory[int(WARM * len(memory))]),
         "MB at the end": float(memory[-1]),
         "MB at most": float(memory.max()),
@@ -160,7 +196,8 @@ def main() -> None:
         "board's address and another port; a browser takes events for 3 s and goes.",
         f"Memory is resident, of the session and the process that receives; warm after {WARM:.0%} of a row's time. "
         f"The day's scans come at {RATE:g} Hz.",
-        "No disk is filled here: tests/capture/test_kept.py says what a full one does.",
+        f"Every {FULL_EVERY:g} s something else takes all room on the recording's disk, for {FULL_FOR:g} s; frames of "
+        "that time are not written, and counted.",
         surroundings(),
     ]
     if options.minutes:

@@ -185,7 +185,7 @@ def live(
     stream = Replay(replay) if replay else _sensor(config, port, baud, host, dca, command_port, data_port)
     radar, methods = stream.config, best_methods(stream.config)[0]
     chosen = {"odometry": odometry or methods["odometry"], "scans": scans or methods["scans"]}
-    writer = None
+    keeper = None
     with until_interrupted() as stopping, ExitStack() as stack:
         with working("warming up"):
             inputs = prepare(Inputs(radar), chosen)
@@ -201,11 +201,11 @@ def live(
         if server is not None:
             print(f"Foxglove: {server.url}", flush=True)
         if output:
-            writer = stack.enter_context(recording(stream, output, overwrite))
+            keeper = stack.enter_context(recording(stream, output, overwrite))
         most = _frames_within(duration, frames, radar.frame_period)
-        live.run(stream, stopping, frames=most, writer=writer, progress=report)
-        warnings = stream.troubles() + live.losses.warnings()
-    _warn([*warnings, *live.health.warnings(), *live.pipeline.slam.warnings()])
+        live.run(stream, stopping, frames=most, keeper=keeper, progress=report)
+        warnings = live.troubles(stream)
+    _warn([*warnings, *live.losses.warnings(), *live.pipeline.slam.warnings()])
     print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
 
 

@@ -25,6 +25,10 @@ class InputError(Exception):
         return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
+class DiskFull(InputError):
+    """There is no space left where something was to be written."""
+
+
 def of_system(error: OSError) -> str:
     """What the system says, and of which file."""
     return f"{error.filename}: {reason(error)}" if error.filename else reason(error)

@@ -1,11 +1,13 @@
 import os
 import signal
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests import checked
+from tests.disk import disk
 
 checked.install()
 # A suite that a script starts in the background ignores Ctrl-C, and so would every program that it starts.
@@ -28,6 +30,13 @@ def recordings() -> Path:
     if not folder.is_dir():
         pytest.skip(f"the public recordings are not at {folder}")
     return folder
+
+
+@pytest.fixture
+def small_disk(tmp_path) -> Iterator[Path]:
+    """A file system of 2 MiB."""
+    with disk(tmp_path / "disk", 2 << 10) as folder:
+        yield folder
 
 
 @pytest.fixture(scope="module")

@@ -10,11 +10,12 @@ import torch
 
 from radarize.batch import Intake
 from radarize.capture.page import Page
+from radarize.capture.record import Keeper
 from radarize.capture.stream import Stream, follow
 from radarize.capture.view import View
 from radarize.health import Health
 from radarize.methods.registry import Inputs, Workshop
-from radarize.recording import Losses, RecordingWriter
+from radarize.recording import Losses
 from radarize.runfolder import OccupancyMap
 from radarize.stopwatch import stage
 
@@ -48,6 +49,7 @@ class Live:
         self.intake = Intake(inputs.signal)
         self.view = View(self.pipeline, inputs.signal)
         self.losses, self.health = Losses(), Health(inputs.radar)
+        self._keeper: Keeper | None = None
         self.busy = 0.0
         self._frame_due = self._map_due = self._stamp = 0.0
 
@@ -57,7 +59,7 @@ class Live:
         stopping: Event,
         *,
         frames: int | None = None,
-        writer: RecordingWriter | None = None,
+        keeper: Keeper | None = None,
         progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
         """Follow the stream until the user stops it, there are enough frames, or it ends; then finish the map.
@@ -66,12 +68,13 @@ class Live:
             stream: an open one; stopped here.
             stopping: set when the user wants to end.
             frames: end after so many.
-            writer: records the frames as well.
+            keeper: records the frames as well.
             progress: called with frames done and wanted (0: until stopped).
 
         Raises:
             InputError: see `follow`.
         """
+        self._keeper = keeper
         self.page.send("facts", self.view.facts())
         for came in follow(stream, stopping, most=TOGETHER, frames=frames):
             start = time.monotonic()
@@ -82,19 +85,20 @@ class Live:
                 with stage("page"):
                     self.view.add(result)
             self.losses.add(valid)
-            if writer:
-                writer.append(adc, stamps, valid)
+            if keeper:
+                keeper.append(adc, stamps, valid)
             with stage("page"):
                 self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
             self.busy += time.monotonic() - start
             progress(int(came["number"][-1]) + 1, frames or 0)
         self.pipeline.finish()
         self._show_map()
-        self.page.send("end", {"troubles": self._troubles(stream)})
+        self.page.send("end", {"troubles": self.troubles(stream)})
 
-    def _troubles(self, stream: Stream) -> list[str]:
-        """What is wrong so far, and where odometry had a hard time."""
-        return [*stream.troubles(), *self.health.warnings()]
+    def troubles(self, stream: Stream) -> list[str]:
+        """What is wrong with the stream and its recording so far, and where odometry had a hard time."""
+        left_out = self._keeper.warnings() if self._keeper else []
+        return [*stream.troubles(), *left_out, *self.health.warnings()]
 
     def _show(self, stream: Stream, adc: np.ndarray, valid: np.ndarray, stamp: float) -> None:
         now = time.monotonic()
@@ -109,7 +113,7 @@ class Live:
             "lost_share": self.losses.lost_chirps / max(self.losses.chirps, 1),
             "waiting": max(counts.frames - counts.dropped - self.losses.frames, 0),
             "slots": stream.ring.slots,
-            "troubles": self._troubles(stream),
+            "troubles": self.troubles(stream),
         }
         pictures = self.view.pictures(adc, valid)
         self.page.send("frame", self.view.frame(pictures, stamp) | figures)

@@ -1,22 +1,69 @@
 """Recording a stream, whatever ends it."""
 
+import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
 from threading import Event
 
+import numpy as np
+from jaxtyping import Bool, Float, Int16
+
 from radarize.capture.stream import Stream, follow
-from radarize.errors import InputError, first_line
+from radarize.errors import DiskFull, InputError, first_line
 from radarize.recording import RecordingWriter
 
 #: Frames written at once, at most.
 _BATCH = 16
+#: s that a recording waits for a disk that is full, before it ends.
+PATIENCE = 60.0
+
+
+class Keeper:
+    """Appends frames to a recording. Those that come while the disk is full are left out.
+
+    Attributes:
+        left_out: frames so far.
+    """
+
+    def __init__(self, writer: RecordingWriter):
+        self.writer, self.left_out = writer, 0
+        self._full_since: float | None = None
+
+    def append(
+        self,
+        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        stamps: Float[np.ndarray, "frame"],
+        valid: Bool[np.ndarray, "frame loop tx"],
+    ) -> None:
+        """Append frames, or leave them out.
+
+        Raises:
+            InputError: they cannot be appended, or the disk has been full for too long.
+        """
+        appended = self.writer.losses.frames
+        try:
+            self.writer.append(adc, stamps, valid)
+            self._full_since = None
+        except DiskFull as error:
+            now = time.monotonic()
+            if self._full_since is None:
+                self._full_since = now
+                print(f"warning: {error}; frames are left out, for up to {PATIENCE:g} s", file=sys.stderr)
+            if now - self._full_since >= PATIENCE:
+                raise
+        self.left_out += len(stamps) - (self.writer.losses.frames - appended)
+
+    def warnings(self) -> list[str]:
+        """One sentence, or none if nothing was left out."""
+        return [f"{self.left_out} frames are left out, since the disk was full"] if self.left_out else []
 
 
 @contextmanager
-def recording(stream: Stream, output: Path, overwrite: bool = False) -> Iterator[RecordingWriter]:
-    """A writer of a stream's frames. Whatever ends it, the recording is whole under its own name; where the disk does
+def recording(stream: Stream, output: Path, overwrite: bool = False) -> Iterator[Keeper]:
+    """A keeper of a stream's frames. Whatever ends it, the recording is whole under its own name; where the disk does
     not permit that, what is left is named, and how to rescue it.
 
     Args:
@@ -29,13 +76,14 @@ def recording(stream: Stream, output: Path, overwrite: bool = False) -> Iterator
     """
     about = {"cfg_text": stream.text, "attributes": stream.facts}
     writer = RecordingWriter(output, stream.config, **about, overwrite=overwrite)
+    keeper = Keeper(writer)
     ended: BaseException | None = None
     try:
-        yield writer
+        yield keeper
     except BaseException as error:
         ended = error
     early = [f"it ended early: {_sentence(ended)}"] if ended else []
-    warnings = [*stream.troubles(), *writer.losses.warnings(), *early]
+    warnings = [*stream.troubles(), *keeper.warnings(), *writer.losses.warnings(), *early]
     writer.annotate(warnings="; ".join(warnings), first_packet_time=stream.counts.first)
     kept = str(output)
     try:
@@ -65,9 +113,9 @@ def record(
 ) -> Path:
     """Write a stream's frames to a recording until the user stops it, there are enough, or nothing comes any more.
 
-    Lost samples are zero and marked; frames that were dropped because the disk is too slow are left out. Stamps are
-    those of the radar's clock, from 0 on, whatever was lost. What the user should know is joined in the recording's
-    attribute ``warnings``.
+    Lost samples are zero and marked; frames for which the disk is too slow, or full for a while, are left out. Stamps
+    are those of the radar's clock, from 0 on, whatever was lost. What the user should know is joined in the
+    recording's attribute ``warnings``.
 
     Args:
         stream: an open one; stopped here.
@@ -83,8 +131,8 @@ def record(
     batches = follow(stream, stopping, most=_BATCH, frames=frames)
     if (first := next(batches, None)) is None:
         raise InputError(f"{output}: not written, since no whole frame came before the end")
-    with recording(stream, output, overwrite) as writer:
+    with recording(stream, output, overwrite) as keeper:
         for batch in chain([first], batches):
-            writer.append(batch["adc"], batch["time"], batch["valid"])
+            keeper.append(batch["adc"], batch["time"], batch["valid"])
             progress(int(batch["number"][-1]) + 1, frames or 0)
     return output

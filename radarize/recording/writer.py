@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
-from radarize.errors import InputError, explained, reason
+from radarize.errors import FULL, DiskFull, InputError, explained, reason
 from radarize.hdf5 import FORMAT, open_hdf5
 from radarize.locks import hold
 from radarize.radar.config import RadarConfig
@@ -26,8 +26,8 @@ from radarize.recording.captured import spare
 from radarize.recording.losses import Losses
 from radarize.replacing import replacing
 
-#: Bytes of disk kept free for HDF5's own structures, so that a recording can be closed when the disk fills up. HDF5
-#: writes chunks when it drops them from its cache, where h5py reports no error: running out must be seen before.
+#: Bytes claimed of the disk beyond what is written, for HDF5's own structures. HDF5 writes chunks when it drops them
+#: from its cache, where h5py reports no error: they must have their place on the disk before.
 _RESERVE = 512 << 10
 #: Of the layout.
 _FORMAT = 1
@@ -81,8 +81,8 @@ class RecordingWriter:
         losses: of the frames appended so far.
 
     Raises:
-        InputError: the file cannot be created, or another program writes it; a write failed (for instance, no space
-            left); a recording of a radar is there already.
+        InputError: the file cannot be created, or another program writes it; a recording of a radar is there already.
+        DiskFull: of any call. Nothing is spoiled: what was to be appended may be left out, and writing go on.
     """
 
     def __init__(
@@ -104,19 +104,25 @@ class RecordingWriter:
         self._file: h5py.File | None = None
         self._notes: dict[str, object] = {}
         self._pending: list[tuple] = []
-        self._unflushed = 0
+        self._unflushed = self._waiting = 0  # frames, bytes
         if not overwrite:
             spare(self.path)
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True)
-            self._require_space(sum(product.data.nbytes for product in (products or {}).values()))
             if self.part.exists():
                 os.close(hold(self.part))  # of one who died, or refused
+            self._room = os.open(self.part, os.O_RDWR | os.O_CREAT | os.O_TRUNC, 0o666)
+            try:
+                self._claim(sum(product.data.nbytes for product in (products or {}).values()))
+            except OSError:
+                os.close(self._room)
+                self.part.unlink()
+                raise
             self._file = h5py.File(self.part, "w", libver=FORMAT)
             self._create(cfg_text, attributes or {}, streams or {}, products or {})
             self._held = hold(self.part)  # HDF5 itself does so until readers may follow
         except OSError as error:
-            raise InputError(f"cannot write {self.part}: {reason(error)}") from error
+            raise _failed("write", self.part, error) from error
 
     def _create(self, cfg_text, attributes, streams, products) -> None:
         file = self._file
@@ -146,7 +152,8 @@ class RecordingWriter:
         """Append frames, and rows of other streams by path, which count as soon as the frames do.
 
         Raises:
-            InputError: the shapes do not fit the configuration, or the disk is full; frames flushed before stay.
+            InputError: the shapes do not fit the configuration.
+            DiskFull: they may be left out, and later ones appended.
         """
         if self.raw and adc.shape[1:] != self.config.frame_shape:
             raise InputError(
@@ -159,7 +166,7 @@ class RecordingWriter:
         if self.raw:
             rows["radar/adc"] = adc
         with self._telling("write"):
-            self._require_space(sum(np.asarray(data).nbytes for data in rows.values()))
+            self._claim(sum(np.asarray(data).nbytes for data in rows.values()))
             for name, data in rows.items():
                 self._extend(name, data)
             self._extend("radar/valid", valid)
@@ -172,15 +179,21 @@ class RecordingWriter:
     def extend(self, name: str, data: np.ndarray) -> None:
         """Append rows to a stream that runs at its own rate (an IMU)."""
         with self._telling("write"):
-            self._require_space(data.nbytes)
+            self._claim(data.nbytes)
             self._extend(name, data)
 
-    def _require_space(self, size: int) -> None:
-        free = shutil.disk_usage(self.path.parent).free
-        if free < size + _RESERVE:
-            if self._file:
-                self.flush()
-            raise OSError(errno.ENOSPC, "no space left on the device")
+    def _claim(self, size: int) -> None:
+        """Have the disk set so many bytes aside behind what is written, so that nobody else can take them.
+
+        Raises:
+            OSError: it has not as many; what was appended before has its place.
+        """
+        waiting, end = self._waiting + size, self._file.id.get_filesize() if self._file else 0
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(self._room, end, waiting + _RESERVE)
+        elif shutil.disk_usage(self.part).free < waiting + _RESERVE:  # macOS: others may be quicker
+            raise OSError(errno.ENOSPC, FULL)
+        self._waiting = waiting
 
     def _extend(self, name: str, data: np.ndarray) -> None:
         if not len(data):
@@ -197,13 +210,13 @@ class RecordingWriter:
     def flush(self) -> None:
         """Make every appended frame visible to readers. Times go last: a frame counts once its time is there."""
         self._file.flush()
+        self._waiting = 0
+        self._claim(0)  # HDF5 cuts the file to what it holds
         for times in self._pending:
             self._extend("radar/time", times)
             self.frames += len(times)
         self._pending.clear()
         self._file["radar/time"].flush()
-        if shutil.disk_usage(self.path.parent).free == 0:  # somebody else filled the disk; HDF5 would not say so
-            raise OSError(errno.ENOSPC, "no space left on the device")
         self._unflushed = 0
 
     @contextmanager
@@ -212,14 +225,16 @@ class RecordingWriter:
         try:
             yield
         except (OSError, RuntimeError) as error:
-            raise InputError(f"cannot {what} {self.part}: {reason(error)}") from error
+            raise _failed(what, self.part, error) from error
 
     def close(self, keep_part: bool = False) -> None:
         """Flush, close and give the file its final name, unless `keep_part`."""
         if self._file:
             with self._telling("finish"):
                 self.flush()
+                os.ftruncate(self._room, self._file.id.get_filesize())  # what was claimed and not used
                 self._file.close()
+                os.close(self._room)
                 os.close(self._held)
                 if self._notes:  # HDF5 takes no new attributes while readers may follow
                     with open_hdf5(self.part, mode="r+") as file:
@@ -237,6 +252,11 @@ class RecordingWriter:
         else:
             with suppress(InputError):  # the first error is the one to report
                 self.close(keep_part=True)
+
+
+def _failed(what: str, part: Path, error: Exception) -> InputError:
+    kind = DiskFull if reason(error) == FULL else InputError
+    return kind(f"cannot {what} {part}: {reason(error)}")
 
 
 def add(

@@ -1,18 +1,22 @@
 """Long trials in short: a session of seconds over a bad network, an hour of SLAM at a blow, one kill."""
 
 import numpy as np
+import pytest
 
 from benchmarks import kills, soak
 from radarize.radar.presets import PRESETS
 from tests.virtual import record
 
 
-def test_a_session_over_a_bad_network(tmp_path, monkeypatch):
-    monkeypatch.setattr(soak, "WALK", 1.0)
+@pytest.mark.usefixtures("small_disk")  # where disks can be mounted
+def test_a_session_over_a_bad_network_onto_a_disk_that_fills(tmp_path, monkeypatch):
+    for name, value in {"WALK": 1.0, "FULL_EVERY": 1.2, "FULL_FOR": 0.4}.items():
+        monkeypatch.setattr(soak, name, value)
     row, warnings = soak.live(0.05, tmp_path, seed=0)
     assert row["exit code"] == 0 and row["forged packets"] > 10
     assert row["lost but not marked, or marked but not lost"] == row["chirps with a wrong sample"] == 0
     assert row["chirps lost"] > 0 and "their chirps are marked" in warnings
+    assert row["times the disk was full"] > 0 and "since the disk was full" in warnings
 
 
 def test_an_hour_at_a_blow():

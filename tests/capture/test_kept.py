@@ -1,5 +1,6 @@
 """Whatever ends a capture, what came is kept, and what was captured is not replaced unasked."""
 
+import errno
 import os
 import signal
 import termios
@@ -12,6 +13,7 @@ import pytest
 from typer.testing import CliRunner
 
 from radarize.capture import live
+from radarize.capture import record as record_module
 from radarize.capture.page import Page
 from radarize.capture.record import record
 from radarize.capture.stream import StreamCounts
@@ -23,6 +25,7 @@ from radarize.methods.registry import CLASSICAL, Inputs
 from radarize.radar.assembler import PacketCounts
 from radarize.recording import Product, Recording, RecordingWriter, Stream, recover
 from radarize.recording import writer as writer_module
+from tests.disk import fill
 from tests.virtual import SMALL
 
 ADC = np.random.default_rng(0).integers(-300, 300, (30, *SMALL.frame_shape), dtype=np.int16)
@@ -75,10 +78,53 @@ def test_whatever_goes_wrong(tmp_path, wrong, words):
     assert os.listdir(tmp_path) == ["a.h5"]
 
 
+class OnSmallDisk(Played):
+    """A stream; somebody else fills the disk before its third batch of four, and makes room before the last."""
+
+    def __init__(self, disk):
+        super().__init__()
+        self._taken = disk / "taken"
+
+    def frames(self, most: int) -> np.ndarray | None:
+        if len(self._left) == 2:
+            fill(self._taken)
+        elif len(self._left) == 1:
+            self._taken.unlink()
+        return super().frames(most)
+
+
+def test_a_disk_that_fills_and_empties(small_disk, capsys):
+    """What was appended before is kept, although HDF5 writes it later; what comes while it is full is left out."""
+    captured(small_disk / "a.h5", OnSmallDisk(small_disk))
+    assert "no space left on the device; frames are left out, for up to 60 s" in capsys.readouterr().err
+    kept = [*range(10), *range(15, 20)]
+    with Recording(small_disk / "a.h5") as recording:
+        assert np.array_equal(recording.adc(0, 99), ADC[kept])
+        assert np.array_equal(recording.times, np.array(kept) * SMALL.frame_period)
+        assert recording.attributes["warnings"] == "the fan is loud; 5 frames are left out, since the disk was full"
+    assert os.listdir(small_disk) == ["a.h5"]
+
+
+def test_a_disk_that_others_fill_at_once(small_disk):
+    """What was appended has its place: a recording ends whole on a disk without a free byte."""
+    with RecordingWriter(small_disk / "a.h5", SMALL) as writer:
+        writer.append(ADC[:10], np.arange(10.0))
+        fill(small_disk / "taken")
+    with Recording(small_disk / "a.h5") as recording:
+        assert np.array_equal(recording.adc(0, 99), ADC[:10])
+
+
 def test_a_disk_that_stays_full(tmp_path, monkeypatch):
     """Not even its end can be written: what is left is named, and can be rescued later."""
-    free = [1 << 40] * 5  # for the first frames
-    monkeypatch.setattr(writer_module.shutil, "disk_usage", lambda _: SimpleNamespace(free=free.pop() if free else 0))
+    free = [None] * 3  # for the first frames
+
+    def claim(*_):
+        if not free:
+            raise OSError(errno.ENOSPC, "No space left on device")
+        free.pop()
+
+    monkeypatch.setattr(writer_module.os, "posix_fallocate", claim)
+    monkeypatch.setattr(record_module, "PATIENCE", 0.0)
     with pytest.raises(InputError, match=r"no space left.*kept in .*a.h5.part, of which radarize recover .*a.h5.part"):
         captured(tmp_path / "a.h5")
 

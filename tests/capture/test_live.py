@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from radarize.batch import Intake
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
+from radarize.capture.record import Keeper
 from radarize.capture.replay import Replay
 from radarize.cli import app
 from radarize.errors import InputError
@@ -70,7 +71,7 @@ def test_a_replay_gives_what_the_file_gives(walk, tmp_path):
     with Page("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
         live = Kept(Inputs(PRESETS["radarize"]), CLASSICAL, page)
         with RecordingWriter(tmp_path / "again.h5", stream.config) as writer:
-            live.run(stream, threading.Event(), writer=writer)
+            live.run(stream, threading.Event(), keeper=Keeper(writer))
     inputs = Inputs(PRESETS["radarize"])
     offline, intake = Workshop(inputs).pipeline(**CLASSICAL), Intake(inputs.signal)
     with Recording(walk) as one, Recording(tmp_path / "again.h5") as other:

@@ -1,4 +1,4 @@
-"""From scene to samples: scatterers, facets, legs, echoes, synthesis, front end."""
+"""From scene to samples: scatterers, reflectors, paths, echoes, synthesis, front end."""
 
 import contextlib
 from pathlib import Path

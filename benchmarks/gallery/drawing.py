@@ -1,0 +1,36 @@
+"""What several laws need: the radar, curves of theory and simulation, and simple worlds."""
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from radarize.radar.presets import PRESETS
+from radarsim.physics.antenna import ISOTROPIC
+from radarsim.physics.finder import EchoFinder
+from radarsim.physics.reflectors import Reflectors
+from radarsim.physics.scatterers import Scatterers
+from radarsim.scene.scene import Scene
+
+CONFIG = PRESETS["radarize"]
+LAMBDA = CONFIG.wavelength
+HERE, AHEAD = np.zeros(3), np.eye(3)
+NOWHERE = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+THEORY = {"color": "black", "lw": 1, "label": "theory"}
+LEVEL = "received / transmitted, dB"
+FOUND = {"color": "tab:red", "marker": "o", "ms": 3.5, "ls": "", "label": "simulated"}
+
+
+def compare(axis: Axes, x, theory, found) -> float:
+    """Draw both over x; the largest difference."""
+    axis.plot(x, theory, **THEORY)
+    axis.plot(x, found, **FOUND)
+    return np.abs(np.asarray(found) - theory).max()
+
+
+def target(*place: float) -> EchoFinder:
+    """Finds a scatterer of 1 m^2 there."""
+    return EchoFinder(None, Scatterers.points(np.array(place), np.ones(1)), None, CONFIG, antenna=ISOTROPIC)
+
+
+def walls_of(scene: Scene) -> EchoFinder:
+    """Finds the surfaces of a scene alone."""
+    return EchoFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)

@@ -31,6 +31,7 @@ LAYERS = (
     "report",
     "benchmark",
     "importers exporters foxglove capture shownmaps viewer mcap",
+    "commands",
     "cli",
 )
 #: The same of `radarsim`.
@@ -135,7 +136,7 @@ def test_functions_take_at_most_eight():
     """Compiled kernels included, which take named tuples; the command line's options are another matter."""
     found = set()
     for path in (*modules("radarize").values(), *modules("radarsim").values(), *(ROOT / "benchmarks").rglob("*.py")):
-        if path.name == "cli.py":
+        if path.name == "cli.py" or path.parent.name == "commands":
             continue
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):

@@ -1,33 +1,51 @@
 """Damaged and hostile input for every reader of foreign bytes: each must end in a result or in one sentence.
 
-Inputs and what a reader may take are those of `tests/fuzzing/readers.py`. Each reader runs in a process of its own,
-which dies of a crash in a library, of a hang, or of memory without end; its input then lies where the message says.
+Inputs and what a reader may take are those of `tests/fuzzing`. Each reader runs in a process of its own, which dies of
+a crash in a library, of a hang, or of memory without end; its input then lies where the message says.
 """
 
+import ast
 import json
+import os
 import resource
 import signal
 import tempfile
 import time
 import warnings
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
+from coverage import Coverage
 from hypothesis import HealthCheck, Phase, given, seed, settings
 from rich.progress import track
 
-from benchmarks.results import Data, command_line, publish, surroundings
-from tests.fuzzing.readers import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, attempt
-from tests.fuzzing.readers import READERS as OF_RECORDINGS
-from tests.fuzzing.worlds import WORLDS
+import radarize
+import radarsim
+from benchmarks.results import Data, command_line, publish, same, surroundings
+from tests.fuzzing.reader import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, Attempt, Reader, attempt
+from tests.fuzzing.readers import READERS
 
-READERS = OF_RECORDINGS | WORLDS
-
-#: Inputs of one seed: hypothesis remembers what it has tried.
+#: Inputs of one seed: hypothesis remembers what it has tried. Of the first seed's, what they reach is measured.
 _BATCH = 500
 #: Address space beyond what a process has before it starts, bytes; and s until a hang is the end of it.
-_ADDRESSES, _HANG = 4 << 30, 60
+_ADDRESSES, _HANG = 4 << 30, 120
+
+
+def tried(reader: Reader, count: int, number: int, folder: Path) -> list[Attempt]:
+    """What came of the inputs of one seed."""
+    found = []
+
+    def one(data: object) -> None:
+        signal.alarm(_HANG)
+        found.append(attempt(reader, data, folder))
+
+    run = settings(
+        max_examples=count, deadline=None, database=None, phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )(given(reader.inputs)(one))  # fmt: skip
+    seed(number)(run)()
+    return found
 
 
 def try_all(name: str, count: int, first: int, folder: Path) -> dict[str, object]:
@@ -36,18 +54,9 @@ def try_all(name: str, count: int, first: int, folder: Path) -> dict[str, object
     reader, found = READERS[name](), []
     used = resource.getpagesize() * int(Path("/proc/self/statm").read_text().split()[0])
     resource.setrlimit(resource.RLIMIT_AS, (used + _ADDRESSES, used + _ADDRESSES))
-
-    def one(data: object) -> None:
-        signal.alarm(_HANG)
-        found.append(attempt(reader, data, folder))
-
     start = time.perf_counter()
     for number, done in enumerate(range(0, count, _BATCH)):
-        run = settings(
-            max_examples=min(_BATCH, count - done), deadline=None, database=None, phases=[Phase.generate],
-            suppress_health_check=list(HealthCheck),
-        )(given(reader.inputs)(one))  # fmt: skip
-        seed(first + number)(run)()
+        found += tried(reader, min(_BATCH, count - done), first + number, folder)
     accepted = sum(each.accepted for each in found)
     return {
         "reader": name,
@@ -60,25 +69,56 @@ def try_all(name: str, count: int, first: int, folder: Path) -> dict[str, object
     }
 
 
+def reached(name: str, first: int, folder: Path) -> float:
+    """Of the lines of this project's functions that a reader enters: share that the first seed's inputs reach, %."""
+    warnings.simplefilter("ignore")
+    reader = READERS[name]()
+    coverage = Coverage(data_file=None, source_pkgs=[radarize.__name__, radarsim.__name__])
+    with coverage.collect():
+        tried(reader, _BATCH, first, folder)
+    lines = hit = 0
+    for path in coverage.get_data().measured_files():
+        _, statements, _, missing, _ = coverage.analysis2(path)
+        run = set(statements) - set(missing)
+        for node in ast.walk(ast.parse(Path(path).read_text())):
+            if isinstance(node, ast.FunctionDef):
+                inside = set(range(node.body[0].lineno, node.end_lineno + 1)) & set(statements)
+                if inside & run:
+                    lines, hit = lines + len(inside), hit + len(inside & run)
+    return 100 * hit / lines
+
+
+def judged(name: str, count: int, first: int) -> dict[str, object] | str:
+    """A row of the table, from processes of its own; or what the reader failed on."""
+    folder = Path(tempfile.mkdtemp(prefix="fuzzing-"))
+    with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as process:
+        try:
+            row = process.submit(try_all, name, count, first, folder).result()
+            row["lines reached, %"] = process.submit(reached, name, first, folder).result()
+        except Exception as error:  # the reader's own, or that its process has died
+            return f"{name}: failed on what lies in {folder} ({error})"
+    folder.rmdir()
+    return row
+
+
 PARSER = command_line(
     __doc__,
     inputs=(5000, "for each reader"),
     seed=(0, "of hypothesis"),
+    workers=(len(os.sched_getaffinity(0)), "readers at a time"),
 )
 PARSER.add_argument("--reader", choices=list(READERS), help="this one alone, without a table")
 
 
 def main() -> None:
-    """The table; ends at the first input that a reader fails on."""
-    options, rows = PARSER.parse_args(), []
-    for name in track([options.reader] if options.reader else list(READERS), "readers"):
-        folder = Path(tempfile.mkdtemp(prefix="fuzzing-"))
-        with ProcessPoolExecutor(1, get_context("spawn")) as process:
-            try:
-                rows.append(process.submit(try_all, name, options.inputs, options.seed, folder).result())
-            except Exception as error:  # the reader's own, or that its process has died
-                raise SystemExit(f"{name}: failed on what lies in {folder} ({error})") from error
-        folder.rmdir()
+    """The table, if no reader fails."""
+    options = PARSER.parse_args()
+    names = [options.reader] if options.reader else list(READERS)
+    with ThreadPoolExecutor(options.workers) as threads:
+        found = threads.map(lambda name: judged(name, options.inputs, options.seed), names)
+        rows = list(track(found, "readers", total=len(names)))
+    if failed := [each for each in rows if isinstance(each, str)]:
+        raise SystemExit("\n".join(failed))
     if options.reader:
         print(json.dumps(rows[0], indent=2))
         return
@@ -87,7 +127,7 @@ def main() -> None:
     publish(
         "fuzzing",
         "Damaged and hostile input",
-        [*rows, {"reader": "all", **total, **most}],
+        same([*rows, {"reader": "all", **total, **most}]),
         data=Data(f"{total['inputs']} damaged inputs", (), options.seed),
         networks=(),
         notes=[
@@ -96,6 +136,9 @@ def main() -> None:
             f"More than {MOST_SECONDS:g} s of processor time, or {MOST_MEMORY >> 20} MiB and {MOST_TIMES} times its "
             "size in memory, would have failed the input. Memory is what was resident beyond the state before; the "
             "longest is in processor time, s are on the clock, making and placing the inputs included.",
+            f"Lines reached: by the first {_BATCH} inputs, of the lines of this project's functions that a reader "
+            "enters; "
+            "compiled functions are left out.",
             surroundings(),
         ],
     )

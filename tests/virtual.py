@@ -102,6 +102,10 @@ class Running:
     said: str = ""
 
 
+# What a script starts in the background ignores Ctrl-C, and so does every program that it starts.
+signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
 @contextmanager
 def emulator(source: Path | str, folder: Path, *options: object) -> Iterator[Running]:
     """`radarsim emulate`, ended by an interrupt."""

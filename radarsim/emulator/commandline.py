@@ -44,6 +44,7 @@ OPTIONAL = {"bpmCfg": 4, "configDataPort": 2}
 _COUNTS = RF | DEMO | OPTIONAL
 #: Read once, at the first sensorStart; other values need a reboot.
 _OPENING = ("channelCfg", "adcCfg", "lowPower")
+_MOST_FRAMES = 65535
 _FRAMES = ("profileCfg", "chirpCfg", "frameCfg")
 _USAGE = "Error: Invalid usage of the CLI command\n"
 _PARTIAL = (
@@ -168,7 +169,10 @@ class CommandLine:
         last = {line[0]: line[1:] for line in self._lines}
         if last["lvdsStreamCfg"][FIELDS["lvdsStreamCfg"].index("dataFmt")] != "1":
             raise InputError("lvdsStreamCfg dataFmt is not 1 (ADC samples), so nothing would go to the DCA1000")
-        return config, int(float(last["frameCfg"][FIELDS["frameCfg"].index("numFrames")]))
+        frames = last["frameCfg"][FIELDS["frameCfg"].index("numFrames")]
+        if not (frames.isdecimal() and frames.isascii() and len(frames) <= 5 and int(frames) <= _MOST_FRAMES):
+            raise InputError(f"frameCfg numFrames is {frames}, expected 0 (without end) to {_MOST_FRAMES}")
+        return config, int(frames)
 
     def _stop(self, values: list[str]) -> tuple[str, int]:
         if not self._started:

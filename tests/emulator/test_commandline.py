@@ -136,6 +136,7 @@ def test_antennas_cannot_change_without_a_reboot():
         ("frameCfg 0 2 32 0 16.7 1 0", "frame_period is 16.7 ms"),
         ("frameCfg 0 3 32 0 33.333 1 0", "chirp 3 has none"),
         ("lvdsStreamCfg -1 0 0 0", "nothing would go to the DCA1000"),
+        ("frameCfg 0 2 32 many 33.333 1 0", "numFrames is many, expected 0 (without end) to 65535"),
     ],
 )
 def test_limits_are_named(command, says):

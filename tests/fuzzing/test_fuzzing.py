@@ -3,11 +3,9 @@
 import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 
-from tests.fuzzing.readers import READERS as OF_RECORDINGS
-from tests.fuzzing.readers import attempt, clear
+from tests.fuzzing.reader import attempt, clear
+from tests.fuzzing.readers import READERS
 from tests.fuzzing.worlds import WORLDS
-
-READERS = OF_RECORDINGS | WORLDS
 
 #: Inputs by reader, as far as they fit into a few seconds in all.
 EXAMPLES = {name: 30 if name.startswith("ROS") or name in WORLDS else 75 for name in READERS}

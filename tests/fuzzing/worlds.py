@@ -16,7 +16,7 @@ from radarsim.scene.description import described
 from radarsim.scene.importers import carmen, import_scene, meshes, mitsuba
 from radarsim.waypoints import read_waypoints
 from tests.fuzzing.damage import damaged, misspelled
-from tests.fuzzing.readers import Reader, clear
+from tests.fuzzing.reader import Reader, clear
 
 _SCENE = """name: a
 objects:

@@ -92,7 +92,7 @@ def _meet(origins, directions, turn, center, half, capsule, distance):
                 distance[f, i] = min(distance[f, i], found)
 
 
-@njit(inline="always")
+@njit
 def _box(a, d, half):
     low, high = -np.inf, np.inf
     for k in range(3):
@@ -105,7 +105,7 @@ def _box(a, d, half):
     return low if 0 < low <= high else np.inf
 
 
-@njit(inline="always")
+@njit
 def _capsule(a, d, half):
     """A cylinder about z, and a ball at either end: the nearest of the three."""
     radius, length = half[0], half[2]

@@ -10,62 +10,62 @@ from radarsim.physics.antenna import amplitude_gain
 from radarsim.physics.coefficients import TABLE
 
 
-@njit(inline="always")
+@njit
 def vector(array):
     """The three numbers of an array."""
     return array[0], array[1], array[2]
 
 
-@njit(inline="always")
+@njit
 def dot(a, b):
     """Scalar product, without conjugation."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(inline="always")
+@njit
 def minus(a, b):
     """a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-@njit(inline="always")
+@njit
 def along(a, t, b):
     """a + t b."""
     return a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]
 
 
-@njit(inline="always")
+@njit
 def cross(a, b):
     """Vector product."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(inline="always")
+@njit
 def length(a):
     """Euclidean norm."""
     return np.sqrt(dot(a, a))
 
 
-@njit(inline="always")
+@njit
 def unit(a):
     """The direction of a vector."""
     size = length(a) + 1e-12
     return a[0] / size, a[1] / size, a[2] / size
 
 
-@njit(inline="always")
+@njit
 def mirrored(p, center, normal):
     """A point mirrored in a plane."""
     return along(p, -2 * dot(minus(p, center), normal), normal)
 
 
-@njit(inline="always")
+@njit
 def write(a, out):
     """Into the first three places of an array."""
     out[0], out[1], out[2] = a
 
 
-@njit(inline="always")
+@njit
 def gain_towards(direction, rotation, pattern):
     """Amplitude gain of the antenna towards a direction in the world."""
     return amplitude_gain(
@@ -76,7 +76,7 @@ def gain_towards(direction, rotation, pattern):
     )
 
 
-@njit(inline="always")
+@njit
 def facing(normal, towards, two_sided):
     """Cosine between a normal and the unit vector away from the surface; 1 for an isotropic scatterer."""
     if normal[0] == 0.0 and normal[1] == 0.0 and normal[2] == 0.0:
@@ -85,7 +85,7 @@ def facing(normal, towards, two_sided):
     return abs(cosine) if two_sided else cosine
 
 
-@njit(inline="always")
+@njit
 def ramp(inside, zone):
     """0 ... 1 as a point moves from `zone` outside an edge to `zone` inside; two abutting mirrors add up to one."""
     x = inside / zone
@@ -96,26 +96,26 @@ def ramp(inside, zone):
     return 0.5 + 0.25 * x * (3 - x * x)
 
 
-@njit(inline="always")
+@njit
 def upright(up, direction):
     """The field that the board's patches send, or take, along a unit direction: upright and across it."""
     return unit(along(up, -dot(up, direction), direction))
 
 
-@njit(inline="always")
+@njit
 def upwards(rotation):
     """Where the board's upper edge points, of a sensor that is turned so to the world."""
     return rotation[0, 2], rotation[1, 2], rotation[2, 2]
 
 
-@njit(inline="always")
+@njit
 def sent(up, direction):
     """The field that sets out, as a complex vector."""
     x, y, z = upright(up, direction)
     return x + 0j, y + 0j, z + 0j
 
 
-@njit(inline="always")
+@njit
 def reflected(field, arriving, leaving, normal, reflection):
     """A transverse field after a mirror: TE and TM parts times their Fresnel coefficients.
 

@@ -81,7 +81,7 @@ def gain_pattern(antenna: Antenna | None = None) -> GainPattern:
     return GainPattern(azimuth, elevation, float(azimuth.max() * elevation.max()))
 
 
-@njit(inline="always")
+@njit
 def amplitude_gain(x, y, z, pattern):
     """Amplitude gain towards the sensor-frame direction (x, y, z), not necessarily normalised; 0 behind the board.
 
@@ -97,7 +97,7 @@ def amplitude_gain(x, y, z, pattern):
     return a * b
 
 
-@njit(inline="always")
+@njit
 def _angle(y, x):
     """arctan(y / x) for x > 0 and y >= 0 to 2e-8 rad, three times as fast (Abramowitz and Stegun 4.4.49)."""
     t = min(x, y) / max(x, y)

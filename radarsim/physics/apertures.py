@@ -15,7 +15,7 @@ STRIP_FADE, STRIP_FAR = 2.0, 3.0
 CORNERS = 20
 
 
-@njit(inline="always")
+@njit
 def depth(planes, count, x, y):
     """Distance of a point inside the nearest of some edges."""
     least = 1e9
@@ -71,7 +71,7 @@ def kirchhoff(polygon, corners):
     return total / (2 * np.pi)
 
 
-@njit(inline="always")
+@njit
 def side(x0, y0, x1, y1, size):
     """How far the origin is on the left of a side of this size, and where along it the side begins and ends."""
     dx, dy = (x1 - x0) / size, (y1 - y0) / size
@@ -132,7 +132,7 @@ def _from_middle(u):
     return np.sign(u) * (0.5 - weight * weight * (3 - 2 * weight) * edge)
 
 
-@njit(inline="always")
+@njit
 def misses(stop, way, square, aperture):
     """Whether a path leaves nothing worth while: `passes` without a root, for a quick look."""
     center, normal, u, v, half_u, half_v = aperture
@@ -143,7 +143,7 @@ def misses(stop, way, square, aperture):
     return x * x * across >= farthest or y * y * cosine * cosine >= farthest * across
 
 
-@njit(inline="always")
+@njit
 def passes(stop, way, square, aperture):
     """What the aperture of a mirror passes of a path in a direction over a stop on it.
 
@@ -163,7 +163,7 @@ def passes(stop, way, square, aperture):
     return strip(-half_x - x, half_x - x) * strip(-half_y - y, half_y - y)
 
 
-@njit(inline="always")
+@njit
 def aperture(flat, m):
     """The rectangle that stands for a flat reflector: center, normal, u, v, half sides."""
     return (

@@ -127,7 +127,7 @@ class Arcs(Table):
     shape: Float[np.ndarray, "part 13"]
 
 
-@njit(inline="always")
+@njit
 def path_over(shape, one, two):
     """Length of the shortest way over a round body between two places beside one another, m."""
     pivot, axis, radius = vec(shape[1:4]), vec(shape[4:7]), shape[7]
@@ -144,7 +144,7 @@ def path_over(shape, one, two):
     return length(minus(one, place)) + length(minus(two, place))
 
 
-@njit(inline="always")
+@njit
 def stationary(quadric, one, two):
     """Where a way between two places over a quadric is stationary, by Newton's steps.
 

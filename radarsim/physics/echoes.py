@@ -97,7 +97,7 @@ class Echoes:
         return out
 
 
-@njit(inline="always")
+@njit
 def _distance(p, q, move):
     """From p + move to q."""
     x, y, z = p[0] + move[0] - q[0], p[1] + move[1] - q[1], p[2] + move[2] - q[2]

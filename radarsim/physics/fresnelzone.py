@@ -131,7 +131,7 @@ def _spread(corners, normal, stretches, nodes, begin, end, inside):
             )
 
 
-@njit(inline="always")
+@njit
 def _within(place, corners, normal):
     """Whether a point over a convex outline is on the same side of all of its edges."""
     left, right = True, True

@@ -146,7 +146,7 @@ def _search(search, frame, flat, orders, found):
     return count
 
 
-@njit(inline="always")
+@njit
 def _after(orders, a, b):
     """Whether b can be the mirror after a."""
     some = orders.firsts[orders.start[b] : orders.start[b + 1]]
@@ -154,7 +154,7 @@ def _after(orders, a, b):
     return at < len(some) and some[at] == a
 
 
-@njit(inline="always")
+@njit
 def _passes(image, back, path, wavelength, center, normal, corners):
     """Whether the last stretch of a path comes from near its last mirror: a quick test before the full one."""
     n, c = vec(normal), vec(center)

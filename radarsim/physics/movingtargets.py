@@ -143,7 +143,7 @@ def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
                 break
 
 
-@njit(inline="always")
+@njit
 def _meets_box(a, d, span, half):
     low, high = 0.0, span
     for k in range(3):
@@ -156,7 +156,7 @@ def _meets_box(a, d, span, half):
     return low <= high
 
 
-@njit(inline="always")
+@njit
 def _meets_capsule(a, d, span, half):
     """Closest approach of the segment a + s d, 0 <= s <= span, to the axis |z| <= half length, by alternation."""
     s = span / 2

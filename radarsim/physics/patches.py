@@ -164,24 +164,24 @@ def strength(search, patches, of, one, two):
     return aim, quadric, place, value * search.wavelength / (4 * np.pi * way) * np.sqrt(endless / abs(high * low))
 
 
-@njit(inline="always")
+@njit
 def _away(value, least):
     """A number that is not nearer to nought than so."""
     return value if abs(value) > least else (least if value >= 0 else -least)
 
 
-@njit(inline="always")
+@njit
 def _mixed(a, one, b, two, scale):
     return along(along((0.0, 0.0, 0.0), a * scale, one), b * scale, two)
 
 
-@njit(inline="always")
+@njit
 def _grazes(quadric, place, one, two):
     there, back, normal = unit(minus(one, place)), unit(minus(two, place)), quadric[2]
     return dot(there, normal) < 0.05 or dot(back, normal) < 0.05
 
 
-@njit(inline="always")
+@njit
 def _off(patches, corner, turn, one, two):
     """How the direction that halves the angle differs from the normal at a corner."""
     place, normal = vec(patches.place[corner]), vec(patches.normal[corner])
@@ -251,7 +251,7 @@ def _nearest(patches, face, turn, one, two):
     return ca[0], (ca[1], 0.0, 1 - ca[1]), shares
 
 
-@njit(inline="always")
+@njit
 def _on_side(one, two):
     """The square of the least vector between two, and its share of the way from one to the other."""
     way = minus(two, one)
@@ -331,12 +331,12 @@ def _fresnel(patches, of, zones, way):
     return inside + total / (2 * np.pi)
 
 
-@njit(inline="always")
+@njit
 def _hidden(patches, corner, turn, way):
     return turn * dot(minus(way[0], vec(patches.place[corner])), vec(patches.normal[corner])) < 0
 
 
-@njit(inline="always")
+@njit
 def _units(place, zones, way):
     """Fresnel units from the specular point: the direction as over its quadric, as far as the way is longer."""
     middle, first, second, elliptic, _ = zones

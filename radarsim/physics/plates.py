@@ -180,7 +180,7 @@ def _beyond(h, s, slant, x, wavelength):
     return total * turn * around * end * h * h * s * np.sqrt(wavelength / 2) / (2 * np.pi)
 
 
-@njit(inline="always")
+@njit
 def _turn(n, out, all_axes, point, isometry):
     """Reflection in a plane (out zero), half turn about an edge, or inversion in a corner."""
     for i in range(3):

@@ -124,7 +124,7 @@ def _find(search, frame, flat, seen, curved, found):
     return count
 
 
-@njit(inline="always")
+@njit
 def _add(search, frame, flat, way, echo, found):
     """Write an echo, either way round, if it is strong enough; how many that makes.
 
@@ -160,7 +160,7 @@ def _add(search, frame, flat, way, echo, found):
     return ways
 
 
-@njit(inline="always")
+@njit
 def _ways(search, p, flat, seen, ball, ways):
     """Mirrors (-1: none, the first) and images of the radar of all ways that may lead into a ball; returns how many."""
     mirrors, images = ways
@@ -189,7 +189,7 @@ def _ways(search, p, flat, seen, ball, ways):
     return count
 
 
-@njit(inline="always")
+@njit
 def _strength(search, bodies, b, one, two):
     """The point of a body between two places, its normal there, and the amplitude that an isotropic antenna gets from
     one place to the other."""
@@ -225,7 +225,7 @@ def _strength(search, bodies, b, one, two):
     return place, n, size
 
 
-@njit(inline="always")
+@njit
 def _over(search, frame, flat, m, source, place):
     """Where a way to a place leaves for, where the place is seen, and gain times what the mirror's aperture passes."""
     p, rotation = vec(search.position[frame]), search.rotation[frame]
@@ -240,7 +240,7 @@ def _over(search, frame, flat, m, source, place):
     return stop, mirrored(place, center, normal), value * gain_towards(minus(stop, p), rotation, search)
 
 
-@njit(inline="always")
+@njit
 def _polarisation(search, frame, flat, ends, place, n, reflection):
     """Product of the reflection coefficients, an upright field sent and taken.
 

@@ -127,7 +127,7 @@ class SpecularCandidates:
         return found, stops
 
 
-@njit(inline="always")
+@njit
 def _crossing(a, b, center, normal):
     """Where the line from a to b crosses a plane."""
     ha, hb = dot(minus(a, center), normal), dot(minus(b, center), normal)
@@ -139,7 +139,7 @@ def _from_nought(counts: Int[np.ndarray, "n"]) -> Int[np.ndarray, "n+1"]:
     return np.concatenate([[0], np.cumsum(counts)])
 
 
-@njit(inline="always")
+@njit
 def _image(p, flat, mirrors):
     """The last of some mirrors; the sensor as seen in all but it, its image in all, and the former's height over it,
     nought where its back is turned."""

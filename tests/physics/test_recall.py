@@ -43,10 +43,10 @@ def power(frames):
 
 @pytest.mark.parametrize("name", ["office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"])
 def test_ghosts_that_are_found(name, monkeypatch):
-    """At least 99 % of the power of ghosts; over four frames of each scene it is 99.4 to 100 %."""
+    """At least 99 % of the power of ghosts; over four frames of each scene it is 99.4 to 100 %, of which one is taken here."""
     scene = Scene.load(name)
     scenario = Scenario(scene, Walk("handheld", 30).through(scene, 1), CONFIG, seed=1)
-    times = np.array([3.0, 19.0])
+    times = np.array([19.0])
     found = power(scenario.frames(times))
     monkeypatch.setattr(finding.sight, "mirrors", every_mirror)
     monkeypatch.setattr(finding, "LEAST_TWICE", 0.0)

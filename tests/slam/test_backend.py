@@ -268,18 +268,18 @@ def test_standing_still_takes_no_nodes_and_hardly_any_memory():
         slam.add_scan(k / 30, azimuths, wall + rng.normal(0, 0.02, len(wall)))
 
     tracemalloc.start()
-    for k in range(1500):
+    for k in range(900):
         push(k, rng.normal(0, [1e-4, 1e-4, 1e-5]))
-        if k in (500, 1499):
+        if k in (300, 899):
             taken[k] = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
-    assert (taken[1499] - taken[500]) / 999 * 108_000 < 20e6
+    assert (taken[899] - taken[300]) / 599 * 108_000 < 20e6
     assert len(slam.nodes) == 1
-    spread = slam.odometry.motion(slam.nodes[0].time, 1499 / 30)[1]
-    assert spread[0, 0] == pytest.approx(1500e-6, rel=0.05)  # no step's covariance is forgotten
-    for k in range(1500, 1560):
+    spread = slam.odometry.motion(slam.nodes[0].time, 899 / 30)[1]
+    assert spread[0, 0] == pytest.approx(900e-6, rel=0.1)  # no step's covariance is forgotten
+    for k in range(900, 960):
         push(k, np.array([0.02, 0, 0]))
     slam.finish()
     times, poses = slam.trajectory()
-    assert len(times) == 1560 and len(slam.nodes) > 3
-    assert poses[-1] == pytest.approx(pose, abs=0.1) and np.abs(poses[:1500, :2]).max() < 0.1
+    assert len(times) == 960 and len(slam.nodes) > 3
+    assert poses[-1] == pytest.approx(pose, abs=0.1) and np.abs(poses[:900, :2]).max() < 0.1

@@ -46,8 +46,10 @@ def test_to_and_fro_in_one_room_ends_to_grow():
 def test_rooms_that_nobody_went_to_again_stay():
     corridor = walk([[1.5, 1.5], [10.5, 1.5], [10.5, 10.5], [1.5, 10.5], [1.5, 1.5]], 0.1, 0.15)
     corner = walk([[1.5, 1.5], [5, 1.5], [1.5, 1.5]], 0.1, 0.15)
-    slam, rng = Slam(SlamConfig.preset("radar"), endless=True), np.random.default_rng(1)
-    play(slam, ring(), np.concatenate([corridor, *[corner] * 30]), rng)
+    slam, made, rng = Slam(SlamConfig.preset("radar"), endless=True), [], np.random.default_rng(1)
+    add, slam.graph.add_node = slam.graph.add_node, lambda pose: (made.append(pose), add(pose))
+    play(slam, ring(), np.concatenate([corridor, *[corner] * 15]), rng)
+    assert len(made) > len(slam.nodes) + 50
     there = slam.graph.poses[:, :2]
     away = np.hypot(*(there[:, None] - corridor[None, ::20, :2]).transpose(2, 0, 1)).min(axis=0)
     assert away.max() < 1.0  # every place of the lap has a node

@@ -55,7 +55,8 @@ install_system_packages() {
 }
 
 install_python_packages() {
-    pip="python -m pip --disable-pip-version-check install -qq --no-deps"
+    # Modules are compiled when somebody imports them (--no-compile), which of most of them nobody ever does.
+    pip="python -m pip --disable-pip-version-check install -qq --no-deps --no-compile"
     # The lock file is complete, so nothing is resolved (--no-deps): no package can bring the CUDA build of torch, or
     # anything else, along. torch goes first, because it is the one whose build matters: without the CUDA libraries
     # that it was not given, the build for CUDA does not import, and the one for processors takes its place.

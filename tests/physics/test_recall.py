@@ -43,7 +43,7 @@ def power(frames):
 
 @pytest.mark.parametrize("name", ["office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"])
 def test_ghosts_that_are_found(name, monkeypatch):
-    """At least 99 % of the power of ghosts; over four frames of each scene it is 99.4 to 100 %, of which one is taken here."""
+    """At least 99 % of the power of ghosts, in one frame; over four of each scene it is 99.4 to 100 %."""
     scene = Scene.load(name)
     scenario = Scenario(scene, Walk("handheld", 30).through(scene, 1), CONFIG, seed=1)
     times = np.array([19.0])

@@ -96,9 +96,8 @@ def run(
 
     Args:
         scans, odometry: as in `Log.read`.
-        output: folder to write: trajectory.tum (a pose for every scan), odometry.tum, map.pgm and map.yaml, scans.h5
-            (with ``trajectory_covariance``), run.json, and reference.tum if there is one: what `radarize evaluate` and
-            `radarize report` read.
+        output: folder to write: trajectory.tum (a pose for every scan), odometry.tum, map.pgm and map.yaml, scans.h5,
+            run.json, and reference.tum if there is one: what `radarize evaluate` and `radarize report` read.
         config: of the back end.
         reference: TUM file of true poses; of a run's folder its ``reference.tum`` by default.
         progress: called with (scans done, scans in all).
@@ -116,13 +115,12 @@ def run(
     slam = Slam(config)
     log.feed(slam, progress)
     with RunWriter(output) as writer:
-        kept = {"trajectory_covariance": (slam.covariances(), "m^2, m rad, rad^2")}
         if source is not None:
-            writer.inherit(source.scans, without=tuple(kept))
+            writer.inherit(source.scans, without=("trajectory_covariance",))
         else:
-            kept |= {"time": (log.times, "s"), "azimuths": (log.azimuths, "rad"), "ranges": (log.ranges, "m")}
-        for name, (data, unit) in kept.items():
-            writer.put(name, data, unit)
+            writer.put("time", log.times, "s")
+            writer.put("azimuths", log.azimuths, "rad")
+            writer.put("ranges", log.ranges, "m")
         if len(log.odometry):
             writer.write_poses("odometry", (log.odometry_times, planar_poses(log.odometry)))
         if truth is not None:

@@ -7,6 +7,7 @@ import numpy as np
 from evo.core.trajectory import PoseTrajectory3D
 
 from radarize.errors import InputError
+from radarize.evaluation.claims import pose_nees
 from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.motion import velocity_errors
@@ -65,7 +66,8 @@ def evaluate(
         errors: of its trajectories (`trajectory_errors`), where they are at hand.
 
     Returns:
-        ``slam`` and ``odometry``: `TrajectoryErrors.summary`. Where the run knows the truth about them, ``map``:
+        ``slam`` and ``odometry``: `TrajectoryErrors.summary`, of SLAM with ``nees``, see
+        `radarize.evaluation.claims.pose_nees`. Where the run knows the truth about them, ``map``:
         `map_errors`, ``scans``: `scan_errors`, ``velocity``: `velocity_errors`. Numbers that do not exist are None.
         Where the run tells it, ``blind``: `radarize.odometry.blindness.BlindSpans`.
 
@@ -77,6 +79,8 @@ def evaluate(
     metrics: dict[str, object] = {name: item.summary() for name, item in errors.items()}
     metrics["reference"] = Path(reference).name if reference else "reference.tum"
     scans, grid, best = run.scans, run.map, errors["slam"]
+    if "trajectory_covariance" in scans:
+        metrics["slam"]["nees"] = pose_nees(best, run.trajectory[0], scans["trajectory_covariance"])
     if scans_known := {"truth/scan", "truth/scan_azimuths"} <= scans.keys():
         there = true_ranges(scans["azimuths"], scans["truth/scan"], scans["truth/scan_azimuths"])
         metrics["scans"] = scan_errors(scans["ranges"], there)

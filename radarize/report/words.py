@@ -19,6 +19,8 @@ _TRAJECTORY = (
     Figure("mean ATE / distance", "ate_share", "%", 100, ".2f"),
     Figure("end drift / distance", "drift", "%", 100, ".2f", "how far the ends are apart if the starts agree"),
     Figure("distance travelled", "distance", "m", 1, ".1f"),
+    Figure("squared error over the claimed", "nees", "", 1, ".2f",
+           "of the way since the start, per dimension: 1 if claims are honest"),
 )  # fmt: skip
 _PARTS = {
     "map": (

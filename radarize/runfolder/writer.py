@@ -157,13 +157,15 @@ class RunWriter:
         self.put("heatmaps/velocities", maps.velocities, "m/s, closing positive")
 
     def finish(self, slam: Slam, facts: Mapping[str, object]) -> Path:
-        """Write trajectory, map and ``run.json`` of a finished session, and put the folder in place.
+        """Write trajectory with its covariances, map and ``run.json`` of a finished session, and put the folder in
+        place.
 
         Raises:
             InputError: something cannot be written.
         """
         times, poses = slam.trajectory()
         self.write_poses("trajectory", (times, planar_poses(poses)))
+        self.put("trajectory_covariance", slam.covariances(), "m^2, m rad, rad^2")
         made = {
             "warnings": [*self._facts.get("warnings", ()), *slam.warnings()],
             "nodes": len(slam.nodes),

@@ -1,0 +1,41 @@
+"""Whether a trajectory is as far from the truth as it says."""
+
+import numpy as np
+from evo.core.trajectory import PoseTrajectory3D
+from jaxtyping import Float
+
+from radarize.evaluation.metrics import TrajectoryErrors
+from radarize.evaluation.trajectory import yaws
+from radarize.pose import between
+
+#: s from the start on, in which hardly anything is uncertain yet.
+EARLY = 5.0
+
+
+def pose_nees(
+    errors: TrajectoryErrors, times: Float[np.ndarray, "pose"], covariances: Float[np.ndarray, "claim 3 3"]
+) -> float:
+    """Mean squared error of the way since the start in units of its covariance, per dimension: 1 if claims are honest.
+
+    Args:
+        errors: of the trajectory.
+        times: of all its poses, s.
+        covariances: of each pose, (x, y, yaw) in its own frame, given the first.
+
+    Returns:
+        NaN where nothing lies more than `EARLY` after the start, or where there is no covariance.
+    """
+    late = errors.time > times[0] + EARLY
+    if not late.any() or len(covariances) != len(times):
+        return float("nan")
+    claimed = covariances[np.searchsorted(times, errors.time[late])]
+    if not (np.isfinite(claimed).all() and (np.linalg.det(claimed) > 0).all()):
+        return float("nan")
+    estimate, truth = (_since_start(some)[late] for some in (errors.estimate, errors.reference))
+    error = between(truth, estimate)
+    return float(np.einsum("pi,pij,pj->p", error, np.linalg.inv(claimed), error).mean() / 3)
+
+
+def _since_start(poses: PoseTrajectory3D) -> Float[np.ndarray, "pose 3"]:
+    planar = np.column_stack([poses.positions_xyz[:, :2], yaws(poses)])
+    return between(planar[:1], planar)

@@ -30,8 +30,8 @@ from tests.fuzzing.readers import READERS
 
 #: Inputs of one seed: hypothesis remembers what it has tried. Of the first seed's, what they reach is measured.
 _BATCH = 500
-#: Readers that take over 10 ms for an input get so much less.
-_SLOW, _LESS = {"ROS 1 bag", "ROS 2 mcap", "ROS 2 db3", "npy", ".bin"}, 4
+#: Readers that take over 5 ms for an input, making it included; they get so much less.
+_SLOW, _LESS = {"pcap", ".bin", "npy", "mat", "HDF5 recording", "ROS 1 bag", "ROS 2 mcap", "ROS 2 db3"}, 4
 #: Address space beyond what a process has before it starts, bytes; and s until a hang is the end of it.
 _ADDRESSES, _HANG = 4 << 30, 120
 
@@ -124,9 +124,8 @@ def main() -> None:
     """The table, if no reader fails."""
     options = PARSER.parse_args()
     names = [options.reader] if options.reader else list(READERS)
-    kept = (
-        Path("build/fuzzing") / f"{commit(Path(__file__))}-{options.inputs}-{options.seed}"
-    )  # it goes on where it was stopped
+    # It goes on where it was stopped.
+    kept = Path("build/fuzzing") / f"{commit(Path(__file__))}-{options.inputs}-{options.seed}"
     with ThreadPoolExecutor(options.workers) as threads:
         found = threads.map(lambda name: judged(name, options.inputs, options.seed, kept), names)
         rows = list(track(found, "readers", total=len(names)))
@@ -150,8 +149,7 @@ def main() -> None:
             "size in memory, would have failed the input. Memory is what was resident beyond the state before; the "
             "longest is in processor time, s are on the clock, making and placing the inputs included.",
             f"Lines reached: by the first {_BATCH} inputs, of the lines of this project's functions that a reader "
-            "enters; "
-            "compiled functions are left out.",
+            "enters; compiled functions are left out.",
             surroundings(),
         ],
     )

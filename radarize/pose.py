@@ -49,6 +49,12 @@ def adjoint(a: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
     return np.array([[cos, -sin, a[1]], [sin, cos, -a[0]], [0, 0, 1]])
 
 
+def carried(covariance: Float[np.ndarray, "3 3"], motion: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Covariance of a pose in its own frame after an exact motion, in the frame at its end."""
+    back = adjoint(inverse(motion))
+    return back @ covariance @ back.T
+
+
 def interpolate(a: Pose, b: Pose, fraction: np.ndarray | float) -> Pose:
     """Pose at a fraction (0 gives a, 1 gives b) of the way, position on the straight line, heading the short way."""
     share = np.asarray(fraction, float)

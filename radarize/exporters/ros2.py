@@ -21,7 +21,7 @@ from radarize.exporters.bagwriter import BagWriter, header, message, vector
 from radarize.heatmaps import Heatmaps
 from radarize.log import Log
 from radarize.points import COLUMNS
-from radarize.pose import adjoint, between, inverse
+from radarize.pose import between, carried
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.tum import planar_poses
@@ -116,8 +116,7 @@ def _odometry(log: Log) -> Iterator[Event]:
         if k:
             step = between(log.odometry[k - 1], pose)
             velocity = step / (time - log.odometry_times[k - 1])
-            back = adjoint(inverse(step))
-            spread = back @ spread @ back.T + (0 if log.covariances is None else log.covariances[k])
+            spread = carried(spread, step) + (0 if log.covariances is None else log.covariances[k])
         c, s = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])  # on the axes of the odometry's own frame
         twist = np.array([velocity[0], velocity[1], 0, 0, 0, velocity[2]])

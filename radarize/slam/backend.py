@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
-from radarize.pose import adjoint, between, compose, interpolate, transform
+from radarize.pose import between, carried, compose, interpolate, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.grid import OccupancyGrid
@@ -321,8 +321,8 @@ class Slam:
         unknown = self.graph.covariances()
 
         def spread(anchor: int, number: int) -> np.ndarray:
-            carry = adjoint(between(self.graph.poses[number], self.graph.poses[anchor]))
-            return near + unknown[number] + carry @ unknown[anchor] @ carry.T
+            motion = between(self.graph.poses[anchor], self.graph.poses[number])
+            return near + unknown[number] + carried(unknown[anchor], motion)
 
         for number in range(0, len(self.nodes), max(c.nodes // 2, 1)):
             questions = self._questions(number, 2 * c.candidates, c.final_score, spread)

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
-from radarize.pose import adjoint, between, interpolate, inverse
+from radarize.pose import adjoint, between, carried, interpolate
 from radarize.slam.config import OdometryConfig
 from radarize.slam.rows import Rows
 
@@ -113,7 +113,7 @@ class Odometry:
     def _sum(self, start: float, end: float) -> Float[np.ndarray, "3 3"] | None:
         """Covariance of a motion; None if one of its steps came without.
 
-        Steps are independent: C = Ad C_before Ad^T + C_step, with the adjoint of the step's inverse.
+        Steps are independent: C is that of the way before, carried over the step, and the step's.
         """
         times, total = self.times, np.zeros((3, 3))
         if known := self._known and self._known[0] == start and self._known[1] <= end:
@@ -128,8 +128,8 @@ class Odometry:
         for k, covariance in enumerate(steps, first):
             t0, t1 = times[k - 1], times[k]
             begin, finish = max(start, t0), min(end, t1)
-            carry = adjoint(inverse(between(self.pose(begin), self.pose(finish))))
-            total = carry @ total @ carry.T + (finish - begin) / (t1 - t0) * covariance
+            motion = between(self.pose(begin), self.pose(finish))
+            total = carried(total, motion) + (finish - begin) / (t1 - t0) * covariance
         return total
 
     def model(self, step: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

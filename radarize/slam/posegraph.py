@@ -13,7 +13,7 @@ import gtsam
 import numpy as np
 from jaxtyping import Float
 
-from radarize.pose import adjoint, between
+from radarize.pose import between, carried
 from radarize.slam.rows import Rows
 
 
@@ -167,8 +167,8 @@ class PoseGraph:
         found = np.zeros((len(self.poses), 3, 3))
         for factor in self._certain:
             of, to = factor.keys()
-            carry = adjoint(between(self.poses[to], self.poses[of]))
-            found[to] = carry @ found[of] @ carry.T + factor.noiseModel().covariance()
+            motion = between(self.poses[of], self.poses[to])
+            found[to] = carried(found[of], motion) + factor.noiseModel().covariance()
         return found
 
     def _believed(self) -> list:

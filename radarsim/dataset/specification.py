@@ -51,6 +51,8 @@ from radarsim.scene.description import Description, described, find, shipped, sp
 
 #: What a building here may say of itself that stands beside `building` in a scene file.
 LIFE = "clutter", "unevenness", "interferers"
+#: Recordings that a data set may stand for: a count with a digit too many takes all memory.
+MOST = 20_000
 Platform = Literal["handheld", "cart", "robot"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 
@@ -154,6 +156,9 @@ class Specification(Strict):
         frontend = None if self.frontend is None else self._beside(self.frontend)
         fixed = {"radar": radar, "frontend": frontend, "sensors": self._sensors(), "storage": self.storage}
         variants = [("", Variant())] if not self.variants else [(f"_{key}", v) for key, v in self.variants.items()]
+        total = sum(group.count * len(group.platforms) for group in self.recordings) * len(variants)
+        if total > MOST:
+            raise InputError(f"recordings: stand for {total} recordings, expected at most {MOST}")
         settings = {key: self._settings(key, variant, radar, frontend) for key, variant in variants}
         tasks, count = [], Counter()
         for number, group in enumerate(self.recordings):

@@ -18,7 +18,7 @@ class RandomSplit(Strict):
     """Drawn anew for each of `folds` splits, called NAME-0, NAME-1, ..."""
 
     kind: Literal["random"]
-    folds: int = Field(5, gt=0)
+    folds: int = Field(5, gt=0, le=100)
     train: Share = 0.7
     validation: Share = 0.1
     test: Share = 0.2

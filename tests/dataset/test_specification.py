@@ -251,6 +251,7 @@ GROUP = PLAIN["recordings"][0]
         ({"recordings": [{"building": "old"}]}, "has no recordings[0].platform"),
         ({"recordings": [GROUP | {"platform": "drone"}]}, "recordings[0].platform is 'drone'"),
         ({"recordings": [GROUP | {"count": 0}]}, "recordings[0].count is 0"),
+        ({"recordings": [GROUP | {"count": 4294967296}]}, "recordings, expected at most 20000"),
         ({"recordings": [GROUP | {"duration": 0.001}]}, "recordings[0].duration is 0.001 s, expected at least one"),
         ({"recordings": [GROUP | {"building": "x"}]}, "recordings[0].building is 'x', expected one of buildings: old"),
         ({"recordings": [GROUP | {"building": "office"}]}, "recordings[0].floors is [0, 2], but building office is a"),
@@ -264,6 +265,7 @@ GROUP = PLAIN["recordings"][0]
         ({"splits": {"a": {"kind": "random", "train": 0.5}}}, "splits.a: train + validation + test is 0.8, expected 1"),
         ({"splits": {"a": {"kind": "x"}}}, "splits.a.kind is 'x', expected one of: random"),
         ({"splits": {"a": {"kind": "random", "folds": 0}}}, "splits.a.folds is 0"),
+        ({"splits": {"a": {"kind": "random", "folds": 65536}}}, "splits.a.folds is 65536"),
         ({"splits": {"a": {"kind": "platform", "train": ["x"]}}}, "splits.a: train names 'x', expected some of: cart"),
         (
             {"splits": {"a": {"kind": "platform", "train": ["cart"], "test": ["cart"]}}},

@@ -92,11 +92,8 @@ def reached(name: str, first: int, folder: Path) -> float:
     return 100 * hit / lines
 
 
-def judged(name: str, count: int, first: int, kept: Path) -> dict[str, object] | str:
-    """A row of the table, from processes of its own, or as an earlier run kept it; or what the reader failed on."""
-    path = kept / f"{list(READERS).index(name)}.json"
-    if path.exists():
-        return json.loads(path.read_text())
+def judged(name: str, count: int, first: int) -> dict[str, object] | str:
+    """A row of the table, from processes of its own; or what the reader failed on."""
     count = count // _LESS if name in _SLOW else count
     folder = Path(tempfile.mkdtemp(prefix="fuzzing-"))
     with ProcessPoolExecutor(1, get_context("spawn"), max_tasks_per_child=1) as process:
@@ -106,8 +103,19 @@ def judged(name: str, count: int, first: int, kept: Path) -> dict[str, object] |
         except Exception as error:  # the reader's own, or that its process has died
             return f"{name}: failed on what lies in {folder} ({error})"
     folder.rmdir()
-    with replacing(path) as part:
-        part.write_text(json.dumps(row))
+    return row
+
+
+def kept(name: str, count: int, first: int) -> dict[str, object] | str:
+    """What is `judged`, or was by an earlier run of the same commit: a long one goes on where it was stopped."""
+    source = commit(Path(__file__))
+    path = Path("build/fuzzing") / f"{source}-{count}-{first}" / f"{list(READERS).index(name)}.json"
+    if path.exists():
+        return json.loads(path.read_text())
+    row = judged(name, count, first)
+    if isinstance(row, dict) and source.endswith("(clean)"):
+        with replacing(path) as part:
+            part.write_text(json.dumps(row))
     return row
 
 
@@ -123,17 +131,17 @@ PARSER.add_argument("--reader", choices=list(READERS), help="this one alone, wit
 def main() -> None:
     """The table, if no reader fails."""
     options = PARSER.parse_args()
-    names = [options.reader] if options.reader else list(READERS)
-    # It goes on where it was stopped.
-    kept = Path("build/fuzzing") / f"{commit(Path(__file__))}-{options.inputs}-{options.seed}"
+    if options.reader:
+        row = judged(options.reader, options.inputs, options.seed)
+        if isinstance(row, str):
+            raise SystemExit(row)
+        print(json.dumps(row, indent=2))
+        return
     with ThreadPoolExecutor(options.workers) as threads:
-        found = threads.map(lambda name: judged(name, options.inputs, options.seed, kept), names)
-        rows = list(track(found, "readers", total=len(names)))
+        found = threads.map(lambda name: kept(name, options.inputs, options.seed), READERS)
+        rows = list(track(found, "readers", total=len(READERS)))
     if failed := [each for each in rows if isinstance(each, str)]:
         raise SystemExit("\n".join(failed))
-    if options.reader:
-        print(json.dumps(rows[0], indent=2))
-        return
     total = {key: sum(row[key] for row in rows) for key in ("inputs", "read", "refused", "s")}
     most = {key: max(row[key] for row in rows) for key in ("longest, ms", "most memory, MB")}
     publish(

@@ -8,8 +8,6 @@ import tempfile
 import threading
 import time
 import urllib.request
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -26,15 +24,15 @@ from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarsim.emulator.disturbance import Disturbance
 from radarsim.simulate import simulate
-from tests.disk import fill
+from tests.disk import disk, fill
 from tests.slam.world import box, scan, walk
 from tests.virtual import BOARD, COMPUTER, emulator
 
 NETWORK = {"loss": 0.01, "duplicate": 0.01, "reorder": 0.01}
 #: s of the walk that is played again and again; s between looks at memory; share of a session that warms up.
 WALK, LOOK, WARM = 5.0, 1.0, 0.2
-#: s between a disk that fills and the next time that it does, and how long it stays full; bytes of it for a frame.
-FULL_EVERY, FULL_FOR, ROOM_FOR_A_FRAME = 120.0, 3.0, 400_000
+#: s between a disk that fills and the next time that it does, and how long it stays full; kiB of it for a frame.
+FULL_EVERY, FULL_FOR, ROOM_FOR_A_FRAME = 120.0, 3.0, 400
 #: A room, m, and a way through it that is walked for so many s of each hour, scans coming at so many Hz.
 ROOM = np.concatenate([box(0, 0, 8, 6), box(3, 2.5, 3.6, 3.1), box(7, 0, 8, 0.6), box(0, 5, 0.5, 6)])
 ROUND, WALKED, RATE = [[1, 1], [6, 1], [6, 4.5], [1, 4.5], [1, 1]], 60.0, 5.0
@@ -65,21 +63,6 @@ def look_on(url: str, ended: threading.Event, counts: dict[str, int]) -> None:
         counts["visits"] += 1
 
 
-@contextmanager
-def disk(folder: Path, size: int) -> Iterator[Path]:
-    """A file system of so many bytes, which lies in a file."""
-    image, place = folder / "image.ext4", folder / "recorded"
-    place.mkdir()
-    with image.open("wb") as file:
-        file.truncate(size)
-    subprocess.run(["mkfs.ext4", "-q", "-m", "0", image], check=True)
-    subprocess.run(["mount", "-o", "loop", image, place], check=True)
-    try:
-        yield place
-    finally:
-        subprocess.run(["umount", place], check=True)
-
-
 def crowd_out(place: Path, ended: threading.Event, counts: dict[str, int]) -> None:
     """Somebody whose files fill a disk now and then."""
     while not ended.wait(FULL_EVERY):
@@ -92,7 +75,8 @@ def crowd_out(place: Path, ended: threading.Event, counts: dict[str, int]) -> No
 def live(minutes: float, folder: Path, seed: int) -> tuple[dict[str, object], str]:
     """A session at the virtual radar: a row of the table, and what its recording warns of."""
     frames = round(60 * minutes / PRESETS["radarize"].frame_period)
-    with disk(folder, (64 << 20) + frames * ROOM_FOR_A_FRAME) as place:
+    room = (64 << 10) + frames * ROOM_FOR_A_FRAME
+    with disk(folder / "recorded", room, folder / "image.ext4") as place:
         return _live(frames, folder, place / "live.h5", seed)
 
 

@@ -21,6 +21,7 @@ from radarize.benchmark.results import command
 from radarize.benchmark.study import Benchmark, Chosen, Options, Study, carry_out
 from radarize.benchmark.table import Table
 from radarize.console import progress
+from radarize.evaluation.claims import normalised
 from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.evaluation.motion import velocity_errors
 from radarize.evaluation.trajectory import trajectory, yaws
@@ -72,8 +73,7 @@ def pose_nees(
         drift.add(pose, step, 0.0)
     claimed = np.stack([drift.between(start, start + length) for start in starts])
     moved, truly = (between(some[first], some[first + length]) for some in (poses, true))
-    error = between(truly, moved)
-    return np.einsum("wi,wij,wj->w", error, np.linalg.inv(claimed), error) / 3
+    return normalised(between(truly, moved), claimed)
 
 
 def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:

@@ -1,17 +1,15 @@
 import os
-import signal
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+import tests.interruptible  # noqa: F401
 from tests import checked
 from tests.disk import disk
 
 checked.install()
-# A suite that a script starts in the background ignores Ctrl-C, and so would every program that it starts.
-signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 #: Folders of the longest files. While the first compiles the kernels that all use, the second needs none.

@@ -11,12 +11,16 @@ import pytest
 
 
 @contextmanager
-def disk(folder: Path, size: int) -> Iterator[Path]:
-    """A file system of so many kiB, in memory, where root can mount one."""
+def disk(folder: Path, size: int, image: Path | None = None) -> Iterator[Path]:
+    """A file system of so many kiB, in a file or in memory, where root can mount one."""
     folder.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", folder]
+    if image is None:
+        mount = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", folder]
+    else:
+        subprocess.run(["mkfs.ext4", "-q", "-m", "0", image, str(size)], check=True)
+        mount = ["mount", "-o", "loop", image, folder]
     if os.geteuid() != 0 or subprocess.run(mount, stderr=subprocess.DEVNULL).returncode:
-        pytest.skip("needs root and leave to mount a tmpfs")
+        pytest.skip("needs root and leave to mount a disk")
     try:
         yield folder
     finally:

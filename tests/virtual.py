@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+import tests.interruptible  # noqa: F401
 from radarize.capture.board import Network
 from radarize.capture.sensor import Sensor
 from radarize.radar.cfg import write_cfg
@@ -100,10 +101,6 @@ class Running:
     command_port: int
     data_port: int
     said: str = ""
-
-
-# What a script starts in the background ignores Ctrl-C, and so does every program that it starts.
-signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""Whether a trajectory is as far from the truth as it says."""
+"""Whether estimates are as far from the truth as they say."""
 
 import numpy as np
 from evo.core.trajectory import PoseTrajectory3D
@@ -10,6 +10,18 @@ from radarize.pose import between
 
 #: s from the start on, in which hardly anything is uncertain yet.
 EARLY = 5.0
+
+
+def normalised(
+    errors: Float[np.ndarray, "sample axis"], covariances: Float[np.ndarray, "sample axis axis"]
+) -> Float[np.ndarray, "sample"]:
+    """Squared errors in units of their covariances, per dimension: 1 on average if these are honest.
+
+    Raises:
+        np.linalg.LinAlgError: a covariance is singular.
+    """
+    whitened = np.linalg.solve(covariances, errors[..., None])[..., 0]
+    return (errors * whitened).sum(axis=1) / errors.shape[1]
 
 
 def pose_nees(
@@ -32,8 +44,7 @@ def pose_nees(
     if not (np.isfinite(claimed).all() and (np.linalg.det(claimed) > 0).all()):
         return float("nan")
     estimate, truth = (_since_start(some)[late] for some in (errors.estimate, errors.reference))
-    error = between(truth, estimate)
-    return float(np.einsum("pi,pij,pj->p", error, np.linalg.inv(claimed), error).mean() / 3)
+    return float(normalised(between(truth, estimate), claimed).mean())
 
 
 def _since_start(poses: PoseTrajectory3D) -> Float[np.ndarray, "pose 3"]:

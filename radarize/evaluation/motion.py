@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float
 
+from radarize.evaluation.claims import normalised
 from radarize.evaluation.metrics import Statistics
 from radarize.pose import wrap
 
@@ -50,9 +51,8 @@ def velocity_errors(
     }
     if covariance is not None and len(length):
         try:
-            whitened = np.linalg.solve(covariance[known], difference[..., None])[..., 0]
-            squared = (difference * whitened).sum(axis=1)
-            result["nees"], result["nees_median"] = float(squared.mean() / 2), float(np.median(squared) / np.log(4))
+            squared = normalised(difference, covariance[known])
+            result["nees"], result["nees_median"] = float(squared.mean()), float(np.median(squared) / np.log(2))
         except np.linalg.LinAlgError:
             result["nees"] = result["nees_median"] = np.nan
     return result

@@ -15,7 +15,7 @@ import torch
 from jaxtyping import Shaped
 
 from radarize import __version__, polar
-from radarize.errors import InputError, explained
+from radarize.errors import FULL, InputError, explained
 from radarize.health import Health
 from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS
@@ -217,5 +217,5 @@ class RunWriter:
         """Turn what comes of writing into an InputError; refuses where the disk has no room for so many bytes."""
         with explained(f"{self.folder}: cannot be written", OSError, RuntimeError):
             if shutil.disk_usage(self._files.part).free < size + _RESERVE:
-                raise OSError(errno.ENOSPC, "no space left on the device")
+                raise OSError(errno.ENOSPC, FULL)
             yield

@@ -1,14 +1,12 @@
 """Long trials in short: a session of seconds over a bad network, an hour of SLAM at a blow, one kill."""
 
 import numpy as np
-import pytest
 
 from benchmarks import kills, soak
 from radarize.radar.presets import PRESETS
 from tests.virtual import record
 
 
-@pytest.mark.usefixtures("small_disk")  # where disks can be mounted
 def test_a_session_over_a_bad_network_onto_a_disk_that_fills(tmp_path, monkeypatch):
     for name, value in {"WALK": 1.0, "FULL_EVERY": 1.2, "FULL_FOR": 0.4}.items():
         monkeypatch.setattr(soak, name, value)

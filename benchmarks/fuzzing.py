@@ -31,7 +31,10 @@ from tests.fuzzing.readers import READERS
 #: Inputs of one seed: hypothesis remembers what it has tried. Of the first seed's, what they reach is measured.
 _BATCH = 500
 #: Readers that take over 5 ms for an input, making it included; they get so much less.
-_SLOW, _LESS = {"pcap", ".bin", "npy", "mat", "HDF5 recording", "ROS 1 bag", "ROS 2 mcap", "ROS 2 db3"}, 4
+_SLOW, _LESS = {
+    "pcap", ".bin", "npy", "mat", "HDF5 recording", "ROS 1 bag", "ROS 2 mcap", "ROS 2 db3",
+    *(name for name in READERS if name.startswith("run: ")),
+}, 4  # fmt: skip
 #: Address space beyond what a process has before it starts, bytes; and s until a hang is the end of it.
 _ADDRESSES, _HANG = 4 << 30, 120
 

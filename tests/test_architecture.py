@@ -26,7 +26,7 @@ LAYERS = (
     "slam",
     "pipeline health runfolder",
     "methods",
-    "run log walkposes training",
+    "run log walkclock walkposes training",
     "evaluation",
     "report",
     "benchmark",

@@ -103,6 +103,7 @@ PICTURES = {f"radarhd {number}": (None,) for number in TRAINING} | {"RadarHD, tr
 
 CHOICES = (
     Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),
+    Choice("how pictures are smoothed before their clocks are compared", PICTURES),
     Choice("what odometry claims of its errors, and its fusion with the network", ODOMETRY),
     Choice("how long the map of turns remembers, and what the network's turns count for", TURNS),
     Choice("how long errors of velocities are claimed to last", LASTING),

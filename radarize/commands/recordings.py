@@ -63,6 +63,9 @@ def import_(
         ),
     ] = None,
     walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
+    align: Annotated[
+        bool, typer.Option(help="Of a walk: the lidar's pictures of the same instants, not of the same numbers.")
+    ] = False,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,
     rx: Annotated[str | None, typer.Option(help="How many receivers (4), or which (1,3).")] = None,
@@ -101,7 +104,7 @@ def import_(
     from radarize.recording import keeping
 
     radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk, encoding, layout)
+    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk, align, encoding, layout)
     with keeping(output), progress("import") as report:
         tell(import_recording(source, output, given, progress=report))
 

@@ -72,7 +72,9 @@ def import_recording(
         raise InputError(f"{output}: is the source itself, expected another output file")
     products = _poses(given.poses) if given.poses else {}
     if picture_format.asked(source, given.walk):
-        return picture_format.import_walk(source, given.walk, output, products, progress or (lambda done, total: None))
+        return picture_format.import_walk(
+            source, given.walk, output, products, progress or (lambda done, total: None), align=given.align
+        )
 
     capture = _open(source, output, given)
     batches = iter(capture.batches)

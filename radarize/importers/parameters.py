@@ -42,6 +42,7 @@ class Given:
         latency: from a frame's start to its receipt in a ROS bag, s; by default what the headers say, else the burst's
             length.
         walk: number of a walk in a data set of pictures.
+        align: take, as truth of a walk's frame, the lidar's picture of the same instant, not of the same number.
         encoding: of a .bin's words, ``signed`` or ``offset-binary``.
         layout: of a .bin's words, see `radarize.importers.layout`.
     """
@@ -55,6 +56,7 @@ class Given:
     variable: str | None = None
     latency: float | None = None
     walk: int | None = None
+    align: bool = False
     encoding: str = "signed"
     layout: str = "pairs"
 

@@ -1,6 +1,7 @@
 """A real walk of RadarHD's repository (`radarize.walks`): pictures of a radar, and scans of the lidar beside it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,12 @@ from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, RecordingWriter, Stream
 from radarize.tum import planar_poses
+from radarize.walkclock import Clock
 from radarize.walkposes import lidar_poses, stamps
-from radarize.walks import Walk
+from radarize.walks import PERIOD, Walk
+
+#: s that pictures of one number may be apart before somebody is warned.
+_APART = 0.2
 
 
 def import_walk(
@@ -20,6 +25,8 @@ def import_walk(
     output: Path,
     products: dict[str, Product],
     progress: Callable[[int, int], None] = lambda done, total: None,
+    *,
+    align: bool = False,
 ) -> Path:
     """Write a recording without samples: a picture a frame, and as truth what the lidar saw.
 
@@ -29,37 +36,53 @@ def import_walk(
         output: recording to write.
         products: poses from elsewhere; by SLAM with the lidar's scans where there are none.
         progress: called with frames done and in all.
+        align: take as truth the lidar's pictures of the same instants, not of the same numbers (`radarize.walkclock`),
+            and leave out the frames of instants that it has none of.
 
     Raises:
         InputError: no such walk, or a picture is missing, damaged, or of another size.
     """
     walk = Walk.find(data, number)
-    times = stamps(walk.frames)
+    times, total = stamps(walk.frames), 3 * walk.frames
+    clock = Clock.of(walk, lambda done, _: progress(done, total))
+    about = {"source": f"RadarHD walk {number} ({walk.folder.name})"}
+    if align:
+        about["clock"] = f"truth of frame k is of the lidar's picture {clock.first:.2f} + {clock.rate:.4f} k"
+    elif (apart := PERIOD * clock.apart(walk.frames)) > _APART:
+        about["warnings"] = (
+            f"radar and lidar are numbered alike, but up to {apart:.1f} s apart, so that truth is of other instants: "
+            "--align pairs them by what they see"
+        )
+    if "truth/pose" not in products:
+        about["found"] = "no poses were given: they are by SLAM with the lidar's scans"
+        poses = planar_poses(lidar_poses(walk, lambda done, _: progress(walk.frames + done, total)))
+        products = products | {
+            "truth/time": Product(times, "s", "of poses"),
+            "truth/pose": Product(poses, "m; x y z qx qy qz qw", "sensor in the lidar's map"),
+        }
+    if align:
+        known = products["truth/time"]
+        products = products | {"truth/time": replace(known, data=PERIOD * clock.radar(known.data / PERIOD))}
     streams = {
         polar.PICTURE: Stream((polar.ROWS, polar.COLUMNS), "u1", "", "RadarHD's picture of one loop, 0...255"),
         "truth/scan": Stream((polar.BEAMS,), "f4", "m", "range of the lidar's first point, inf where it has none"),
         "truth/lidar": polar.LIDAR,
     }
     bearings = Product(polar.BEAM_AZIMUTHS, "rad", "bearings of /truth/scan, positive to the left")
-    about = {"source": f"RadarHD walk {number} ({walk.folder.name})"}
-    if "truth/pose" not in products:
-        about["found"] = "no poses were given: they are by SLAM with the lidar's scans"
-        poses = planar_poses(lidar_poses(walk, lambda done, total: progress(done, 2 * total)))
-        products = products | {
-            "truth/time": Product(times, "s", "of poses"),
-            "truth/pose": Product(poses, "m; x y z qx qy qz qw", "sensor in the lidar's map"),
-        }
     writer = RecordingWriter(
         output, PRESETS["radarhd"], attributes=about, streams=streams,
         products={"truth/scan_azimuths": bearings, **products}, raw=False,
     )  # fmt: skip
+    partners = clock.partners(walk.frames) if align else np.arange(walk.frames)
     with writer:
         for frames, pictures in walk.batches():
-            lidar = np.stack([walk.lidar(frame) for frame in range(frames.start, frames.stop)])
-            first = np.where(lidar.any(axis=1), polar.RANGES[lidar.argmax(axis=1)], np.inf)
-            rows = {polar.PICTURE: pictures, "truth/scan": first, "truth/lidar": np.packbits(lidar, axis=2)}
-            writer.append(None, times[frames], rows=rows)
-            progress(walk.frames + frames.stop, 2 * walk.frames)
+            there = partners[frames] >= 0
+            if there.any():
+                lidar = np.stack([walk.lidar(partner) for partner in partners[frames][there]])
+                first = np.where(lidar.any(axis=1), polar.RANGES[lidar.argmax(axis=1)], np.inf)
+                rows = {polar.PICTURE: pictures[there], "truth/scan": first, "truth/lidar": np.packbits(lidar, axis=2)}
+                writer.append(None, times[frames][there], rows=rows)
+            progress(2 * walk.frames + frames.stop, total)
     return output
 
 

@@ -2,6 +2,7 @@
 
 import json
 import lzma
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,13 +10,15 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from radarize import polar
-from radarize.benchmark.real import median_error
+from radarize.benchmark.real import Options, clocked_turn_errors, median_error, real
 from radarize.benchmark.realmotion import SMOOTH, disturbed, shifted_turns, smoothed, turn_errors
 from radarize.cli import app
 from radarize.errors import InputError
-from radarize.tum import write_tum
+from radarize.tum import planar_poses, write_tum
+from radarize.walkclock import Clock
 from radarize.walkposes import BEARINGS, scan, true_poses
 from radarize.walks import Walk
+from tests.twoclocks import MadeUp
 
 FRAMES = 46
 
@@ -68,6 +71,30 @@ def test_every_walk_and_method_has_a_row(clone, tmp_path, monkeypatch):
     assert found["picture"]["mod_hausdorff_m"] == pytest.approx(0.21, abs=0.04)
     assert found["picture"]["chamfer_m"] == pytest.approx(0.21, abs=0.06)
     assert "all real" in (tmp_path / "out" / "real.md").read_text()
+
+
+def test_what_is_of_one_instant_is_nearer(tmp_path):
+    """A radar that lost frames: by number, pictures are of places up to 0.75 m apart; by instant they agree."""
+    walk = MadeUp(tmp_path / "clone", 7, 320, first=-30.0, rate=1.08)
+    write_tum(tmp_path / "7.tum", 0.05 * np.arange(320), planar_poses(np.array([walk.pose(k) for k in range(320)])))
+    found = real(walk.write(walk.folder), tmp_path / "out", Options(weights=tmp_path, poses=tmp_path))
+    rows = {row["method"]: row for row in found.tables[0].rows}
+    assert rows["picture"]["instant_chamfer_m"] < 0.32 < 0.45 < rows["picture"]["chamfer_m"]
+    shifted = rows["shifted pictures, smoothed"]
+    assert shifted["instant_yaw_rmse_deg"] < shifted["yaw_rmse_deg"]
+    clock = found.tables[1].rows[0]
+    assert clock["start_s"] == pytest.approx(1.5, abs=0.1) and clock["alike by instant"] > 2 * clock["alike by number"]
+    assert clock["end_s"] == pytest.approx(1.5 - 0.05 * 0.08 * 319, abs=0.1)
+
+
+def test_turns_of_the_same_instants():
+    """Who tells the turns of the radar's instants exactly is right by instant, and wrong by number."""
+    walk = MadeUp(Path(), 7, 320, first=-30.0, rate=1.08)
+    poses = np.array([walk.pose(frame) for frame in range(320)])
+    yaw = np.array([walk.pose(-30.0 + 1.08 * frame)[2] for frame in range(320)])
+    turns = np.concatenate([np.full(4, np.nan), yaw[4:] - yaw[:-4]])
+    errors = clocked_turn_errors(turns, poses, Clock(-30.0, 1.08))
+    assert errors["instant_yaw_rmse_deg"] < 0.01 < 1.0 < errors["yaw_rmse_deg"]
 
 
 @pytest.mark.parametrize(("options", "words"), [

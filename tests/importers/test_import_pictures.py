@@ -2,6 +2,7 @@
 
 import os
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from radarize.pose import between
 from radarize.recording import Recording
 from radarize.tum import planar, read_tum, write_tum
 from radarize.walks import Walk
+from tests.twoclocks import MadeUp
 
 
 @pytest.fixture
@@ -75,6 +77,32 @@ def test_a_real_walk(recordings, tmp_path):
     assert 0.02 < (picture > 0).mean() < 0.2 and picture.max() == 255
     assert 0.3 < (picture[:, 6:] > 0).any(axis=1).mean() and not picture[:, :6].any()  # within 70 deg, beyond leakage
     assert 0.3 < np.isfinite(scan).mean() and 0.5 < np.median(scan[np.isfinite(scan)]) < 6
+
+
+def test_pictures_of_one_number_that_are_not_of_one_instant(tmp_path):
+    """A warning says so; aligned, truth is of the same instants, and frames that the lidar did not see are left out."""
+    walk = MadeUp(tmp_path / "clone", 7, 320, first=-30.0, rate=1.08)
+    walk.write(walk.folder)
+    times = 0.05 * np.arange(320)
+    write_tum(tmp_path / "poses.tum", times, np.tile([0.1, 0, 0, 0, 0, 0, 1.0], (320, 1)))
+    given = Given(walk=7, poses=tmp_path / "poses.tum")
+    with Recording(import_recording(walk.folder, tmp_path / "7.h5", given)) as recording:
+        assert "up to 1.5 s apart" in recording.attributes["warnings"]
+        assert len(recording) == 320 and recording.read("truth/time") == pytest.approx(times)
+    aligned = import_recording(walk.folder, tmp_path / "7.h5", replace(given, align=True))
+    with Recording(aligned) as recording:
+        assert "warnings" not in recording.attributes and "of the lidar's picture -" in recording.attributes["clock"]
+        frames = np.rint(recording.read("radar/time") / 0.05).astype(int)
+        assert np.abs(frames[[0, -1]] - [28, 319]).max() <= 1 and np.array_equal(
+            np.diff(frames), np.ones(len(frames) - 1)
+        )
+        assert np.array_equal(recording.rows("maps/picture", 9, 10)[0], walk.radar(frames[9]))
+        seen = np.unpackbits(recording.read("truth/lidar"), axis=2).astype(bool)
+        true = [walk.lidar(k) for k in range(320)]
+        partner = [np.argmax([(each & one).sum() for one in true]) for each in seen[::40]]
+        assert partner == pytest.approx(-30 + 1.08 * frames[::40], abs=2)
+        # A pose of the lidar's frame 100 is of the radar's frame (100 + 30) / 1.08.
+        assert recording.read("truth/time")[100] == pytest.approx(0.05 * 130 / 1.08, abs=0.1)
 
 
 @pytest.mark.parametrize("spoil, words", [

@@ -1,0 +1,119 @@
+"""What methods see in a real walk's pictures, frame by frame, and how far from the lidar's points that is."""
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int, UInt8
+
+from radarize import polar
+from radarize.clouds import Apart
+from radarize.features.windows import Windows
+from radarize.methods.pictures.memory import Memory
+from radarize.methods.pictures.network import PictureNet
+from radarize.methods.pictures.points import first_surfaces, points
+from radarize.methods.pictures.scans import on_bearings
+from radarize.nets.weights import Header
+from radarize.points import Cfar, level_around
+from radarize.radar.presets import PRESETS
+from radarize.walkclock import Clock
+from radarize.walkposes import BEARINGS, scan, stamps
+from radarize.walks import FIRST, Walk
+
+#: What stands in every picture, by name: all cells; the first one of each azimuth that stands out; all that do.
+_CFAR = Cfar(window=8, guard=4, threshold=64.0)
+_BEFORE = ("picture", "cfar")
+
+Cells = Bool[np.ndarray, "range column"]
+Ranges = Float[np.ndarray, "bearing"]
+
+
+class Distances(NamedTuple):
+    """How far a method's points of one frame are from the lidar's: of the same number, and of the same instant, nan
+    where the lidar has no picture of it."""
+
+    number: Apart
+    instant: Apart
+
+
+class Judged(NamedTuple):
+    """A walk.
+
+    Attributes:
+        apart: of each method, for every frame that is judged.
+        ranges: scans of each method, and of the lidar at the same instants.
+        partner: the lidar's frame of each frame's instant; -1: it has none.
+        clouds: the lidar's points, by its own frames.
+        pictures: the radar's.
+    """
+
+    apart: dict[str, list[Distances]]
+    ranges: dict[str, Float[np.ndarray, "frame bearing"]]
+    partner: Int[np.ndarray, "frame"]
+    clouds: list[Float[np.ndarray, "point 2"]]
+    pictures: UInt8[np.ndarray, "frame range azimuth"]
+
+
+def judge(
+    walk: Walk,
+    clock: Clock,
+    network: tuple[PictureNet, Header] | None,
+    others: dict[str, dict[int, Float[np.ndarray, "point 2"]]],
+    step: Callable[[], None],
+) -> Judged:
+    """Go through a walk's frames once; `step` is called after each."""
+    partner = clock.partners(walk.frames)
+    clouds = [polar.cartesian(walk.lidar(frame)) for frame in range(walk.frames)]
+    found = Judged({}, {}, partner, clouds, np.empty((walk.frames, polar.ROWS, polar.COLUMNS), np.uint8))
+    nothing = np.empty((0, 2))
+    for frame, picture, cells, first in _methods(walk, network):
+        same = clouds[partner[frame]] if partner[frame] >= 0 else nothing
+        found.pictures[frame] = picture
+        told = {name: polar.cartesian(each) for name, each in cells.items()}
+        told |= {name: known[frame] for name, known in others.items() if frame in known}
+        for name, each in told.items():
+            if frame >= FIRST:
+                apart = Distances(Apart.of(each, clouds[frame]), Apart.of(each, same))
+                found.apart.setdefault(name, []).append(apart)
+        # The nearest points; pictures and CFAR have many that stand before a surface.
+        scans = {name: scan(each) for name, each in (told | {"lidar": same}).items() if name not in _BEFORE}
+        for name, each in (scans | first).items():
+            if name not in found.ranges:
+                found.ranges[name] = np.full((walk.frames, len(BEARINGS)), np.nan)
+            found.ranges[name][frame] = each
+        step()
+    return found
+
+
+def _methods(
+    walk: Walk, network: tuple[PictureNet, Header] | None
+) -> Iterator[tuple[int, UInt8[np.ndarray, "range azimuth"], dict[str, Cells], dict[str, Ranges]]]:
+    """A walk's pictures, frame by frame, where each method sees something in them, and scans of those that tell first
+    surfaces themselves."""
+    windows, memory = (network[1].windows(PRESETS["radarhd"]), Memory()) if network else (None, None)
+    times = stamps(walk.frames)
+    for frames, pictures in walk.batches():
+        likely = _network(network[0], windows, memory, pictures, times[frames]) if network else None
+        for k, picture in enumerate(pictures):
+            stands = picture > level_around(picture.astype(float), _CFAR, 0, False) + _CFAR.threshold
+            nearest = stands & (np.cumsum(stands, axis=0) == 1)
+            cells, first = {"picture": picture > 0, "cfar": stands, "first-echo": nearest}, {}
+            if likely:
+                cells["network"], first["network"] = (each[k] for each in likely)
+            yield frames.start + k, picture, cells, first
+
+
+@torch.inference_mode()
+def _network(
+    net: PictureNet,
+    windows: Windows,
+    memory: Memory,
+    pictures: UInt8[np.ndarray, "frame range azimuth"],
+    times: Float[np.ndarray, "frame"],
+) -> tuple[Bool[np.ndarray, "frame range column"], Float[np.ndarray, "frame bearing"]]:
+    """Points of a batch's frames, and their scans."""
+    shown = windows.push({"picture": pictures.astype(np.float16)}, times)[0]
+    likely = net.estimate(shown.maps)
+    # Maps average over time themselves: their scans are each frame's own.
+    return points(memory.push(likely, times), net.dense).numpy(), on_bearings(first_surfaces(likely), BEARINGS)

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 import yaml
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, UInt8
 
 from benchmarks.realism import CONFIG, shares
 from benchmarks.results import Data, command_line, publish
@@ -20,6 +20,7 @@ from benchmarks.results import Walk as Facts
 from radarize import polar
 from radarize.console import progress
 from radarize.tum import planar_poses, write_tum
+from radarize.walkclock import Clock
 from radarize.walkposes import BEARINGS, lidar_poses, scan, stamps, true_poses
 from radarize.walks import PERIOD, Walk
 from radarize.yamlfile import read_yaml
@@ -58,7 +59,7 @@ ASSUMED = {
 #: Rows by which the twin's pictures may have to be moved: the real radar reads up to 0.34 m too far.
 _BIAS = range(9)
 #: Frames at either end of a walk that are left out.
-_MARGIN = 20
+_MARGIN = 30
 
 Pictures = UInt8[np.ndarray, "frame range azimuth"]
 
@@ -84,9 +85,9 @@ def scene(log: Path, assumed: Assumed) -> Path:
 
 
 def simulated(
-    path: Path, poses: Float[np.ndarray, "frame 3"], height: float, frames: Int[np.ndarray, "frame"], seed: int
+    path: Path, poses: Float[np.ndarray, "frame 3"], height: float, frames: Float[np.ndarray, "shown"], seed: int
 ) -> Pictures:
-    """Pictures of some frames of the same drive."""
+    """Pictures of the same drive, at some frames of its poses, also between them."""
     drive = planar_poses(poses)
     drive[:, 2] = height
     tum = write_tum(path.with_suffix(".drive.tum"), stamps(len(poses)), drive)
@@ -147,8 +148,10 @@ PARSER = command_line(
 def main() -> None:
     options = PARSER.parse_args()
     walks = [Walk.find(options.data, int(number)) for number in options.walks.split(",")]
-    frames = [np.arange(_MARGIN, walk.frames - _MARGIN, options.every) for walk in walks]
-    real = [np.stack([walk.radar(k) for k in some]) for walk, some in zip(walks, frames, strict=True)]
+    shown = [np.arange(_MARGIN, walk.frames - _MARGIN, options.every) for walk in walks]
+    real = [np.stack([walk.radar(k) for k in some]) for walk, some in zip(walks, shown, strict=True)]
+    # Poses are of the lidar's frames, and its clock is another.
+    frames = [Clock.of(walk).lidar(some) for walk, some in zip(walks, shown, strict=True)]
     rows = []
     with progress("twins") as report, tempfile.TemporaryDirectory() as folder:
         for number, walk in enumerate(walks):
@@ -168,7 +171,8 @@ def main() -> None:
         networks=(),
         notes=[
             "Correlation of the twin's pictures (`radarize.polar`, four antennas) with real ones of the same instants, "
-            "of the same walk backwards, and of another walk; the twin's are moved by as much as fits best (bias).",
+            "of the same walk backwards, and of another walk; the twin's are moved by as much as fits best (bias). "
+            "Instants are those of the radar, whose clock is not the lidar's (`radarize.walkclock`).",
             "MS-SSIM: of the same instants, and of another walk. Range profile: correlation of shares of cells kept "
             "over range. Level: mean of the cells kept, between the least (0) and the largest (1) of a picture.",
             "The lidar's plane is all that is known of a room: nothing above or below it, no glass, no material.",

@@ -17,10 +17,10 @@ from jaxtyping import Float, Int
 from scipy.ndimage import gaussian_filter
 
 from radarize import polar
-from radarize.walks import Walk
+from radarize.walks import PERIOD, Walk
 
 #: Frames by which pictures may be apart, and by which their distance may grow per frame.
-_APART, _DRIFTS = 100, np.arange(-0.15, 0.1501, 0.0025)
+APART, _DRIFTS = 100, np.arange(-0.15, 0.1501, 0.0025)
 #: Rows that are averaged, and deviations (frames, rows, columns) of the Gaussian that smooths what is left, so that
 #: neither a bearing's error nor the speckle of an echo decides. Turns by the network are then off by 0.42 deg on 24
 #: training walks, by 0.45 with three fifths of the Gaussian, and by 0.66 as numbered.
@@ -61,13 +61,13 @@ class Clock:
         """That of a walk; as it is numbered where its pictures do not tell, for nothing moved or it is too short."""
         if walk.frames < _LEAST:
             return cls()
-        alike = _alike(*_pictures(walk, progress))
-        drift, late, best = _line(alike)
-        paired, middle = float(np.nanmean(alike[_APART])), (walk.frames - 1) / 2
+        known = alike(walk, progress)
+        drift, late, best = _line(known)
+        paired, middle = float(np.nanmean(known[APART])), (walk.frames - 1) / 2
         if not best > _ALIKE:
             return cls(alike=best, paired=paired)
         odd = np.arange(walk.frames) // _PART % 2 == 1
-        halves = [_line(np.where(kept, alike, np.nan)) for kept in (odd, ~odd)]
+        halves = [_line(np.where(kept, known, np.nan)) for kept in (odd, ~odd)]
         ends = np.array([[late - drift * middle, late + drift * middle] for drift, late, _ in halves])
         return cls(late - drift * middle, 1 + drift, best, paired, float(np.ptp(ends, axis=0).max()))
 
@@ -88,6 +88,30 @@ class Clock:
         """Frames that pictures of one number are apart, at most."""
         ends = np.array([0, frames - 1])
         return float(np.abs(self.lidar(ends) - ends).max())
+
+    def row(self, frames: int) -> dict[str, float]:
+        """What tables say of a walk's clocks; s by which the lidar's picture of a number is later than the radar's."""
+        ends = np.array([0, frames - 1])
+        start, end = PERIOD * (ends - self.lidar(ends))
+        return {
+            "start_s": float(start),
+            "end_s": float(end),
+            "alike by number": self.paired,
+            "alike by instant": self.alike,
+            "halves differ_s": PERIOD * self.doubt,
+        }
+
+
+def alike(walk: Walk, progress: Callable[[int, int], None] = lambda done, total: None) -> Alike:
+    """Correlation of each picture of the radar with that of the lidar `APART` frames before it, and so on until as many
+    after it; nan: there is none."""
+    radar, lidar = _pictures(walk, progress)
+    frames = len(radar)
+    found = np.full((2 * APART + 1, frames), np.nan, np.float32)
+    for row, shift in enumerate(range(-APART, APART + 1)):
+        some = np.arange(max(0, -shift), min(frames, frames - shift))
+        found[row, some] = np.einsum("ij,ij->i", radar[some], lidar[some + shift])
+    return found
 
 
 def _pictures(walk: Walk, progress: Callable[[int, int], None]) -> tuple[Pooled, Pooled]:
@@ -111,24 +135,13 @@ def _changes(pictures: Float[np.ndarray, "frame row column"]) -> Pooled:
     return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-9)
 
 
-def _alike(radar: Pooled, lidar: Pooled) -> Alike:
-    """Correlation of each picture of the radar with that of the lidar `_APART` frames before it, and so on until as
-    many after it; nan: there is none."""
-    frames = len(radar)
-    found = np.full((2 * _APART + 1, frames), np.nan, np.float32)
-    for row, shift in enumerate(range(-_APART, _APART + 1)):
-        some = np.arange(max(0, -shift), min(frames, frames - shift))
-        found[row, some] = np.einsum("ij,ij->i", radar[some], lidar[some + shift])
-    return found
-
-
-def _line(alike: Alike) -> tuple[float, float, float]:
+def _line(known: Alike) -> tuple[float, float, float]:
     """Drift (frames per frame), lateness in the middle (frames), and mean of the line on which it is largest; nan: no
     line meets enough."""
-    rows, frames = alike.shape
+    rows, frames = known.shape
     padded = np.full((3 * rows, frames), np.nan, np.float32)
-    padded[rows : 2 * rows] = alike
-    wanted = _MET * np.isfinite(alike[_APART]).sum()
+    padded[rows : 2 * rows] = known
+    wanted = _MET * np.isfinite(known[APART]).sum()
     best = (0.0, 0.0, np.nan)
     for drift in _DRIFTS:
         along = np.rint(drift * (np.arange(frames) - (frames - 1) / 2)).astype(int)
@@ -139,5 +152,5 @@ def _line(alike: Alike) -> tuple[float, float, float]:
         mean[met < wanted] = -np.inf
         top = int(mean.argmax())
         if np.isfinite(mean[top]) and not mean[top] <= best[2]:
-            best = (float(drift), float(top - _APART), float(mean[top]))
+            best = (float(drift), float(top - APART), float(mean[top]))
     return best

@@ -117,7 +117,7 @@ def real(
         others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
         step = lambda *_: progress(next(done), total)  # noqa: E731
         clock = Clock.of(walk, step)
-        clocks.append(_clock_row(walk, clock))
+        clocks.append({"walk": walk.number} | clock.row(walk.frames))
         judged = judge(walk, clock, scans, others, step)
         errors |= {(walk.number, name): apart for name, apart in judged.apart.items()}
         told = {"shifted pictures": shifted_turns(judged.pictures)}
@@ -202,18 +202,6 @@ def _median(values: Sequence[float]) -> float:
     """Of those that are numbers."""
     known = [value for value in values if np.isfinite(value)]
     return float(np.median(known)) if known else np.nan
-
-
-def _clock_row(walk: Walk, clock: Clock) -> dict[str, float]:
-    last = walk.frames - 1
-    return {
-        "walk": walk.number,
-        "start_s": PERIOD * -clock.first,
-        "end_s": PERIOD * (last - float(clock.lidar(np.array([last]))[0])),
-        "alike by number": clock.paired,
-        "alike by instant": clock.alike,
-        "halves differ_s": PERIOD * clock.doubt,
-    }
 
 
 def _paired(errors: dict[tuple[int, str], list[Distances]]) -> list[dict]:

@@ -1,0 +1,87 @@
+"""How far RadarHD's radar and lidar pictures of one number are apart in time, walk by walk.
+
+Clocks are told by how alike pictures are (`radarize.walkclock`). A second witness, which they know nothing of: turns by
+shifting the radar's pictures against each other, compared with those of the lidar's poses, by number and by instant.
+"""
+
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from benchmarks.results import Data, command_line, publish
+from benchmarks.results import Walk as Facts
+from radarize.benchmark.real import clocked_turn_errors
+from radarize.benchmark.realmotion import shifted_turns, smoothed
+from radarize.console import progress
+from radarize.walkclock import APART, Clock, alike
+from radarize.walkposes import lidar_poses, true_poses
+from radarize.walks import PERIOD, TRAINING, Walk
+
+#: Walks that are drawn: two of the building of the training, two of another.
+SHOWN = (118, 132, 227, 237)
+PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "clocks.png"
+#: Frames, standard deviation, of what is drawn.
+_SMOOTH = 3
+
+
+def draw(walks: list[Walk], clocks: dict[int, Clock]) -> None:
+    """How alike pictures are, over the walk and over how much later the lidar's is."""
+    figure, axes = plt.subplots(1, len(walks), figsize=(11, 3), sharey=True)
+    for axis, walk in zip(axes, walks, strict=True):
+        found = gaussian_filter1d(np.nan_to_num(alike(walk)), _SMOOTH, axis=1)
+        end, most = PERIOD * walk.frames, PERIOD * APART
+        # A lidar's picture of a larger number is taken earlier than its number says.
+        axis.imshow(found[::-1], aspect="auto", origin="lower", extent=(0, end, -most, most), vmin=0, vmax=0.5)
+        frames = np.array([0, walk.frames - 1])
+        axis.plot(PERIOD * frames, PERIOD * (frames - clocks[walk.number].lidar(frames)), "w--", lw=1)
+        axis.axhline(0, color="w", lw=0.5)
+        axis.set(title=f"walk {walk.number}", xlabel="s", ylim=(-most, most))
+    axes[0].set_ylabel("lidar's picture later by, s")
+    figure.tight_layout()
+    figure.savefig(PICTURE, dpi=90)
+
+
+PARSER = command_line(
+    __doc__,
+    data=(Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"),
+    poses=("", "folder of poses, WALK.tum; by the lidar if none"),
+)
+
+
+def main() -> None:
+    """All walks, training and test."""
+    options = PARSER.parse_args()
+    walks = [Walk.find(options.data, number) for number in TRAINING] + Walk.tests(options.data)
+    rows, clocks = [], {}
+    with progress("walks") as report:
+        for done, walk in enumerate(walks):
+            poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
+            clock = clocks[walk.number] = Clock.of(walk)
+            turns = smoothed(shifted_turns(np.stack([walk.radar(frame) for frame in range(walk.frames)])))
+            errors = clocked_turn_errors(turns, poses, clock)
+            rows.append({
+                "walk": walk.number, "part": walk.folder.name, **clock.row(walk.frames),
+                "yaw_rmse_deg": errors["yaw_rmse_deg"], "instant_yaw_rmse_deg": errors["instant_yaw_rmse_deg"],
+            })  # fmt: skip
+            report(done + 1, len(walks))
+    draw([walk for walk in walks if walk.number in SHOWN], clocks)
+    publish(
+        "clocks",
+        "Clocks of real walks",
+        rows,
+        data=Data("RadarHD's walks", tuple(Facts(f"radarhd {walk.number}", None, None, False) for walk in walks)),
+        networks=(),
+        notes=[
+            "By how many seconds the lidar's picture is later than the radar's of the same number, at a walk's start "
+            "and end; mean correlation of pictures of one number, and of one instant; by how much two halves of the walk "
+            "differ. Without figures: too short, or nothing moved.",
+            "Yaw over 0.2 s by shifting the radar's pictures against each other, smoothed over 0.3 s: error against "
+            "the lidar's poses, by number and by instant. The clocks do not know it.",
+        ],
+    )
+
+
+if __name__ == "__main__":
+    main()

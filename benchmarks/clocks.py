@@ -75,8 +75,8 @@ def main() -> None:
         networks=(),
         notes=[
             "By how many seconds the lidar's picture is later than the radar's of the same number, at a walk's start "
-            "and end; mean correlation of pictures of one number, and of one instant; by how much two halves of the walk "
-            "differ. Without figures: too short, or nothing moved.",
+            "and end; mean correlation of pictures of one number, and of one instant; by how much two halves of the "
+            "walk differ. Without figures: too short, or nothing moved.",
             "Yaw over 0.2 s by shifting the radar's pictures against each other, smoothed over 0.3 s: error against "
             "the lidar's poses, by number and by instant. The clocks do not know it.",
         ],

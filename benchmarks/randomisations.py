@@ -34,6 +34,7 @@ from radarize.training.dataset import recordings
 from radarize.walkclock import Clock
 from radarize.walks import FIRST, TRAINING, Walk
 from radarize.yamlfile import read_yaml
+from radarsim.scene.description import shipped
 
 #: Frames of a walk from one of a window to the next, and frames of a window, as the shipped network has them.
 EVERY, WINDOW = 4, 5
@@ -105,7 +106,7 @@ def real(walks: list[Walk], every: int) -> Real:
 
 def chosen(data: Path, variant: Variant) -> tuple[Path, ...]:
     """Simulated walks of a variant."""
-    specification = read_yaml(Path("scenes/datasets/radarhd.yaml"))
+    specification = read_yaml(shipped() / "datasets" / "radarhd.yaml")
     found = []
     for path in recordings(data):
         with Recording(path) as recording:
@@ -172,7 +173,7 @@ PARSER = command_line(
     __doc__,
     data=(Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"),
     simulated=(Path("radarhd"), "what `radarsim dataset radarhd` made"),
-    steps=(400, "of each training"),
+    steps=(500, "of each training"),
     every=(40, "of so many frames of the real walks one is judged"),
 )
 
@@ -181,7 +182,7 @@ def main() -> None:
     """Train and judge all, beside each other."""
     options = PARSER.parse_args()
     walks = [Walk.find(options.data, number) for number in TRAINING]
-    windows, settings = real(walks, options.every), Settings(width=8, frames=WINDOW, batch=32, rate=2e-3)
+    windows, settings = real(walks, options.every), Settings(width=8, frames=WINDOW, batch=16, rate=2e-3)
     paths = {name: chosen(options.simulated, variant) for name, variant in VARIANTS.items()}
     jobs = {
         name: partial(tried, variant, paths[name], windows, settings, options.steps)

@@ -7,8 +7,9 @@ told: by number, as published, and by instant.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from itertools import count
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -30,6 +31,8 @@ from radarize.benchmark.realpoints import Distances, Judged, judge
 from radarize.benchmark.results import Data, Network, Results, command, machine
 from radarize.benchmark.results import Walk as Facts
 from radarize.benchmark.table import Table
+from radarize.errors import InputError
+from radarize.jobs import Report, perform
 from radarize.methods.method import Weights
 from radarize.methods.pictures.network import PictureNet
 from radarize.nets.weights import load
@@ -77,6 +80,8 @@ class Options:
         predictions: of other programs by name.
         weights: folder of the networks' weights; the shipped ones if None.
         poses: folder of true poses, NUMBER.tum; by SLAM with the lidar's scans if None.
+        workers: walks at a time; as many as there are cores if None.
+        ray: address of a Ray cluster to use instead.
         command: that the results name.
     """
 
@@ -84,6 +89,8 @@ class Options:
     predictions: dict[str, Path] = field(default_factory=dict)
     weights: Path | None = None
     poses: Path | None = None
+    workers: int | None = None
+    ray: str | None = None
     command: str = field(default_factory=lambda: command("radarize"))
 
 
@@ -107,44 +114,69 @@ def real(
     """
     machine()  # as things are now
     walks = [Walk.find(data, number) for number in options.walks] or Walk.tests(data)
-    weights = Weights(options.weights)
-    seen, turned = (weights.of(kind) for kind in ("pictures", "picture-turns"))
-    scans = load(seen, PictureNet, PRESETS["radarhd"]) if seen.is_file() else None
-    done, total = count(1), 2 * sum(walk.frames for walk in walks)
-    rows, maps, clocks, errors = [], [], [], {}
-    for walk in walks:
-        poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
-        others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
-        step = lambda *_: progress(next(done), total)  # noqa: E731
-        clock = Clock.of(walk, step)
-        clocks.append({"walk": walk.number} | clock.row(walk.frames))
-        judged = judge(walk, clock, scans, others, step)
-        errors |= {(walk.number, name): apart for name, apart in judged.apart.items()}
-        told = {"shifted pictures": shifted_turns(judged.pictures)}
-        rates = network_rates(weights, judged.pictures) if turned.is_file() else None
-        if rates is not None:
-            told["network"] = SPAN * PERIOD * rates[:, 0]
-        told |= {f"{name}, smoothed": smoothed(each) for name, each in told.items()}
-        moved = {name: clocked_turn_errors(each, poses, clock) for name, each in told.items()}
-        drawn = _maps(walk, judged, poses, rates)
-        maps += drawn
-        mapped_by = {row["method"]: row for row in drawn}
-        for name in dict.fromkeys([*judged.apart, *moved, *mapped_by]):
-            about = {"walk": walk.number, "part": walk.folder.name, "method": name}
-            row = about | _row(judged.apart.get(name, [])) | moved.get(name, {})
-            best = mapped_by.get(name, {})
-            rows.append(row | {"ate_m": best.get("ate_m", np.nan), "map_f1": best.get("map_f1_20cm", np.nan)})
+    total, done, found = sum(walk.frames for walk in walks), {}, {}
+    jobs = {f"walk {walk.number}": partial(_compare, walk, options) for walk in walks}
+    for news in perform(jobs, options.workers, options.ray):
+        if news.error is not None:
+            raise InputError(news.error)
+        if news.ended:
+            found[news.name] = news.result
+        else:
+            done[news.name] = int(news.done)
+        progress(sum(done.values()), total)
+    each = [found[name] for name in jobs]
+    errors = {key: apart for one in each for key, apart in one.apart.items()}
     data_of = Data("RadarHD's walks", tuple(Facts(f"radarhd {walk.number}", None, None, False) for walk in walks))
     tables = [
-        Table("Real walks", rows, list(NOTES)),
-        Table("Clocks", clocks, [CLOCK_NOTE]),
+        Table("Real walks", [row for one in each for row in one.rows], list(NOTES)),
+        Table("Clocks", [one.clock for one in each], [CLOCK_NOTE]),
         Table("Between methods", _paired(errors)),
-        Table("SLAM and maps", maps, [MAP_NOTE]),
+        Table("SLAM and maps", [row for one in each for row in one.maps], [MAP_NOTE]),
     ]
-    networks = tuple(Network.of(path) for path in (seen, turned) if path.is_file())
+    networks = tuple(Network.of(path) for path in _networks(options) if path.is_file())
     results = Results("In the real world", tables, data_of, networks, options.command)
     results.write(Path(output), "real")
     return results
+
+
+class _Compared(NamedTuple):
+    """What comes of a walk: rows of the tables, and how far each method's points are off, by walk and method."""
+
+    rows: list[dict[str, object]]
+    clock: dict[str, float]
+    maps: list[dict[str, object]]
+    apart: dict[tuple[int, str], list[Distances]]
+
+
+def _networks(options: Options) -> tuple[Path, Path]:
+    """Weights for points, and for turns."""
+    weights = Weights(options.weights)
+    return weights.of("pictures"), weights.of("picture-turns")
+
+
+def _compare(walk: Walk, options: Options, report: Report) -> _Compared:
+    """All methods on a walk; `report` takes frames done."""
+    seen, turned = _networks(options)
+    scans = load(seen, PictureNet, PRESETS["radarhd"]) if seen.is_file() else None
+    poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
+    others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
+    clock = Clock.of(walk)
+    judged = judge(walk, clock, scans, others, report)
+    told = {"shifted pictures": shifted_turns(judged.pictures)}
+    rates = network_rates(Weights(options.weights), judged.pictures) if turned.is_file() else None
+    if rates is not None:
+        told["network"] = SPAN * PERIOD * rates[:, 0]
+    told |= {f"{name}, smoothed": smoothed(each) for name, each in told.items()}
+    moved = {name: clocked_turn_errors(each, poses, clock) for name, each in told.items()}
+    maps, rows = _maps(walk, judged, poses, rates), []
+    mapped_by = {row["method"]: row for row in maps}
+    for name in dict.fromkeys([*judged.apart, *moved, *mapped_by]):
+        about = {"walk": walk.number, "part": walk.folder.name, "method": name}
+        row = about | _row(judged.apart.get(name, [])) | moved.get(name, {})
+        best = mapped_by.get(name, {})
+        rows.append(row | {"ate_m": best.get("ate_m", np.nan), "map_f1": best.get("map_f1_20cm", np.nan)})
+    apart = {(walk.number, name): each for name, each in judged.apart.items()}
+    return _Compared(rows, {"walk": walk.number} | clock.row(walk.frames), maps, apart)
 
 
 def clocked_turn_errors(

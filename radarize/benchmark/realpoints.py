@@ -60,9 +60,9 @@ def judge(
     clock: Clock,
     network: tuple[PictureNet, Header] | None,
     others: dict[str, dict[int, Float[np.ndarray, "point 2"]]],
-    step: Callable[[], None],
+    report: Callable[[float], None],
 ) -> Judged:
-    """Go through a walk's frames once; `step` is called after each."""
+    """Go through a walk's frames once; `report` takes how many are done."""
     partner = clock.partners(walk.frames)
     clouds = [polar.cartesian(walk.lidar(frame)) for frame in range(walk.frames)]
     found = Judged({}, {}, partner, clouds, np.empty((walk.frames, polar.ROWS, polar.COLUMNS), np.uint8))
@@ -82,7 +82,7 @@ def judge(
             if name not in found.ranges:
                 found.ranges[name] = np.full((walk.frames, len(BEARINGS)), np.nan)
             found.ranges[name][frame] = each
-        step()
+        report(frame + 1)
     return found
 
 

@@ -95,7 +95,7 @@ def benchmark(
         if value is None:
             raise InputError(f"{option} is missing, expected a folder")
     if name == "real":
-        return _benchmark_real(data, out, weights, walks, predictions or [], poses)
+        return _benchmark_real(data, out, weights, walks, predictions or [], poses, workers, ray)
     from radarize.benchmark.run import benchmark as compare
     from radarize.benchmark.study import Options
 
@@ -109,7 +109,14 @@ def benchmark(
 
 
 def _benchmark_real(
-    data: Path, out: Path, weights: Path | None, walks: str | None, predictions: list[str], poses: Path | None
+    data: Path,
+    out: Path,
+    weights: Path | None,
+    walks: str | None,
+    predictions: list[str],
+    poses: Path | None,
+    workers: int | None,
+    ray: str | None,
 ) -> None:
     from radarize.benchmark.real import SHOWN, Options, real
 
@@ -121,7 +128,7 @@ def _benchmark_real(
         if not (name and folder and Path(folder).is_dir()):
             raise InputError(f"--predictions is {name}={folder}, expected NAME=FOLDER of a folder that is there")
     others = {name: Path(each) for name, each in named.items()}
-    options = Options([int(number) for number in numbers], others, weights, poses)
+    options = Options([int(number) for number in numbers], others, weights, poses, workers, ray)
     with progress("real") as report:
         results = real(data, out, options, progress=report)
     print_table(*results.tables[0].in_terminal(SHOWN))

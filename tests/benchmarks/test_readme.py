@@ -1,7 +1,10 @@
 """Figures in the pages are those of the results."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).parents[2]
 #: Columns of the ranking, of the results' and in the page.
@@ -22,3 +25,44 @@ def test_the_ranking_is_that_of_the_stress_test():
         digits = {name: 3 if name.endswith(", m") else 1 for name in COLUMNS}
         lines.append(f"| {row['scans']} | " + " | ".join(f"{row[name]:.{digits[name]}f}" for name in COLUMNS) + " |")
     assert "\n".join(lines) in (ROOT / "docs" / "about" / "results.md").read_text(), "\n".join(lines)
+
+
+#: Test walks by place, as columns of the pages' tables.
+PLACES = ((117, 132), (227, 230, 233, 237, 242), (248, 250))
+
+
+def real_rows(title: str) -> list[dict]:
+    tables = json.loads((ROOT / "benchmarks" / "results" / "real.json").read_text())["tables"]
+    return next(table["rows"] for table in tables if table["title"] == title)
+
+
+def mean(rows: list[dict], method: str, column: str, walks: tuple[int, ...]) -> float:
+    values = [row[column] for row in rows if row["method"] == method and row["walk"] in walks]
+    assert len(values) == len(walks)
+    return sum(values) / len(values)
+
+
+def cells(method: str, column: str, places: Sequence[tuple[int, ...]]) -> str:
+    """By instant, and in brackets by number."""
+    rows = real_rows("Real walks")
+    both = [[mean(rows, method, by + column, walks) for by in ("instant_", "")] for walks in places]
+    return " | ".join(f"{instant:.2f} ({number:.2f})" for instant, number in both)
+
+
+@pytest.mark.parametrize(("page", "methods"), [
+    ("README.md", ("cfar", "network", "RadarHD")), ("docs/about/results.md", ("picture", "cfar", "network", "RadarHD")),
+])  # fmt: skip
+def test_distances_on_real_walks_are_those_of_the_results(page, methods):
+    text = (ROOT / page).read_text().replace("**", "")
+    for method in methods:
+        assert f"| {cells(method, 'chamfer_m', PLACES)} |" in text, method
+
+
+def test_turns_and_maps_of_real_walks_are_those_of_the_results():
+    text = (ROOT / "docs/about/results.md").read_text()
+    for method in ("network", "network, smoothed", "shifted pictures, smoothed"):
+        assert f"| {cells(method, 'yaw_rmse_deg', PLACES[:2])} |" in text, method
+    moving, maps = PLACES[0] + PLACES[1], real_rows("SLAM and maps")
+    for method in ("network", "RadarHD", "lidar"):
+        off, f1 = (mean(maps, method, column, moving) for column in ("ate_m", "map_f1_20cm"))
+        assert f"| {off:.2f} | {100 * f1:.0f} |" in text, method

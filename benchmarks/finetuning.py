@@ -1,8 +1,9 @@
 """What simulation saves of reality: the network for RadarHD's pictures trained on real walks alone, and the same walks
 shown to one that was trained in simulation first.
 
-Only training walks are shown, and only test walks judge. The weights stay with whoever makes them, and those that are
-there already are not made again. Made for a GPU; `--steps 10` tries it on two cores.
+Pictures are paired by instant (`radarize.walkclock`), and judged by instant and by number. Only training walks are
+shown, and only test walks judge. The weights stay with whoever makes them, and those that are there already are not
+made again. Made for a GPU; `--steps 10` tries it on two cores.
 """
 
 import argparse
@@ -10,6 +11,7 @@ import math
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
+from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -27,7 +29,16 @@ from radarize.methods.pictures.points import points
 from radarize.methods.pictures.training import DENSE, elsewhere, entropy, unpacked
 from radarize.nets.weights import Header, build, load, save
 from radarize.radar.presets import PRESETS
+from radarize.walkclock import Clock
 from radarize.walks import FIRST, PERIOD, TRAINING, Walk
+
+
+class Distances(NamedTuple):
+    """Chamfer distances, m."""
+
+    number: float
+    instant: float
+
 
 #: Walks by how many of them are shown; steps and rates of both trainings.
 SHOWN = {
@@ -56,19 +67,21 @@ PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "finetuning.png"
 
 
 class Seen:
-    """Real walks in memory."""
+    """Real walks in memory: the radar's pictures, and the lidar's of the same instants."""
 
     def __init__(self, walks: list[Walk], device: torch.device):
-        frames = [range(0, walk.frames, EVERY) for walk in walks]
-        read = zip(walks, frames, strict=True)
-        self.radar = [torch.from_numpy(np.stack([walk.radar(k) for k in at])).to(device) for walk, at in read]
-        read = zip(walks, frames, strict=True)
-        lidar = [np.stack([np.packbits(walk.lidar(k), axis=1) for k in at]) for walk, at in read]
-        self.lidar = [torch.from_numpy(each).to(device) for each in lidar]
+        self.radar, self.lidar, self.there = [], [], []
+        for walk in walks:
+            frames = range(0, walk.frames, EVERY)
+            partners = Clock.of(walk).partners(walk.frames)[frames]
+            lidar = np.stack([np.packbits(walk.lidar(max(0, partner)), axis=1) for partner in partners.tolist()])
+            self.radar.append(torch.from_numpy(np.stack([walk.radar(frame) for frame in frames])).to(device))
+            self.lidar.append(torch.from_numpy(lidar).to(device))
+            self.there.append(partners >= 0)
 
     def items(self, window: int) -> list[tuple[int, int]]:
         """Walk and newest frame of each window."""
-        return [(walk, k) for walk, radar in enumerate(self.radar) for k in range(window - 1, len(radar))]
+        return [(walk, k) for walk, there in enumerate(self.there) for k in range(window - 1, len(there)) if there[k]]
 
     def windows(self, items: list[tuple[int, int]], window: int) -> tuple[Maps, Tensor]:
         """Pictures and labels."""
@@ -145,19 +158,19 @@ def train(options: argparse.Namespace) -> None:
             save(net, header.model_copy(update={"data": data, "metrics": metrics}), _path(options.out, shown, how))
 
 
-def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, float], Header]:
-    """Median Chamfer distance of each walk, m."""
+def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, Distances], Header]:
+    """Median Chamfer distance of each walk, m, by number and by instant."""
     net, header = load(path, PictureNet, PRESETS["radarhd"])
     found = {}
     for walk in walks:
-        apart = []
-        for end in range(FIRST, walk.frames, every):
+        partners, apart = Clock.of(walk).partners(walk.frames), []
+        for end in (frame for frame in range(FIRST, walk.frames, every) if partners[frame] >= 0):
             frames = range(end - EVERY * (header.frames - 1), end + 1, EVERY)
             pictures = torch.from_numpy(np.stack([walk.radar(k) for k in frames]))[None, :, None].float()
             with torch.inference_mode():
                 cells = points(net.estimate(pictures), net.dense)[0].numpy()
-            apart.append(Apart.of_pictures(cells, walk.lidar(end)).chamfer)
-        found[walk.number] = float(np.nanmedian(apart))
+            apart.append([Apart.of_pictures(cells, walk.lidar(k)).chamfer for k in (end, int(partners[end]))])
+        found[walk.number] = Distances(*(float(each) for each in np.nanmedian(apart, axis=0)))
     return found, header
 
 
@@ -186,7 +199,13 @@ def main() -> None:
         for (shown, how), path in paths.items():
             found, header = judged(walks, path, options.every)
             report(next(done), len(paths))
-            groups = {name: np.mean([found[walk] for walk in some if walk in found]) for name, some in GROUPS.items()}
+            groups = {
+                place if by == "instant" else f"{place}, by number": np.mean(
+                    [getattr(found[walk], by) for walk in some if walk in found]
+                )
+                for place, some in GROUPS.items()
+                for by in reversed(Distances._fields)
+            }
             minutes = header.metrics.get("minutes", 0.0)
             rows.append({"how": how, "real walks": shown, "minutes": minutes, **groups})
     draw(rows)
@@ -198,8 +217,9 @@ def main() -> None:
         data=Data("RadarHD's test walks", facts),
         networks=tuple(Network.of(path) for path in paths.values()),
         notes=[
-            "Median Chamfer distance of a walk's points from the lidar's, m, mean over the walks of a group; `alone`: "
-            "trained on real walks alone; `tuned`: trained on simulated walks first; `simulation`: on these alone.",
+            "Median Chamfer distance of a walk's points from the lidar's of the same instant, and of the same number, "
+            "m, mean over the walks of a group; `alone`: trained on real walks alone; `tuned`: trained on simulated "
+            "walks first; `simulation`: on these alone.",
             "Steps, rates and walks were fixed before any test walk was looked at; the probability from which on "
             "every cell has a point is that which is best on the walks that were shown.",
         ],

@@ -78,7 +78,7 @@ def import_walk(
         for frames, pictures in walk.batches():
             there = partners[frames] >= 0
             if there.any():
-                lidar = np.stack([walk.lidar(partner) for partner in partners[frames][there]])
+                lidar = np.stack([walk.lidar(partner) for partner in partners[frames][there].tolist()])
                 first = np.where(lidar.any(axis=1), polar.RANGES[lidar.argmax(axis=1)], np.inf)
                 rows = {polar.PICTURE: pictures[there], "truth/scan": first, "truth/lidar": np.packbits(lidar, axis=2)}
                 writer.append(None, times[frames][there], rows=rows)

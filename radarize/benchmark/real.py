@@ -79,7 +79,7 @@ class Options:
         walks: numbers; all that test if none.
         predictions: of other programs by name.
         weights: folder of the networks' weights; the shipped ones if None.
-        poses: folder of true poses, NUMBER.tum; by SLAM with the lidar's scans if None.
+        poses: folder of true poses, NUMBER.tum, on the lidar's clock; by SLAM with the lidar's scans if None.
         workers: walks at a time; as many as there are cores if None.
         ray: address of a Ray cluster to use instead.
         command: that the results name.
@@ -161,14 +161,14 @@ def _compare(walk: Walk, options: Options, report: Report) -> _Compared:
     poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
     others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
     clock = Clock.of(walk)
-    judged = judge(walk, clock, scans, others, report)
+    judged = judge(walk, clock, scans, others, lambda done: report(done / 2))
     told = {"shifted pictures": shifted_turns(judged.pictures)}
     rates = network_rates(Weights(options.weights), judged.pictures) if turned.is_file() else None
     if rates is not None:
         told["network"] = SPAN * PERIOD * rates[:, 0]
     told |= {f"{name}, smoothed": smoothed(each) for name, each in told.items()}
     moved = {name: clocked_turn_errors(each, poses, clock) for name, each in told.items()}
-    maps, rows = _maps(walk, judged, poses, rates), []
+    maps, rows = _maps(walk, judged, poses, rates, lambda share: report(walk.frames * (1 + share) / 2)), []
     mapped_by = {row["method"]: row for row in maps}
     for name in dict.fromkeys([*judged.apart, *moved, *mapped_by]):
         about = {"walk": walk.number, "part": walk.folder.name, "method": name}
@@ -194,8 +194,10 @@ def _maps(
     judged: Judged,
     poses: Float[np.ndarray, "frame 3"],
     rates: Float[np.ndarray, "frame 2"] | None,
+    report: Report,
 ) -> list[dict[str, object]]:
-    """A row for the scans of each method; `rates` of turning are those of our networks alone."""
+    """A row for the scans of each method; `rates` of turning are those of our networks alone. `report` takes the share
+    of methods that are done."""
     surface, there = surface_of(judged.clouds, poses), judged.partner >= 0
     poses = poses[judged.partner[there]]
     odometry = disturbed(poses, walk.number)
@@ -210,6 +212,7 @@ def _maps(
             | {"alone_odometry_ate_m": drift(matched, poses)}
             | {"alone_ate_m": alone["ate_m"], "alone_map_f1_20cm": alone["map_f1_20cm"]}
         )
+        report(len(rows) / len(judged.ranges))
     return rows
 
 

@@ -71,6 +71,11 @@ class Clock:
         ends = np.array([[late - drift * middle, late + drift * middle] for drift, late, _ in halves])
         return cls(late - drift * middle, 1 + drift, best, paired, float(np.ptp(ends, axis=0).max()))
 
+    @property
+    def told(self) -> bool:
+        """Whether pictures tell it."""
+        return bool(np.isfinite(self.doubt))
+
     def lidar(self, frame: Float[np.ndarray, "frame"] | Int[np.ndarray, "frame"]) -> Float[np.ndarray, "frame"]:
         """The lidar's frames, between whole numbers, at those of the radar."""
         return self.first + self.rate * frame

@@ -46,7 +46,11 @@ def import_walk(
     times, total = stamps(walk.frames), 3 * walk.frames
     clock = Clock.of(walk, lambda done, _: progress(done, total))
     about = {"source": f"RadarHD walk {number} ({walk.folder.name})"}
-    if align:
+    if align and not clock.told:
+        about["warnings"] = (
+            "--align: pictures do not tell a clock, for they are too few or nothing moved; paired by number"
+        )
+    elif align:
         about["clock"] = f"truth of frame k is of the lidar's picture {clock.first:.2f} + {clock.rate:.4f} k"
     elif (apart := PERIOD * clock.apart(walk.frames)) > _APART:
         about["warnings"] = (

@@ -105,6 +105,13 @@ def test_pictures_of_one_number_that_are_not_of_one_instant(tmp_path):
         assert recording.read("truth/time")[100] == pytest.approx(0.05 * 130 / 1.08, abs=0.1)
 
 
+def test_clocks_that_pictures_do_not_tell(clone, tmp_path):
+    """Twenty frames are too few: a warning, and pictures of one number as without --align."""
+    with Recording(import_recording(clone, tmp_path / "7.h5", Given(walk=7, align=True))) as recording:
+        assert "paired by number" in recording.attributes["warnings"] and "clock" not in recording.attributes
+        assert len(recording) == 20
+
+
 @pytest.mark.parametrize("spoil, words", [
     (lambda f: (f / "radar/R_7_3.png").unlink(), r"R_7_3\.png: is missing"),
     (lambda f: (f / "lidar/L_7_4.png").unlink(), r"L_7_4\.png: no such file"),

@@ -64,7 +64,7 @@ def import_(
     ] = None,
     walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
     align: Annotated[
-        bool, typer.Option(help="Of a walk: the lidar's pictures of the same instants, not of the same numbers.")
+        bool, typer.Option("--align", help="Of a walk: the lidar's pictures of the same instants, not numbers.")
     ] = False,
     samples: Annotated[int | None, typer.Option(help="Complex samples per chirp.")] = None,
     loops: Annotated[int | None, typer.Option(help="Loops per frame.")] = None,

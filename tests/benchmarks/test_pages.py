@@ -16,7 +16,7 @@ from radarsim import cli as radarsim
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results"
 #: Pages of a former layout, to be made again; then they leave this list.
-FORMER = {"ablation", "fuzzing", "slam_backend"}
+FORMER = {"ablation", "slam_backend"}
 PAGES = sorted(path.stem for path in RESULTS.glob("*.json"))
 
 

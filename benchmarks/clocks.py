@@ -15,8 +15,8 @@ from benchmarks.results import Walk as Facts
 from radarize.benchmark.real import clocked_turn_errors
 from radarize.benchmark.realmotion import shifted_turns, smoothed
 from radarize.console import progress
-from radarize.walkclock import APART, Clock, alike
-from radarize.walkposes import lidar_poses, true_poses
+from radarize.walkclock import APART, Alike, Clock, alike
+from radarize.walkposes import poses_of
 from radarize.walks import PERIOD, TRAINING, Walk
 
 #: Walks that are drawn: two of the building of the training, two of another.
@@ -26,16 +26,16 @@ PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "clocks.png"
 _SMOOTH = 3
 
 
-def draw(walks: list[Walk], clocks: dict[int, Clock]) -> None:
+def draw(shown: list[tuple[Walk, Clock, Alike]]) -> None:
     """How alike pictures are, over the walk and over how much later the lidar's is."""
-    figure, axes = plt.subplots(1, len(walks), figsize=(11, 3), sharey=True)
-    for axis, walk in zip(axes, walks, strict=True):
-        found = gaussian_filter1d(np.nan_to_num(alike(walk)), _SMOOTH, axis=1)
+    figure, axes = plt.subplots(1, len(shown), figsize=(11, 3), sharey=True)
+    for axis, (walk, clock, known) in zip(axes, shown, strict=True):
+        found = gaussian_filter1d(np.nan_to_num(known), _SMOOTH, axis=1)
         end, most = PERIOD * walk.frames, PERIOD * APART
         # A lidar's picture of a larger number is taken earlier than its number says.
         axis.imshow(found[::-1], aspect="auto", origin="lower", extent=(0, end, -most, most), vmin=0, vmax=0.5)
         frames = np.array([0, walk.frames - 1])
-        axis.plot(PERIOD * frames, PERIOD * (frames - clocks[walk.number].lidar(frames)), "w--", lw=1)
+        axis.plot(PERIOD * frames, PERIOD * (frames - clock.lidar(frames)), "w--", lw=1)
         axis.axhline(0, color="w", lw=0.5)
         axis.set(title=f"walk {walk.number}", xlabel="s", ylim=(-most, most))
     axes[0].set_ylabel("lidar's picture later by, s")
@@ -54,11 +54,14 @@ def main() -> None:
     """All walks, training and test."""
     options = PARSER.parse_args()
     walks = [Walk.find(options.data, number) for number in TRAINING] + Walk.tests(options.data)
-    rows, clocks = [], {}
+    rows, shown = [], []
     with progress("walks") as report:
         for done, walk in enumerate(walks):
-            poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
-            clock = clocks[walk.number] = Clock.of(walk)
+            poses = poses_of(walk, options.poses)
+            known = alike(walk)
+            clock = Clock.along(known)
+            if walk.number in SHOWN:
+                shown.append((walk, clock, known))
             turns = smoothed(shifted_turns(np.stack([walk.radar(frame) for frame in range(walk.frames)])))
             errors = clocked_turn_errors(turns, poses, clock)
             rows.append({
@@ -66,12 +69,12 @@ def main() -> None:
                 "yaw_rmse_deg": errors["yaw_rmse_deg"], "instant_yaw_rmse_deg": errors["instant_yaw_rmse_deg"],
             })  # fmt: skip
             report(done + 1, len(walks))
-    draw([walk for walk in walks if walk.number in SHOWN], clocks)
+    draw(shown)
     publish(
         "clocks",
         "Clocks of real walks",
         rows,
-        data=Data("RadarHD's walks", tuple(Facts(f"radarhd {walk.number}", None, None, False) for walk in walks)),
+        data=Data("RadarHD's walks", tuple(Facts.radarhd(walk.number) for walk in walks)),
         networks=(),
         notes=[
             "By how many seconds the lidar's picture is later than the radar's of the same number, at a walk's start "

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import matplotlib.pyplot as plt
 import numpy as np
 import torch
+from jaxtyping import UInt8
 from torch import Generator, Tensor
 
 from benchmarks.results import Data, Network, command_line, publish
@@ -158,6 +159,11 @@ def train(options: argparse.Namespace) -> None:
             save(net, header.model_copy(update={"data": data, "metrics": metrics}), _path(options.out, shown, how))
 
 
+def window(walk: Walk, end: int, frames: int) -> UInt8[np.ndarray, "frame range azimuth"]:
+    """The radar's pictures that a network sees at a frame."""
+    return np.stack([walk.radar(k) for k in range(end - EVERY * (frames - 1), end + 1, EVERY)])
+
+
 def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, Distances], Header]:
     """Median Chamfer distance of each walk, m, by number and by instant."""
     net, header = load(path, PictureNet, PRESETS["radarhd"])
@@ -165,8 +171,7 @@ def judged(walks: list[Walk], path: Path, every: int) -> tuple[dict[int, Distanc
     for walk in walks:
         partners, apart = Clock.of(walk).partners(walk.frames), []
         for end in (frame for frame in range(FIRST, walk.frames, every) if partners[frame] >= 0):
-            frames = range(end - EVERY * (header.frames - 1), end + 1, EVERY)
-            pictures = torch.from_numpy(np.stack([walk.radar(k) for k in frames]))[None, :, None].float()
+            pictures = torch.from_numpy(window(walk, end, header.frames))[None, :, None].float()
             with torch.inference_mode():
                 cells = points(net.estimate(pictures), net.dense)[0].numpy()
             apart.append([Apart.of_pictures(cells, walk.lidar(k)).chamfer for k in (end, int(partners[end]))])
@@ -209,7 +214,7 @@ def main() -> None:
             minutes = header.metrics.get("minutes", 0.0)
             rows.append({"how": how, "real walks": shown, "minutes": minutes, **groups})
     draw(rows)
-    facts = tuple(Facts(f"radarhd {walk.number}", None, None, False) for walk in walks)
+    facts = tuple(Facts.radarhd(walk.number) for walk in walks)
     publish(
         "finetuning",
         "What simulation saves of reality",

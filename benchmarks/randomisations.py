@@ -17,6 +17,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, UInt8
 
+from benchmarks.finetuning import window
 from benchmarks.results import Data, command_line, publish
 from benchmarks.results import Walk as Facts
 from radarize.clouds import Apart
@@ -36,8 +37,8 @@ from radarize.walks import FIRST, TRAINING, Walk
 from radarize.yamlfile import read_yaml
 from radarsim.scene.description import shipped
 
-#: Frames of a walk from one of a window to the next, and frames of a window, as the shipped network has them.
-EVERY, WINDOW = 4, 5
+#: Frames of a window, as the shipped network has them.
+WINDOW = Pictures.defaults.frames
 #: dB, as good as nothing; m, the middle of what the radar reads too far.
 _NONE, _BIAS = -200.0, sum(training.BIAS) / 2
 
@@ -99,7 +100,7 @@ def real(walks: list[Walk], every: int) -> Real:
         for end in range(FIRST, walk.frames, every):
             if partners[end] >= 0:
                 found.walk.append(walk.number)
-                found.pictures.append(np.stack([walk.radar(end - EVERY * k) for k in reversed(range(WINDOW))]))
+                found.pictures.append(window(walk, end, WINDOW))
                 found.lidar.append(walk.lidar(int(partners[end])))
     return found._replace(pictures=np.stack(found.pictures))
 
@@ -209,7 +210,7 @@ def main() -> None:
         "randomisations",
         "What simulated walks must vary",
         rows,
-        data=Data("RadarHD's training walks", tuple(Facts(f"radarhd {w.number}", None, None, False) for w in walks)),
+        data=Data("RadarHD's training walks", tuple(Facts.radarhd(w.number) for w in walks)),
         networks=(),
         notes=[
             "Median Chamfer distance of a real walk's points from the lidar's of the same instant, m, mean over walks. "

@@ -21,7 +21,7 @@ from radarize import polar
 from radarize.console import progress
 from radarize.tum import planar_poses, write_tum
 from radarize.walkclock import Clock
-from radarize.walkposes import BEARINGS, lidar_poses, scan, stamps, true_poses
+from radarize.walkposes import BEARINGS, poses_of, scan, stamps
 from radarize.walks import PERIOD, Walk
 from radarize.yamlfile import read_yaml
 from radarsim.motion import motion_from_tum
@@ -155,7 +155,7 @@ def main() -> None:
     rows = []
     with progress("twins") as report, tempfile.TemporaryDirectory() as folder:
         for number, walk in enumerate(walks):
-            poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
+            poses = poses_of(walk, options.poses)
             log = lidar_log(walk, poses, Path(folder))
             for done, (about, assumed) in enumerate(ASSUMED.items()):
                 report(number * len(ASSUMED) + done, len(walks) * len(ASSUMED))
@@ -167,7 +167,7 @@ def main() -> None:
         "walktwins",
         "Twins of real walks",
         rows,
-        data=Data("RadarHD's training walks", tuple(Facts(f"radarhd {w.number}", None, None, False) for w in walks)),
+        data=Data("RadarHD's training walks", tuple(Facts.radarhd(w.number) for w in walks)),
         networks=(),
         notes=[
             "Correlation of the twin's pictures (`radarize.polar`, four antennas) with real ones of the same instants, "

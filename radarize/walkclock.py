@@ -59,14 +59,19 @@ class Clock:
     @classmethod
     def of(cls, walk: Walk, progress: Callable[[int, int], None] = lambda done, total: None) -> "Clock":
         """That of a walk; as it is numbered where its pictures do not tell, for nothing moved or it is too short."""
-        if walk.frames < _LEAST:
+        return cls.along(alike(walk, progress))
+
+    @classmethod
+    def along(cls, known: Alike) -> "Clock":
+        """The line on which a walk's pictures are most alike."""
+        frames = known.shape[1]
+        if frames < _LEAST:
             return cls()
-        known = alike(walk, progress)
         drift, late, best = _line(known)
-        paired, middle = float(np.nanmean(known[APART])), (walk.frames - 1) / 2
+        paired, middle = float(np.nanmean(known[APART])), (frames - 1) / 2
         if not best > _ALIKE:
             return cls(alike=best, paired=paired)
-        odd = np.arange(walk.frames) // _PART % 2 == 1
+        odd = np.arange(frames) // _PART % 2 == 1
         halves = [_line(np.where(kept, known, np.nan)) for kept in (odd, ~odd)]
         ends = np.array([[late - drift * middle, late + drift * middle] for drift, late, _ in halves])
         return cls(late - drift * middle, 1 + drift, best, paired, float(np.ptp(ends, axis=0).max()))
@@ -89,18 +94,18 @@ class Clock:
         found = np.rint(self.lidar(np.arange(frames))).astype(int)
         return np.where((found >= 0) & (found < frames), found, -1)
 
-    def apart(self, frames: int) -> float:
-        """Frames that pictures of one number are apart, at most."""
-        ends = np.array([0, frames - 1])
-        return float(np.abs(self.lidar(ends) - ends).max())
-
-    def row(self, frames: int) -> dict[str, float]:
-        """What tables say of a walk's clocks; s by which the lidar's picture of a number is later than the radar's."""
+    def late(self, frames: int) -> tuple[float, float]:
+        """s by which the lidar's picture of a number is later than the radar's, at a walk's start and end."""
         ends = np.array([0, frames - 1])
         start, end = PERIOD * (ends - self.lidar(ends))
+        return float(start), float(end)
+
+    def row(self, frames: int) -> dict[str, float]:
+        """What tables say of a walk's clocks."""
+        start, end = self.late(frames)
         return {
-            "start_s": float(start),
-            "end_s": float(end),
+            "start_s": start,
+            "end_s": end,
             "alike by number": self.paired,
             "alike by instant": self.alike,
             "halves differ_s": PERIOD * self.doubt,

@@ -20,6 +20,11 @@ BEARINGS = np.radians(np.linspace(-90, 90, 181))
 EVERY = 2
 
 
+def poses_of(walk: Walk, folder: Path | str | None) -> Float[np.ndarray, "frame 3"]:
+    """`true_poses` of a folder, or `lidar_poses` where there is none."""
+    return true_poses(Path(folder), walk) if folder else lidar_poses(walk)
+
+
 def true_poses(folder: Path, walk: Walk) -> Float[np.ndarray, "frame 3"]:
     """x, y (m), yaw (rad) of each frame of a walk, from FOLDER/NUMBER.tum, whose times begin with the first frame.
 

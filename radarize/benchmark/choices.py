@@ -41,6 +41,11 @@ class Walk:
         simulated = str(about.get("source", "")).startswith("radarsim")
         return cls(str(about.get("scene", "-")), int(about["seed"]) if "seed" in about else None, metres, simulated)
 
+    @classmethod
+    def radarhd(cls, number: int) -> "Walk":
+        """One of RadarHD's repository."""
+        return cls(f"radarhd {number}", None, None, False)
+
 
 @dataclass(frozen=True)
 class Choice:
@@ -99,7 +104,7 @@ LASTING = {
 }
 
 #: RadarHD's training walks, one by one and all together.
-PICTURES = {f"radarhd {number}": (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
+PICTURES = {Walk.radarhd(number).scene: (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
 
 CHOICES = (
     Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),

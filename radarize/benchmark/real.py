@@ -38,7 +38,7 @@ from radarize.methods.pictures.network import PictureNet
 from radarize.nets.weights import load
 from radarize.radar.presets import PRESETS
 from radarize.walkclock import Clock
-from radarize.walkposes import at, lidar_poses, stamps, true_poses
+from radarize.walkposes import at, poses_of, stamps
 from radarize.walks import PERIOD, Predictions, Walk
 
 NOTES = (
@@ -126,7 +126,7 @@ def real(
         progress(sum(done.values()), total)
     each = [found[name] for name in jobs]
     errors = {key: apart for one in each for key, apart in one.apart.items()}
-    data_of = Data("RadarHD's walks", tuple(Facts(f"radarhd {walk.number}", None, None, False) for walk in walks))
+    data_of = Data("RadarHD's walks", tuple(Facts.radarhd(walk.number) for walk in walks))
     tables = [
         Table("Real walks", [row for one in each for row in one.rows], list(NOTES)),
         Table("Clocks", [one.clock for one in each], [CLOCK_NOTE]),
@@ -158,7 +158,7 @@ def _compare(walk: Walk, options: Options, report: Report) -> _Compared:
     """All methods on a walk; `report` takes frames done."""
     seen, turned = _networks(options)
     scans = load(seen, PictureNet, PRESETS["radarhd"]) if seen.is_file() else None
-    poses = true_poses(options.poses, walk) if options.poses else lidar_poses(walk)
+    poses = poses_of(walk, options.poses)
     others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
     clock = Clock.of(walk)
     judged = judge(walk, clock, scans, others, lambda done: report(done / 2))

@@ -52,7 +52,7 @@ def import_walk(
         )
     elif align:
         about["clock"] = f"truth of frame k is of the lidar's picture {clock.first:.2f} + {clock.rate:.4f} k"
-    elif (apart := PERIOD * clock.apart(walk.frames)) > _APART:
+    elif (apart := max(map(abs, clock.late(walk.frames)))) > _APART:
         about["warnings"] = (
             f"radar and lidar are numbered alike, but up to {apart:.1f} s apart, so that truth is of other instants: "
             "--align pairs them by what they see"

@@ -91,7 +91,7 @@ def _methods(
 ) -> Iterator[tuple[int, UInt8[np.ndarray, "range azimuth"], dict[str, Cells], dict[str, Ranges]]]:
     """A walk's pictures, frame by frame, where each method sees something in them, and scans of those that tell first
     surfaces themselves."""
-    windows, memory = (network[1].windows(PRESETS["radarhd"]), Memory()) if network else (None, None)
+    windows, memory = (network[1].windows(PRESETS["radarhd"], network[0].maker), Memory()) if network else (None, None)
     times = stamps(walk.frames)
     for frames, pictures in walk.batches():
         likely = _network(network[0], windows, memory, pictures, times[frames]) if network else None

@@ -6,7 +6,7 @@ entries in `radarize.methods`.
 
 from functools import partial
 
-from radarize.benchmark import mapping, odometry, runtime, slam, varied
+from radarize.benchmark import mapping, odometry, radars, runtime, slam, varied
 from radarize.benchmark.drawings import draw
 from radarize.benchmark.study import Benchmark, Chosen
 
@@ -75,6 +75,13 @@ BENCHMARKS: dict[str, Benchmark] = {
         lacks=varied.STRESS.lacks,
         draw=varied.STRESS.draw,
         picture=varied.STRESS.picture,
+    ),
+    "radars": Benchmark(
+        "Other radars",
+        "Networks of one radar on others, beside methods without networks (data set `radars`).",
+        radars.pairs,
+        radars.tables,
+        lacks=radars.lacks,
     ),
     "ablation": Benchmark(
         "Ablations",

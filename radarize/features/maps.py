@@ -65,11 +65,13 @@ class Maker(ABC):
         maps: by name, what they are.
         names: of those that the array can make.
         history: frames before its own that a map needs.
+        physical: rows are metres or m/s, so that a network can be shown those of any chirp, see `Resampling`.
     """
 
     maps: dict[str, str]
     names: tuple[str, ...]
     history = 0
+    physical = False
 
     @staticmethod
     def stride(config: RadarConfig) -> int:
@@ -102,9 +104,14 @@ class Maker(ABC):
 
 
 class MapMaker(Maker):
-    """Makes the maps of one radar configuration, dB; without antennas of two heights, only those of the row."""
+    """Makes the maps of one radar configuration, dB.
+
+    Without antennas of two heights, `names` has only those of the row; whoever asks for the others all the same gets
+    the row's, by Bartlett as well: they differ in what is above and below.
+    """
 
     maps = MAPS
+    physical = True
 
     def __init__(self, config: RadarConfig):
         self.heatmaps = Heatmaps(config, AZIMUTHS)
@@ -130,13 +137,16 @@ class MapMaker(Maker):
     ) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
         """Maps of a spectrum at hand."""
         heatmaps, names = self.heatmaps, names or self.names
+        paired = heatmaps.pairs is not None
         with stage("maps"):
             limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else None
             makers = {
                 "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
-                "elevation_aware": lambda: heatmaps.elevation_aware_of(spectrum),
+                "elevation_aware": lambda: (
+                    heatmaps.elevation_aware_of(spectrum) if paired else heatmaps.range_azimuth_of(spectrum)
+                ),
                 "doppler_azimuth": lambda: heatmaps.doppler_azimuth_of(limited, "capon"),
-                "doppler_elevation_aware": lambda: heatmaps.doppler_azimuth_of(limited, elevation_aware=True),
+                "doppler_elevation_aware": lambda: heatmaps.doppler_azimuth_of(limited, elevation_aware=paired),
             }
             return {name: _decibels(makers[name]()) for name in names}
 

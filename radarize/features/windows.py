@@ -1,7 +1,8 @@
 """Windows of a stream: the maps of a frame and of some before it, as networks see them.
 
-Networks know the time between their frames from training, not from what they see: a radar whose frames come twice as
-often shows them every second one, and where frames are lost, they see no window that spans the gap.
+Networks know the time between their frames, and what a row of a map means, from training, not from what they see: a
+radar whose frames come twice as often shows them every second one, its maps are brought to the network's grid, and
+where frames are lost, they see no window that spans the gap.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,6 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Float16, Int
+
+from radarize.features.grid import Resampling
 
 
 @dataclass(frozen=True)
@@ -34,14 +37,22 @@ class Windows:
     Args:
         maps: names of a frame's.
         frames: of a window.
-        stride: the radar's frames from one of the network's to the next.
         period: s, from one of the radar's frames to the next.
-        spacing: most frames of the network's from one of a window to the next.
+        spacings: the radar's frames from one of a window to the next, ascending.
+        resampling: of the radar's maps, to the network's grid; None if they lie on it.
     """
 
-    def __init__(self, maps: Sequence[str], frames: int, stride: int, period: float, spacing: int = 1):
-        self.maps, self.frames, self.stride = tuple(maps), frames, stride
-        self._period, self._reach = period, (frames - 1) * stride * spacing
+    def __init__(
+        self,
+        maps: Sequence[str],
+        frames: int,
+        period: float,
+        spacings: Sequence[int] = (1,),
+        resampling: Resampling | None = None,
+    ):
+        self.maps, self.frames, self.spacings = tuple(maps), frames, tuple(spacings)
+        self._period, self._resampling = period, resampling
+        self._reach = (frames - 1) * self.spacings[-1]
         self._past: torch.Tensor | None = None
         self._stamps = np.zeros(0)  # of the past frames
 
@@ -49,17 +60,16 @@ class Windows:
         self,
         made: Mapping[str, Float16[np.ndarray, "frame row azimuth"]],
         stamps: Float[np.ndarray, "frame"],
-        spacings: Sequence[int] = (1,),
     ) -> list[Shown]:
-        """Windows that end at the next frames, by their maps and stamps (s), for each spacing (frames of the network's)
-        between their frames."""
+        """Windows that end at the next frames, by their maps and stamps (s), for each spacing."""
         new = torch.stack([torch.from_numpy(made[name]) for name in self.maps], dim=1).float()
+        if self._resampling is not None:
+            new = self._resampling(new)
         frames = new if self._past is None else torch.cat([self._past, new])
         stamps = np.concatenate([self._stamps, stamps])
         found = []
-        for spacing in spacings:
-            apart = spacing * self.stride * self._period
-            rows, there = spaced(stamps, len(new), self.frames, apart, self._period)
+        for spacing in self.spacings:
+            rows, there = spaced(stamps, len(new), self.frames, spacing * self._period, self._period)
             found.append(Shown(frames[torch.from_numpy(rows)], there.all(axis=1), rows[:, -1] - rows[:, 0]))
         kept = max(len(frames) - self._reach, 0)
         self._past, self._stamps = frames[kept:], stamps[kept:]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from jaxtyping import Float
 from pydantic import ValidationError
@@ -15,10 +16,11 @@ from torch import Tensor, nn
 
 from radarize import __version__
 from radarize.errors import InputError, explained
-from radarize.features.grid import TOLERANCE, Grid
+from radarize.features.grid import TOLERANCE, Grid, Resampling
 from radarize.features.maps import Maker, MapMaker
 from radarize.features.windows import Windows
 from radarize.plain import Frozen
+from radarize.radar.array import azimuth_row
 from radarize.radar.config import RadarConfig
 from radarize.replacing import replacing
 
@@ -52,26 +54,47 @@ class Header(Frozen):
     metrics: dict[str, float] = {}
     version: str = __version__
 
-    def stride(self, config: RadarConfig) -> int:
-        """Frames of a radar from one to the next of those that the network was trained on: 2 at 30 Hz, if at 15 Hz.
+    def windows(self, config: RadarConfig, maker: type[Maker], spacings: Sequence[int] | None = None) -> Windows:
+        """Of a radar's frames, as the network was trained on them.
 
-        Raises:
-            ValueError: the radar's frames do not come as often, or not at a whole multiple.
+        Args:
+            config: of the radar.
+            maker: of its maps.
+            spacings: some of the network's; the first if None. The radar's that come nearest are taken, each once.
         """
+        chosen = self.spacings[:1] if spacings is None else spacings
         ratio = self.grid.frame_period / config.frame_period
-        if round(ratio) < 1 or abs(ratio - round(ratio)) > TOLERANCE * ratio:
-            raise ValueError(
-                f"frame period {config.frame_period:.6g} instead of {self.grid.frame_period:.6g} or a part"
-            )
-        return round(ratio)
+        own, centred = Grid.of(config, self.maps[0], maker), self.maps[0].startswith("doppler")
+        return Windows(
+            self.maps, self.frames, config.frame_period, sorted({max(1, round(ratio * spacing)) for spacing in chosen}),
+            Resampling.between(self.grid, own, centred) if maker.physical else None,
+        )  # fmt: skip
 
-    def windows(self, config: RadarConfig) -> Windows:
-        """Of a radar's frames, as the network was trained on them."""
-        return Windows(self.maps, self.frames, self.stride(config), config.frame_period, max(self.spacings))
+    def ranges(self, config: RadarConfig) -> Float[np.ndarray, "row"]:
+        """Where the rows of a map over range lie that the network sees of a radar, m."""
+        return self.grid.step * np.arange(self.grid.rows) - config.range_bias
+
+    def difference(self, config: RadarConfig, maker: type[Maker]) -> str | None:
+        """Why the network cannot be shown a radar's maps, in words; None if it can."""
+        own, period = Grid.of(config, self.maps[0], maker), config.frame_period
+        if not maker.physical:
+            share = self.grid.frame_period / period
+            fits = round(share) >= 1 and abs(share - round(share)) < TOLERANCE * share
+            return self.grid.difference(own, ignore=("frame_period",)) or (
+                None if fits else f"frame period {period:.6g} instead of {self.grid.frame_period:.6g} or a part"
+            )
+        if (antennas := len(azimuth_row(config))) < LEAST_ANTENNAS:
+            return f"{antennas} antennas in a row, expected at least {LEAST_ANTENNAS}"
+        longest = LATEST * max(self.spacings) * self.grid.frame_period
+        if self.frames > 1 and period > longest:
+            return f"a frame period of {period:.3g} s, expected at most {longest:.3g} s"
+        return self.grid.lack(own)
 
 
 #: Bytes of a file's header: ours have some thousands.
 _HEADER = 1 << 20
+#: What tells bearings; and by how much longer than any that it was trained on a window may be.
+LEAST_ANTENNAS, LATEST = 4, 1.6
 
 
 class Network(nn.Module):
@@ -182,13 +205,8 @@ def _check(header: Header, config: RadarConfig, path: Path, maker: type[Maker]) 
         return
     if header.maps[0] not in maker.maps:
         raise InputError(f"{path}: reads maps {header.maps[0]!r}, expected some of: {', '.join(maker.maps)}")
-    difference = header.grid.difference(Grid.of(config, header.maps[0], maker), ignore=("frame_period",))
-    try:
-        header.stride(config)
-    except ValueError as error:
-        difference = difference or str(error)
-    if difference:
-        raise InputError(f"{path}: does not fit this radar, whose maps have {difference}; it needs weights of its own")
+    if difference := header.difference(config, maker):
+        raise InputError(f"{path}: does not fit this radar, which has {difference}")
 
 
 def write(tensors: dict[str, Tensor], about: dict[str, Any], path: Path) -> None:

@@ -5,7 +5,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
 from radarize.radar.config import RadarConfig
-from radarize.radar.presets import load_config
+from radarize.radar.presets import PRESETS, load_config
 from radarize.yamlfile import changed
 from radarsim.motion import Mounting
 from radarsim.physics.frontend_config import FrontEndConfig
@@ -24,22 +24,25 @@ class Variant(Strict):
 
     Attributes:
         level: of a scene that has levels (`radarsim.scene.description`); the walk is planned in its level 0.
-        radar: fields of `RadarConfig` to change.
+        radar: fields of `RadarConfig` to change, or a preset in place of the radar.
         frontend: fields of `FrontEndConfig` to change; of its parts, those given.
         mounting: of the sensor on the platform: x y z in m, roll pitch yaw in degrees.
         attributes: of the recordings.
     """
 
     level: int = Field(0, ge=0)
-    radar: dict[str, object] = {}
+    radar: dict[str, object] | str = {}
     frontend: dict[str, object] = {}
     mounting: Annotated[tuple[float, ...], Field(min_length=6, max_length=6)] | None = None
     attributes: Attributes = {}
 
     @field_validator("radar")
     @classmethod
-    def _known(cls, fields: dict) -> dict:
-        if unknown := fields.keys() - RadarConfig.model_fields:
+    def _known(cls, fields: dict | str) -> dict | str:
+        if isinstance(fields, str):
+            if fields not in PRESETS:
+                raise ValueError(f"no such preset, expected one of {', '.join(PRESETS)}, or fields to change")
+        elif unknown := fields.keys() - RadarConfig.model_fields:
             raise ValueError(f"{min(unknown)}: unknown key, expected some of {', '.join(RadarConfig.model_fields)}")
         return fields
 
@@ -49,8 +52,8 @@ class Variant(Strict):
         Raises:
             InputError: no such preset or file, or an impossible value.
         """
-        if not self.radar:
-            return name
+        if not self.radar or isinstance(self.radar, str):
+            return self.radar or name
         return RadarConfig.build("radar", **changed(load_config(name)[0], self.radar))
 
     def frontend_of(self, file: str | None) -> FrontEndConfig:

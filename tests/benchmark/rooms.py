@@ -15,7 +15,7 @@ CONFIG = PRESETS["radarize"].model_copy(update={"loops": 8, "samples": 32, "fram
 ROOMS = {
     "A_handheld": ("A", "handheld", {"stress": "corner", "severity": 0}),
     "A_cart": ("A", "cart", {"stress": "corner", "severity": 1}),
-    "B_robot": ("B", "robot", {"ablation": "loops", "value": 8}),
+    "B_robot": ("B", "robot", {"ablation": "loops", "value": 8, "chirps": "of 8 loops"}),
 }
 #: As `radarsim dataset` writes it.
 INDEX = {

@@ -27,6 +27,7 @@ from radarize.recording import Recording
 from tests.benchmark import toys as toy_file
 from tests.benchmark.rooms import ROOMS, write_room, write_rooms
 from tests.benchmark.toys import add
+from tests.evaluation.fake_run import walk
 
 
 @pytest.fixture
@@ -245,6 +246,30 @@ def test_bad_input_is_one_sentence(rooms, tmp_path, name, choices, expected):
         benchmark(name, rooms, tmp_path / "out", Options(**choices))
 
 
+def test_radars_stand_beside_each_other(toys, tmp_path, monkeypatch):
+    """Two walks by one radar, one by another; a path that is a tenth too long is off by a tenth of its way from its
+    middle."""
+    folder, off = tmp_path / "radars", []
+    folder.mkdir()
+    for seed, chirps in enumerate(("far", "far", "near")):
+        write_room(folder / f"A_cart_{seed}.h5", 60, seed, scene="A_0", platform="cart", chirps=chirps)
+        path = walk()[1][40 * seed :][:60]
+        off.append(0.1 * np.linalg.norm(path - path.mean(axis=0), axis=1).mean())
+    chosen = {"odometry": "scaled", "scans": "threshold"}
+    monkeypatch.setattr("radarize.benchmark.radars.CLASSICAL", {"odometry": "scaled", "scans": "metre"})
+    monkeypatch.setattr("radarize.benchmark.radars.BEST", chosen)
+    monkeypatch.setattr("radarize.benchmark.radars.best_methods", lambda config: (chosen, ""))
+    (table,) = benchmark("radars", folder, tmp_path / "out")["radars"].tables
+    assert [(row["radar"], row["scans"], row["chosen"], row["walks"]) for row in table.rows] == [
+        ("far", "metre", "", 2), ("far", "threshold", "yes", 2),
+        ("near", "metre", "", 1), ("near", "threshold", "yes", 1),
+    ]  # fmt: skip
+    mean, error = (float(part) for part in table.rows[0]["odometry m"].split(" +- "))
+    assert mean == pytest.approx(np.mean(off[:2]), abs=1e-3)
+    assert error == pytest.approx(abs(off[0] - off[1]) / 2, abs=6e-4) and error > 1e-3
+    assert table.rows[2]["odometry m"] == "-"
+
+
 def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):
     lone = tmp_path / "lone"
     lone.mkdir()
@@ -253,6 +278,8 @@ def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):
     (lone / "A_cart.h5").symlink_to(rooms / "A_cart.h5")
     with pytest.raises(InputError, match="no recording has attributes ablation and value"):
         benchmark("ablation", lone, tmp_path)
+    with pytest.raises(InputError, match="no recording has an attribute chirps"):
+        benchmark("radars", lone, tmp_path)
     with pytest.raises(InputError, match="no split of kind building, expected one to train on"):
         benchmark("buildings", lone, tmp_path, Options(trained=True))
     with pytest.raises(

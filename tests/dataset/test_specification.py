@@ -258,6 +258,10 @@ GROUP = PLAIN["recordings"][0]
         ({"recordings": [GROUP | {"waypoints": [[1, 2]]}]}, "recordings[0].waypoints is [[1, 2]]"),
         ({"variants": {"a": {"level": 1}}}, "buildings.old: is generated and has no levels"),
         ({"variants": {"a": {"radar": {"slop": 1}}}}, "variants.a.radar: slop: unknown key, expected some of board"),
+        (
+            {"variants": {"a": {"radar": "short-range"}}},
+            "variants.a.radar is 'short-range': no such preset, expected one of radarize, long-range",
+        ),
         ({"variants": {"a": {"radar": {"slope": "steep"}}}}, "variants.a: radar: slope is 'steep'"),
         ({"variants": {"a": {"radar": {"slope": 90e12}}}}, "variants.a: radar configuration: start_frequency, slope"),
         ({"variants": {"a": {"frontend": {"noize": 1}}}}, "variants.a: frontend: noize: unknown key"),
@@ -284,7 +288,7 @@ def test_mistakes_are_one_sentence(tmp_path, changes, expected):
 def test_files_that_are_no_specification(tmp_path):
     with pytest.raises(
         InputError,
-        match="no specification 'huge', expected .* one of: ablation/.*, evaluation, .*radarize146, small, str",
+        match="no specification 'huge', expected .* one of: ablation/.*, evaluation, .*radarize146, radars, small, str",
     ):
         Specification.load("huge")
     path = tmp_path / "x.yaml"

@@ -27,6 +27,7 @@ DATASETS = {
     "stress": {"corner": ("cart",)},
     "radarhd": {"A401": ("cart", "handheld")},
     "ablation/loops": {"office": ("handheld",)},
+    "radars": {"A501": ("handheld",)},
 }
 SECONDS, PLACE = 1.5, "stress/corner"
 

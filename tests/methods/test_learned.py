@@ -6,7 +6,8 @@ import torch
 
 from radarize.batch import Batch, Signal
 from radarize.errors import InputError
-from radarize.features.grid import Grid
+from radarize.features.grid import Grid, Resampling
+from radarize.features.maps import MapMaker
 from radarize.methods.radarize.fused import FusedVelocity
 from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
@@ -47,9 +48,9 @@ def test_windows_are_frames_of_the_trained_rate(tmp_path):
     everything, times = spectra(12), np.arange(12) * CONFIG.frame_period
     level = torch.from_numpy(SIGNAL.maker.of(everything, ("range_azimuth",))["range_azimuth"]).float().mean(dim=(1, 2))
     for cuts in ([12], [5, 7], [1] * 12):
-        windows = load(weights(tmp_path, "rotation"), RotationNet, CONFIG)[1].windows(CONFIG)
+        windows = load(weights(tmp_path, "rotation"), RotationNet, CONFIG)[1].windows(CONFIG, MapMaker, (1, 4))
         batches = parts(SIGNAL, everything, times, cuts)
-        pushed = [windows.push(batch.maps(windows.maps), batch.stamps, (1, 4)) for batch in batches]
+        pushed = [windows.push(batch.maps(windows.maps), batch.stamps) for batch in batches]
         for k, spacing in enumerate((1, 4)):
             shown = torch.cat([part[k].maps for part in pushed]).mean(dim=(2, 3, 4))
             whole = np.concatenate([part[k].whole for part in pushed])
@@ -58,10 +59,33 @@ def test_windows_are_frames_of_the_trained_rate(tmp_path):
             assert torch.allclose(shown, level[torch.tensor(expected)], atol=0.01)
 
 
-def test_a_radar_of_another_rate_is_refused(tmp_path):
-    odd = CONFIG.model_copy(update={"frame_period": 0.05})
-    with pytest.raises(InputError, match="frame period 0.05 instead of 0.066666 or a part"):
-        load(weights(tmp_path, "rotation"), RotationNet, odd)
+@pytest.mark.parametrize(
+    ("period", "spacings"), [(0.02, (3, 7, 13)), (0.033333, (2, 4, 8)), (0.05, (1, 3, 5)), (0.15, (1, 2)), (0.3, (1,))]
+)
+def test_windows_of_other_rates_last_as_long(tmp_path, period, spacings):
+    """Of a network trained on 1, 2 and 4 frames of 67 ms; each spacing once."""
+    header = load(weights(tmp_path, "rotation"), RotationNet)[1]
+    radar = CONFIG.model_copy(update={"frame_period": period})
+    assert header.windows(radar, MapMaker, (1, 2, 4)).spacings == spacings
+
+
+def test_frames_that_are_farther_apart_than_any_it_knows_are_refused(tmp_path):
+    slow = CONFIG.model_copy(update={"frame_period": 0.5})
+    with pytest.raises(InputError, match=r"which has a frame period of 0.5 s, expected at most 0.427 s"):
+        load(weights(tmp_path, "rotation"), RotationNet, slow)
+
+
+def test_maps_of_other_chirps_are_shown_on_the_known_grid(tmp_path):
+    """With the same echoes in the same cells, see tests/features/test_grid.py."""
+    fine = CONFIG.model_copy(update={"samples": 192, "sample_rate": 2 * CONFIG.sample_rate, "loops": 40})
+    signal, header = Signal(fine), load(weights(tmp_path, "translation"), TranslationNet, fine)[1]
+    noise = torch.randn((3, 192, 40, 12), dtype=torch.complex64, generator=torch.Generator().manual_seed(0))
+    made = signal.maker.of(noise, MAPS["translation"])
+    (shown,) = header.windows(fine, MapMaker).push(made, fine.frame_period * np.arange(3))
+    assert shown.maps.shape == (3, 2, 2, CONFIG.loops, 80)
+    resampling = Resampling(header.grid, Grid.of(fine, "doppler_azimuth"), centred=True)
+    both = torch.stack([torch.from_numpy(made[name]) for name in MAPS["translation"]], dim=1).float()
+    assert torch.equal(shown.maps[:, -1], resampling(both))
 
 
 def test_batches_do_not_matter(tmp_path):

@@ -283,7 +283,7 @@ def test_what_does_not_fit_is_refused(data, tmp_path):
     with pytest.raises(InputError, match="translation.safetensors: no such file"):
         run(data / "0.h5", tmp_path / "run", odometry="published", scans="published", weights=tmp_path)
     networks(tmp_path)
-    with pytest.raises(InputError, match="does not fit this radar, whose maps have rows 64 instead of 96"):
+    with pytest.raises(InputError, match="does not fit this radar, which has rows 64 instead of 96"):
         other = Inputs(CONFIG.model_copy(update={"samples": 64}), weights=Weights(tmp_path))
         Workshop(other).odometry("published", "published")
     done = CliRunner().invoke(app, ["train", "translation", "--settings", "old", "--data", ".", "-o", "a.safetensors"])

@@ -54,8 +54,14 @@ def test_round_trip(kind, tmp_path):
 def test_what_does_not_fit_is_refused(tmp_path):
     net, header = network("translation")
     path = save(net, header, tmp_path / "net.safetensors")
-    with pytest.raises(InputError, match="does not fit this radar, whose maps have rows 16 instead of 32"):
-        load(path, TranslationNet, CONFIG.model_copy(update={"loops": 16}))
+    for change, lack in (
+        ({"loops": 12}, "steps of 0.306, expected at most 0.229"),
+        ({"idle_time": 500e-6, "loops": 18}, "a reach of 1.15, expected at least 1.83"),
+        ({"frame_period": 0.1}, "a frame period of 0.1 s, expected at most 0.0533 s"),
+        ({"rx": (0,), "tx_order": (0, 2)}, "2 antennas in a row, expected at least 4"),
+    ):
+        with pytest.raises(InputError, match=f"net.safetensors: does not fit this radar, which has {lack}"):
+            load(path, TranslationNet, CONFIG.model_copy(update=change))
     with pytest.raises(InputError, match="missing.safetensors: no such file"):
         load(tmp_path / "missing.safetensors", TranslationNet)
     (tmp_path / "text.safetensors").write_text("no weights at all")

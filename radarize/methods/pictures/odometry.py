@@ -24,7 +24,7 @@ class PictureRates:
 
     def __init__(self, inputs: Inputs):
         self._stream = PictureStream(inputs, PictureTurnNet)
-        self.span = self._stream.stride * inputs.radar.frame_period
+        self.span = self._stream.spacing * inputs.radar.frame_period
 
     @torch.inference_mode()
     def rates(self, batch: Batch) -> Float[np.ndarray, "frame 2"]:
@@ -34,7 +34,7 @@ class PictureRates:
         """
         shown = self._stream.windows(batch)
         mean, covariance = self._stream.net.estimate(shown.maps)
-        told = np.column_stack([mean[:, 0] / self.span, self._stream.stride * covariance[:, 0, 0] / self.span**2])
+        told = np.column_stack([mean[:, 0] / self.span, self._stream.spacing * covariance[:, 0, 0] / self.span**2])
         return np.where(shown.whole[:, None], told, np.nan)
 
 

@@ -25,7 +25,7 @@ class PictureStream:
 
     Attributes:
         net: the network.
-        stride: frames from one picture of a window to the next.
+        spacing: frames from one picture of a window to the next.
 
     Raises:
         InputError: no such weights, or they are for another radar.
@@ -33,8 +33,8 @@ class PictureStream:
 
     def __init__(self, inputs: Inputs, kind: type[Network]):
         self.net, header = load(inputs.weights.of(kind.kind), kind, inputs.radar)
-        self._windows, self._maker = header.windows(inputs.radar), inputs.part(PictureMaker)
-        self.stride = self._windows.stride
+        self._windows, self._maker = header.windows(inputs.radar, PictureMaker), inputs.part(PictureMaker)
+        self.spacing = self._windows.spacings[0]
 
     def windows(self, batch: Batch) -> Shown:
         """Of the next frames."""

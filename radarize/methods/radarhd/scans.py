@@ -26,7 +26,7 @@ class RadarHdScans:
 
     def __init__(self, radar: RadarConfig, weights: Path):
         self._net, header = load(weights, RadarHdNet, radar)
-        self._windows, self._ranges = header.windows(radar), radar.ranges - radar.range_bias
+        self._windows, self._ranges = header.windows(radar, self._net.maker), header.ranges(radar)
 
     @torch.inference_mode()
     def picture(self, batch: Batch) -> Float[torch.Tensor, "frame range direction"]:

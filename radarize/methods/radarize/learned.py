@@ -31,7 +31,7 @@ class LearnedVelocity:
 
     def __init__(self, radar: RadarConfig, weights: Path):
         self._net, header = load(weights, TranslationNet, radar)
-        self._windows = header.windows(radar)
+        self._windows = header.windows(radar, self._net.maker)
 
     @torch.inference_mode()
     def estimate(self, batch: Batch) -> Velocities:
@@ -56,9 +56,9 @@ class LearnedRotation:
     def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):
         settings = settings or TurnConfig()
         self._net, header = load(weights, RotationNet, radar)
-        self._windows, known = header.windows(radar), header.spacings
-        self.spacings = [s for s in settings.spacings if s in known] or list(known)
-        size = max(self.spacings) * self._windows.stride + 1
+        known = header.spacings
+        self._windows = header.windows(radar, self._net.maker, [s for s in settings.spacings if s in known] or known)
+        size = self._windows.spacings[-1] + 1
         self._longest = (size - 0.5) * radar.frame_period
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
         self._yaws = Ties(size, settings.wander, settings.fastest)
@@ -85,11 +85,6 @@ class LearnedRotation:
         growth[told] *= self._alike
         return Rotations(yaw, growth, told)
 
-    @property
-    def stride(self) -> int:
-        """The radar's frames from one of the network's to the next."""
-        return self._windows.stride
-
     @torch.inference_mode()
     def turns(
         self, batch: Batch, velocities: Velocities
@@ -97,10 +92,10 @@ class LearnedRotation:
         """What the network says of the next frames.
 
         Returns:
-            Turns (rad) over each of `spacings` until them, and variances; NaN where frames are missing in between.
+            Turns (rad) over each spacing until them, and variances; NaN where frames are missing in between.
             From how many frames ago; 0 where frames are missing.
         """
-        windows = self._windows.push(batch.maps(self._windows.maps), batch.stamps, self.spacings)
+        windows = self._windows.push(batch.maps(self._windows.maps), batch.stamps)
         whole = np.stack([shown.whole for shown in windows])
         back = np.where(whole, np.stack([shown.back for shown in windows]), 0)
         turns = np.full((*back.shape, 2), np.nan)

@@ -1,5 +1,6 @@
 """The methods, put together."""
 
+from radarize.mapping.scans import HeatmapScans
 from radarize.methods.method import Inputs
 from radarize.methods.radarize.fused import FusedVelocity
 from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
@@ -29,5 +30,6 @@ def _turns(inputs: Inputs) -> LearnedRotation:
 
 
 def segmentation(inputs: Inputs, first: bool = True) -> Segmentation:
-    """The network's first surfaces, or its likeliest cells."""
-    return Segmentation(inputs.radar, inputs.weights.of("segmentation"), first=first)
+    """The network's first surfaces, or its likeliest cells; farther than it sees, first echoes."""
+    far = HeatmapScans(inputs.signal.heatmaps, "first-echo", inputs.configuration.scans) if first else None
+    return Segmentation(inputs.radar, inputs.weights.of("segmentation"), first, far)

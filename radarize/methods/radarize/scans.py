@@ -8,6 +8,7 @@ from jaxtyping import Float
 
 from radarize.batch import Batch
 from radarize.mapping import echoes
+from radarize.mapping.scans import HeatmapScans
 from radarize.methods.radarize.segmentation import SegmentationNet
 from radarize.nets.weights import load
 from radarize.radar.config import RadarConfig
@@ -25,15 +26,18 @@ class Segmentation:
     Args:
         first: take the first surface; False: the likeliest occupied cell of each bearing, wherever it is, for
             comparison.
+        beyond: scans of a radar that sees farther than the network: what they see there is taken, where the network
+            sees nothing.
 
     Raises:
-        InputError: no such weights, or they are for another radar.
+        InputError: no such weights, or they do not fit the radar.
     """
 
-    def __init__(self, radar: RadarConfig, weights: Path, first: bool = True):
+    def __init__(self, radar: RadarConfig, weights: Path, first: bool = True, beyond: HeatmapScans | None = None):
         self._net, header = load(weights, SegmentationNet, radar)
-        self._windows, self._ranges = header.windows(radar), radar.ranges - radar.range_bias
+        self._windows, self._ranges = header.windows(radar, self._net.maker), header.ranges(radar)
         self.first = first
+        self._beyond = beyond if radar.max_range > header.grid.reach else None
 
     @torch.inference_mode()
     def occupancy(self, batch: Batch) -> Float[np.ndarray, "frame range bearing"]:
@@ -49,7 +53,11 @@ class Segmentation:
                 bins = first_surface(occupancy, LEAST)
             else:
                 bins = echoes.strongest(occupancy >= LEAST, occupancy)
-        return np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
+        near = np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
+        if self._beyond is None:
+            return near
+        far = self._beyond.scan(batch)
+        return np.where(np.isinf(near) & (far > self._ranges[-1]), far, near)
 
 
 def first_surface(

@@ -1,0 +1,72 @@
+"""Networks that were trained with one radar, on others: walks that several radars see alike (data set `radars`)."""
+
+import pandas as pd
+
+from radarize.benchmark.dataset import DataSet
+from radarize.benchmark.protocol import figures_of
+from radarize.benchmark.runs import Pair
+from radarize.benchmark.study import Chosen, Study
+from radarize.benchmark.table import NONE, Table
+from radarize.methods.registry import BEST, CLASSICAL, best_methods
+from radarize.radar.config import RadarConfig
+
+#: Attribute that says which radar saw a recording.
+CHIRPS = "chirps"
+#: Columns with means and their standard errors over walks, and columns with means in %, by paths of `Study.of`.
+MEANS = {
+    "odometry m": "odometry.ate.position.mean",
+    "odometry rad": "odometry.ate.rotation.mean",
+    "SLAM m": "slam.ate.position.mean",
+}
+SHARES = {"map F1 %": "map.f1", "returned %": "scans.returned", "within 10 cm %": "scans.within_10cm"}
+NOTES = (
+    "Every walk is made once for each radar, with the same seed and scatterers. The networks were trained with the "
+    "first radar's chirps alone. Means over walks and their standard errors. Returned: of bearings with a surface in "
+    "the radar's reach, so the farther a radar sees, the more it has to return. Within 10 cm: of returned bearings.",
+    "chosen: what `radarize run` takes for that radar if nothing is asked for.",
+)
+
+
+def pairs(chosen: Chosen) -> list[Pair]:
+    """Neither with networks, scans alone, and both; or what was asked for instead."""
+    without, best = Pair(**CLASSICAL), Pair(**BEST)
+    usual = dict.fromkeys([without, Pair(without.odometry, best.scans), best])
+    wanted = [pair for pair in usual if pair.odometry in chosen.odometry and pair.scans in chosen.scans]
+    return wanted or chosen.by_odometry()
+
+
+def lacks(data: DataSet) -> str:
+    """What a data set must have and has not: recordings that say which radar it was."""
+    if any(CHIRPS in case.attributes for case in data.cases):
+        return ""
+    return f"no recording has an attribute {CHIRPS}, expected a data set such as that of `radarsim dataset radars`"
+
+
+def tables(study: Study) -> list[Table]:
+    """Figures by radar and pair of methods."""
+    chirps = {}
+    for case in study.data.cases:
+        chirps.setdefault(case.attributes.get(CHIRPS), []).append(case)
+    rows = [
+        {"radar": radar, "odometry by": pair.odometry, "scans": pair.scans} | _row(study, radar, pair, cases[0].config)
+        for radar, cases in chirps.items()
+        for pair in study.pairs
+        if radar is not None
+    ]
+    return [Table("By radar", rows, list(NOTES))]
+
+
+def _row(study: Study, radar: str, pair: Pair, config: RadarConfig) -> dict[str, object]:
+    runs = study.of(pair)
+    runs = runs[[run.case.attributes.get(CHIRPS) == radar for run in runs["run"]]]
+    means, shares = figures_of(runs, MEANS), 100 * figures_of(runs, SHARES)
+    return (
+        {"chosen": "yes" if Pair(**best_methods(config)[0]) == pair else "", "walks": len(runs)}
+        | {name: with_error(values) for name, values in means.items()}
+        | shares.mean().to_dict()
+    )
+
+
+def with_error(values: pd.Series) -> str:
+    """Mean +- standard error over walks."""
+    return f"{values.mean():.3f} +- {values.sem():.3f}" if len(values) > 1 else NONE

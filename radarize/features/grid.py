@@ -7,6 +7,7 @@ to these rows, so that what is far for one radar is far for any.
 import numpy as np
 import torch
 from jaxtyping import Float
+from pydantic import Field
 
 from radarize.features.maps import Maker, MapMaker
 from radarize.plain import Frozen
@@ -30,11 +31,12 @@ class Grid(Frozen):
         frame_period: s.
     """
 
-    rows: int
-    step: float
-    azimuths: int
+    # Limits are those of any radar: files of weights are foreign input.
+    rows: int = Field(ge=1, le=1 << 14)
+    step: float = Field(gt=0, le=1e3)
+    azimuths: int = Field(ge=1, le=1 << 14)
     field: float
-    frame_period: float
+    frame_period: float = Field(gt=0, le=1e4)
 
     @classmethod
     def of(cls, config: RadarConfig, name: str, maker: type[Maker] = MapMaker) -> "Grid":

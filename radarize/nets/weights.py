@@ -4,12 +4,12 @@ import json
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import torch
 from jaxtyping import Float
-from pydantic import ValidationError
+from pydantic import Field, ValidationError
 from safetensors import safe_open
 from safetensors.torch import save as serialise
 from torch import Tensor, nn
@@ -46,7 +46,7 @@ class Header(Frozen):
     maps: tuple[str, ...]
     width: int
     grid: Grid | None
-    spacings: tuple[int, ...] = (1,)
+    spacings: tuple[Annotated[int, Field(ge=1, le=1 << 10)], ...] = Field((1,), min_length=1, max_length=1 << 6)
     data: str = ""
     split: str | None = None
     seed: int = 0
@@ -88,13 +88,16 @@ class Header(Frozen):
         longest = LATEST * max(self.spacings) * self.grid.frame_period
         if self.frames > 1 and period > longest:
             return f"a frame period of {period:.3g} s, expected at most {longest:.3g} s"
+        if period * OFTENEST < self.grid.frame_period:
+            return f"a frame period of {period:.3g} s, expected at least {self.grid.frame_period / OFTENEST:.3g} s"
         return self.grid.lack(own)
 
 
 #: Bytes of a file's header: ours have some thousands.
 _HEADER = 1 << 20
-#: What tells bearings; and by how much longer than any that it was trained on a window may be.
-LEAST_ANTENNAS, LATEST = 4, 1.6
+#: What tells bearings; by how much longer than any that it was trained on a window may be; and how many times as often
+#: as in its training frames may come, which it keeps until a window is full.
+LEAST_ANTENNAS, LATEST, OFTENEST = 4, 1.6, 32
 
 
 class Network(nn.Module):

@@ -11,6 +11,7 @@ from hypothesis.strategies import SearchStrategy
 import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
 from radarize.evaluation.evaluate import evaluate
 from radarize.features.grid import Grid
+from radarize.features.maps import MapMaker
 from radarize.log import Log
 from radarize.methods.radarize.motion import RotationNet
 from radarize.nets.weights import Header, build, save
@@ -105,4 +106,12 @@ def weights() -> Reader:
             for cut, seed in cuts
         )
     )
-    return Reader(st.one_of(damaged(seeds), heads), file("a.safetensors"), lambda path: load_weights(path, RotationNet))
+    return Reader(st.one_of(damaged(seeds), heads), file("a.safetensors"), _shown)
+
+
+def _shown(path: Path) -> None:
+    """What the network would be shown of a radar that is not that of its training."""
+    radar = PRESETS["long-range"]
+    header = load_weights(path, RotationNet, radar)[1]
+    made = {name: np.zeros((2, radar.samples, 80), np.float16) for name in header.maps}
+    header.windows(radar, MapMaker, header.spacings).push(made, radar.frame_period * np.arange(2))

@@ -76,7 +76,7 @@ def test_frames_that_are_farther_apart_than_any_it_knows_are_refused(tmp_path):
 
 
 def test_maps_of_other_chirps_are_shown_on_the_known_grid(tmp_path):
-    """With the same echoes in the same cells, see tests/features/test_grid.py."""
+    """With the same echoes in the same cells, see tests/features/test_resampling.py."""
     fine = CONFIG.model_copy(update={"samples": 192, "sample_rate": 2 * CONFIG.sample_rate, "loops": 40})
     signal, header = Signal(fine), load(weights(tmp_path, "translation"), TranslationNet, fine)[1]
     noise = torch.randn((3, 192, 40, 12), dtype=torch.complex64, generator=torch.Generator().manual_seed(0))

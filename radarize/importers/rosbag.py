@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterator
 from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
+from reprlib import repr as shortened
 
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Reader1
@@ -87,6 +88,9 @@ class Bag:
             with explained(f"{path}: is no readable ROS bag"):
                 self._reader = StreamingReader(path) if self._ros1 else Reader2(path)
                 self._reader.open()
+                for connection in self._reader.connections:  # SQLite's columns hold values of any type
+                    if not isinstance(connection.topic, str) or not isinstance(connection.msgtype, str):
+                        raise ValueError(f"a topic is named {shortened(connection.topic)}, expected text")
             stack.callback(self._reader.close)
             with explained(f"{path}: has message definitions that cannot be read"):
                 self._types = self._definitions()
@@ -132,6 +136,8 @@ class Bag:
         decode = self._types.deserialize_ros1 if self._ros1 else self._types.deserialize_cdr
         with explained(f"{self.path}: is no readable ROS bag"):
             for connection, time, data in self._reader.messages(connections=connections):
+                if not isinstance(time, int):
+                    raise ValueError(f"a message on {connection.topic} has no number for its time, {shortened(time)}")
                 yield connection.topic, time, decode(data, connection.msgtype)
 
 

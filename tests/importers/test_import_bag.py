@@ -1,5 +1,6 @@
 """ROS bags in the published layout, written from a recording whose truth is known in closed form."""
 
+import sqlite3
 import tracemalloc
 from pathlib import Path
 
@@ -318,6 +319,33 @@ def test_a_bag_that_breaks_off_inside_says_so(tmp_path):
     (tmp_path / "b.bag").write_bytes(data)
     with pytest.raises(InputError, match="b.bag: is no readable ROS bag"):
         import_recording(tmp_path / "b.bag", tmp_path / "out.h5", Given(config=SMALL))
+
+
+LAST = "where timestamp = (select max(timestamp) from messages)"
+
+
+@pytest.mark.parametrize(
+    ("change", "value", "said"),
+    [
+        (f"messages set timestamp = ? {LAST}", "noon", "/radar0/radar_data has no number for its time, 'noon'"),
+        (f"messages set timestamp = ? {LAST}", b"noon", "/radar0/radar_data has no number for its time, b'noon'"),
+        (f"messages set timestamp = ? {LAST}", 0.5, "/radar0/radar_data has no number for its time, 0.5"),
+        (f"messages set data = ? {LAST}", "noon", ""),
+        ("topics set name = ?", b"radar", "a topic is named b'radar', expected text"),
+        ("topics set type = ?", b"type", ""),
+    ],
+)
+def test_values_of_any_type_are_refused(tmp_path, change, value, said):
+    """SQLite keeps anything in any column."""
+    with BagWriter(tmp_path / "a", 2) as bag:
+        for k, frame in enumerate(noise(SMALL, 3)):
+            bag.frame(0.05 * k, frame, SMALL)
+    (path,) = (tmp_path / "a").glob("*.db3")
+    with sqlite3.connect(path) as base:
+        base.execute(f"update {change}", [value])
+    with pytest.raises(InputError, match=f"a.db3: .*{said}"):
+        import_recording(path, tmp_path / "out.h5", Given(config=SMALL))
+    assert not (tmp_path / "out.h5").exists()
 
 
 def test_depth_encodings():

@@ -62,13 +62,14 @@ class Grid(Frozen):
         """m, or m/s from the lowest speed to the highest."""
         return self.rows * self.step
 
-    def lack(self, other: "Grid") -> str | None:
-        """What another radar's maps lack to be brought to this grid, in words; None if nothing does."""
+    def lack(self, other: "Grid", unit: str) -> str | None:
+        """What another radar's maps, with rows in a unit, lack to be brought to this grid, in words; None if nothing
+        does."""
         coarsest, least = COARSEST * self.step, LEAST_SHARE * self.reach
         if other.step > coarsest:
-            return f"steps of {other.step:.3g}, expected at most {coarsest:.3g}"
+            return f"bins of {other.step:.3g} {unit}, expected at most {coarsest:.3g} {unit}"
         if other.reach < least:
-            return f"a reach of {other.reach:.3g}, expected at least {least:.3g}"
+            return f"a reach of {other.reach:.3g} {unit}, expected at least {least:.3g} {unit}"
         return None
 
 

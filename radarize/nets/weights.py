@@ -90,7 +90,7 @@ class Header(Frozen):
             return f"a frame period of {period:.3g} s, expected at most {longest:.3g} s"
         if period * OFTENEST < self.grid.frame_period:
             return f"a frame period of {period:.3g} s, expected at least {self.grid.frame_period / OFTENEST:.3g} s"
-        return self.grid.lack(own)
+        return self.grid.lack(own, "m/s" if self.maps[0].startswith("doppler") else "m")
 
 
 #: Bytes of a file's header: ours have some thousands.

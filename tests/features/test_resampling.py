@@ -87,8 +87,7 @@ def test_an_echo_is_in_the_same_cell_for_every_radar(name):
 
 def test_what_a_radar_lacks():
     known = grid(40, 1.0)
-    assert (
-        known.lack(grid(30, 1.0)) is None and known.lack(grid(1000, 0.1)) is None and known.lack(grid(20, 1.9)) is None
-    )
-    assert known.lack(grid(30, 2.1)) == "steps of 2.1, expected at most 2"
-    assert known.lack(grid(19, 1.0)) == "a reach of 19, expected at least 20"
+    for fits in (grid(30, 1.0), grid(1000, 0.1), grid(20, 1.9)):
+        assert known.lack(fits, "m") is None
+    assert known.lack(grid(30, 2.1), "m") == "bins of 2.1 m, expected at most 2 m"
+    assert known.lack(grid(19, 1.0), "m/s") == "a reach of 19 m/s, expected at least 20 m/s"

@@ -207,7 +207,7 @@ def test_a_lost_frame_is_in_no_window(tmp_path):
 class Says:
     """An estimator whose answers are given."""
 
-    lever = 0.0
+    lever, limit = 0.0, 10.0
 
     def __init__(self, velocity, covariance, seen=True):
         velocity = np.atleast_2d(velocity)
@@ -245,6 +245,14 @@ def test_fusion_claims_what_correlated_errors_leave(correlation):
     error = found.velocity[:, :, None]
     nees = (error.mT @ np.linalg.solve(found.covariance, error)).mean() / 2
     assert nees == pytest.approx(1, abs=0.04)
+
+
+def test_fusion_believes_no_network_beyond_the_speeds_that_it_sees():
+    """At 10.5 m/s a network that sees 10 m/s says something, and is sure of it."""
+    fast = [10.5, 0.0]
+    found = FusedVelocity(Says([0.3, 0.1], 1e-4 * np.eye(2)), Says(fast, Q)).estimate(None)
+    assert np.allclose(found.velocity[0], fast, atol=0.06)
+    assert (np.linalg.eigvalsh(found.covariance[0]) > 0.9 * np.diag(Q)).all()
 
 
 def test_fusion_with_one_that_knows_nothing_is_the_other():

@@ -55,8 +55,8 @@ def test_what_does_not_fit_is_refused(tmp_path):
     net, header = network("translation")
     path = save(net, header, tmp_path / "net.safetensors")
     for change, lack in (
-        ({"loops": 12}, "steps of 0.306, expected at most 0.229"),
-        ({"idle_time": 500e-6, "loops": 18}, "a reach of 1.15, expected at least 1.83"),
+        ({"loops": 12}, "bins of 0.306 m/s, expected at most 0.229 m/s"),
+        ({"idle_time": 500e-6, "loops": 18}, "a reach of 1.15 m/s, expected at least 1.83 m/s"),
         ({"frame_period": 1e-3, "loops": 1}, "a frame period of 0.001 s, expected at least 0.00104 s"),
         ({"frame_period": 0.1}, "a frame period of 0.1 s, expected at most 0.0533 s"),
         ({"rx": (0,), "tx_order": (0, 2)}, "2 antennas in a row, expected at least 4"),

@@ -1,9 +1,11 @@
 """Network and least squares together, each by what it says of its own error."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from radarize.batch import Batch
-from radarize.methods.radarize.learned import LearnedVelocity
+from radarize.methods.radarize.learned import ANY_VELOCITY, LearnedVelocity
 from radarize.odometry.doppler import DopplerVelocity, Velocities
 from radarize.odometry.settings import FusionConfig
 
@@ -27,6 +29,9 @@ class FusedVelocity:
     def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames."""
         one, other = self.learned.estimate(batch), self.doppler.estimate(batch)
+        # Faster than the network sees, its maps are empty.
+        seen = one.seen & (np.hypot(*other.velocity.T) <= self.learned.limit)
+        one = replace(one, seen=seen, covariance=np.where(seen[:, None, None], one.covariance, ANY_VELOCITY))
         roots = np.linalg.cholesky(one.covariance), np.linalg.cholesky(other.covariance)
         # What one estimator knows nothing of has no error in common with the other.
         both = self.settings.correlation * (one.seen & other.seen)

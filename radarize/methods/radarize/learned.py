@@ -15,12 +15,15 @@ from radarize.odometry.settings import TurnConfig
 from radarize.odometry.ties import Ties
 from radarize.radar.config import RadarConfig
 
-#: m/s, standard deviation of a velocity of which a network says nothing.
-_ANY_VELOCITY = 2.0
+#: (m/s)^2, covariance of a velocity of which a network says nothing.
+ANY_VELOCITY = 2.0**2 * np.eye(2)
 
 
 class LearnedVelocity:
     """Velocity estimator by `TranslationNet`.
+
+    Attributes:
+        limit: m/s; it sees no faster speeds.
 
     Raises:
         InputError: no such weights, or they are for another radar.
@@ -32,6 +35,7 @@ class LearnedVelocity:
     def __init__(self, radar: RadarConfig, weights: Path):
         self._net, header = load(weights, TranslationNet, radar)
         self._windows = header.windows(radar, self._net.maker)
+        self.limit = header.grid.reach / 2
 
     @torch.inference_mode()
     def estimate(self, batch: Batch) -> Velocities:
@@ -39,7 +43,7 @@ class LearnedVelocity:
         shown = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
         told = shown.whole & ~batch.aliases.any(axis=1)  # it was taught speeds that do not alias
         velocity = np.zeros((len(batch), 2))
-        covariance = np.tile(_ANY_VELOCITY**2 * np.eye(2), (len(batch), 1, 1))
+        covariance = np.tile(ANY_VELOCITY, (len(batch), 1, 1))
         if told.any():
             mean, spread = self._net.estimate(shown.maps[told])
             velocity[told], covariance[told] = mean.double().numpy(), spread.double().numpy()

@@ -66,3 +66,15 @@ def test_turns_and_maps_of_real_walks_are_those_of_the_results():
     for method in ("network", "RadarHD", "lidar"):
         off, f1 = (mean(maps, method, column, moving) for column in ("ate_m", "map_f1_20cm"))
         assert f"| {off:.2f} | {100 * f1:.0f} |" in text, method
+
+
+def test_other_radars_are_those_of_the_results():
+    """Without networks, and what is chosen for each radar."""
+    text = (ROOT / "docs/about/results.md").read_text()
+    found = json.loads((ROOT / "benchmarks" / "results" / "radars.json").read_text())["tables"][0]["rows"]
+    for radar in {row["radar"] for row in found}:
+        without = next(row for row in found if row["radar"] == radar and row["scans"] == "first-echo")
+        chosen = next(row for row in found if row["radar"] == radar and row["chosen"])
+        figures = [f"{row[name]:.0f}" for name in ("map F1 %", "within 10 cm %") for row in (without, chosen)]
+        line = " | ".join([without["SLAM m"], chosen["SLAM m"], *figures])
+        assert f"| {line} |" in text, (radar, line)

@@ -103,7 +103,7 @@ LASTING = {
     "D_0": (1781852632830259480,),
 }
 
-#: 20 s by hand in a building of style A, seed 301, and by cart in C, seed 303, each as six radars see it.
+#: 20 s by hand in a building of style A, seed 301, and by cart in C, seed 303, as up to eleven radars see them.
 RADARS = {"A_0": (4309744100947278613,), "C_0": (2078735959714348781,)}
 
 #: RadarHD's training walks, one by one and all together.
@@ -115,7 +115,11 @@ CHOICES = (
     Choice("what odometry claims of its errors, and its fusion with the network", ODOMETRY),
     Choice("how long the map of turns remembers, and what the network's turns count for", TURNS),
     Choice("how long errors of velocities are claimed to last", LASTING),
-    Choice("how coarse maps of other radars may be, and which radars turn without networks", RADARS),
+    Choice(
+        "how coarse maps of other radars may be, which radars turn without networks, and what arrays that tell little "
+        "claim of velocities",
+        RADARS,
+    ),
     Choice("the compass and what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),

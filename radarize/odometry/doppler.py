@@ -78,6 +78,11 @@ class DopplerConfig(Frozen):
         0.003, "of the speed, standard deviation of what echoes share along it: their elevation", ge=0
     )
     course_noise: float = setting(0.0065, "rad, of what they share across it: azimuths that are off to one side", ge=0)
+    rough: float = setting(
+        0.06, "of the speed, standard deviation of what echoes share along it and across it where the array tells no "
+        "elevation; twice that in rows of fewer than 8 antennas; chosen on two walks of 20 s (by hand in A, seed 301, "
+        "by cart in C, seed 303) with two transmitters, the first also with one, and by two other boards", ge=0
+    )  # fmt: skip
     floor: float = setting(0.0005, "m/s, least standard deviation of a velocity", ge=0)
 
 
@@ -103,6 +108,8 @@ class DopplerVelocity:
         # An echo's phase turns with its way to the transmitter and back to the receiver: it is the middle that moves.
         self.lever = float(virtual_positions(self.config).reshape(-1, 3)[self.row, 1].mean()) / 2
         self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
+        flat, short = self.pairs is None, len(self.row) < _ROW
+        self._rough = self.settings.rough * (2 if short else 1 if flat else 0)
         # One table of random numbers for all frames: the same frame gives the same answer in any batch.
         self._draws = np.random.default_rng(0).random((self.settings.hypotheses, 2))
 
@@ -122,7 +129,8 @@ class DopplerVelocity:
         s = self.settings
         across = np.stack([-velocity[:, 1], velocity[:, 0]], axis=1)
         along, side = (v[:, :, None] * v[:, None] for v in (velocity, across))
-        return s.scale_noise**2 * along + s.course_noise**2 * side + s.floor**2 * np.eye(2)
+        scale, course = (noise**2 + self._rough**2 for noise in (s.scale_noise, s.course_noise))
+        return scale * along + course * side + s.floor**2 * np.eye(2)
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 6"]:
         """Peaks of one frame: range bin, closing speed (m/s), u_y, u_z and its variance, power over the median."""
@@ -185,6 +193,8 @@ UNKNOWN_SPEED = 10.0
 _ECHOES, _DETERMINED = 4, 0.3
 #: Standard deviations from which a velocity is not zero: a walk that sets in is slow, but its speed is well known.
 _SIGMAS = 3.0
+#: Antennas of the row that claims were fitted to.
+_ROW = 8
 #: A weaker peak beside a stronger one of the same range and Doppler may be its sidelobe (-25 dB, and mismatch).
 SIDELOBE = 0.1
 

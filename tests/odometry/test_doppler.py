@@ -5,6 +5,7 @@ import pytest
 
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import DopplerVelocity, _fit
+from radarize.radar.array import BOARDS
 from radarize.radar.presets import PRESETS
 from tests.batches import batch
 from tests.echoes import record
@@ -164,6 +165,18 @@ def test_other_configurations(room, preset):
     maps = Heatmaps(config)
     found = DopplerVelocity(maps).estimate(batch(config, burst(room, (0.8, 0.2), config=config), np.zeros(1)))
     np.testing.assert_allclose(found.velocity[0], (0.8, 0.2), atol=0.08)
+
+
+def test_four_antennas_in_a_row_claim_little(room):
+    """They hardly tell bearings: velocities are off by some tenths, and what is claimed knows of it."""
+    fields = {"board": "iwr6843aop", "start_frequency": 60e9}
+    config = CONFIG.model_copy(update=fields | {"channel_calibration": BOARDS["iwr6843aop"].channel_calibration})
+    adc = np.concatenate([burst(room, v, yaw=y, config=config) for v in VELOCITIES[:6] for y in (0.3, 2.1)])
+    truth = np.repeat(VELOCITIES[:6], 2, axis=0)
+    found = DopplerVelocity(Heatmaps(config)).estimate(batch(config, adc, np.arange(len(adc))))
+    error = (found.velocity - truth)[found.seen, :, None]
+    nees = (error.mT @ np.linalg.solve(found.covariance[found.seen], error)).mean() / 2
+    assert found.seen.mean() > 0.8 and error.std() > 0.1 and 0.2 < nees < 2
 
 
 @pytest.mark.parametrize("direction", [(0.0, 0.0), (0.3, 0.1), (0.94, 0.0), (1.0, 0.0)])

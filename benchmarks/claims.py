@@ -52,12 +52,11 @@ def judge(case: Case, networks: Networks) -> tuple[dict[str, float], np.ndarray]
         true = true_ranges(BEARINGS, recording.read("truth/scan"), recording.read("truth/scan_azimuths"))
     spans = {}
     for spacing, told in zip(rotation.spacings, np.concatenate(turns, axis=1), strict=True):
-        back = spacing * rotation.stride
-        error = wrap(told[back:, 0] - wrap(yaw[back:] - yaw[:-back]))
-        spans[f"turn over {back * case.config.frame_period:.2f} s"] = float(np.mean(error**2 / told[back:, 1]))
+        error = wrap(told[spacing:, 0] - wrap(yaw[spacing:] - yaw[:-spacing]))
+        spans[f"turn over {spacing * case.config.frame_period:.2f} s"] = float(np.mean(error**2 / told[spacing:, 1]))
     bins, claimed = (np.concatenate(part) for part in zip(*ranges, strict=True))
-    step = inputs.signal.heatmaps.ranges[1] - inputs.signal.heatmaps.ranges[0]
-    right = np.abs(inputs.signal.heatmaps.ranges[0] + bins * step - true) <= (NEAR + 0.5) * step
+    step = scans.ranges[1] - scans.ranges[0]
+    right = np.abs(scans.ranges[0] + bins * step - true) <= (NEAR + 0.5) * step
     classes = np.where(claimed >= LEAST, np.digitize(claimed, CLAIMS[1:-1]), -1)
     chosen = [classes == k for k in range(len(CLAIMS) - 1)]
     return spans, np.array([[one.sum(), claimed[one].sum(), right[one].sum()] for one in chosen])

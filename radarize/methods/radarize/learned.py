@@ -55,6 +55,9 @@ class LearnedRotation:
 
     The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
     one Gaussian state (`Ties`), which goes on at its rate where frames are lost.
+
+    Attributes:
+        spacings: the radar's frames over which turns are measured, ascending.
     """
 
     def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):
@@ -62,7 +65,8 @@ class LearnedRotation:
         self._net, header = load(weights, RotationNet, radar)
         known = header.spacings
         self._windows = header.windows(radar, self._net.maker, [s for s in settings.spacings if s in known] or known)
-        size = self._windows.spacings[-1] + 1
+        self.spacings = self._windows.spacings
+        size = self.spacings[-1] + 1
         self._longest = (size - 0.5) * radar.frame_period
         self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
         self._yaws = Ties(size, settings.wander, settings.fastest)

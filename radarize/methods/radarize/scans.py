@@ -29,13 +29,16 @@ class Segmentation:
         beyond: scans of a radar that sees farther than the network: what they see there is taken, where the network
             sees nothing.
 
+    Attributes:
+        ranges: of the network's rows, m.
+
     Raises:
         InputError: no such weights, or they do not fit the radar.
     """
 
     def __init__(self, radar: RadarConfig, weights: Path, first: bool = True, beyond: HeatmapScans | None = None):
         self._net, header = load(weights, SegmentationNet, radar)
-        self._windows, self._ranges = header.windows(radar, self._net.maker), header.ranges(radar)
+        self._windows, self.ranges = header.windows(radar, self._net.maker), header.ranges(radar)
         self.first = first
         self._beyond = beyond if radar.max_range > header.grid.reach else None
 
@@ -53,11 +56,11 @@ class Segmentation:
                 bins = first_surface(occupancy, LEAST)
             else:
                 bins = echoes.strongest(occupancy >= LEAST, occupancy)
-        near = np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
+        near = np.where(np.isfinite(bins), self.ranges[0] + bins * (self.ranges[1] - self.ranges[0]), np.inf)
         if self._beyond is None:
             return near
         far = self._beyond.scan(batch)
-        return np.where(np.isinf(near) & (far > self._ranges[-1]), far, near)
+        return np.where(np.isinf(near) & (far > self.ranges[-1]), far, near)
 
 
 def first_surface(

@@ -14,6 +14,7 @@ from radarize.benchmark.networks import Networks
 from radarize.console import progress
 from radarize.effort import BATCH
 from radarize.evaluation.scans import true_ranges
+from radarize.mapping import echoes
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
 from radarize.methods.radarize.scans import LEAST, NEAR, Segmentation, likeliest
@@ -56,7 +57,7 @@ def judge(case: Case, networks: Networks) -> tuple[dict[str, float], np.ndarray]
         spans[f"turn over {spacing * case.config.frame_period:.2f} s"] = float(np.mean(error**2 / told[spacing:, 1]))
     bins, claimed = (np.concatenate(part) for part in zip(*ranges, strict=True))
     step = scans.ranges[1] - scans.ranges[0]
-    right = np.abs(scans.ranges[0] + bins * step - true) <= (NEAR + 0.5) * step
+    right = np.abs(echoes.at(bins, scans.ranges) - true) <= (NEAR + 0.5) * step
     classes = np.where(claimed >= LEAST, np.digitize(claimed, CLAIMS[1:-1]), -1)
     chosen = [classes == k for k in range(len(CLAIMS) - 1)]
     return spans, np.array([[one.sum(), claimed[one].sum(), right[one].sum()] for one in chosen])

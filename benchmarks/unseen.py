@@ -19,7 +19,7 @@ from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.followed import Followed, joined, true_poses
 from radarize.benchmark.results import command
 from radarize.benchmark.study import Benchmark, Chosen, Options, Study, carry_out
-from radarize.benchmark.table import Table
+from radarize.benchmark.table import Table, with_error
 from radarize.console import progress
 from radarize.evaluation.claims import normalised
 from radarize.evaluation.metrics import evaluate_trajectory
@@ -82,9 +82,9 @@ def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:
     frames = joined([_followed(path) for path in paths])
     velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
     return {
-        "odometry m": f"{odometry.mean():.3f} +- {odometry.sem():.3f}",
+        "odometry m": with_error(odometry),
         "odometry rad": runs["odometry.ate.rotation.mean"].mean(),
-        "SLAM m": f"{slam.mean():.3f} +- {slam.sem():.3f}",
+        "SLAM m": with_error(slam),
         "SLAM rad": runs["slam.ate.rotation.mean"].mean(),
         "worst SLAM m": slam.max(),
         f"over {LOST:g} m": int((slam > LOST).sum()),

@@ -6,9 +6,8 @@ from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.protocol import figures_of
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.study import Chosen, Study
-from radarize.benchmark.table import NONE, Table
+from radarize.benchmark.table import Table, with_error
 from radarize.methods.registry import BEST, CLASSICAL, best_methods
-from radarize.radar.config import RadarConfig
 
 #: Attribute that says which radar saw a recording.
 CHIRPS = "chirps"
@@ -44,29 +43,18 @@ def lacks(data: DataSet) -> str:
 
 def tables(study: Study) -> list[Table]:
     """Figures by radar and pair of methods."""
-    chirps = {}
-    for case in study.data.cases:
-        chirps.setdefault(case.attributes.get(CHIRPS), []).append(case)
-    rows = [
-        {"radar": radar, "odometry by": pair.odometry, "scans": pair.scans} | _row(study, radar, pair, cases[0].config)
-        for radar, cases in chirps.items()
-        for pair in study.pairs
-        if radar is not None
-    ]
+    radars = {case.attributes[CHIRPS]: case.config for case in study.data.cases if CHIRPS in case.attributes}
+    found = {pair: study.of(pair) for pair in study.pairs}
+    rows = []
+    for radar, config in radars.items():
+        best = Pair(**best_methods(config)[0])
+        for pair, runs in found.items():
+            mine = runs[[run.case.attributes.get(CHIRPS) == radar for run in runs["run"]]]
+            about = {"radar": radar, "odometry by": pair.odometry, "scans": pair.scans}
+            rows.append(about | {"chosen": "yes" if pair == best else "", "walks": len(mine)} | _figures(mine))
     return [Table("By radar", rows, list(NOTES))]
 
 
-def _row(study: Study, radar: str, pair: Pair, config: RadarConfig) -> dict[str, object]:
-    runs = study.of(pair)
-    runs = runs[[run.case.attributes.get(CHIRPS) == radar for run in runs["run"]]]
+def _figures(runs: pd.DataFrame) -> dict[str, object]:
     means, shares = figures_of(runs, MEANS), 100 * figures_of(runs, SHARES)
-    return (
-        {"chosen": "yes" if Pair(**best_methods(config)[0]) == pair else "", "walks": len(runs)}
-        | {name: with_error(values) for name, values in means.items()}
-        | shares.mean().to_dict()
-    )
-
-
-def with_error(values: pd.Series) -> str:
-    """Mean +- standard error over walks."""
-    return f"{values.mean():.3f} +- {values.sem():.3f}" if len(values) > 1 else NONE
+    return {name: with_error(values) for name, values in means.items()} | shares.mean().to_dict()

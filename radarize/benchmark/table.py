@@ -100,3 +100,8 @@ def cell(value: object) -> str:
     if value is None or (isinstance(value, float) and not np.isfinite(value)):
         return NONE
     return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def with_error(values: pd.Series) -> str:
+    """Mean of a figure over walks +- its standard error; of a single walk there is none."""
+    return f"{values.mean():.3f} +- {values.sem():.3f}" if len(values) > 1 else NONE

@@ -51,11 +51,13 @@ class Axes:
         rows: range bins, or Doppler bins.
         step: m, or m/s, from row to row.
         azimuths: of columns, rad, ascending to the left.
+        centred: rows are speeds, m/s, zero in the middle; otherwise ranges, m, from zero on.
     """
 
     rows: int
     step: float
     azimuths: Float[np.ndarray, "azimuth"]
+    centred: bool = False
 
 
 class Maker(ABC):
@@ -121,7 +123,7 @@ class MapMaker(Maker):
     def axes(config: RadarConfig, name: str) -> Axes:
         """Rows and columns of a map."""
         if name.startswith("doppler"):
-            return Axes(config.loops, config.velocity_resolution, AZIMUTHS)
+            return Axes(config.loops, config.velocity_resolution, AZIMUTHS, centred=True)
         return Axes(config.samples, config.range_resolution, AZIMUTHS)
 
     def shape(self, name: str) -> tuple[int, int]:

@@ -31,6 +31,13 @@ def strongest(
     return _peak(occupied, power, occupied.any(axis=1))
 
 
+def at(
+    bins: Float[np.ndarray, "frame azimuth"], ranges: Float[np.ndarray, "range"]
+) -> Float[np.ndarray, "frame azimuth"]:
+    """Ranges (m) of fractional bins, inf where there is none, by those of whole bins, evenly spaced."""
+    return np.where(np.isfinite(bins), ranges[0] + bins * (ranges[1] - ranges[0]), np.inf)
+
+
 def _peak(candidates: np.ndarray, power: np.ndarray, seen: np.ndarray) -> np.ndarray:
     # Vertex of the parabola through log power at the strongest cell and its two neighbours.
     bins = power.shape[1]

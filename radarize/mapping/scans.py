@@ -75,8 +75,7 @@ class Maps:
 
     def scans(self, method: str) -> Float[np.ndarray, "frame bearing"]:
         """Ranges on `BEARINGS`, m, inf where nothing is seen, by a key of `METHODS`."""
-        bins = METHODS[method](self)
-        return np.where(np.isfinite(bins), self.ranges[0] + bins * (self.ranges[1] - self.ranges[0]), np.inf)
+        return echoes.at(METHODS[method](self), self.ranges)
 
 
 def detect(power: Float[np.ndarray, "frame range bearing"], maps: Maps) -> Bool[np.ndarray, "frame range bearing"]:

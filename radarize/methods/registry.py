@@ -100,10 +100,11 @@ def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
         except InputError as error:
             chosen[what] = CLASSICAL[what]
             why.append(str(error))
-    seen = header_of(weights.of("rotation")).grid
-    if seen and chosen["odometry"] == BEST["odometry"] and radar.max_range > FARTHER * seen.reach:
-        chosen["odometry"] = CLASSICAL["odometry"]
-        why.append(f"the radar sees {radar.max_range:.0f} m, and the network that tells turns {seen.reach:.1f} m")
+    if chosen["odometry"] == BEST["odometry"]:
+        seen = header_of(weights.of("rotation")).grid
+        if seen and radar.max_range > FARTHER * seen.reach:
+            chosen["odometry"] = CLASSICAL["odometry"]
+            why.append(f"the radar sees {radar.max_range:.0f} m, and the network that tells turns {seen.reach:.1f} m")
     return chosen, "; ".join(why)
 
 

@@ -64,7 +64,7 @@ class Header(Frozen):
         """
         chosen = self.spacings[:1] if spacings is None else spacings
         ratio = self.grid.frame_period / config.frame_period
-        own, centred = Grid.of(config, self.maps[0], maker), self.maps[0].startswith("doppler")
+        own, centred = Grid.of(config, self.maps[0], maker), maker.axes(config, self.maps[0]).centred
         return Windows(
             self.maps, self.frames, config.frame_period, sorted({max(1, round(ratio * spacing)) for spacing in chosen}),
             Resampling.between(self.grid, own, centred) if maker.physical else None,
@@ -90,7 +90,7 @@ class Header(Frozen):
             return f"a frame period of {period:.3g} s, expected at most {longest:.3g} s"
         if period * OFTENEST < self.grid.frame_period:
             return f"a frame period of {period:.3g} s, expected at least {self.grid.frame_period / OFTENEST:.3g} s"
-        return self.grid.lack(own, "m/s" if self.maps[0].startswith("doppler") else "m")
+        return self.grid.lack(own, "m/s" if maker.axes(config, self.maps[0]).centred else "m")
 
 
 #: Bytes of a file's header: ours have some thousands.

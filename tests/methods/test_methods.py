@@ -126,6 +126,12 @@ def test_networks_where_they_fit_and_classical_methods_elsewhere(tmp_path):
         Workshop(Inputs(CONFIG, weights=Weights(tmp_path))).odometry("learned", "threshold")
 
 
+def test_without_weights_methods_are_classical(tmp_path, monkeypatch):
+    monkeypatch.setattr(Weights, "of", lambda self, kind: tmp_path / f"{kind}.safetensors")
+    methods, why = best_methods(CONFIG)
+    assert methods == CLASSICAL and "translation.safetensors: no such file" in why
+
+
 def test_every_choice_is_in_the_registry():
     for choice in (BEST, CLASSICAL, PICTURED):
         assert choice["odometry"] in ODOMETRY and choice["scans"] in SCANS

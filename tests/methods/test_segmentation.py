@@ -47,16 +47,22 @@ def test_the_first_surface_is_where_it_is_likeliest():
             assert found[frame, bearing] == pytest.approx(expected)
 
 
-def test_ghosts_behind_a_surface_and_guesses_are_not_returned(tmp_path):
+@pytest.fixture
+def untrained(tmp_path):
+    """Weights that say nothing."""
     header = Header(
         kind="segmentation", frames=1, maps=("range_azimuth", "elevation_aware"), width=2,
         grid=Grid.of(CONFIG, "range_azimuth"),
     )  # fmt: skip
     net = build(SegmentationNet, header)
     net(*example(net, header))
+    return save(net.eval(), header, tmp_path / "s.safetensors")
+
+
+def test_ghosts_behind_a_surface_and_guesses_are_not_returned(untrained):
     signal = Signal(CONFIG)
     ranges = signal.heatmaps.ranges
-    scans = Segmentation(CONFIG, save(net.eval(), header, tmp_path / "s.safetensors"))
+    scans = Segmentation(CONFIG, untrained)
     zeros = torch.zeros(2, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)
     batch = of_spectrum(signal, zeros, np.arange(2) * CONFIG.frame_period)
     assert scans.scan(batch).shape == (2, len(BEARINGS))
@@ -71,7 +77,7 @@ def test_ghosts_behind_a_surface_and_guesses_are_not_returned(tmp_path):
     assert np.allclose(found[:, 10], ranges[30], atol=step / 2)
     assert np.isinf(found[:, 20]).all() and np.isfinite(found).sum() == 2
     assert first_surface(likely, 0.4)[0, 20] == pytest.approx(40, abs=0.5)
-    alone = Segmentation(CONFIG, tmp_path / "s.safetensors", first=False)
+    alone = Segmentation(CONFIG, untrained, first=False)
     alone._net = Says(likely)
     found = alone.scan(batch)
     assert np.allclose(found[:, 10], ranges[60], atol=step / 2) and np.isfinite(found).sum() == 2
@@ -87,15 +93,9 @@ class Echoes:
         return np.tile(self.ranges, (len(batch), 1))
 
 
-def test_a_radar_that_sees_farther_has_echoes_beyond_the_network(tmp_path):
+def test_a_radar_that_sees_farther_has_echoes_beyond_the_network(untrained):
     """Ranges mean metres whatever the radar's bins; an echo that is nearer is the network's to tell."""
-    header = Header(
-        kind="segmentation", frames=1, maps=("range_azimuth", "elevation_aware"), width=2,
-        grid=Grid.of(CONFIG, "range_azimuth"),
-    )  # fmt: skip
-    net = build(SegmentationNet, header)
-    net(*example(net, header))
-    path, radar = save(net.eval(), header, tmp_path / "s.safetensors"), PRESETS["long-range"]
+    radar = PRESETS["long-range"]
     told = np.full(len(BEARINGS), np.inf)
     told[[10, 20, 30]] = 8.0, 9.0, 3.0
     likely = np.full((1, CONFIG.samples, len(BEARINGS)), 1e-4)
@@ -104,12 +104,12 @@ def test_a_radar_that_sees_farther_has_echoes_beyond_the_network(tmp_path):
     batch = of_spectrum(
         signal, torch.zeros(2, radar.samples, radar.loops, 12, dtype=torch.complex64), np.arange(2) / 30
     )
-    scans = Segmentation(radar, path, beyond=Echoes(told))
+    scans = Segmentation(radar, untrained, beyond=Echoes(told))
     scans._net = Says(likely)
     found = scans.scan(batch)
     assert np.allclose(found[:, 10], 45 * CONFIG.range_resolution, atol=0.5 * CONFIG.range_resolution)
     assert (found[:, 20] == 9.0).all() and np.isinf(found[:, 30]).all() and np.isfinite(found).sum() == 4
-    near = Segmentation(CONFIG, path, beyond=Echoes(told))  # which sees no farther than the network
+    near = Segmentation(CONFIG, untrained, beyond=Echoes(told))  # which sees no farther than the network
     near._net = Says(likely)
     batch = of_spectrum(Signal(CONFIG), torch.zeros(1, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64), [0.0])
     assert np.isfinite(near.scan(batch)).sum() == 1

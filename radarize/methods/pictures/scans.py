@@ -33,7 +33,7 @@ class PictureStream:
 
     def __init__(self, inputs: Inputs, kind: type[Network]):
         self.net, header = load(inputs.weights.of(kind.kind), kind, inputs.radar)
-        self._windows, self._maker = header.windows(inputs.radar, PictureMaker), inputs.part(PictureMaker)
+        self._windows, self._maker = header.windows(inputs.radar, self.net.maker), inputs.part(PictureMaker)
         self.spacing = self._windows.spacings[0]
 
     def windows(self, batch: Batch) -> Shown:

@@ -77,7 +77,7 @@ class PublishedMaps(Maker):
             rows, columns = DOPPLER_SIZE
             places = (np.arange(columns) + 0.5) * len(BEAMS) / columns - 0.5
             azimuths = -np.interp(places, np.arange(len(BEAMS)), BEAMS)[::-1]
-            return Axes(rows, 2 * config.max_velocity / rows, azimuths)
+            return Axes(rows, 2 * config.max_velocity / rows, azimuths, centred=True)
         return Axes(config.samples, config.range_resolution, BEARINGS)
 
     def __call__(self, adc, valid=None, names=None, frames=slice(None)):

@@ -40,7 +40,7 @@ class RadarHdScans:
         with stage("scans"):
             likely = adaptive_max_pool2d(self.picture(batch), (len(self._ranges), len(BEARINGS))).numpy()
             bins = echoes.first(likely > float(self._net.least), likely)
-        return np.where(np.isfinite(bins), self._ranges[0] + bins * (self._ranges[1] - self._ranges[0]), np.inf)
+        return echoes.at(bins, self._ranges)
 
 
 def scans(inputs: Inputs) -> RadarHdScans:

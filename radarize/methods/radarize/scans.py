@@ -56,7 +56,7 @@ class Segmentation:
                 bins = first_surface(occupancy, LEAST)
             else:
                 bins = echoes.strongest(occupancy >= LEAST, occupancy)
-        near = np.where(np.isfinite(bins), self.ranges[0] + bins * (self.ranges[1] - self.ranges[0]), np.inf)
+        near = echoes.at(bins, self.ranges)
         if self._beyond is None:
             return near
         far = self._beyond.scan(batch)

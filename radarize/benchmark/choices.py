@@ -106,6 +106,14 @@ LASTING = {
 #: 20 s by hand in a building of style A, seed 301, and by cart in C, seed 303, as up to eleven radars see them.
 RADARS = {"A_0": (4309744100947278613,), "C_0": (2078735959714348781,)}
 
+#: 60 s by hand and by cart in buildings of styles A to D with seeds 611 to 614; and six of RadarHD's training walks.
+CLOSURES = {
+    "A_0": (1916884242829496425, 6086624209057059746),
+    "B_0": (4195935064897767939, 3447146838335465922),
+    "C_0": (3504363901255723526, 2355549049601989642),
+    "D_0": (8114638757705633081, 4019752636069625728),
+} | {Walk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
+
 #: RadarHD's training walks, one by one and all together.
 PICTURES = {Walk.radarhd(number).scene: (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
 
@@ -120,6 +128,7 @@ CHOICES = (
         "claim of velocities",
         RADARS,
     ),
+    Choice("what closures count for in the back end's preset radar, and its cells", CLOSURES),
     Choice("the compass and what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),

@@ -73,6 +73,10 @@ class MatcherConfig(Frozen):
     )  # fmt: skip
     translation_floor: float = setting(0.01, "no match is believed better than this, m", gt=0)
     rotation_floor: float = setting(0.003, "nor than this, rad", gt=0)
+    alike: int = setting(
+        1, "so many matches, and so many closures, err alike, for one submap misleads all that are matched with it: in "
+        "what is claimed of poses they count as one", ge=1
+    )  # fmt: skip
     iterations: int = setting(20, "at most so many Gauss-Newton steps", gt=0, le=1000)
     spacing: float = setting(0.05, "points are thinned to one per square of this size, m", ge=0.005)
 
@@ -129,8 +133,9 @@ class SlamConfig(Frozen):
         """A named set of parameters.
 
         ``lidar``: wide, dense and exact scans. ``radar``: narrow, short and noisy scans at 30 Hz with odometry that is
-        good in translation and weak in heading; matches weigh little, so that they do no harm. ``cartographer``: what
-        the paper published of its settings, and Cartographer's own defaults beside them, where they apply.
+        good in translation and weak in heading; matches weigh little, so that they do no harm, and closures as much as
+        they are worth. ``cartographer``: what the paper published of its settings, and Cartographer's own defaults
+        beside them, where they apply.
 
         Raises:
             InputError: there is no preset of that name.
@@ -157,14 +162,15 @@ PRESETS: dict[str, SlamConfig] = {
             rotation_per_radian=0.05,
         ),
         node=NodeConfig(distance=0.3, angle=0.2, duration=3.0, scans=10, min_points=25),
-        # Cartographer's settings published with Radarize: 0.08 m cells, ranges from 0.3 m.
-        grid=GridConfig(resolution=0.08, hit=0.65, miss=0.45, min_range=0.3, free_range=0.0, nodes=16),
+        # Cartographer's settings published with Radarize: ranges from 0.3 m.
+        grid=GridConfig(hit=0.65, miss=0.45, min_range=0.3, free_range=0.0, nodes=16),
         matcher=MatcherConfig(
-            presearch_distance=0.0, presearch_angle=0.0, sigma=2.0, translation_floor=0.03, rotation_floor=0.015
+            presearch_distance=0.0, presearch_angle=0.0, sigma=2.0, translation_floor=0.03, rotation_floor=0.015,
+            alike=16,
         ),
         loop=LoopConfig(
             radius=8.0, distance=3.0, angle=0.5, candidates=5, every=4, nodes=8, front=0.25, min_score=0.4,
-            final_score=0.4, levels=4, sigma=2.0, translation_floor=0.05, rotation_floor=0.02,
+            final_score=0.4, levels=4, sigma=1.0, translation_floor=0.02, rotation_floor=0.006,
         ),
     ),
     # Published with Radarize: 0.08 m cells, 30 scans per submap (Cartographer finishes one after twice as many), ranges

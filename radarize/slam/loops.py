@@ -118,7 +118,6 @@ class LoopSearch:
             return None  # the peak of the search is no minimum of the refinement: not a place that fits
         covariance = uncertainty(refined, c.translation_floor, c.rotation_floor)
         covariance += scatter(pyramid, points, refined.pose, distance=c.distance / 2, angle=c.angle / 2, sigma=c.sigma)
-        covariance *= c.nodes  # they see the same from the same side, and are in other questions too: they count as one
         return Closure(submap.anchor, question.node, refined.pose, covariance, score)
 
 

@@ -25,6 +25,7 @@ class PoseGraph:
 
     Args:
         inlier_probability: a closure is rejected when its error is less likely than one minus this.
+        alike: so many matches, and so many closures, err alike, and count as one in `covariances`.
 
     Attributes:
         closures: (of, to) of all closures.
@@ -32,8 +33,8 @@ class PoseGraph:
         solved: False once `covariances` could not be solved for.
     """
 
-    def __init__(self, inlier_probability: float = 0.99):
-        self.inlier_probability = inlier_probability
+    def __init__(self, inlier_probability: float = 0.99, alike: int = 1):
+        self.inlier_probability, self.alike = inlier_probability, alike
         self.closures: list[tuple[int, int]] = []
         self.accepted = np.zeros(0, bool)
         self.solved = True
@@ -150,7 +151,7 @@ class PoseGraph:
         solver finds it, that of odometry alone, and `solved` is False."""
         if not len(self.poses):
             return np.zeros((0, 3, 3))
-        graph, values = self._graph(self._believed()), self._values()
+        graph, values = self._graph([self._counted(factor) for factor in self._believed()]), self._values()
         for solve in (gtsam.Marginals, _by_qr):
             try:
                 solution = solve(graph, values)
@@ -175,6 +176,11 @@ class PoseGraph:
         new = np.ones(len(self._matches) - len(self._matches_kept), bool)
         keep = np.concatenate([self._matches_kept, new, self.accepted])
         return [factor for factor, keep in zip([*self._matches, *self._uncertain], keep, strict=True) if keep]
+
+    def _counted(self, factor: gtsam.BetweenFactorPose2) -> gtsam.BetweenFactorPose2:
+        """A factor that weighs as little as others that err alike leave it to."""
+        noise = gtsam.noiseModel.Gaussian.Covariance(self.alike * factor.noiseModel().covariance())
+        return gtsam.BetweenFactorPose2(*factor.keys(), factor.measured(), noise)
 
     def _judge(self) -> None:
         graph = self._graph([*self._matches, *self._uncertain])

@@ -70,6 +70,29 @@ def test_covariances_grow_from_the_start_and_shrink_with_loops():
     np.testing.assert_allclose(loose.covariances()[:, 0, 0], 0.01 * np.arange(5), atol=1e-6)
 
 
+def test_matches_and_closures_that_err_alike_claim_as_much_as_one():
+    """Four of each, of variance 0.04 beside a step of 1: with alike = 4 they leave 1 / (1 / 1 + 2 / 0.04)."""
+
+    def graph(alike):
+        found = PoseGraph(alike=alike)
+        found.add_node(np.zeros(3))
+        found.add_node(np.array([1.0, 0, 0]))
+        found.add_motion(0, 1, np.array([1.0, 0, 0]), np.eye(3))
+        for k in range(4):
+            found.add_match(0, 1, np.array([1.2, 0, 0]), 0.04 * np.eye(3))
+            found.add_closure(0, 1, np.array([1.2, 0, 0]), 0.04 * np.eye(3))
+            found.believe(k)
+        found.optimise()
+        return found
+
+    alone, alike = graph(1), graph(4)
+    np.testing.assert_allclose(np.diag(alone.covariances()[1]), 1 / (1 + 8 / 0.04), rtol=1e-3)
+    np.testing.assert_allclose(np.diag(alike.covariances()[1]), 1 / (1 + 2 / 0.04), rtol=1e-3)
+    # Where poses lie they all count.
+    np.testing.assert_allclose(alike.poses[1], [1 + 0.2 * 200 / 201, 0, 0], atol=1e-6)
+    np.testing.assert_array_equal(alike.poses, alone.poses)
+
+
 def test_steps_known_to_a_tenth_of_a_millimetre_beside_such_that_are_not_known_at_all():
     rng, graph = np.random.default_rng(2), PoseGraph()
     graph.add_node(np.zeros(3))

@@ -118,7 +118,8 @@ def test_a_log_that_unpacks_to_a_thousand_times_its_size_is_refused(tmp_path):
 def test_settings_from_a_file(tmp_path):
     (tmp_path / "s.yaml").write_text("grid: {nodes: 20}\nloop: {enabled: false}\n")
     config = SlamConfig.load(tmp_path / "s.yaml", "radar")
-    assert config.grid.nodes == 20 and not config.loop.enabled and config.grid.resolution == 0.08
+    assert config.grid.nodes == 20 and not config.loop.enabled
+    assert config.grid.hit == SlamConfig.preset("radar").grid.hit != SlamConfig().grid.hit
     for text, sentence in (
         ("grid: {cells: 3}", "grid.cells"),
         ("loop: {every: 0}", "loop.every is 0"),

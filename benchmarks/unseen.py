@@ -19,7 +19,7 @@ from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.followed import Followed, joined, true_poses
 from radarize.benchmark.results import command
 from radarize.benchmark.study import Benchmark, Chosen, Options, Study, carry_out
-from radarize.benchmark.table import Table, with_error
+from radarize.benchmark.table import Table, with_error, with_median
 from radarize.console import progress
 from radarize.evaluation.claims import normalised
 from radarize.evaluation.metrics import evaluate_trajectory
@@ -90,9 +90,9 @@ def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:
         f"over {LOST:g} m": int((slam > LOST).sum()),
         f"SLAM over {WORSE:g} x odometry": int((slam > WORSE * odometry).sum()),
         "map F1 %": 100 * runs["map.f1"].mean(),
-        "NEES velocity (median)": f"{velocity['nees']:.2f} ({velocity['nees_median']:.2f})",
-        **{f"NEES pose {span} s (median)": "{:.2f} ({:.2f})".format(*_mean_and_median(paths, span)) for span in SPANS},
-        "NEES SLAM (median)": f"{runs['slam.nees'].mean():.2f} ({runs['slam.nees'].median():.2f})",
+        "NEES velocity (median)": with_median(velocity["nees"], velocity["nees_median"]),
+        **{f"NEES pose {span} s (median)": with_median(*_mean_and_median(paths, span)) for span in SPANS},
+        "NEES SLAM (median)": with_median(runs["slam.nees"].mean(), runs["slam.nees"].median()),
     }
 
 

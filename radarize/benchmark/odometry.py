@@ -9,7 +9,7 @@ import pandas as pd
 from radarize.benchmark.followed import Followed, joined, turn_nees, turned
 from radarize.benchmark.protocol import figures_of
 from radarize.benchmark.study import Study
-from radarize.benchmark.table import Table
+from radarize.benchmark.table import Table, with_median
 from radarize.benchmark.trajectories import trajectory_tables
 from radarize.evaluation.metrics import Statistics
 from radarize.evaluation.motion import velocity_errors
@@ -85,7 +85,7 @@ def row(runs: pd.DataFrame, found: Sequence[Followed]) -> dict[str, object]:
         "yaw over 0.27 s, RMSE deg": float(np.rad2deg(turns.rmse)),
         **figures_of(runs, ABSOLUTE).mean(),
         **{name: ", ".join(f"{value:.4f}" for value in values) for name, values in relative.items()},
-        "NEES velocity (median)": f"{velocity['nees']:.2f} ({velocity['nees_median']:.2f})" if known else None,
+        "NEES velocity (median)": with_median(velocity["nees"], velocity["nees_median"]) if known else None,
         "NEES yaw step": turn_nees(found, 0),
         "NEES yaw over 0.27 s": turn_nees(found, WINDOW),
     }

@@ -105,3 +105,8 @@ def cell(value: object) -> str:
 def with_error(values: pd.Series) -> str:
     """Mean of a figure over walks +- its standard error; of a single walk there is none."""
     return f"{values.mean():.3f} +- {values.sem():.3f}" if len(values) > 1 else NONE
+
+
+def with_median(mean: float, median: float) -> str:
+    """Mean of a ratio, in brackets its median."""
+    return f"{mean:.2f} ({median:.2f})"

@@ -178,7 +178,7 @@ class PoseGraph:
         return [factor for factor, keep in zip([*self._matches, *self._uncertain], keep, strict=True) if keep]
 
     def _counted(self, factor: gtsam.BetweenFactorPose2) -> gtsam.BetweenFactorPose2:
-        """A factor that weighs as little as others that err alike leave it to."""
+        """A match or a closure at its share: `alike` of them weigh as much as one."""
         noise = gtsam.noiseModel.Gaussian.Covariance(self.alike * factor.noiseModel().covariance())
         return gtsam.BetweenFactorPose2(*factor.keys(), factor.measured(), noise)
 

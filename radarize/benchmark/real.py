@@ -54,9 +54,10 @@ NOTES = (
     "with the lidar's own first points, the best there is. Both by instant.",
 )
 MAP_NOTE = (
-    "With the same odometry for all methods: the lidar's poses with errors added, see `radarize.benchmark.realmotion`; "
-    "`alone`: odometry, too, is by matching scans, for `network` with the turns that its partner tells. Maps against "
-    "the lidar's points at its poses, of which three frames have seen a cell of 5 cm. `odometry`: its ATE without SLAM."
+    "With the same odometry for all methods: the lidar's poses with errors added, of a size that SLAM is told, see "
+    "`radarize.benchmark.realmotion`; `alone`: odometry, too, is by matching scans, for `network` with the turns that "
+    "its partner tells. Maps against the lidar's points at its poses, of which three frames have seen a cell of 5 cm. "
+    "`odometry`: its ATE without SLAM."
 )
 
 CLOCK_NOTE = (
@@ -200,7 +201,7 @@ def _maps(
     of methods that are done."""
     surface, there = surface_of(judged.clouds, poses), judged.partner >= 0
     poses = poses[judged.partner[there]]
-    odometry = disturbed(poses, walk.number)
+    odometry, claimed = disturbed(poses, walk.number)
     off, rows = drift(odometry, poses), []
     for name, each in judged.ranges.items():
         ranges = each[there]
@@ -208,7 +209,7 @@ def _maps(
         alone = mapped(ranges, poses, surface, matched, covariance)
         rows.append(
             {"walk": walk.number, "method": name, "odometry_ate_m": off}
-            | mapped(ranges, poses, surface, odometry)
+            | mapped(ranges, poses, surface, odometry, claimed)
             | {"alone_odometry_ate_m": drift(matched, poses)}
             | {"alone_ate_m": alone["ate_m"], "alone_map_f1_20cm": alone["map_f1_20cm"]}
         )

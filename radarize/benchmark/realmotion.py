@@ -84,17 +84,25 @@ def smoothed(turns: Float[np.ndarray, "frame"]) -> Float[np.ndarray, "frame"]:
     return np.where(known, averaged, np.nan)
 
 
-def disturbed(poses: Float[np.ndarray, "frame 3"], seed: int) -> Float[np.ndarray, "frame 3"]:
-    """Poses as an odometry with errors would have added them up."""
+def disturbed(
+    poses: Float[np.ndarray, "frame 3"], seed: int
+) -> tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame 3 3"]]:
+    """Poses as an odometry with errors would have added them up, and the covariance of each step.
+
+    Covariances know of each step alone: a bias counts as an error that is new every second.
+    """
     rng = np.random.default_rng(seed)
     steps = between(poses[:-1], poses[1:])
-    length = np.hypot(steps[:, 0], steps[:, 1])
-    steps[:, :2] += rng.normal(size=(len(steps), 2)) * (_STEP[0] * length + _STEP[1])[:, None]
+    deviation = _STEP[0] * np.hypot(steps[:, 0], steps[:, 1]) + _STEP[1]
+    steps[:, :2] += rng.normal(size=(len(steps), 2)) * deviation[:, None]
     steps[:, 2] += rng.normal(0, _YAW, len(steps)) + PERIOD * rng.normal(0, _BIAS)
     found = [poses[0]]
     for step in steps:
         found.append(compose(found[-1], step))
-    return np.array(found)
+    covariance = np.zeros((len(poses), 3, 3))
+    covariance[1:, 0, 0] = covariance[1:, 1, 1] = deviation**2
+    covariance[1:, 2, 2] = _YAW**2 + _BIAS**2 * PERIOD
+    return np.array(found), covariance
 
 
 def followed(
@@ -142,7 +150,7 @@ def mapped(
     poses: Float[np.ndarray, "frame 3"],
     surface: Float[np.ndarray, "point 2"],
     odometry: Float[np.ndarray, "frame 3"],
-    covariance: Float[np.ndarray, "frame 3 3"] | None = None,
+    covariance: Float[np.ndarray, "frame 3 3"],
 ) -> dict[str, float]:
     """SLAM with scans: error of its trajectory, and its map against the lidar's.
 
@@ -151,11 +159,11 @@ def mapped(
         poses: true ones.
         surface: of the lidar's map, m, in the frame of the poses.
         odometry: that SLAM is given.
-        covariance: of its steps; as the back end's settings have them if None.
+        covariance: of its steps.
     """
     slam = Slam(_CONFIG)
     for frame in range(len(ranges)):
-        slam.add_odometry(PERIOD * frame, odometry[frame], None if covariance is None else covariance[frame])
+        slam.add_odometry(PERIOD * frame, odometry[frame], covariance[frame])
         slam.add_scan(PERIOD * frame, BEARINGS, ranges[frame])
     slam.finish()
     times, found = slam.trajectory()

@@ -14,6 +14,7 @@ from radarize.benchmark.real import Options, clocked_turn_errors, median_error, 
 from radarize.benchmark.realmotion import SMOOTH, disturbed, shifted_turns, smoothed, turn_errors
 from radarize.cli import app
 from radarize.errors import InputError
+from radarize.pose import between
 from radarize.tum import planar_poses, write_tum
 from radarize.walkclock import Clock
 from radarize.walkposes import BEARINGS, scan, true_poses
@@ -153,9 +154,18 @@ def test_scans_have_the_nearest_point_of_each_bearing():
 def test_odometry_drifts_as_its_errors_say():
     """Variance of the end's yaw over many seeds: that of the steps, added up, and of the bias."""
     poses = np.zeros((201, 3))
-    ends = [disturbed(poses, seed)[-1, 2] for seed in range(100)]
+    ends = [disturbed(poses, seed)[0][-1, 2] for seed in range(100)]
     expected = np.hypot(np.sqrt(200) * np.radians(0.1), 200 * 0.05 * np.radians(0.3))
     assert np.std(ends) == pytest.approx(expected, rel=0.25)
+
+
+def test_odometry_claims_what_it_is_off_by_over_a_second():
+    """Along a line, over many seeds: squared errors over claims are 1, along the way, across it and in heading."""
+    poses = np.column_stack([0.05 * np.arange(21), np.zeros(21), np.zeros(21)])
+    found = [disturbed(poses, seed) for seed in range(400)]
+    steps = np.array([between(odometry[:-1], odometry[1:]) - [0.05, 0, 0] for odometry, _ in found]).sum(axis=1)
+    claimed = np.diagonal(found[0][1].sum(axis=0))
+    assert np.mean(steps**2, axis=0) / claimed == pytest.approx(1, abs=0.25)
 
 
 def test_poses_must_be_there(clone, tmp_path):

@@ -67,7 +67,7 @@ SCENE = Scene.of(
 
 def room(*sensors: str, seed: int = 4) -> Scenario:
     """Somebody in a room, and everything that noise, boards and phases are drawn for; the radar swings on an arm."""
-    places, mounting = np.array([[0.8, 1.5], [3.0, 2.5]]), Mounting.of((0.2, 0.05, 0.1), (2, 3, -1))
+    places, mounting = np.array([[0.8, 1.5], [1.9, 2.0]]), Mounting.of((0.2, 0.05, 0.1), (2, 3, -1))
     walk = Walk("cart", 1.3, waypoints=places, mounting=mounting)
     return Scenario(SCENE, walk.through(SCENE, seed), CONFIG, FrontEndConfig(), seed, sensors)
 

@@ -60,6 +60,15 @@ class Panels:
         order = sorted(range(len(found)), key=lambda k: (found[self.panel].iloc[k], kinds.iloc[k]))
         return found.iloc[order].reset_index(drop=True)
 
+    def means(self, rows: pd.DataFrame, title: str) -> Table:
+        """Figures by what was varied and by line, mean over walks; of trajectories with their standard errors."""
+        groups = in_words(rows).groupby([rows[self.panel], rows[self.over], rows[self.line]], sort=False)
+        found, errors = groups.mean(), groups.sem()
+        for figure in {FIGURES["odometry"].title, FIGURES["slam"].title} & {*found}:
+            found.insert(found.columns.get_loc(figure) + 1, f"{figure} +-", errors[figure])
+        found.insert(0, "walks", groups.size())
+        return Table(title, found.reset_index().to_dict("records"), ["Means over walks +- their standard errors."])
+
     def table(self, rows: pd.DataFrame, title: str) -> Table:
         """Figures by what was varied and by line."""
         labels = rows[[self.panel, self.over, self.line]]
@@ -108,7 +117,7 @@ def classical_pairs(chosen: Chosen) -> list[Pair]:
 
 def ablation_tables(study: Study) -> list[Table]:
     """Figures over the values of each parameter."""
-    return [ABLATION.table(ABLATION.rows(study), "By parameter")]
+    return [ABLATION.means(ABLATION.rows(study), "By parameter")]
 
 
 def stress_pairs(chosen: Chosen) -> list[Pair]:

@@ -26,7 +26,7 @@ DATASETS = {
     "inertial": {"A101": ("handheld", "cart")},
     "stress": {"corner": ("cart",)},
     "radarhd": {"A401": ("cart", "handheld")},
-    "ablation/loops": {"office": ("handheld",)},
+    "ablation/loops": {"A701": ("handheld",)},
     "radars": {"A501": ("handheld",)},
 }
 SECONDS, PLACE = 1.5, "stress/corner"

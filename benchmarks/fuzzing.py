@@ -109,17 +109,22 @@ def judged(name: str, count: int, first: int) -> dict[str, object] | str:
     return row
 
 
-def kept(name: str, count: int, first: int) -> dict[str, object] | str:
-    """What is `judged`, or was by an earlier run of the same commit: a long one goes on where it was stopped."""
-    source = commit(Path(__file__))
-    path = Path("build/fuzzing") / f"{source}-{count}-{first}" / f"{list(READERS).index(name)}.json"
-    if path.exists():
-        return json.loads(path.read_text())
+def kept(name: str, count: int, first: int, earlier: str | None = None) -> dict[str, object] | str:
+    """What is `judged`, or was by a run of this commit or an earlier one: a long one goes on where it was stopped."""
+    now = commit(Path(__file__))
+    for source in (now, earlier):
+        path = _row(name, count, first, source)
+        if path.exists():
+            return json.loads(path.read_text()) | {"commit": source}
     row = judged(name, count, first)
-    if isinstance(row, dict) and source.endswith("(clean)"):
-        with replacing(path) as part:
+    if isinstance(row, dict) and now.endswith("(clean)"):
+        with replacing(_row(name, count, first, now)) as part:
             part.write_text(json.dumps(row))
-    return row
+    return row | {"commit": now} if isinstance(row, dict) else row
+
+
+def _row(name: str, count: int, first: int, source: str | None) -> Path:
+    return Path("build/fuzzing") / f"{source}-{count}-{first}" / f"{list(READERS).index(name)}.json"
 
 
 PARSER = command_line(
@@ -129,6 +134,7 @@ PARSER = command_line(
     workers=(len(os.sched_getaffinity(0)), "readers at a time"),
 )
 PARSER.add_argument("--reader", choices=list(READERS), help="this one alone, without a table")
+PARSER.add_argument("--earlier", help="rows of a run at this commit count, too, which another reader's fault has ended")
 
 
 def main() -> None:
@@ -141,7 +147,7 @@ def main() -> None:
         print(json.dumps(row, indent=2))
         return
     with ThreadPoolExecutor(options.workers) as threads:
-        found = threads.map(lambda name: kept(name, options.inputs, options.seed), READERS)
+        found = threads.map(lambda name: kept(name, options.inputs, options.seed, options.earlier), READERS)
         rows = list(track(found, "readers", total=len(READERS)))
     if failed := [each for each in rows if isinstance(each, str)]:
         raise SystemExit("\n".join(failed))
@@ -161,6 +167,8 @@ def main() -> None:
             "longest is in processor time, s are on the clock, making and placing the inputs included.",
             f"Lines reached: by the first {_BATCH} inputs, of the lines of this project's functions that a reader "
             "enters; compiled functions are left out.",
+            "Commit: of the code that was tried; where a reader failed, it was mended and tried again, and others were "
+            "not.",
             surroundings(),
         ],
     )

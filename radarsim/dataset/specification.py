@@ -45,7 +45,7 @@ from radarize.radar.presets import load_config
 from radarize.yamlfile import read_yaml
 from radarsim.complaint import complaint
 from radarsim.dataset.splits import Split
-from radarsim.dataset.task import Task
+from radarsim.dataset.task import Task, content
 from radarsim.dataset.variant import Attributes, Strict, Variant
 from radarsim.scene.description import Description, described, find, shipped, split_level
 
@@ -160,12 +160,16 @@ class Specification(Strict):
         if total > MOST:
             raise InputError(f"recordings: stand for {total} recordings, expected at most {MOST}")
         settings = {key: self._settings(key, variant, radar, frontend) for key, variant in variants}
-        tasks, count = [], Counter()
+        tasks, count, scenes = [], Counter(), {}
         for number, group in enumerate(self.recordings):
             for name, platform, floor in group.each(count):
                 seed = np.random.SeedSequence([self.seed, *name.encode()]).generate_state(1, np.uint64)[0]
                 for key, variant in variants:
                     config, digest = settings[key]
+                    place = group.building, floor, variant.level
+                    if place not in scenes:
+                        scene = self._scene(*place)
+                        scenes[place] = {"scene": scene, "content": content(scene)}
                     frames = config.frames_within(group.duration)
                     if not frames:
                         raise InputError(
@@ -175,10 +179,10 @@ class Specification(Strict):
                     tasks.append(
                         Task(
                             name=name + key, building=group.building, floor=floor, platform=platform,
-                            scene=self._scene(group.building, floor, variant.level), duration=group.duration,
-                            frames=frames, seed=int(seed >> np.uint64(1)), settings=digest, waypoints=group.waypoints,
-                            variant=variant, attributes=self.attributes | group.attributes | variant.attributes,
-                            **fixed,
+                            duration=group.duration, frames=frames, seed=int(seed >> np.uint64(1)), settings=digest,
+                            waypoints=group.waypoints, variant=variant,
+                            attributes=self.attributes | group.attributes | variant.attributes,
+                            **scenes[place], **fixed,
                         )
                     )  # fmt: skip
         return tuple(tasks)

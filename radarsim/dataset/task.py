@@ -43,6 +43,7 @@ class Task:
         sensors: truth sensors.
         storage: ``raw`` or ``heatmaps``.
         waypoints: to go through instead of a tour, m.
+        content: of the scene's file, see `content`; None: it has none.
         variant: what differs from other recordings of the same walk.
         attributes: of the recording.
     """
@@ -61,6 +62,7 @@ class Task:
     sensors: tuple[str, ...]
     storage: str
     waypoints: tuple[tuple[float, float], ...] | None = None
+    content: dict[str, object] | None = None
     variant: Variant = Variant()
     attributes: Attributes = field(default_factory=dict)
 
@@ -72,11 +74,7 @@ class Task:
             found[file] = found[file] and Path(found[file]).name
         found["attributes"] = self.attributes or None  # older recordings know no such fields
         found["variant"] = self.variant.model_dump(mode="json", exclude_defaults=True) or None
-        if isinstance(self.scene, str):
-            file = Path(split_level(self.scene)[0])
-            found["scene"] = {"file": Path(self.scene).name, "sha256": _digest(file)}
-            if parts := meshes(file):
-                found["scene"]["meshes"] = {part.name: _digest(part) for part in parts}
+        found["scene"] = found.pop("content") or self.scene
         return found
 
     @property
@@ -191,6 +189,19 @@ class Task:
     @property
     def _place(self) -> str:
         return self.building if self.floor is None else f"{self.building}_{self.floor}"
+
+
+def content(scene: dict | str) -> dict[str, object] | None:
+    """Name and digest of a scene's file, and digests of its meshes by name; None of a scene without a file.
+
+    Raises:
+        InputError: one of them cannot be read.
+    """
+    if isinstance(scene, dict):
+        return None
+    file = Path(split_level(scene)[0])
+    parts = {part.name: _digest(part) for part in meshes(file)}
+    return {"file": Path(scene).name, "sha256": _digest(file)} | ({"meshes": parts} if parts else {})
 
 
 def _digest(path: Path) -> str:

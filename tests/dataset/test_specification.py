@@ -12,7 +12,9 @@ from radarize.errors import InputError
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS, load_config
+from radarsim.dataset import specification
 from radarsim.dataset.specification import Specification
+from radarsim.dataset.task import content
 from radarsim.physics.frontend_config import Channel, FrontEndConfig, Leakage
 from radarsim.scene.description import shipped
 
@@ -166,6 +168,15 @@ def test_a_plain_recording_is_the_one_it_always_was(tmp_path):
     """Fields that data sets did not have before count as absent, so that finished recordings stay finished."""
     parameters = load(tmp_path).tasks[0].parameters
     assert all(parameters[name] is None for name in ("waypoints", "variant", "attributes"))
+
+
+def test_files_of_scenes_are_read_once(tmp_path, monkeypatch):
+    """And not for each of the 20,000 recordings that there may be."""
+    asked = []
+    monkeypatch.setattr(specification, "content", lambda scene, made=content: asked.append(scene) or made(scene))
+    fields = {"building": "o", "platform": ["cart", "robot"], "count": 500, "duration": 1}
+    found = load(tmp_path, buildings={"o": "office"}, recordings=[fields])
+    assert len(found.as_data()["recordings"]) == 1000 and len(asked) == 1
 
 
 def test_levels_are_scenes_of_their_own(tmp_path):

@@ -71,9 +71,9 @@ def attempt(reader: Reader, data: object, folder: Path) -> Attempt:
         accepted, text = False, str(error)
         assert text.isprintable() and 10 < len(text) < 1500, f"{text[:200]!r}... is no sentence"
     seconds, memory = time.process_time() - start, _peak_memory() - before
-    clear(folder)
     assert seconds < MOST_SECONDS, f"took {seconds:.1f} s"
     assert memory < MOST_MEMORY + MOST_TIMES * reader.size(data), f"took {memory >> 20} MiB"
+    clear(folder)  # of what failed it stays
     return Attempt(accepted, seconds, memory)
 
 

@@ -1,41 +1,33 @@
-"""The SLAM back end: real lidar logs, graphs with false loops, simulated radar, time and memory."""
+"""The SLAM back end: real lidar logs, graphs with false loops, simulated radar walks, time and memory."""
 
-import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
+from rich.progress import track
 
 from benchmarks.results import SHARED, Data, Walk, command_line, memory_mb, publish, timed
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Beside
-from radarize.console import progress
+from radarize.errors import InputError
 from radarize.jsonfile import read_json
 from radarize.log import Log
 from radarize.methods.registry import BEST
 from radarize.pose import between, compose, wrap
-from radarize.run import run
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.tum import planar, read_tum
-from radarsim.simulate import simulate
 from tests.slam.world import align, ate, lap
 
 RADISH = SHARED / "radish"
 #: Cartographer on the same files, its best settings: mean ATE in m and rad, and s.
 THEIRS = Beside("Cartographer", "lidar logs, the very same files", simulated=False)
 CARTOGRAPHER = {"intel": (0.055, 0.0126, 33), "csail": (0.130, 0.0184, 36), "orebro": (0.149, 0.0138, 19)}
-#: Recordings made where none are given: scene, platform, duration in s, seed.
-RECORDINGS = [("office", "handheld", 110, 11), ("office", "cart", 110, 12), ("floor", "handheld", 120, 3),
-              ("floor", "handheld", 120, 4), ("floor", "cart", 120, 2), ("floor", "cart", 120, 5),
-              ("corridor", "cart", 60, 3), ("corridor", "handheld", 90, 1),
-              ("physics/plain", "handheld", 60, 1)]  # fmt: skip
 #: How rows of the preset that the paper's settings make are marked.
 CLASSIC = "preset cartographer"
-#: The corridor without any feature, and a walk of 40 m along it.
-PLAIN, ALONG = "physics/plain", np.array([[0.0, 0.0], [40.0, 0.0]])
 
 
 def errors(truth: np.ndarray, estimate: np.ndarray) -> tuple[float, float]:
@@ -144,44 +136,33 @@ def graph_rows(seed: int) -> list[dict[str, object]]:
     return rows
 
 
-def simulated(folder: Path) -> Path:
-    """Make recordings, run the pipeline on them, and keep the runs; what is there already is left as it is."""
-    for scene, platform, duration, seed in RECORDINGS:
-        name = f"{Path(scene).name}_{platform}{seed}"
-        if (folder / name / "run.json").is_file():
-            continue
-        recording = folder / f"{name}.h5"
-        if not recording.is_file():
-            with progress(f"{name}: recording") as move:
-                simulate(
-                    scene, recording, platform=platform, duration=duration, seed=seed, progress=move,
-                    waypoints=ALONG if scene == PLAIN else None,
-                )  # fmt: skip
-        with progress(f"{name}: odometry and scans") as move:
-            run(recording, folder / name, progress=move)
-        recording.unlink()
-    return folder
-
-
 def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
-    """Every run in a folder, its own odometry and scans; and what it is of."""
-    rows, walks = [], []
-    for path in sorted(p.parent for p in folder.glob("*/reference.tum")):
+    """Means over the runs of a benchmark's folder, each with its own odometry and scans, and the worst one, by preset;
+    and what they are of."""
+    paths = sorted(path.parent for path in folder.glob(f"*/{Pair(**BEST)}/reference.tum"))
+    if not paths:
+        raise InputError(f"{folder}: has no runs of {Pair(**BEST)}, expected such as `benchmarks.unseen` keeps")
+    found: dict[str, list[dict[str, object]]] = {"radar": [], "cartographer": []}
+    walks = []
+    for path in track(paths, "radar walks"):
         log, (times, poses) = Log.read(path), read_tum(path / "reference.tum")
         truth = planar(poses)[np.abs(times[None] - log.times[:, None]).argmin(axis=1)]
-        entry = row(f"radar, {path.name}", log, truth, SlamConfig.preset("radar"))
+        for preset, rows in found.items():
+            rows.append(row(path.parent.name, log, truth, SlamConfig.preset(preset)))
         about = read_json(path / "run.json")["recording_attributes"]
-        walks.append(Walk(about.get("scene", "-"), about.get("seed"), entry["path m"], "engine" in about))
-        rows.append({**entry, "to beat": "half of odometry" if entry["loop m"] >= 80 else "1.05 x odometry"})
-        rows.append(row(f"radar, {path.name}, {CLASSIC}", log, truth, SlamConfig.preset("cartographer")))
-    return rows, walks
+        walks.append(Walk(about.get("scene", "-"), about.get("seed"), rows[-1]["path m"], "engine" in about))
+    summary = []
+    for preset, rows in found.items():
+        frame, name = pd.DataFrame(rows), f"radar{'' if preset == 'radar' else f', {CLASSIC}'}"
+        worst = rows[int(frame["ATE m"].argmax())]
+        summary.append({"case": f"{name}, mean of {len(rows)} walks", **frame.mean(numeric_only=True)})
+        summary.append(worst | {"case": f"{name}, the worst: {worst['case']}"})
+    return summary, walks
 
 
 PARSER = command_line(
     __doc__,
-    data=(Path, "folder of runs (radarize run -o); by default some are made"),
-    record=(False, "make those that --data lacks, and keep them"),
-    no_radar=(False, "lidar and graphs alone"),
+    data=(Path, "folder of runs that `benchmarks.unseen` keeps; lidar and graphs alone if none"),
     seeds=(3, "of disturbances, for each log"),
     seed=(7, "the first of them"),
 )
@@ -215,26 +196,23 @@ def main() -> None:
         f"Memory grew by {10 * (memory_mb() - resident) / rows[-1]['path m']:.2f} MB per 10 m on the way to "
         f"{rows[-1]['submaps']} submaps, the final optimisation included."
     )
-    if not options.no_radar:
-        with tempfile.TemporaryDirectory() as folder:
-            data = options.data or Path(folder)
-            found, simulations = radar_rows(simulated(data) if options.record or not options.data else data)
-            rows, walks = rows + found, walks + simulations
+    if options.data:
+        found, simulations = radar_rows(options.data)
+        rows, walks = rows + found, walks + simulations
     publish(
         "slam_backend",
         "SLAM back end",
         rows,
         data=Data("lidar logs of Radish and radar walks", tuple(walks), options.seed),
-        networks=() if options.no_radar else Networks().used(Pair(**BEST).networks),
+        networks=Networks().used(Pair(**BEST).networks) if options.data else (),
         beside=[THEIRS],
         notes=[
             "Mean errors after alignment; closures: believed / found. One preset for all logs, one for all radar runs. "
             "Lidar's targets are Cartographer's on the same files, with its best settings.",
             "Per scan: what `add_odometry` and `add_scan` take of the caller, wall and processor time; the loop search "
             "runs in two threads beside it. s, CPU s: the whole log, final optimisation included.",
-            "Settings were chosen among about 20 variants by looking at these very logs, their disturbed versions and "
-            "radar runs: the undisturbed figures flatter, the disturbed ones show the spread. Where the radar sees "
-            "nothing for seconds (the floor, handheld), a few closures decide, and small changes move much.",
+            "Settings for lidar were chosen among about 20 variants by looking at these very logs and their disturbed "
+            "versions: the undisturbed figures flatter, the disturbed ones show the spread.",
             *notes,
         ],
     )

@@ -75,7 +75,7 @@ EVALUATION = {
     "D_0": (8193936916513206940, 687363756677759437, 1271877811012469606),
     "office": (1929245240579931105, 3971611656923845614, 7440840146975223735),
 }
-#: Radar walks of `benchmarks.slam_backend`.
+#: Radar walks that `benchmarks.slam_backend` once had.
 BACK_END = {"plain": (1,), "office": (11, 12), "floor": (3, 4, 2, 5), "corridor": (3, 1)}
 
 #: 20 s by hand, on a cart and on a robot in buildings of styles A and B with seed 201: the first six of a data set that
@@ -128,7 +128,7 @@ CHOICES = (
         "claim of velocities",
         RADARS,
     ),
-    Choice("what closures count for in the back end's preset radar, and its cells", CLOSURES),
+    Choice("what closures need and count for in the back end's preset radar, and its cells", CLOSURES),
     Choice("the compass and what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),

@@ -171,7 +171,7 @@ PRESETS: dict[str, SlamConfig] = {
         ),
         loop=LoopConfig(
             radius=8.0, distance=3.0, angle=0.5, candidates=5, every=4, nodes=8, front=0.25, min_score=0.55,
-            final_score=0.55, levels=4, sigma=1.0, translation_floor=0.02, rotation_floor=0.006,
+            final_score=0.4, levels=4, sigma=1.0, translation_floor=0.02, rotation_floor=0.006,
         ),
     ),
     # Published with Radarize: 0.08 m cells, 30 scans per submap (Cartographer finishes one after twice as many), ranges

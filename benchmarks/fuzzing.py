@@ -112,7 +112,7 @@ def judged(name: str, count: int, first: int) -> dict[str, object] | str:
 def kept(name: str, count: int, first: int, earlier: str | None = None) -> dict[str, object] | str:
     """What is `judged`, or was by a run of this commit or an earlier one: a long one goes on where it was stopped."""
     now = commit(Path(__file__))
-    for source in (now, earlier):
+    for source in filter(None, (now, earlier)):
         path = _row(name, count, first, source)
         if path.exists():
             return json.loads(path.read_text()) | {"commit": source}
@@ -123,7 +123,7 @@ def kept(name: str, count: int, first: int, earlier: str | None = None) -> dict[
     return row | {"commit": now} if isinstance(row, dict) else row
 
 
-def _row(name: str, count: int, first: int, source: str | None) -> Path:
+def _row(name: str, count: int, first: int, source: str) -> Path:
     return Path("build/fuzzing") / f"{source}-{count}-{first}" / f"{list(READERS).index(name)}.json"
 
 

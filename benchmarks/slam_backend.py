@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import replace
+from operator import itemgetter
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,6 @@ from benchmarks.results import SHARED, Data, Walk, command_line, memory_mb, publ
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Beside
-from radarize.errors import InputError
 from radarize.jsonfile import read_json
 from radarize.log import Log
 from radarize.methods.registry import BEST
@@ -141,8 +141,9 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
     and what they are of."""
     paths = sorted(path.parent for path in folder.glob(f"*/{Pair(**BEST)}/reference.tum"))
     if not paths:
-        raise InputError(f"{folder}: has no runs of {Pair(**BEST)}, expected such as `benchmarks.unseen` keeps")
-    found: dict[str, list[dict[str, object]]] = {"radar": [], "cartographer": []}
+        raise SystemExit(f"{folder}: has no runs of {Pair(**BEST)}, expected such as `benchmarks.unseen` keeps")
+    cases = {"radar": "radar", "cartographer": f"radar, {CLASSIC}"}
+    found: dict[str, list[dict[str, object]]] = {preset: [] for preset in cases}
     walks = []
     for path in track(paths, "radar walks"):
         log, (times, poses) = Log.read(path), read_tum(path / "reference.tum")
@@ -153,10 +154,9 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
         walks.append(Walk(about.get("scene", "-"), about.get("seed"), rows[-1]["path m"], "engine" in about))
     summary = []
     for preset, rows in found.items():
-        frame, name = pd.DataFrame(rows), f"radar{'' if preset == 'radar' else f', {CLASSIC}'}"
-        worst = rows[int(frame["ATE m"].argmax())]
-        summary.append({"case": f"{name}, mean of {len(rows)} walks", **frame.mean(numeric_only=True)})
-        summary.append(worst | {"case": f"{name}, the worst: {worst['case']}"})
+        worst, case = max(rows, key=itemgetter("ATE m")), cases[preset]
+        summary.append({"case": f"{case}, mean of {len(rows)} walks", **pd.DataFrame(rows).mean(numeric_only=True)})
+        summary.append(worst | {"case": f"{case}, the worst: {worst['case']}"})
     return summary, walks
 
 

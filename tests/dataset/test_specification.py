@@ -12,10 +12,11 @@ from radarize.errors import InputError
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS, load_config
+from radarize.yamlfile import read_yaml
 from radarsim.dataset import specification
 from radarsim.dataset.specification import Specification
-from radarsim.dataset.task import content
 from radarsim.physics.frontend_config import Channel, FrontEndConfig, Leakage
+from radarsim.scene import description
 from radarsim.scene.description import shipped
 
 CONFIG = PRESETS["radarize"]
@@ -173,10 +174,12 @@ def test_a_plain_recording_is_the_one_it_always_was(tmp_path):
 def test_files_of_scenes_are_read_once(tmp_path, monkeypatch):
     """And not for each of the 20,000 recordings that there may be."""
     asked = []
-    monkeypatch.setattr(specification, "content", lambda scene, made=content: asked.append(scene) or made(scene))
+    for module in (specification, description):
+        monkeypatch.setattr(module, "read_yaml", lambda path: asked.append(path.name) or read_yaml(path))
     fields = {"building": "o", "platform": ["cart", "robot"], "count": 500, "duration": 1}
     found = load(tmp_path, buildings={"o": "office"}, recordings=[fields])
-    assert len(found.as_data()["recordings"]) == 1000 and len(asked) == 1
+    assert len(found.as_data()["recordings"]) == 1000
+    assert asked.count("office.yaml") == 2  # what it describes, and which meshes it names
 
 
 def test_levels_are_scenes_of_their_own(tmp_path):
@@ -207,10 +210,8 @@ def test_ablations_change_what_they_are_called_after():
     found: dict[str, list] = {}
     for file in (shipped() / "datasets" / "ablation").glob("*.yaml"):
         tasks = Specification.load(f"ablation/{file.stem}").tasks
-        radars, values = zip(
-            *((load_config(task.variant.radar_of(task.radar))[0], task.attributes["value"]) for task in tasks),
-            strict=True,
-        )
+        radars = [load_config(task.variant.radar_of(task.radar))[0] for task in tasks]
+        values = [task.attributes["value"] for task in tasks]
         found[file.stem] = list(zip(tasks, radars, values, strict=True))
         walks = Counter((task.building, task.seed) for task in tasks)
         assert len(walks) == 10 and {*walks.values()} == {len({*values})}  # ten walks, each at every value
@@ -244,7 +245,7 @@ def test_ablations_change_what_they_are_called_after():
     check("device", lambda _, radar: radar.center_frequency, {"IWR1843BOOST": 78.9e9, "IWR6843ISK": 61.9e9}.get)
     apart = {"TX1 TX3 TX2": 1, "TX1 TX2 TX3": 2, "TX2 TX1 TX3": 1}
     check("tx_order", lambda _, radar: radar.slot[2] - radar.slot[0], apart.get)
-    assert [len(azimuth_row(radar)) for _, radar, _ in found["antennas"][:4]] == [2, 4, 8, 8]
+    assert [len(azimuth_row(radar)) for _, radar, _ in found["antennas"]] == 10 * [2, 4, 8, 8]
 
 
 GROUP = PLAIN["recordings"][0]

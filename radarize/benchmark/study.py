@@ -146,7 +146,7 @@ class Study:
         """Look what is to be done.
 
         Raises:
-            InputError: an unknown method, or a data set without what the benchmark needs.
+            InputError: an unknown method, none that the benchmark compares, or a data set without what it needs.
         """
         options.check()
         if reason := benchmark.lacks(data):
@@ -157,6 +157,8 @@ class Study:
         given = Networks() if options.weights is None else Networks("given", options.weights)
         networks = dict.fromkeys(splits, given)
         study = cls(benchmark, data, output, options, Chosen.of(options, data), splits, networks)
+        if not study.pairs:
+            raise InputError(f"methods names {', '.join(options.methods)}, of which this benchmark compares none")
         if options.trained and benchmark.split is not None:
             if not data.trainable(benchmark.split):
                 raise InputError(

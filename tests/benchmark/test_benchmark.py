@@ -286,6 +286,8 @@ def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):
         InputError, match="nothing could be compared: .*translation.safetensors: does not fit this radar"
     ):
         benchmark("odometry", lone, tmp_path, Options(["learned"]))
+    with pytest.raises(InputError, match="methods names learned, segmentation, of which this benchmark compares none"):
+        benchmark("ablation", rooms, tmp_path, Options(["learned", "segmentation"]))
 
 
 def test_the_how_tos_method_runs(rooms, tmp_path, monkeypatch):

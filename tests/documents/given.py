@@ -15,6 +15,7 @@ from radarize.methods.configuration import Configuration
 from radarize.recording import Recording
 from radarsim.scene.description import shipped
 from tests.importers.ros import write_published
+from tests.importers.rover import write_sequence
 from tests.importers.test_import_pcap import pcap, stream
 
 #: Of data sets: recordings that are made of them, by building and platform; two variants, of `SECONDS` each. What their
@@ -160,6 +161,7 @@ GIVEN: dict[str, Callable[[Path], object]] = {
     "intel-corrected.log.gz": _carmen,
     "replica/mesh_semantic.ply": _mesh,
     "RadarHD/dataset_5": _clone,
+    "iq1m/indoor/baker/baker.1.fwd": write_sequence,
     "mine.yaml": lambda path: path.write_text(Configuration().text()),
     "materials.yaml": lambda path: path.write_text('"*": brick\n'),
 }

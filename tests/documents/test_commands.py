@@ -38,6 +38,7 @@ TYPED_INSTEAD = (
     (r"^((?:radarize|torchrun .* -m radarize\.cli) train (?!.*--epochs).*)$", r"\1 --epochs 1"),
     (r"--width 64", ""),
     (r"^((?:radarize|torchrun .* -m radarize\.cli) train .*)$", r"\1 --width 4"),
+    (r"^(radarize benchmark ablation .*)$", r"\1 --methods doppler,first-echo"),  # which has no networks
     (r"^(radarize benchmark (?!real |.*--methods).* --data .*)$", r"\1 --methods learned,segmentation"),
     (r"^(radarsim twin .*)$", r"\1 --every 15"),
     (r"--nproc-per-node 4", "--nproc-per-node 1"),

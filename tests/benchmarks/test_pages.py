@@ -10,13 +10,10 @@ import typer
 from radarize import cli as radarize
 from radarize.benchmark.registry import BENCHMARKS
 from radarize.benchmark.results import Results
-from radarize.errors import InputError
 from radarsim import cli as radarsim
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results"
-#: Pages of a former layout, to be made again; then they leave this list.
-FORMER = {"ablation", "slam_backend"}
 PAGES = sorted(path.stem for path in RESULTS.glob("*.json"))
 
 
@@ -38,9 +35,7 @@ def understood(command: str) -> None:
 
 
 @pytest.mark.parametrize("name", PAGES)
-def test_a_page_is_as_this_version_writes_it(name, request):
-    if name in FORMER:
-        request.applymarker(pytest.mark.xfail(strict=True, raises=InputError))
+def test_a_page_is_as_this_version_writes_it(name):
     results = Results.read(RESULTS / f"{name}.json")
     assert results.markdown() == (RESULTS / f"{name}.md").read_text()
     understood(results.command)
@@ -51,7 +46,7 @@ def test_a_page_is_as_this_version_writes_it(name, request):
 
 
 def test_every_page_has_its_figures():
-    assert PAGES == sorted(path.stem for path in RESULTS.glob("*.md")) and FORMER <= set(PAGES)
+    assert PAGES == sorted(path.stem for path in RESULTS.glob("*.md"))
 
 
 @pytest.mark.parametrize(

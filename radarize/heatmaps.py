@@ -206,29 +206,6 @@ class Heatmaps:
             )
         return spectrum[..., torch.as_tensor(self.pairs)]
 
-    def elevation_of(
-        self, spectrum: torch.Tensor
-    ) -> tuple[Float32[torch.Tensor, "frame range azimuth"], Float32[torch.Tensor, "frame range azimuth"]]:
-        """Direction cosine u_z of each cell of a range-azimuth map, and how coherent the two heights are (0...1).
-
-        From the phase between the upper and the lower antennas of the elevation pairs. Where echoes from above and
-        below mix, or noise prevails, the coherence is low.
-
-        Raises:
-            InputError: the array has no such pairs.
-        """
-        lower, upper = self._paired(spectrum).unbind(dim=-1)
-
-        def beam(a: torch.Tensor, b: torch.Tensor) -> torch.Tensor:
-            steering = self._pair_steering
-            return (steering.conj() * (a.transpose(-1, -2) @ b.conj() @ steering)).sum(dim=-2)
-
-        cross = beam(upper, lower)
-        power = (beam(upper, upper).real * beam(lower, lower).real).clamp_min(0).sqrt()
-        z = virtual_positions(self.config).reshape(-1, 3)[self.pairs, 2]
-        height = float((z[:, 1] - z[:, 0]).mean()) / self.config.wavelength
-        return -torch.angle(cross) / (2 * np.pi * height), cross.abs() / power.clamp_min(1e-12)
-
     def _bartlett(self, covariance: torch.Tensor, steering: torch.Tensor) -> torch.Tensor:
         beams = steering * self._tensor(self._taper(len(steering)), torch.float32)[:, None]
         return ((covariance @ beams) * beams.conj()).sum(dim=-2).real.clamp_min(0)

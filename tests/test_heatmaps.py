@@ -150,17 +150,6 @@ def test_elevation_aware_fades_the_ceiling():
     assert 10 * np.log10(aware[1] / aware[0]) == pytest.approx(law, abs=0.7)
 
 
-@pytest.mark.parametrize("elevation", [-25, 0, 30])
-def test_elevation_of_a_cell(elevation):
-    maps = Heatmaps(CONFIG)
-    spectrum = maps.spectrum(frame(point(2.0, 10, elevation), velocity=(1.0, 0.2, 0.0)))
-    power = maps.range_azimuth_of(spectrum)[0].numpy()
-    r, a = np.unravel_index(int(np.argmax(power)), power.shape)
-    u_z, coherence = (float(m[0, r, a]) for m in maps.elevation_of(spectrum))
-    assert u_z == pytest.approx(np.sin(np.radians(elevation)), abs=0.04)
-    assert coherence > 0.95
-
-
 def test_calibration_is_by_physical_transmitter():
     factors = np.exp(2j * np.pi * np.random.default_rng(3).random(12))
     config = CONFIG.model_copy(update={"channel_calibration": tuple((1 / f.real.item(), 0.0) for f in np.ones(12))})
@@ -195,7 +184,6 @@ def test_lost_frame_is_zero(method):
     valid = np.zeros(adc.shape[:3], bool)
     assert (maps.range_azimuth(adc, valid, method).numpy() == 0).all()
     assert (maps.doppler_azimuth(adc, valid).numpy() == 0).all()
-    assert np.isfinite(maps.elevation_of(maps.spectrum(adc))[1].numpy()).all()
 
 
 @pytest.mark.parametrize(

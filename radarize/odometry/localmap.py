@@ -18,13 +18,11 @@ class View(NamedTuple):
 
     Attributes:
         feature: (range, azimuth) contrast, dB.
-        u_z: (range, azimuth) direction cosine upward of each cell.
         ranges: of rows, m, evenly spaced.
         sines: of the columns' azimuths, evenly spaced and symmetric.
     """
 
     feature: Float32[np.ndarray, "range azimuth"]
-    u_z: Float32[np.ndarray, "range azimuth"]
     ranges: Float[np.ndarray, "range"]
     sines: Float[np.ndarray, "azimuth"]
 
@@ -79,14 +77,14 @@ class LocalMap:
 @njit(cache=True, fastmath=True)
 def _correlate(view, grid, position, yaws):
     """Normalised correlation of a polar map with the grid, and their overlap; cells weigh by area."""
-    (feature, u_z, ranges, sines), (mean, count, cell) = view, grid
+    (feature, ranges, sines), (mean, count, cell) = view, grid
     side = mean.shape[0]
     correlation, overlap = np.zeros(len(yaws)), np.zeros(len(yaws))
     origin_x, origin_y = position[0] / cell + side / 2, position[1] / cell + side / 2
     ahead, left = np.empty(feature.shape, np.float32), np.empty(feature.shape, np.float32)
     for i in range(len(ranges)):
         for j in range(len(sines)):
-            ahead[i, j] = ranges[i] / cell * np.sqrt(max(1 - sines[j] ** 2 - u_z[i, j] ** 2, 0.0))
+            ahead[i, j] = ranges[i] / cell * np.sqrt(max(1 - sines[j] ** 2, 0.0))
             left[i, j] = ranges[i] / cell * sines[j]
     for k in range(len(yaws)):
         c, s = np.cos(yaws[k]), np.sin(yaws[k])
@@ -120,7 +118,7 @@ def _correlate(view, grid, position, yaws):
 @njit(cache=True, fastmath=True)
 def _blend(view, grid, position, yaw, least):
     """Running mean of polar maps on the grid; a cell's newest value weighs 1/count, but no less than `least`."""
-    (feature, u_z, ranges, sines), (mean, count, cell) = view, grid
+    (feature, ranges, sines), (mean, count, cell) = view, grid
     side, (rows, columns) = mean.shape[0], feature.shape
     nearest, spacing, field = ranges[0], ranges[1] - ranges[0], sines[-1]
     x, y = position
@@ -134,19 +132,12 @@ def _blend(view, grid, position, yaw, least):
             ground = np.sqrt(dx * dx + dy * dy)
             if ahead <= 0:
                 continue
-            # Which polar cell lies over this spot depends on its elevation: look at the horizon first, then there.
-            flat = 1.0
-            for look in range(2):
-                i = (ground / flat - nearest) / spacing
-                j = (left / ground * flat + field) / (2 * field) * (columns - 1)
-                if i < 0 or j < 0 or i >= rows - 1 or j >= columns - 1:
-                    break
-                if look == 0:
-                    flat = np.sqrt(1 - u_z[int(i + 0.5), int(j + 0.5)] ** 2)
-            else:
-                a, b = int(i), int(j)
-                u, v = i - a, j - b
-                f = (feature[a, b] * (1 - v) + feature[a, b + 1] * v) * (1 - u)
-                f += (feature[a + 1, b] * (1 - v) + feature[a + 1, b + 1] * v) * u
-                count[ix, iy] += 1
-                mean[ix, iy] += max(1 / count[ix, iy], least) * (f - mean[ix, iy])
+            i, j = (ground - nearest) / spacing, (left / ground + field) / (2 * field) * (columns - 1)
+            if i < 0 or j < 0 or i >= rows - 1 or j >= columns - 1:
+                continue
+            a, b = int(i), int(j)
+            u, v = i - a, j - b
+            f = (feature[a, b] * (1 - v) + feature[a, b + 1] * v) * (1 - u)
+            f += (feature[a + 1, b] * (1 - v) + feature[a + 1, b + 1] * v) * u
+            count[ix, iy] += 1
+            mean[ix, iy] += max(1 / count[ix, iy], least) * (f - mean[ix, iy])

@@ -8,7 +8,7 @@ from radarize.batch import Signal
 from radarize.odometry.compass import Strongest
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
-from radarize.odometry.rotation import MapRotation, Rotations
+from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
 from radarize.pose import wrap
 from radarize.radar.presets import PRESETS
 from tests.batches import of_spectrum
@@ -16,24 +16,26 @@ from tests.batches import of_spectrum
 CONFIG = PRESETS["radarize"]
 SIGNAL = Signal(CONFIG)
 CELL = 0.05
+#: By how much larger sines of azimuth are than the array reads.
+SHORT = 1.025
 WORLD = gaussian_filter(np.random.default_rng(0).normal(size=(400, 400)), 2.5, mode="wrap")
 WORLD = np.clip(WORLD / WORLD.std() - 1, 0, None)
 
 
-def see(rotation: MapRotation, poses: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Features and elevations of frames at poses (x, y, yaw), half of them noise."""
-    bearing = np.arcsin(rotation._sines) + poses[:, None, None, 2]
+def see(rotation: MapRotation, poses: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Features of frames at poses (x, y, yaw), half of them noise, as seen by an array that reads sines too small."""
+    bearing = np.arcsin(SHORT * rotation._sines) + poses[:, None, None, 2]
     x = poses[:, None, None, 0] + rotation._ranges[:, None] * np.cos(bearing)
     y = poses[:, None, None, 1] + rotation._ranges[:, None] * np.sin(bearing)
     seen = map_coordinates(WORLD, [x / CELL + 200, y / CELL + 200], order=1, mode="grid-wrap")
     noise = gaussian_filter(rng.normal(size=seen.shape), (0, 1, 1))
     seen = seen + noise * WORLD.std() / noise.std()
-    return (seen - seen.mean()).astype(np.float32), np.zeros(seen.shape, np.float32)
+    return (seen - seen.mean()).astype(np.float32)
 
 
-def follow(times: np.ndarray, poses: np.ndarray, prior=None) -> Rotations:
+def follow(times: np.ndarray, poses: np.ndarray, prior=None, settings=None) -> Rotations:
     """What `MapRotation` makes of frames at true poses whose velocities are known."""
-    rotation = MapRotation(SIGNAL.heatmaps, prior=prior)
+    rotation = MapRotation(SIGNAL.heatmaps, settings, prior)
     rotation.features = lambda poses: see(rotation, poses, np.random.default_rng(1))
     rotation.echoes = lambda poses: [Strongest(0.0, 0.0, 0.0, clear=False)] * len(poses)
     velocity = np.gradient(poses[:, :2], times, axis=0)
@@ -54,6 +56,14 @@ def test_swinging_to_and_fro_at_any_frame_rate(rate):
     error = np.cumsum(found.yaw) - (yaw - yaw[0])
     assert np.degrees(np.sqrt((error**2).mean())) < 1.5
     assert found.seen.mean() > 0.95
+
+
+def test_an_array_that_reads_bearings_too_small_turns_as_far():
+    times = np.arange(0, 6, 1 / 30)
+    yaw = np.radians(60) * times
+    poses = np.stack([np.zeros(len(times)), np.zeros(len(times)), yaw], axis=1)
+    turned = [follow(times, poses, settings=RotationConfig(stretch=s)).yaw.sum() / yaw[-1] for s in (SHORT, 1.0)]
+    assert turned[0] == pytest.approx(1, abs=0.004) and turned[1] < 0.987
 
 
 def test_fifteen_seconds_lost_leave_the_map():
@@ -100,7 +110,7 @@ def test_the_search_goes_as_far_as_the_prior_is_unsure():
 def test_what_a_blind_second_claims_does_not_depend_on_the_frame_rate(rate):
     rotation = MapRotation(SIGNAL.heatmaps)
     shape = len(rotation._ranges), len(rotation._sines)
-    rotation.features = lambda frames: (np.zeros((len(frames), *shape), np.float32),) * 2
+    rotation.features = lambda frames: np.zeros((len(frames), *shape), np.float32)
     rotation.echoes = lambda frames: [Strongest(0.0, 0.0, 0.0, clear=False)] * len(frames)
     count = rate + 1
     nothing = Velocities(
@@ -117,7 +127,7 @@ def test_a_map_that_is_left_behind_is_empty():
     rng = np.random.default_rng(3)
     ranges, sines = np.arange(0.2, 4, 0.045), np.linspace(-0.85, 0.85, 69)
     feature = rng.normal(size=(len(ranges), len(sines))).astype(np.float32)
-    view = View(feature, np.zeros_like(feature), ranges, sines)
+    view = View(feature, ranges, sines)
     grid, yaws = LocalMap(4.0, CELL), np.zeros(1)
     grid.blend(view, np.zeros(2), 0.0, 0.05)
     assert grid.correlate(view, np.zeros(2), yaws)[0][0] > 0.5

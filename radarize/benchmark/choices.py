@@ -115,6 +115,7 @@ STRETCH = {
     "D_0": (8114638757705633081, 4019752636069625728, 7459226803460902511, 5527239757033558413),
     "office": (375825190500141883, 7731343103967264058),
 }
+
 #: These and six of RadarHD's training walks; what score closures need, each in three or six variants of the other
 #: settings, so that luck counts for less.
 CLOSURES = STRETCH | {Walk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}

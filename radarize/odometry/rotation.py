@@ -12,7 +12,7 @@ Three things decide what a frame looks like to the matcher (`MapRotation.feature
   and azimuth are taken out by their medians.
 - Capon's ridges are sharper than windowed sums by far, and so is the match.
 - u_y = sin(azimuth) cos(elevation): what lies above and below seems nearer to the middle than it is, and turns come out
-  1 to 2 % short. Elevations measured per cell are too unsure to help; all sines are taken larger by one factor.
+  2 to 3 % short. Elevations measured per cell are too unsure to help; all sines are taken larger by one factor.
 """
 
 from dataclasses import dataclass

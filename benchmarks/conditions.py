@@ -24,6 +24,7 @@ from radarize.methods.registry import BEST, ODOMETRY, SCANS, Workshop
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarize.tum import planar_poses
+from radarsim.batches import Batches
 from radarsim.motion import Motion
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
@@ -228,7 +229,8 @@ def recorded(walk: Mapping[str, object], name: str, folder: Path) -> Path:
         scene, seed = Scene.load(walk["scene"]), walk["seed"]
         motion = Walk(walk["platform"], walk["duration"]).through(scene, seed)
         plain = Scenario(scene, motion, PRESETS["radarize"], seed=seed)
-        record(condition.scenario(plain) if condition.scenario else plain, path)
+        scenario = condition.scenario(plain) if condition.scenario else plain
+        record(Batches(scenario, scenario.times), path)
     return path
 
 

@@ -16,13 +16,13 @@ from benchmarks.results import Data, command_line, publish, timed
 from radarize.jobs import perform
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
+from radarsim.batches import TOGETHER
 from radarsim.dataset.run import making
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
 from radarsim.sensors.suite import ALWAYS, Suite, chosen
-from radarsim.simulate import TOGETHER
 from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"]

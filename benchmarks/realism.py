@@ -19,11 +19,11 @@ from radarize import polar
 from radarize.console import progress
 from radarize.radar.presets import PRESETS
 from radarize.yamlfile import read_yaml
+from radarsim.batches import TOGETHER
 from radarsim.motion import Motion
 from radarsim.scenario import Scenario
 from radarsim.scene.description import find
 from radarsim.scene.scene import Scene
-from radarsim.simulate import TOGETHER
 from radarsim.walk import Walk as WayThrough
 
 SCENES = "office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"

@@ -8,10 +8,10 @@ import numpy as np
 
 from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, timed, walked
 from radarize.radar.presets import PRESETS
+from radarsim.batches import TOGETHER
 from radarsim.physics.pathsolver import DEPTH, RAYS
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.simulate import TOGETHER
 from radarsim.walk import Walk
 from tests.physics.brute_force import direct_sum
 

@@ -24,11 +24,11 @@ from radarize.walkclock import Clock
 from radarize.walkposes import BEARINGS, poses_of, scan, stamps
 from radarize.walks import PERIOD, Walk
 from radarize.yamlfile import read_yaml
+from radarsim.batches import TOGETHER
 from radarsim.motion import motion_from_tum
 from radarsim.scenario import Scenario
 from radarsim.scene.importers import Options, import_scene
 from radarsim.scene.scene import Scene
-from radarsim.simulate import TOGETHER
 from radarsim.twin.likeness import DEPTH, correlation, similarity
 
 

@@ -122,7 +122,7 @@ def lidar_pixels(
     inside &= distance <= REACH
     row = np.searchsorted(RANGES, distance[inside])
     column = np.searchsorted(np.degrees(BEAM_AZIMUTHS), np.degrees(np.arctan2(y, x)[inside]))
-    return np.unique(np.stack([row, column], axis=1), axis=0)
+    return np.stack(np.unravel_index(np.unique(row * BEAMS + column), (ROWS, BEAMS)), axis=1)
 
 
 def azimuths(columns: int) -> Float[np.ndarray, "column"]:

@@ -7,9 +7,9 @@ import numpy as np
 
 from radarize.errors import InputError
 from radarize.recording import Recording, add
+from radarsim.batches import TOGETHER
 from radarsim.scenario import Scenario
 from radarsim.sensors.suite import Suite
-from radarsim.simulate import TOGETHER
 
 _SAME = 1e-6  # m, by which a motion that is planned anew may differ
 

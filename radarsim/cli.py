@@ -51,18 +51,21 @@ def simulate(
             "adc-by-cause, I/Q split by cause, before noise (a much larger file)."
         ),
     ] = "",
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
     from radarize.recording import Recording, keeping
     from radarsim.motion import Mounting
     from radarsim.simulate import simulate
     from radarsim.statistics import Statistics
+    from radarsim.threads import default_workers
 
     with keeping(output), progress(f"simulate {Path(scene).stem}") as report:
         written = simulate(
             scene, output, platform=platform, trajectory=trajectory, waypoints=waypoints, duration=duration, seed=seed,
             mounting=Mounting.parse(mounting) if mounting else None, radar=radar, frontend=frontend, engine=engine,
-            sensors=[name.strip() for name in sensors.split(",") if name.strip()], progress=report,
+            sensors=[name.strip() for name in sensors.split(",") if name.strip()],
+            workers=workers or default_workers(), progress=report,
         )  # fmt: skip
     with Recording(written) as recording:
         print(Statistics.from_json(recording.attributes["motion"]))

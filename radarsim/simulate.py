@@ -1,12 +1,11 @@
 """Recordings of scenarios: frame after frame to a file, and on from where a killed run stopped."""
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Int16
 from llvmlite.binding import get_host_cpu_name
 
 from radarize import __version__
@@ -15,34 +14,59 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
 from radarize.recording import Recording, RecordingWriter, spare
+from radarsim.batches import Batch, Batches
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
-from radarsim.sensors.suite import Suite, chosen
+from radarsim.sensors.suite import chosen
 from radarsim.statistics import Statistics, crossings
 from radarsim.walk import Walk
-
-#: Frames that are made together, which is quicker: ray tests and loops over scatterers go well in large numbers.
-TOGETHER = 16
 
 
 def simulate(
     scene: str | Path | Scene,
     output: Path,
     *,
-    seed: int = 0,
-    radar: str | RadarConfig = "radarize",
-    frontend: Path | FrontEndConfig | None = None,
-    engine: str = "radarsim",
-    sensors: Sequence[str] = (),
+    workers: int = 1,
     progress: Callable[[int, int], None] | None = None,
-    **walk: object,
+    **plan: object,
 ) -> Path:
     """Simulate a recording.
 
     Args:
         scene: a scene, its YAML file, or the name of one that comes with the project.
         output: recording to write.
+        workers: processes beside this one that make frames; 1: this one does. A script that asks for more needs an
+            ``if __name__ == "__main__"``, as whatever starts processes does.
+        progress: called with (frames done, frames in all).
+        plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, engine, sensors, platform,
+            duration, trajectory, waypoints, mounting.
+
+    Returns:
+        the path written.
+
+    Raises:
+        InputError: unusable scene, configuration, trajectory, way-points, sensor or output.
+    """
+    scenario, cfg_text, about = planned(scene, **plan)
+    batches = Batches(scenario, scenario.times)
+    return record(batches, output, cfg_text=cfg_text, attributes=about, workers=workers, progress=progress)
+
+
+def planned(
+    scene: str | Path | Scene,
+    *,
+    seed: int = 0,
+    radar: str | RadarConfig = "radarize",
+    frontend: Path | FrontEndConfig | None = None,
+    engine: str = "radarsim",
+    sensors: Sequence[str] = (),
+    **walk: object,
+) -> tuple[Scenario, str, dict[str, object]]:
+    """What `simulate` simulates.
+
+    Args:
+        scene: as there.
         seed: of the tour, the scatterers and the noise.
         radar: preset, configuration file or configuration.
         frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
@@ -51,14 +75,13 @@ def simulate(
             speckle is drawn anew for every frame.
         sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
             are the same whatever is chosen.
-        progress: called with (frames done, frames in all).
         walk: how the radar goes, by the fields of `Walk`: platform, duration, trajectory, waypoints, mounting.
 
     Returns:
-        the path written.
+        the scenario, the radar's original configuration text, and attributes of the recording beside `facts`.
 
     Raises:
-        InputError: unusable scene, configuration, trajectory, way-points, sensor or output.
+        InputError: unusable scene, configuration, trajectory, way-points or sensor.
     """
     config, cfg_text = load_config(radar)
     check_limits(config)
@@ -66,80 +89,61 @@ def simulate(
     settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     scenario = Scenario(world, way.through(world, seed), config, settings, seed, names, engine)
-    about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
-    return record(scenario, output, cfg_text=cfg_text, attributes=about, progress=progress)
+    return scenario, cfg_text, {"platform": "trajectory" if way.trajectory is not None else way.platform}
 
 
 def record(
-    scenario: Scenario,
+    batches: Batches,
     output: Path,
     *,
-    times: Float[np.ndarray, "frame"] | None = None,
-    start: float = 0.0,
-    valid: Bool[np.ndarray, "frame loop tx"] | None = None,
     cfg_text: str = "",
     attributes: Mapping[str, object] | None = None,
+    workers: int = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write a recording of a scenario; what a killed run has left of the very same one is taken over.
 
     Args:
-        scenario: to record.
+        batches: to record.
         output: recording to write.
-        times: of the frames' starts on the clock of the motion, s; default: `Scenario.times`.
-        start: stamp of that clock's zero, s.
-        valid: False where a chirp is lost; its samples are then zero, as a capture's are.
         cfg_text: original configuration text.
         attributes: of the file, beside those that say what the scenario is, or instead.
+        workers: as `simulate` has them; the bytes are the same.
         progress: called with (frames done, frames in all).
 
     Returns:
         the path written.
 
     Raises:
-        InputError: the motion is shorter than a frame, none of its frames has an echo, or the recording cannot be
-            written.
+        InputError: the motion is shorter than a frame, none of its frames has an echo, the recording cannot be
+            written, or a process died.
     """
     spare(Path(output))
-    times = scenario.times if times is None else times
-    suite, about = Suite(scenario), facts(scenario) | dict(attributes or {})
-
-    def made(first: int, last: int) -> tuple[Int16[np.ndarray, "frame loop tx rx sample 2"], dict[str, np.ndarray]]:
-        frames = scenario.frames(times[first:last], times[last] if last < len(times) else None)
-        if first == 0 and not any(map(len, frames.echoes)):
-            _require_echoes(scenario, times)
-        arrived = np.True_ if valid is None else valid[first:last, ..., None, None, None]
-        return frames.samples * arrived, suite.observe(frames, first, start)
-
+    scenario, times, suite = batches.scenario, batches.times, batches.suite
+    about = facts(scenario) | dict(attributes or {})
     with (
         _left_over(Path(output)) as found,
         RecordingWriter(
             output, scenario.config, cfg_text=cfg_text, attributes=about, products=suite.products, streams=suite.streams
         ) as writer,
     ):
-        alike = found is not None and found.config == scenario.config
-        begun = found if alike and _fits(found, suite.streams, about, times + start, made) else None
-        for first in range(0, len(times), TOGETHER):
-            last = min(first + TOGETHER, len(times))
-            if begun is not None and last <= len(begun):
-                samples, rows = begun.adc(first, last), {name: begun.rows(name, first, last) for name in suite.streams}
-            else:
-                samples, rows = made(first, last)
-            arrived = None if valid is None else valid[first:last]
-            writer.append(samples, times[first:last] + start, arrived, rows=rows)
+
+        def write(first: int, last: int, batch: Batch) -> None:
+            arrived = None if batches.valid is None else batches.valid[first:last]
+            writer.append(batch.samples, times[first:last] + batches.start, arrived, rows=batch.rows)
             if progress:
                 progress(last, len(times))
+
+        alike = found is not None and found.config == scenario.config
+        begun = found if alike and _fits(found, batches, about) else None
+        kept = [span for span in batches.spans() if begun is not None and span[1] <= len(begun)]
+        for first, last in kept:
+            rows = {name: begun.rows(name, first, last) for name in suite.streams}
+            write(first, last, Batch(begun.adc(first, last), rows))
+        left = batches.spans()[len(kept) :]
+        for span, batch in zip(left, batches.each(left, workers), strict=True):
+            write(*span, batch)
     return Path(output)
-
-
-def _require_echoes(scenario: Scenario, times: Float[np.ndarray, "frame"]) -> None:
-    """Refuse a recording of nothing, as a look at some frames all over it tells."""
-    some = np.unique(np.linspace(0, len(times) - 1, TOGETHER).astype(int))
-    if not any(map(len, scenario.frames(times[some]).echoes)):
-        raise InputError(
-            f"scene {scenario.scene.name}: no frame has an echo, expected surfaces that face the radar within "
-            f"{scenario.config.max_range:.1f} m of it"
-        )
 
 
 def facts(scenario: Scenario) -> dict[str, object]:
@@ -182,12 +186,12 @@ def _length(path: Path) -> int:
         return 0
 
 
-def _fits(begun: Recording, streams: Iterable[str], about: Mapping, stamps: np.ndarray, made: Callable) -> bool:
+def _fits(begun: Recording, batches: Batches, about: Mapping) -> bool:
     """Whether the frames of a recording are the first of one that is to be made; two of them are made to see."""
     count = len(begun)
     return (
         about.items() <= begun.attributes.items()
-        and np.array_equal(begun.times, stamps[:count])
-        and all(map(begun.has, streams))
-        and all(np.array_equal(begun.adc(k, k + 1), made(k, k + 1)[0]) for k in (0, count - 1))
+        and np.array_equal(begun.times, (batches.times + batches.start)[:count])
+        and all(map(begun.has, batches.suite.streams))
+        and all(np.array_equal(begun.adc(k, k + 1), batches.made(k, k + 1).samples) for k in (0, count - 1))
     )

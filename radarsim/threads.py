@@ -1,12 +1,22 @@
-"""How many threads libraries may use beside each other."""
+"""How many processes simulate beside each other, and how many threads libraries may use."""
 
+import os
 from collections.abc import Callable
 from functools import cache, wraps
 
 import numba
+import psutil
 from threadpoolctl import ThreadpoolController
 
 from radarsim import llvm
+
+#: A simulating process's memory at its peak, bytes (benchmarks/dataset_speed.py measures it).
+MEMORY = 1.5e9
+
+
+def default_workers() -> int:
+    """One per core, as far as memory goes: processes share no locks, so two of one thread outrun one of two."""
+    return max(1, min(len(os.sched_getaffinity(0)), int(psutil.virtual_memory().available / MEMORY)))
 
 
 def share_with_drjit() -> None:

@@ -45,6 +45,7 @@ SIMULATOR = (
     "calibrate sight",
     "scenario",
     "sensors",
+    "batches",
     "simulate",
     "accompany dataset emulator twin webpreview doctor",
     "cli",

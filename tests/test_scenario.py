@@ -4,18 +4,26 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
+from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
+from radarsim import batches
 from radarsim.accompany import accompany
+from radarsim.batches import Batches
 from radarsim.draws import draws
 from radarsim.motion import Motion, Mounting
 from radarsim.physics.frontend_config import Band, FrontEndConfig
 from radarsim.scenario import Scenario
+from radarsim.scene import shapes
+from radarsim.scene.materials import MATERIALS
+from radarsim.scene.objects import SceneObject
 from radarsim.scene.scene import Scene
 from radarsim.sensors.suite import Suite
 from radarsim.simulate import record
@@ -70,6 +78,11 @@ def room(*sensors: str, seed: int = 4) -> Scenario:
     places, mounting = np.array([[0.8, 1.5], [1.9, 2.0]]), Mounting.of((0.2, 0.05, 0.1), (2, 3, -1))
     walk = Walk("cart", 1.3, waypoints=places, mounting=mounting)
     return Scenario(SCENE, walk.through(SCENE, seed), CONFIG, FrontEndConfig(), seed, sensors)
+
+
+def recorded(scenario: Scenario, path: Path, **options) -> Path:
+    """All of its frames."""
+    return record(Batches(scenario, scenario.times), path, **options)
 
 
 @pytest.fixture(scope="module")
@@ -162,35 +175,54 @@ def until_killed(scenario: Scenario, path: Path, frames: int) -> Path:
             raise Killed
 
     with pytest.raises(Killed):
-        record(scenario, path, progress=progress)
+        recorded(scenario, path, progress=progress)
     return path.with_name("left").rename(path.with_name(path.name + ".part"))
 
 
 def test_a_killed_recording_goes_on_where_it_stopped(tmp_path, monkeypatch):
     """To the same bytes, without making anew what is there but for two frames that are compared."""
     scenario = room("imu", "points", "tracking", "depth")
-    expected = record(scenario, tmp_path / "whole.h5").read_bytes()
+    expected = recorded(scenario, tmp_path / "whole.h5").read_bytes()
     part = until_killed(scenario, tmp_path / "a.h5", 33)
     with Recording(part) as left:
         kept = len(left)
     assert 30 <= kept < len(scenario.times)
     asked: list[np.ndarray] = []
     monkeypatch.setattr(Scenario, "frames", lambda *args, made=Scenario.frames: asked.append(args[1]) or made(*args))
-    record(scenario, tmp_path / "a.h5")
+    recorded(scenario, tmp_path / "a.h5")
     assert (tmp_path / "a.h5").read_bytes() == expected
     assert sum(map(len, asked)) < len(scenario.times) - kept + 3
     assert sorted(path.name for path in tmp_path.glob("a.h5*")) == ["a.h5"]
 
 
+def test_processes_beside_each_other_make_the_same_bytes(tmp_path, monkeypatch):
+    """Of every stream; and none outlives the recording."""
+    scenario = room("all")
+    expected = recorded(scenario, tmp_path / "a.h5").read_bytes()
+    monkeypatch.setattr(batches, "_WORTH", 1)
+    monkeypatch.setattr(Batches, "made", None)  # this process makes none
+    assert recorded(scenario, tmp_path / "a.h5", workers=2).read_bytes() == expected
+    assert not active_children()
+
+
+def test_what_fails_in_another_process_is_said_here(tmp_path, monkeypatch):
+    monkeypatch.setattr(batches, "_WORTH", 1)
+    far = SceneObject("far", shapes.rectangle((90, 0, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
+    scenario = replace(room(), scene=Scene("away", [far]))
+    with pytest.raises(InputError, match="scene away: no frame has an echo"):
+        recorded(scenario, tmp_path / "a.h5", workers=2)
+    assert not active_children() and not (tmp_path / "a.h5").exists()
+
+
 def test_what_another_run_has_left_is_not_gone_on_with(tmp_path):
     """Another seed, and another world of the same name, which only its frames tell."""
     scenario = room()
-    expected = record(scenario, tmp_path / "whole.h5").read_bytes()
+    expected = recorded(scenario, tmp_path / "whole.h5").read_bytes()
     emptier = Scene("room", [item for item in SCENE.objects if item.name != "pipe"], SCENE.movers)
     emptier = Scenario(emptier, scenario.motion, CONFIG, FrontEndConfig(), scenario.seed)
     for other in (room(seed=5), emptier):
         until_killed(other, tmp_path / "a.h5", 33)
-        record(scenario, tmp_path / "a.h5")
+        recorded(scenario, tmp_path / "a.h5")
         assert (tmp_path / "a.h5").read_bytes() == expected
 
 
@@ -198,8 +230,8 @@ def test_sensors_added_later_are_those_made_at_once(scenario, tmp_path):
     """Even those that look at the radar's echoes and samples."""
     names = ("tracking", "imu", "points", "ghosts", "depth")
     bare = room()
-    later = accompany(record(bare, tmp_path / "later.h5"), bare, names)
-    with Recording(later) as one, Recording(record(room(*names), tmp_path / "once.h5")) as other:
+    later = accompany(recorded(bare, tmp_path / "later.h5"), bare, names)
+    with Recording(later) as one, Recording(recorded(room(*names), tmp_path / "once.h5")) as other:
         assert sorted(one.names()) == sorted(other.names())
         for name in other.names():
             assert np.array_equal(one.read(name), other.read(name), equal_nan=True), name

@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-import psutil
-
 from radarize import __version__
 from radarize.errors import InputError, explained
 from radarize.jobs import Job, Report, perform
@@ -17,9 +15,8 @@ from radarize.locks import hold
 from radarize.replacing import replacing
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Stale, Task
+from radarsim.threads import default_workers
 
-#: A worker's memory at its peak, bytes (benchmarks/dataset_speed.py measures it).
-MEMORY = 1.5e9
 #: The expanded specification beside the recordings: parameters of each, and the members of every split.
 INDEX = "dataset.json"
 
@@ -98,11 +95,6 @@ def make(
         except KeyboardInterrupt:
             raise InputError(f"stopped; {_finished(outcome, tasks, folder)}") from None
     return outcome
-
-
-def default_workers() -> int:
-    """One per core, as far as memory goes: processes share no locks, so two of one thread outrun one of two."""
-    return max(1, min(len(os.sched_getaffinity(0)), int(psutil.virtual_memory().available / MEMORY)))
 
 
 def making(tasks: Iterable[Task], folder: Path) -> dict[str, Job]:

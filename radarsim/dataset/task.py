@@ -126,6 +126,7 @@ class Task:
         """
         from radarize.features.keeping import keep_maps
         from radarsim.accompany import accompany
+        from radarsim.batches import Batches
         from radarsim.simulate import record
         from radarsim.statistics import Statistics
         from radarsim.threads import share_with_drjit
@@ -139,12 +140,12 @@ class Task:
                 accompany(final, scenario, late, about, progress)
             else:
                 path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
-                frames = len(scenario.times)
-                if frames < self.frames:
+                batches = Batches(scenario, scenario.times)
+                if (frames := len(batches.times)) < self.frames:
                     raise InputError(
                         f"the way-points are passed after {frames} of {self.frames} frames, expected more way"
                     )
-                record(scenario, path, cfg_text=cfg_text, attributes=about, progress=progress)
+                record(batches, path, cfg_text=cfg_text, attributes=about, progress=progress)
                 if path != final:
                     keep_maps(path, final)
             self.clear(folder)

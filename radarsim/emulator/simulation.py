@@ -8,11 +8,11 @@ import numpy as np
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config
+from radarsim.batches import TOGETHER
 from radarsim.emulator.source import packed
 from radarsim.scenario import Scenario
 from radarsim.scene.description import find
 from radarsim.scene.scene import Scene
-from radarsim.simulate import TOGETHER
 from radarsim.walk import Walk
 
 

@@ -3,7 +3,8 @@
 A sheet is a slab of its material's thickness, and so is each face of a thick closed body of such a material (hollow: a
 cabinet of boards, a stud wall); its inner faces lie that much further in. A thin closed body is one slab as thick as
 itself. All else is an opaque half space. What a slab reflects and what it lets through are of one formula (ITU-R
-P.2040-4, eqs. 42, 43), which is Airy's sum over the waves between its faces, at the centre of the sweep.
+P.2040-4, eqs. 42, 43), which is Airy's sum over the waves between its faces, at the centre of the sweep. How it turns
+over the sweep is a delay, that of the group.
 """
 
 from dataclasses import replace
@@ -17,6 +18,8 @@ from radarsim.scene.objects import SceneObject
 
 #: Entries of the tables.
 TABLE = 65
+#: From the centre of the sweep to where delays are measured, Hz.
+_STEP = 0.25e9
 #: Closed bodies up to this mean thickness (m) are one homogeneous slab: door leaves, table tops.
 THICKEST_BODY = 0.05
 
@@ -39,6 +42,16 @@ def reflection(material: Material, config: RadarConfig) -> Complex[np.ndarray, "
     return np.conj(material.slab(cosine, frequency)[0]) * material.coherent_factor(cosine, frequency)
 
 
+def lag(material: Material, config: RadarConfig) -> float:
+    """How much later than its front face's a material's head-on echo comes, m; before it (< 0) where the waves from
+    both faces nearly cancel."""
+
+    def head_on(frequency):
+        return material.slab(np.ones(1), frequency)[0][0]
+
+    return float(_delay(head_on, config)) if material.thickness is not None else 0.0
+
+
 def transmission(
     material: Material, config: RadarConfig
 ) -> tuple[Complex[np.ndarray, "2 cosine"], Float[np.ndarray, "cosine"]]:
@@ -53,8 +66,12 @@ def transmission(
         wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT
         return material.slab(cosine, frequency)[1] * np.exp(1j * wavenumber * material.thickness * cosine)
 
-    step = 0.25e9
-    low, high = (excess(config.center_frequency + s * step) for s in (-1, 1))
-    turn = np.angle(np.mean(high * low.conj(), axis=0) + 1e-300)
-    delay = -turn / (2 * np.pi * 2 * step / SPEED_OF_LIGHT)
+    delay = _delay(excess, config)
     return np.conj(excess(config.center_frequency)), np.maximum(delay, 0)
+
+
+def _delay(coefficients, config):
+    """-d arg / dk at the centre of the sweep, m, of the mean over polarisations (rows)."""
+    low, high = (coefficients(config.center_frequency + s * _STEP) for s in (-1, 1))
+    turn = np.angle(np.mean(high * low.conj(), axis=0) + 1e-300)
+    return -turn / (2 * np.pi * 2 * _STEP / SPEED_OF_LIGHT)

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from radarize.radar.config import RadarConfig
 from radarsim.physics.bodies import recognise
-from radarsim.physics.coefficients import TABLE, as_slab, reflection
+from radarsim.physics.coefficients import TABLE, as_slab, lag, reflection
 from radarsim.physics.curved import RoundBodies
 from radarsim.physics.grid import Grid
 from radarsim.physics.patches import Patches
@@ -32,6 +32,7 @@ class Flat(Table):
         horizontal: part of a floor or ceiling.
         reflection: complex reflection coefficient by (facet, polarisation TE / TM, cosine of incidence), roughness
             included, as it appears in the beat signal (conjugate of the field's).
+        lag: how much later than its face the head-on echo comes, m (`coefficients.lag`).
         finish: how uneven they are over plaster, see `unevenness.FINISHES`.
         plate, frame: the moving plate that they belong to (`movingplates`), and the frame in which they stand so;
             -1: they stand still, in all frames.
@@ -46,6 +47,7 @@ class Flat(Table):
     two_sided: Bool[np.ndarray, "facet"]
     horizontal: Bool[np.ndarray, "facet"]
     reflection: Complex[np.ndarray, "facet 2 cosine"]
+    lag: Float[np.ndarray, "facet"]
     finish: Float[np.ndarray, "facet"]
     plate: Int[np.ndarray, "facet"]
     frame: Int[np.ndarray, "facet"]
@@ -60,7 +62,7 @@ class Flat(Table):
         no, empty, still = np.zeros(0, bool), np.zeros((0, 3)), np.zeros(0, int)
         table = np.zeros((0, 2, TABLE), complex)
         shape = np.zeros((0, 4, 3)), empty, empty, empty, empty, np.zeros((0, 2))
-        return cls(*shape, no, no, table, np.zeros(0), still, still)
+        return cls(*shape, no, no, table, np.zeros(0), np.zeros(0), still, still)
 
 
 @dataclass(frozen=True)
@@ -99,10 +101,11 @@ class Reflectors:
         """The reflectors of a scene."""
         flat, inner, bodies, smooth = [], [], [], []
         tables: dict[Material, np.ndarray] = {}
+        lags: dict[Material, float] = {}
         for item in scene.objects:
             slab, whole = as_slab(item)
             if slab not in tables:
-                tables[slab] = reflection(slab, config)
+                tables[slab], lags[slab] = reflection(slab, config), lag(slab, config)
             round_, is_round = recognise(item.mesh)
             finish = FINISHES.get(item.material.name, 0.0)
             bodies += [(b.center, b.axis, b.radius, b.half, tables[slab]) for b in round_]
@@ -114,7 +117,7 @@ class Reflectors:
             middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
             lying = item.floors_and_ceilings(middles, np.reshape([p.normal for p in found], (-1, 3)))
             for p, horizontal in zip(found, lying, strict=True):
-                rest = (item.two_sided, horizontal, tables[slab], finish, -1, -1)
+                rest = (item.two_sided, horizontal, tables[slab], lags[slab], finish, -1, -1)
                 flat.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *rest))
                 if hollow:
                     inwards = -slab.thickness * p.normal

@@ -2,11 +2,11 @@
 
 The beat signal of virtual antenna (k, r), loop l, sample n is a sum over echoes e with path length L (out and back),
 
-    s = sum_e A_e exp(j 2 pi [ (f_c / c) L + ((S / c) L + (f_c / c) dL/dt) (t_n - t_c) ])
+    s = sum_e A_e exp(j 2 pi [ (f_c / c) L - S L^2 / (2 c^2) + ((S / c) L + (f_c / c) dL/dt) (t_n - t_c) ])
 
 with L taken when the middle of the chirp's ADC window passes: range walk, TDM slots and near field are in L, and the
-motion during the ramp is in dL/dt (range-Doppler coupling). A direct sum costs echoes x traces x samples. Here the
-three dimensions come apart:
+motion during the ramp is in dL/dt (range-Doppler coupling). The term in L^2 is the residual video phase (Stove, IEE
+Proc. F 139(5), 1992). A direct sum costs echoes x traces x samples. Here the three dimensions come apart:
 
 1. L of each echo and virtual antenna is a parabola in time through three instants of the burst (its third-order rest
    is below 10 um for anything a person carries), so the phase of a trace is a polynomial in the loop number.
@@ -87,7 +87,7 @@ class Synthesizer:
             start=np.repeat(first, len(config.rx)), step=config.loop_time / clock.half, loops=config.loops,
             samples=config.samples, per_metre=1 / (2 * config.range_resolution),
             per_rate=config.center_frequency / SPEED_OF_LIGHT * config.samples / config.sample_rate / clock.half,
-            wavenumber=config.center_frequency / SPEED_OF_LIGHT,
+            wavenumber=config.center_frequency / SPEED_OF_LIGHT, video=config.slope / (2 * SPEED_OF_LIGHT**2),
         )  # fmt: skip
         n = config.samples
         # Of the instants v = -1...1 within the window, those of the upper half and the middle.
@@ -143,7 +143,7 @@ class Synthesizer:
 
 class _Axes(NamedTuple):
     """Normalised time s of loop 0 per virtual antenna, and between loops; bins per m, and per m of dL/ds; cycles per m
-    of the carrier."""
+    of the carrier, and per m^2 of the residual video phase."""
 
     start: Float[np.ndarray, "virtual"]
     step: float
@@ -152,6 +152,7 @@ class _Axes(NamedTuple):
     per_metre: float
     per_rate: float
     wavenumber: float
+    video: float
 
 
 @njit(parallel=True, cache=True)
@@ -163,7 +164,7 @@ def _waves(lengths, amplitudes, axes):
     turned n_c cycles further.
     """
     echoes, virtual, _ = lengths.shape
-    step, wavenumber = axes.step, axes.wavenumber
+    step = axes.step
     cells, off = np.empty(echoes, np.int64), np.zeros(echoes)
     waves = np.empty((echoes, 6, virtual), np.float32)
     for e in prange(echoes):
@@ -177,8 +178,9 @@ def _waves(lengths, amplitudes, axes):
         for a in range(virtual):
             c0, c1, c2 = lengths[e, a, 0], lengths[e, a, 1], lengths[e, a, 2]
             s = axes.start[a]
-            # float64 only for the part that is large
-            p0 = turn + wavenumber * (c0 + s * (c1 + s * c2))
+            # The residual video phase is as good as straight over a burst. float64 only for the part that is large.
+            wavenumber = axes.wavenumber - 2 * axes.video * c0
+            p0 = turn + axes.video * c0 * c0 + wavenumber * (c0 + s * (c1 + s * c2))
             waves[e, 0, a] = p0 - np.floor(p0)
             waves[e, 1, a] = wavenumber * step * (c1 + 2 * s * c2)
             waves[e, 2, a] = wavenumber * step * step * c2

@@ -20,7 +20,7 @@ lower it by as much at grazing.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 from jaxtyping import Complex, Float
@@ -180,7 +180,11 @@ def skin(frequency: float) -> complex:
 
 def constant(permittivity: float, conductivity: float) -> Callable[[float], complex]:
     """Permittivity function of a material with constant eps' and conductivity (S/m)."""
-    return lambda frequency: complex(permittivity, -conductivity / (2 * np.pi * frequency * EPS0))
+    return partial(_constant, permittivity, conductivity)
+
+
+def _constant(permittivity: float, conductivity: float, frequency: float) -> complex:
+    return complex(permittivity, -conductivity / (2 * np.pi * frequency * EPS0))
 
 
 def decibel(value: float) -> float:

@@ -75,6 +75,10 @@ class Scene:
         cross = np.cross(self.triangles[:, 1] - self.triangles[:, 0], self.triangles[:, 2] - self.triangles[:, 0])
         self.normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-300)
 
+    def __reduce__(self):
+        """Pickled without the geometry for ray tests, which every process makes for itself."""
+        return Scene, (self.name, self.objects, self.movers, self.life, self.interferers)
+
     @classmethod
     def load(cls, path: str | Path) -> "Scene":
         """Read a scene file.

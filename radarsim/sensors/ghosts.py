@@ -90,6 +90,7 @@ class _Tones(NamedTuple):
         kernel: of a tone between two bins.
         per_metre, per_rate: bins by path length and by its change over half a burst.
         wavenumber: cycles by metre.
+        video: cycles by square metre of the residual video phase.
     """
 
     row: Int[np.ndarray, "antenna"]
@@ -98,6 +99,7 @@ class _Tones(NamedTuple):
     per_metre: float
     per_rate: float
     wavenumber: float
+    video: float
 
 
 class CauseMaps:
@@ -129,7 +131,8 @@ class CauseMaps:
         instants = np.interp(even, share / share[-1], np.linspace(-1, 1, len(share)))
         wavenumber = config.center_frequency / SPEED_OF_LIGHT
         per_rate = wavenumber * n / config.sample_rate / clock.half
-        self._tones = _Tones(self.row, instants, kernel, 1 / (2 * config.range_resolution), per_rate, wavenumber)
+        per_metre, video = 1 / (2 * config.range_resolution), config.slope / (2 * SPEED_OF_LIGHT**2)
+        self._tones = _Tones(self.row, instants, kernel, per_metre, per_rate, wavenumber, video)
 
     def __call__(
         self,
@@ -170,7 +173,8 @@ def _spread(spectra, lengths, amplitudes, provenance, tones):
             turn = np.arctan2(amplitudes[e].imag, amplitudes[e].real) / (2 * np.pi) - below // n * ((n - 1) / 2)
             for a in range(antennas):
                 c0, c1, c2 = lengths[e, row[a]]
-                cycles = turn + tones.wavenumber * (c0 + s * (c1 + s * c2))
+                path = c0 + s * (c1 + s * c2)
+                cycles = turn + (tones.wavenumber - tones.video * path) * path
                 sine, cosine = _sincos_cycles(np.float32(cycles - np.floor(cycles + 0.5)))
                 re[a] = size * cosine
                 im[a] = size * sine

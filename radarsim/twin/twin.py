@@ -17,6 +17,7 @@ from radarize.errors import InputError
 from radarize.radar.array import BOARDS
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
+from radarsim.batches import Batches
 from radarsim.calibrate import calibrate
 from radarsim.motion import Motion, Mounting, motion_through
 from radarsim.physics.frontend_config import Channel, FrontEndConfig, Mismatch
@@ -104,10 +105,8 @@ def make_twin(
         "twin_of": Path(recording).name,
         "warnings": "; ".join(filter(None, [walk.left_out, crossed and f"poses: {crossed}"])),
     }
-    return record(
-        scenario, output, times=walk.times, start=walk.start, valid=walk.valid, cfg_text=walk.cfg_text,
-        attributes=about, progress=progress,
-    )  # fmt: skip
+    batches = Batches(scenario, walk.times, walk.start, walk.valid)
+    return record(batches, output, cfg_text=walk.cfg_text, attributes=about, progress=progress)
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,16 @@ from radarsim.physics.synthesis import BurstClock
 def beat(config: RadarConfig, motion, time: float, points, amplitude) -> np.ndarray:
     """Sum over echoes with path length |tx - a| + |b - rx|, every antenna placed anew at every sample instant.
 
-    The instantaneous phase of a dechirped echo of delay tau at time t on a ramp f(t) is 2 pi f(t) tau.
+    What is sent at time t has the phase theta(t) = 2 pi (f_c t + S t^2 / 2); a dechirped echo of delay tau has
+    theta(t) - theta(t - tau).
     """
     loops, n_tx, n_rx, samples, _ = config.frame_shape
     on_ramp = (np.arange(samples) - (samples - 1) / 2) / config.sample_rate
-    frequency = config.center_frequency + config.slope * on_ramp
     out = np.zeros((loops, n_tx, n_rx, samples), complex)
+
+    def sent(t):
+        return config.center_frequency * t + config.slope / 2 * t**2
+
     for loop in range(loops):
         for k in range(n_tx):
             at = time + config.chirp_times[loop, k] + on_ramp
@@ -28,7 +32,7 @@ def beat(config: RadarConfig, motion, time: float, points, amplitude) -> np.ndar
             for r in range(n_rx):
                 rx = position + np.einsum("nij,j->ni", rotation, rx_positions(config)[r])
                 back = np.linalg.norm(points[:, None, 1] - rx, axis=2)
-                phase = frequency * (there + back) / SPEED_OF_LIGHT
+                phase = sent(on_ramp) - sent(on_ramp - (there + back) / SPEED_OF_LIGHT)
                 out[loop, k, r] = (amplitude[:, None] * np.exp(2j * np.pi * phase)).sum(axis=0)
     return out
 
@@ -67,8 +71,9 @@ def direct_sum(config: RadarConfig, lengths: np.ndarray, amplitudes: np.ndarray)
             for r in range(rx):
                 c0, c1, c2 = lengths[:, k * rx + r].T
                 length, rate = c0 + s * (c1 + s * c2), (c1 + 2 * s * c2) / clock.half
-                beat = (config.slope * length + config.center_frequency * rate) / SPEED_OF_LIGHT
-                cycles = config.center_frequency / SPEED_OF_LIGHT * length[:, None] + beat[:, None] * n
+                delay, closing = length / SPEED_OF_LIGHT, rate / SPEED_OF_LIGHT
+                beat = config.slope * delay + config.center_frequency * closing
+                cycles = (config.center_frequency * delay - config.slope / 2 * delay**2)[:, None] + beat[:, None] * n
                 out[loop, k, r] = amplitudes @ np.exp(2j * np.pi * cycles)
     return out
 

@@ -40,7 +40,8 @@ def conductors(*plates, reflection=(-1.0, 1.0)):
     corners = center[:, None] + np.stack([-u_ - v_, u_ - v_, u_ + v_, v_ - u_], axis=1)
     gamma = np.broadcast_to(np.array(reflection)[:, None], (n, 2, TABLE)).astype(complex)
     still = np.full(n, -1)
-    return Flat(corners, center, np.cross(u, v), u, v, half, none, none, gamma.copy(), np.zeros(n), still, still)
+    even = np.zeros(n), np.zeros(n)
+    return Flat(corners, center, np.cross(u, v), u, v, half, none, none, gamma.copy(), *even, still, still)
 
 
 def polar(range_, azimuth_deg=0.0, elevation_deg=0.0):

@@ -70,7 +70,6 @@ def brute_force(echoes, crowd, time, which, mirror=None):
     """The beat signal with every scatterer placed anew at every sample of every chirp; `which`: of each echo."""
     loops, n_tx, n_rx, samples, _ = CONFIG.frame_shape
     on_ramp = (np.arange(samples) - (samples - 1) / 2) / CONFIG.sample_rate
-    frequency = CONFIG.center_frequency + CONFIG.slope * on_ramp
     tx, rx = tx_positions(CONFIG), rx_positions(CONFIG)
     out = np.zeros((loops, n_tx, n_rx, samples), complex)
     for loop in range(0, loops, 5):
@@ -84,7 +83,8 @@ def brute_force(echoes, crowd, time, which, mirror=None):
                     image = place * [1, -1, 1] + [0, 4, 0]
                     virtual = place if mirror is None else np.where(mirror[:, way, None], image, place)
                     legs.append(np.linalg.norm(virtual - antenna, axis=2))
-                phase = frequency[:, None] * (legs[0] + legs[1]) / SPEED_OF_LIGHT
+                delay = (legs[0] + legs[1]) / SPEED_OF_LIGHT
+                phase = CONFIG.center_frequency * delay + CONFIG.slope * delay * (on_ramp[:, None] - delay / 2)
                 out[loop, k, r] = (echoes.amplitude * np.exp(2j * np.pi * phase)).sum(axis=1)
     return out
 

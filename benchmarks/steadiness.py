@@ -1,0 +1,106 @@
+"""How steady echoes are from frame to frame on a walk, beside rays that stand ten times as dense in the way of mirrored
+paths (`radarsim.physics.fresnelzone`).
+
+A frame's echoes have places in the world, so that their phases at the next frame's instant are known. What the next
+frame's field differs by is what motion does not explain: flashes that come into sight, and amplitudes that hang on few
+rays. The first the dense reference shows, too.
+"""
+
+from unittest.mock import patch
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from benchmarks.results import Data, command_line, publish, walked
+from radarize.console import progress
+from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.radar.presets import PRESETS
+from radarsim.batches import TOGETHER
+from radarsim.physics import fresnelzone
+from radarsim.physics.echoes import Echoes
+from radarsim.physics.fresnelzone import Lattice
+from radarsim.scenario import Scenario
+from radarsim.scene.scene import Scene
+from radarsim.walk import Walk
+
+CONFIG = PRESETS["radarize"]
+SCENES = "office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"
+#: Of the field's power, dB: changes above it are counted.
+LIMIT = -10.0
+#: Rays of the reference: to see whether a path is partly clear, how much of it, and for which amplitudes over noise.
+DENSE = {
+    "_FEW": Lattice.fibonacci(89, 55, 1.5),
+    "_MANY": Lattice.fibonacci(610, 377, 1.5),
+    "LEAST_SPLIT": fresnelzone.LEAST_SPLIT / 10,
+}
+#: Hz, over the sweep.
+TONES = CONFIG.center_frequency + CONFIG.bandwidth * np.linspace(-0.5, 0.5, 9)
+
+
+def field(echoes: Echoes, scenario: Scenario, time: float) -> Complex[np.ndarray, "virtual tone"]:
+    """What the antennas receive of echoes at the middle of the frame that starts then, over the sweep."""
+    paths = echoes.lengths(CONFIG, scenario.motion, time)[:, :, 0]
+    cycles = paths[..., None] * TONES / SPEED_OF_LIGHT
+    return np.einsum("e,evt->vt", echoes.amplitude, np.exp(2j * np.pi * cycles))
+
+
+def changes(scenario: Scenario, times: Float[np.ndarray, "frame"]) -> Float[np.ndarray, "frame-1"]:
+    """Change of the field from each frame to the next that motion does not explain, dB of its power."""
+    found: list[float] = []
+    for first in range(0, len(times) - 1, TOGETHER - 1):
+        some = times[first : first + TOGETHER]
+        frames = scenario.frames(some).echoes
+        for before, after, time in zip(frames, frames[1:], some[1:], strict=False):
+            expected, there = field(before, scenario, time), field(after, scenario, time)
+            power = np.sum(np.abs(there - expected) ** 2) / np.sum(np.abs(expected) ** 2)
+            found.append(10 * np.log10(power))
+    return np.array(found)
+
+
+PARSER = command_line(
+    __doc__,
+    frames=(60, "of each walk"),
+    start=(5.0, "of them, s after the walk's"),
+    seed=(3, "of walks and worlds"),
+)
+
+
+def main() -> None:
+    options = PARSER.parse_args()
+    rows, walks = [], []
+    with progress("scenes") as report:
+        for done, name in enumerate(SCENES):
+            scene = Scene.load(name)
+            scenario = Scenario(scene, Walk("cart", 30.0).through(scene, options.seed), CONFIG, seed=options.seed)
+            times = options.start + np.arange(options.frames) * CONFIG.frame_period
+            speed = np.linalg.norm(np.diff(scenario.motion.position(times), axis=0), axis=1) / CONFIG.frame_period
+            own = changes(scenario, times)
+            with patch.multiple(fresnelzone, **DENSE):
+                dense = changes(scenario, times)
+            walks.append(walked(name, options.seed, scenario.motion))
+            rows.append({
+                "scene": name, "m/s": f"{speed.min():.1f} to {speed.max():.1f}", "frames": len(own),
+                "median dB": np.median(own), "above -10 dB": int(np.sum(own > LIMIT)),
+                "so by dense rays": int(np.sum(dense > LIMIT)),
+                "not so by dense rays": int(np.sum((own > LIMIT) & (dense <= LIMIT))),
+                "most beside dense rays dB": np.max(np.maximum(own, LIMIT) - np.maximum(dense, LIMIT)),
+            })  # fmt: skip
+            report(done + 1, len(SCENES))
+    publish(
+        "steadiness",
+        "How steady echoes are from frame to frame",
+        rows,
+        data=Data("walks by cart", tuple(walks), options.seed),
+        networks=(),
+        notes=(
+            "Power of what a frame's field differs by from the echoes of the frame before, carried on to its instant, "
+            "over the power of the field; all antennas, nine tones over the sweep. Most beside dense rays: by how much "
+            f"it is above both {LIMIT:g} dB and the reference, at most.",
+            "Dense rays: 89 instead of 13 to see whether a mirrored path is partly clear, 610 instead of 55 for how "
+            "much of it, and for echoes of a tenth of the amplitude.",
+        ),
+    )
+
+
+if __name__ == "__main__":
+    main()

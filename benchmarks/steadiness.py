@@ -53,7 +53,7 @@ def changes(scenario: Scenario, times: Float[np.ndarray, "frame"]) -> Float[np.n
         for before, after, time in zip(frames, frames[1:], some[1:], strict=False):
             expected, there = field(before, scenario, time), field(after, scenario, time)
             power = np.sum(np.abs(there - expected) ** 2) / np.sum(np.abs(expected) ** 2)
-            found.append(10 * np.log10(power))
+            found.append(10 * np.log10(max(power, 1e-12)))  # at rest
     return np.array(found)
 
 

@@ -4,14 +4,20 @@ Three ways to the frames of the first scene in one run: this simulator; the same
 `--engine sionna`, the paths of Sionna RT's own solver at the same poses.
 """
 
+import tempfile
+import time
+from pathlib import Path
+
 import numpy as np
 
 from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, timed, walked
 from radarize.radar.presets import PRESETS
-from radarsim.batches import TOGETHER
+from radarsim.batches import TOGETHER, Batches
 from radarsim.physics.pathsolver import DEPTH, RAYS
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
+from radarsim.simulate import record
+from radarsim.threads import default_workers
 from radarsim.walk import Walk
 from tests.physics.brute_force import direct_sum
 
@@ -37,6 +43,19 @@ def pace(scenario: Scenario, times: np.ndarray) -> tuple[float, float, float]:
         spent.append(((finding + rest) / len(batch), finding / len(batch)))
         counts += map(len, echoes)
     return *np.median(spent, axis=0), np.mean(counts)
+
+
+def beside(scenario: Scenario, workers: int) -> tuple[float, float]:
+    """A recording by so many processes, to a file: s per frame after the first tenth, and s until that was written."""
+    seen, frames = [], len(scenario.times)
+    with tempfile.TemporaryDirectory() as folder:
+        begun = time.perf_counter()
+        record(
+            Batches(scenario, scenario.times), Path(folder) / "walk.h5", workers=workers,
+            progress=lambda done, total: seen.append((done, time.perf_counter())),
+        )  # fmt: skip
+    first, at = next(each for each in seen if each[0] >= frames / 10)
+    return (seen[-1][1] - at) / (frames - first), at - begun
 
 
 def summed(scenario: Scenario, times: np.ndarray) -> tuple[float, float]:
@@ -67,6 +86,7 @@ def memory_growth(scenario: Scenario, frames: int) -> str:
 PARSER = command_line(
     __doc__,
     frames=(240, "of a walk"),
+    recorded_frames=(1800, "of a recording by several processes"),
     direct_frames=(2, "summed directly"),
     sionna_frames=(20, "by Sionna's paths"),
     memory_frames=(0, "frames of a long run that watches memory"),
@@ -87,6 +107,13 @@ def main() -> None:
         memory = f"{peak_memory_mb():.0f} MB"
         notes.append(f"{name}: first {TOGETHER} frames after {begun:.1f} s; peak memory {memory} so far.")
     _, fastest, echoes, _ = ways[0]
+    workers = default_workers()
+    long = walk(first, np.arange(options.recorded_frames) * CONFIG.frame_period, options.seed)
+    recorded, begun = beside(long, workers)
+    ways.insert(2, (f"{first}: a recording by {workers} processes", recorded, echoes, "a file"))
+    notes.append(
+        f"{first}: by {workers} processes, the first tenth of {options.recorded_frames} frames after {begun:.1f} s."
+    )
 
     few = np.linspace(0, len(times) - 1, options.direct_frames).astype(int)
     seconds, error = summed(scenarios[first], times[few])
@@ -103,7 +130,7 @@ def main() -> None:
     notes += [
         f"Fast synthesis against the direct sum of the same echoes: error power {error:.1f} dB (worst frame).",
         f"The radar makes {CONFIG.frame_rate:.0f} frames/s: {first} runs at {1 / fastest / CONFIG.frame_rate:.2f} of "
-        "real time.",
+        f"real time in one process, {1 / recorded / CONFIG.frame_rate:.2f} in {workers}.",
         f"Medians over {options.frames}, {options.direct_frames} and {options.sionna_frames} frames.",
         f"Sionna RT's PathSolver: {RAYS:.0e} rays, depth {DEPTH}, diffuse reflection; its paths above the noise, "
         "turned into samples by the same synthesis.",

@@ -96,7 +96,7 @@ def main() -> None:
             "Power of what a frame's field differs by from the echoes of the frame before, carried on to its instant, "
             "over the power of the field; all antennas, nine tones over the sweep. Most beside dense rays: by how much "
             f"it is above both {LIMIT:g} dB and the reference, at most.",
-            "Dense rays: 89 instead of 13 to see whether a mirrored path is partly clear, 610 instead of 55 for how "
+            "Dense rays: 89 instead of 21 to see whether a mirrored path is partly clear, 610 instead of 55 for how "
             "much of it, and for echoes of a tenth of the amplitude.",
         ),
     )

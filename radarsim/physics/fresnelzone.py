@@ -52,7 +52,7 @@ class Lattice(NamedTuple):
         return cls(nodes, weight / weight.sum())
 
 
-_FEW, _MANY = Lattice.fibonacci(13, 8, 1.5), Lattice.fibonacci(55, 34, 1.5)
+_FEW, _MANY = Lattice.fibonacci(21, 13, 1.5), Lattice.fibonacci(55, 34, 1.5)
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,7 @@ LAWS = {
     "Box room": (rooms.box_room, "path, m", "images up to it"),
     "Thin pole": (rooms.thin_pole, "offset of the pole, mm", "of the flash without it, dB"),
     "Slab": (rooms.slab, "angle of incidence, deg", "TE coefficient, dB"),
+    "Panes": (rooms.panes, "range, m", "over the largest, dB"),
     "Hollow wall": (rooms.hollow_wall, "range, m", "over the front, dB"),
     "Phantom": (rooms.phantom, "azimuth, deg (left positive)", "range, m"),
     "Moving door": (rooms.moving_door, "angle, deg", "closing speed of the flash, m/s"),

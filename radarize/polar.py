@@ -22,6 +22,8 @@ ROWS, COLUMNS, BEAMS = 256, 64, 512
 REACH = 10.8
 RANGES = np.linspace(0, REACH, ROWS)
 AZIMUTHS, BEAM_AZIMUTHS = (np.radians(np.linspace(-90, 90, columns)) for columns in (COLUMNS, BEAMS))
+#: m: points of a lidar's picture are no higher or lower than this over the lidar.
+SLAB = 0.3
 #: Kept is what has at least this share of the largest magnitude beyond the first bins, where transmitters leak.
 THRESHOLD, LEAKAGE = 0.05, 6
 #: Transmitters of the pictures, as published: eight antennas in a row. The pictures themselves have the beam of four,
@@ -117,7 +119,7 @@ def lidar_pixels(
 ) -> Int[np.ndarray, "pixel 2"]:
     """Rows and columns of a lidar's picture that hold points (x forward, y left, z up, m) of its own height."""
     x, y, z = points.T
-    inside = (x > 0) & (x <= _SQUARE) & (np.abs(y) <= _SQUARE) & (np.abs(z) <= 0.3)
+    inside = (x > 0) & (x <= _SQUARE) & (np.abs(y) <= _SQUARE) & (np.abs(z) <= SLAB)
     distance = np.linalg.norm(points, axis=1)
     inside &= distance <= REACH
     row = np.searchsorted(RANGES, distance[inside])

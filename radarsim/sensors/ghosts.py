@@ -143,7 +143,8 @@ class CauseMaps:
         """Power of each cause in the square of the amplitudes' unit."""
         n = self.config.samples
         spectra = np.zeros((_INSTANTS, len(Provenance), n, 2, len(self.row)), np.float32)
-        _spread(spectra, lengths, amplitudes, provenance, self._tones)
+        polar = np.abs(amplitudes).astype(np.float32), np.angle(amplitudes) / (2 * np.pi)
+        _spread(spectra, lengths, polar, provenance, self._tones)
         return self.beams(spectra[..., 0, :] + 1j * spectra[..., 1, :])
 
     def beams(self, spectra: Complex[np.ndarray, "instant *cell antenna"]) -> Float[np.ndarray, "*cell azimuth"]:
@@ -153,36 +154,35 @@ class CauseMaps:
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def _spread(spectra, lengths, amplitudes, provenance, tones):
-    """spectra[instant, cause, bin, (re, im), antenna] += A exp(j phase) K(tone - bin).
+def _spread(spectra, lengths, polar, provenance, tones):
+    """spectra[instant, cause, bin, (re, im), antenna] += A exp(j phase) K(tone - bin); `polar`: A's sizes and turns.
 
     Phase and tone are those of `synthesis`. The tone is taken to be the same for all antennas: across the array it
     changes by less than a fifth of a bin.
     """
     row, kernel = tones.row, tones.kernel
+    sizes, turns = polar
     antennas, n = len(row), spectra.shape[2]
     for i in prange(len(tones.instants)):
         s = tones.instants[i]
-        re, im = np.empty(antennas, np.float32), np.empty(antennas, np.float32)
-        for e in range(len(amplitudes)):
+        wave = np.empty((2, antennas), np.float32)
+        for e in range(len(sizes)):
             c0, c1, c2 = lengths[e, row[antennas // 2]]
             tone = (c0 + s * (c1 + s * c2)) * tones.per_metre + (c1 + 2 * s * c2) * tones.per_rate
             below = int(np.floor(tone))
-            size = np.float32(abs(amplitudes[e]))
             # A tone N bins higher has turned (N - 1) / 2 cycles more between the middle and the first sample.
-            turn = np.arctan2(amplitudes[e].imag, amplitudes[e].real) / (2 * np.pi) - below // n * ((n - 1) / 2)
+            turn = turns[e] - below // n * ((n - 1) / 2)
             for a in range(antennas):
-                c0, c1, c2 = lengths[e, row[a]]
-                path = c0 + s * (c1 + s * c2)
+                path = lengths[e, row[a], 0] + s * (lengths[e, row[a], 1] + s * lengths[e, row[a], 2])
                 cycles = turn + (tones.wavenumber - tones.video * path) * path
                 sine, cosine = _sincos_cycles(np.float32(cycles - np.floor(cycles + 0.5)))
-                re[a] = size * cosine
-                im[a] = size * sine
+                wave[0, a] = sizes[e] * cosine
+                wave[1, a] = sizes[e] * sine
             for k in range(2 * _WIDTH):
                 x = (below - _WIDTH + 1 + k - tone + _WIDTH) * _FINE
                 at = min(max(int(x), 0), 2 * _WIDTH * _FINE - 1)
                 weight = kernel[at] + np.float32(x - at) * (kernel[at + 1] - kernel[at])
                 cell = spectra[i, provenance[e], (below - _WIDTH + 1 + k) % n]
-                for a in range(antennas):
-                    cell[0, a] += weight * re[a]
-                    cell[1, a] += weight * im[a]
+                for part in range(2):
+                    for a in range(antennas):
+                        cell[part, a] += weight * wave[part, a]

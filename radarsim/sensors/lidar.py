@@ -22,6 +22,8 @@ class Lidar(Sensor):
         bearing, elevation = np.meshgrid(polar.BEAM_AZIMUTHS, ELEVATIONS)
         beams = [np.cos(bearing) * np.cos(elevation), np.sin(bearing) * np.cos(elevation), np.sin(elevation)]
         self._beams = np.stack([each.ravel() for each in beams], axis=1)
+        slope = np.maximum(np.abs(self._beams[:, 2]), polar.SLAB / polar.REACH)
+        self._reach = polar.SLAB / slope  # of each beam before it leaves the slab, m
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The pictures."""
@@ -38,7 +40,7 @@ class Lidar(Sensor):
         cos, sin = np.cos(yaw), np.sin(yaw)
         ways = self._beams @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
         distance = self.scenario.sight.distance(position[None], ways[None], np.array([time]), through_glass=True)[0]
-        hit = np.isfinite(distance)
+        hit = distance <= self._reach
         picture = np.zeros((polar.ROWS, polar.BEAMS), bool)
         picture[tuple(polar.lidar_pixels(self._beams[hit] * distance[hit, None]).T)] = True
         return np.packbits(picture, axis=1)

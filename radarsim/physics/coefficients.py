@@ -47,9 +47,9 @@ def lag(material: Material, config: RadarConfig) -> float:
     both faces nearly cancel."""
 
     def head_on(frequency):
-        return material.slab(np.ones(1), frequency)[0][0]
+        return material.slab(np.ones(1), frequency)[0]
 
-    return float(_delay(head_on, config)) if material.thickness is not None else 0.0
+    return float(_delay(head_on, config)[0]) if material.thickness is not None else 0.0
 
 
 def transmission(

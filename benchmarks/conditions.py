@@ -229,8 +229,7 @@ def recorded(walk: Mapping[str, object], name: str, folder: Path) -> Path:
         scene, seed = Scene.load(walk["scene"]), walk["seed"]
         motion = Walk(walk["platform"], walk["duration"]).through(scene, seed)
         plain = Scenario(scene, motion, PRESETS["radarize"], seed=seed)
-        scenario = condition.scenario(plain) if condition.scenario else plain
-        record(Batches(scenario, scenario.times), path)
+        record(Batches.of(condition.scenario(plain) if condition.scenario else plain), path)
     return path
 
 

@@ -15,10 +15,8 @@ from radarize.radar.presets import PRESETS
 from radarsim.batches import TOGETHER, Batches
 from radarsim.physics.pathsolver import DEPTH, RAYS
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
-from radarsim.simulate import record
+from radarsim.simulate import planned, record
 from radarsim.threads import default_workers
-from radarsim.walk import Walk
 from tests.physics.brute_force import direct_sum
 
 CONFIG = PRESETS["radarize"]
@@ -26,9 +24,7 @@ CONFIG = PRESETS["radarize"]
 
 def walk(name: str, times: np.ndarray, seed: int, **options: object) -> Scenario:
     """A handheld walk, its first frames made."""
-    scene = Scene.load(name)
-    motion = Walk("handheld", len(times) * CONFIG.frame_period + 1).through(scene, seed)
-    scenario = Scenario(scene, motion, CONFIG, seed=seed, **options)
+    scenario, *_ = planned(name, seed=seed, duration=len(times) * CONFIG.frame_period + 1, **options)
     assert scenario.frames(times[:TOGETHER]).samples.any()
     return scenario
 
@@ -51,7 +47,7 @@ def beside(scenario: Scenario, workers: int) -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as folder:
         begun = time.perf_counter()
         record(
-            Batches(scenario, scenario.times), Path(folder) / "walk.h5", workers=workers,
+            Batches.of(scenario), Path(folder) / "walk.h5", workers=workers,
             progress=lambda done, total: seen.append((done, time.perf_counter())),
         )  # fmt: skip
     first, at = next(each for each in seen if each[0] >= frames / 10)
@@ -108,7 +104,7 @@ def main() -> None:
         notes.append(f"{name}: first {TOGETHER} frames after {begun:.1f} s; peak memory {memory} so far.")
     _, fastest, echoes, _ = ways[0]
     workers = default_workers()
-    long = walk(first, np.arange(options.recorded_frames) * CONFIG.frame_period, options.seed)
+    long, *_ = planned(first, seed=options.seed, duration=options.recorded_frames * CONFIG.frame_period)
     recorded, begun = beside(long, workers)
     ways.insert(2, (f"{first}: a recording by {workers} processes", recorded, echoes, "a file"))
     notes.append(

@@ -11,6 +11,7 @@ from unittest.mock import patch
 import numpy as np
 from jaxtyping import Complex, Float
 
+from benchmarks.realism import SCENES
 from benchmarks.results import Data, command_line, publish, walked
 from radarize.console import progress
 from radarize.radar.config import SPEED_OF_LIGHT
@@ -24,7 +25,6 @@ from radarsim.scene.scene import Scene
 from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"]
-SCENES = "office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"
 #: Of the field's power, dB: changes above it are counted.
 LIMIT = -10.0
 #: Rays of the reference: to see whether a path is partly clear, how much of it, and for which amplitudes over noise.
@@ -80,12 +80,15 @@ def main() -> None:
             walks.append(walked(name, options.seed, scenario.motion))
             rows.append({
                 "scene": name, "m/s": f"{speed.min():.1f} to {speed.max():.1f}", "frames": len(own),
-                "median dB": np.median(own), "above -10 dB": int(np.sum(own > LIMIT)),
+                "median dB": np.median(own), f"above {LIMIT:g} dB": int(np.sum(own > LIMIT)),
                 "so by dense rays": int(np.sum(dense > LIMIT)),
                 "not so by dense rays": int(np.sum((own > LIMIT) & (dense <= LIMIT))),
                 "most beside dense rays dB": np.max(np.maximum(own, LIMIT) - np.maximum(dense, LIMIT)),
             })  # fmt: skip
             report(done + 1, len(SCENES))
+    few, many = (
+        f"{len(DENSE[name].nodes)} instead of {len(getattr(fresnelzone, name).nodes)}" for name in ("_FEW", "_MANY")
+    )
     publish(
         "steadiness",
         "How steady echoes are from frame to frame",
@@ -96,8 +99,8 @@ def main() -> None:
             "Power of what a frame's field differs by from the echoes of the frame before, carried on to its instant, "
             "over the power of the field; all antennas, nine tones over the sweep. Most beside dense rays: by how much "
             f"it is above both {LIMIT:g} dB and the reference, at most.",
-            "Dense rays: 89 instead of 21 to see whether a mirrored path is partly clear, 610 instead of 55 for how "
-            "much of it, and for echoes of a tenth of the amplitude.",
+            f"Dense rays: {few} to see whether a mirrored path is partly clear, {many} for how much of it, and for "
+            "echoes of a tenth of the amplitude.",
         ),
     )
 

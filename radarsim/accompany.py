@@ -7,7 +7,7 @@ import numpy as np
 
 from radarize.errors import InputError
 from radarize.recording import Recording, add
-from radarsim.batches import TOGETHER
+from radarsim.batches import Batches
 from radarsim.scenario import Scenario
 from radarsim.sensors.suite import Suite
 
@@ -42,11 +42,9 @@ def accompany(
                 f"{path}: its tour differs by {np.abs(apart).max():.3g} m from what this version plans, expected the "
                 "same; --replace makes it anew"
             )
-    suite, rows = Suite(scenario, sensors), []
-    for first in range(0, len(times), TOGETHER):
-        last = min(first + TOGETHER, len(times))
-        frames = scenario.frames(times[first:last], times[last] if last < len(times) else None)
-        rows.append(suite.observe(frames, first))
+    suite, batches, rows = Suite(scenario, sensors), Batches(scenario, times), []
+    for first, last in batches.spans():
+        rows.append(suite.observe(batches.frames(first, last), first))
         if progress:
             progress(last, len(times))
     joined = {name: np.concatenate([each[name] for each in rows]) for name in suite.streams}

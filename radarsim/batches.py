@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int16
 
 from radarize.errors import InputError
 from radarize.jobs import Report, perform
-from radarsim.scenario import Scenario
+from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.suite import Suite
 from radarsim.threads import share_with_drjit
 
@@ -45,18 +45,31 @@ class Batches:
     start: float = 0.0
     valid: Bool[np.ndarray, "frame loop tx"] | None = None
 
+    @classmethod
+    def of(cls, scenario: Scenario) -> "Batches":
+        """All frames of a scenario.
+
+        Raises:
+            InputError: its motion is shorter than one.
+        """
+        return cls(scenario, scenario.times)
+
     @cached_property
     def suite(self) -> Suite:
         """The sensors."""
         return Suite(self.scenario)
 
+    def frames(self, first: int, last: int) -> Frames:
+        """Frames first to last - 1, nothing of them computed yet."""
+        return self.scenario.frames(self.times[first:last], self.times[last] if last < len(self.times) else None)
+
     def made(self, first: int, last: int) -> Batch:
-        """Frames first to last - 1.
+        """Samples and rows of frames first to last - 1.
 
         Raises:
             InputError: the recording is to begin with them, and none of its frames has an echo.
         """
-        frames = self.scenario.frames(self.times[first:last], self.times[last] if last < len(self.times) else None)
+        frames = self.frames(first, last)
         if first == 0 and not any(map(len, frames.echoes)):
             self._require_echoes()
         arrived = np.True_ if self.valid is None else self.valid[first:last, ..., None, None, None]

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -49,8 +50,7 @@ def simulate(
         InputError: unusable scene, configuration, trajectory, way-points, sensor or output.
     """
     scenario, cfg_text, about = planned(scene, **plan)
-    batches = Batches(scenario, scenario.times)
-    return record(batches, output, cfg_text=cfg_text, attributes=about, workers=workers, progress=progress)
+    return record(Batches.of(scenario), output, cfg_text=cfg_text, attributes=about, workers=workers, progress=progress)
 
 
 def planned(
@@ -127,22 +127,17 @@ def record(
             output, scenario.config, cfg_text=cfg_text, attributes=about, products=suite.products, streams=suite.streams
         ) as writer,
     ):
-
-        def write(first: int, last: int, batch: Batch) -> None:
+        alike = found is not None and found.config == scenario.config
+        begun = found if alike and _fits(found, batches, about) else None
+        spans = batches.spans()
+        kept = [span for span in spans if begun is not None and span[1] <= len(begun)]
+        taken = (Batch(begun.adc(*span), {name: begun.rows(name, *span) for name in suite.streams}) for span in kept)
+        made = batches.each(spans[len(kept) :], workers)
+        for (first, last), batch in zip(spans, chain(taken, made), strict=True):
             arrived = None if batches.valid is None else batches.valid[first:last]
             writer.append(batch.samples, times[first:last] + batches.start, arrived, rows=batch.rows)
             if progress:
                 progress(last, len(times))
-
-        alike = found is not None and found.config == scenario.config
-        begun = found if alike and _fits(found, batches, about) else None
-        kept = [span for span in batches.spans() if begun is not None and span[1] <= len(begun)]
-        for first, last in kept:
-            rows = {name: begun.rows(name, first, last) for name in suite.streams}
-            write(first, last, Batch(begun.adc(first, last), rows))
-        left = batches.spans()[len(kept) :]
-        for span, batch in zip(left, batches.each(left, workers), strict=True):
-            write(*span, batch)
     return Path(output)
 
 

@@ -82,7 +82,7 @@ def room(*sensors: str, seed: int = 4) -> Scenario:
 
 def recorded(scenario: Scenario, path: Path, **options) -> Path:
     """All of its frames."""
-    return record(Batches(scenario, scenario.times), path, **options)
+    return record(Batches.of(scenario), path, **options)
 
 
 @pytest.fixture(scope="module")

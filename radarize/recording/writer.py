@@ -197,16 +197,8 @@ class RecordingWriter:
         self._waiting = waiting
 
     def _extend(self, name: str, data: np.ndarray) -> None:
-        if not len(data):
-            return
-        target = self._file[name]
-        start = len(target)
-        target.resize(start + len(data), axis=0)
-        if target.compression is None or target.chunks[0] > 1:
-            target[start:] = data
-            return
-        for k, row in enumerate(np.broadcast_to(data, (len(data), *target.shape[1:])).astype(target.dtype, copy=False)):
-            target.id.write_direct_chunk((start + k, *(0 for _ in row.shape)), _packed(row))
+        if len(data):
+            _lengthen(self._file[name], data)
 
     def annotate(self, **attributes: object) -> None:
         """Attributes of the file that are known only at the end; stored when the writer is closed."""
@@ -293,13 +285,22 @@ def add(
                 if name in file:
                     raise InputError(f"{path}: has /{name} already, expected a recording without")
             for name, stream in streams.items():
-                data = grow(file, name, stream)
-                data.resize(len(rows[name]), axis=0)
-                data[:] = rows[name]
+                _lengthen(grow(file, name, stream), rows[name])
             for name, product in (products or {}).items():
                 fix(file, name, product)
             file.attrs.update(attributes or {})
     return path
+
+
+def _lengthen(target: h5py.Dataset, data: np.ndarray) -> None:
+    """Put rows behind those that a stream's data set has."""
+    start = len(target)
+    target.resize(start + len(data), axis=0)
+    if target.compression is None or target.chunks[0] > 1:
+        target[start:] = data
+        return
+    for k, row in enumerate(np.broadcast_to(data, (len(data), *target.shape[1:])).astype(target.dtype, copy=False)):
+        target.id.write_direct_chunk((start + k, *(0 for _ in row.shape)), _packed(row))
 
 
 def _packed(row: np.ndarray) -> bytes:

@@ -140,7 +140,7 @@ class Task:
                 accompany(final, scenario, late, about, progress)
             else:
                 path = final if self.storage == "raw" else final.with_name(f"{final.name}.raw.part")
-                batches = Batches(scenario, scenario.times)
+                batches = Batches.of(scenario)
                 if (frames := len(batches.times)) < self.frames:
                     raise InputError(
                         f"the way-points are passed after {frames} of {self.frames} frames, expected more way"

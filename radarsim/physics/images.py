@@ -53,7 +53,7 @@ def flashes(search: Search, flat: Flat, reflectors: Reflectors, obstacles: Obsta
         flat: those in range, and those that move.
         reflectors: of the scene; its curved ones and its unevenness count.
     """
-    found, ways, lags = [], [], []
+    found, ways = [], []
     for frame in range(search.frames):
         parts = plates.parts(flat, search, frame)
         parts = parts[flat.present(frame)[parts.facet]]
@@ -68,11 +68,10 @@ def flashes(search: Search, flat: Flat, reflectors: Reflectors, obstacles: Obsta
         mirrors, shape = np.full((len(cause), 3), -1), np.zeros((len(cause), SHAPE + 1))
         mirrors[: len(parts), 0], shape[len(parts) :, :SHAPE] = parts.facet, arcs.shape
         amplitude = np.append(parts.amplitude, arcs.amplitude)
-        lags += [flat.lag[parts.facet], np.zeros(len(arcs))]
         found.append(Images(np.full(len(cause), frame), isometry, amplitude, cause, mirrors, shape))
     images, ways = Images.joined(found), Stretches.joined(ways)
     factor, delay = fresnelzone.passage(search, flat, obstacles, ways, np.abs(images.amplitude))
-    lag = np.concatenate(lags)  # at the centre of the sweep, amplitudes know it
+    lag = np.append(flat.lag, 0.0)[images.mirrors[:, 0]]  # at the centre of the sweep, amplitudes know it
     images = replace(images, amplitude=images.amplitude * np.exp(-2j * np.pi * lag / search.wavelength))
     return _passed(search, images, factor**2, 2 * delay + lag)  # there and back
 

@@ -100,24 +100,24 @@ class Reflectors:
     def of(cls, scene: Scene, config: RadarConfig, heights: Heights | None = None) -> "Reflectors":
         """The reflectors of a scene."""
         flat, inner, bodies, smooth = [], [], [], []
-        tables: dict[Material, np.ndarray] = {}
-        lags: dict[Material, float] = {}
+        tables: dict[Material, tuple[np.ndarray, float]] = {}
         for item in scene.objects:
             slab, whole = as_slab(item)
             if slab not in tables:
-                tables[slab], lags[slab] = reflection(slab, config), lag(slab, config)
+                tables[slab] = reflection(slab, config), lag(slab, config)
+            gamma, late = tables[slab]
             round_, is_round = recognise(item.mesh)
             finish = FINISHES.get(item.material.name, 0.0)
-            bodies += [(b.center, b.axis, b.radius, b.half, tables[slab]) for b in round_]
+            bodies += [(b.center, b.axis, b.radius, b.half, gamma) for b in round_]
             # physical optics holds down to about a wavelength
             curved, is_curved = pieces(item.mesh, ~is_round, config.wavelength**2)
-            smooth += [(piece, item.two_sided, tables[slab]) for piece in curved]
+            smooth += [(piece, item.two_sided, gamma) for piece in curved]
             found = plates(item.mesh, ~(is_round | is_curved), config.wavelength**2)
             hollow = slab.thickness is not None and not (whole or item.two_sided)
             middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
             lying = item.floors_and_ceilings(middles, np.reshape([p.normal for p in found], (-1, 3)))
             for p, horizontal in zip(found, lying, strict=True):
-                rest = (item.two_sided, horizontal, tables[slab], lags[slab], finish, -1, -1)
+                rest = (item.two_sided, horizontal, gamma, late, finish, -1, -1)
                 flat.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *rest))
                 if hollow:
                     inwards = -slab.thickness * p.normal

@@ -136,6 +136,7 @@ CHOICES = (
     ),
     Choice("what closures need and count for in the back end's preset radar, and its cells", CLOSURES),
     Choice("by how much larger sines of azimuth are taken to match turns", STRETCH),
+    Choice("how many rays tell whether a mirrored path is partly clear", {"office": (3,), "buildings/b": (3,)}),
     Choice("the compass and what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),

@@ -66,12 +66,14 @@ class Correlation(nn.Module):
             nn.Conv2d(features, features, 5, (2, 1), 2),
         )
         # Correlation over azimuth as a product of spectra; by matrices, which are small and known to all run times.
-        waves = torch.arange(columns + 1) * (math.pi / columns)  # of maps twice as wide: shifts do not wrap
-        for name, places in (("spectrum", torch.arange(columns)), ("shift", torch.arange(-turns, turns + 1))):
-            angles = waves[:, None] * places
-            self.register_buffer(name, torch.stack([angles.cos(), -angles.sin()]), persistent=False)
-        both = torch.full((columns + 1, 1), 2.0).index_fill(0, torch.tensor([0, columns]), 1.0)  # signs of frequency
-        self.shift *= both / (2 * columns) / columns**0.5
+        # On the processor even where only sizes are wanted, of no device: arithmetic of those imports torch's compiler.
+        with torch.device("cpu"):
+            waves = torch.arange(columns + 1) * (math.pi / columns)  # of maps twice as wide: shifts do not wrap
+            for name, places in (("spectrum", torch.arange(columns)), ("shift", torch.arange(-turns, turns + 1))):
+                angles = waves[:, None] * places
+                self.register_buffer(name, torch.stack([angles.cos(), -angles.sin()]), persistent=False)
+            both = torch.full((columns + 1, 1), 2.0).index_fill(0, torch.tensor([0, columns]), 1.0)  # frequency's signs
+            self.shift *= both / (2 * columns) / columns**0.5
 
     def forward(self, maps: Maps) -> Float[Tensor, "twice channel band shift"]:
         """Correlation by step in range (channel), range (row, of four bins) and shift in azimuth, of all windows, then

@@ -59,7 +59,7 @@ class ResNet18(nn.Module):
         self.head = nn.Linear(8 * width, outputs)
         self.coarse = False
         for module in self.modules():
-            if isinstance(module, nn.Conv2d):
+            if isinstance(module, nn.Conv2d) and not module.weight.is_meta:  # else only sizes are wanted
                 nn.init.kaiming_normal_(module.weight, mode="fan_out", nonlinearity="relu")
 
     def forward(self, x: Float[Tensor, "item channel row column"]) -> Float[Tensor, "item output"]:

@@ -96,6 +96,7 @@ def weights() -> Reader:
             grid = Grid.of(PRESETS["radarize"], "range_azimuth")
             header = Header(kind="rotation", frames=2, maps=("range_azimuth",), width=width, grid=grid)
             seeds.append(save(build(RotationNet, header), header, path).read_bytes())
+        _shown(path)  # what is imported and compiled at first use is no input's time
     cuts = [(8 + int.from_bytes(seed[:8], "little"), seed) for seed in seeds]
     # A header with other numbers and words before the same tensors, and its length right.
     heads = st.one_of(

@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -103,3 +105,20 @@ def test_onnx_says_the_same(kind, tmp_path):
         named = dict(zip(("maps", "travel"), (each.numpy() for each in inputs), strict=False))
         for found, values in zip(session.run(None, named), expected, strict=True):
             assert np.allclose(found, values.detach(), atol=1e-4)
+
+
+def test_loading_imports_no_compiler():
+    """Nobody waits seconds for what torch imports to compile networks, or to draw numbers of no device."""
+    names = {"milliego": "milliego.network.MilliEgoNet", "rotation": "radarize.motion.RotationNet"}
+    for name, network in names.items():
+        module, _, network = network.rpartition(".")
+        script = f"""
+import sys
+from radarize.methods.{module} import {network}
+from radarize.nets.weights import load
+from radarize.methods.method import Weights
+load(Weights().of("{name}"), {network})
+print("torch" in sys.modules, "torch._dynamo" in sys.modules)
+"""
+        said = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout
+        assert said.split() == ["True", "False"], name

@@ -77,7 +77,8 @@ class MilliEgoNet(Network):
         self.register_buffer("scale", torch.tensor([10.0, 10.0, 10.0, 1.0, 1.0, 1.0]), persistent=False)
         #: Mean squared errors on validation data: x, y (m^2), yaw (rad^2).
         self.register_buffer("error", torch.ones(3))
-        _begin(self)
+        if not self.error.is_meta:  # only sizes are wanted
+            _begin(self)
 
     def features(
         self, panorama: Float[Tensor, "item 2 row column"], imu: Float[Tensor, "item sample 6"]

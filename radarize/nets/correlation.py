@@ -66,7 +66,7 @@ class Correlation(nn.Module):
             nn.Conv2d(features, features, 5, (2, 1), 2),
         )
         # Correlation over azimuth as a product of spectra; by matrices, which are small and known to all run times.
-        # On the processor even where only sizes are wanted, of no device: arithmetic of those imports torch's compiler.
+        # On the processor even where only sizes are wanted (see `load`): arithmetic on "meta" imports torch's compiler.
         with torch.device("cpu"):
             waves = torch.arange(columns + 1) * (math.pi / columns)  # of maps twice as wide: shifts do not wrap
             for name, places in (("spectrum", torch.arange(columns)), ("shift", torch.arange(-turns, turns + 1))):

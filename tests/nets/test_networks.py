@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from torch.nn.functional import conv1d, conv2d, relu
 
 from radarize.features.maps import AZIMUTHS
 from radarize.mapping.scans import BEARINGS
@@ -10,7 +11,7 @@ from radarize.methods.radarize.motion import RotationNet, TranslationNet
 from radarize.methods.radarize.segmentation import SegmentationNet
 from radarize.nets.correlation import Correlation, Moved
 from radarize.nets.gaussian import Gaussian
-from radarize.nets.resnet import ResNet18
+from radarize.nets.resnet import Block, ResNet18
 from radarize.nets.unet import UNet
 
 NETS = {net.kind: net for net in (TranslationNet, RotationNet, SegmentationNet)}
@@ -41,6 +42,16 @@ def test_resnet_of_the_paper_has_11_million_parameters():
     wide = TranslationNet(1, ("doppler_azimuth",), 64)
     assert parameters(wide) == 2 * resnet_parameters(3, 5, 64)  # two looks
     assert parameters(TranslationNet(3, ("a", "b"), 16)) < 1_440_000  # 2.9 MB in float16
+
+
+@pytest.mark.parametrize("axes", [1, 2])
+def test_a_shortcut_takes_every_second_cell_before_it_mixes_channels(axes):
+    """As a 1 x 1 convolution with a stride does, in which oneDNN writes past its memory."""
+    block, x = Block(3, 5, 2, axes).double().eval(), torch.randn(2, 3, *(9, 12)[:axes], dtype=torch.float64)
+    mix, norm = block.shortcut
+    strided = (conv1d, conv2d)[axes - 1](x, mix.weight, stride=2)
+    assert torch.allclose(block(x), relu(block.body(x) + norm(strided)), rtol=1e-12)
+    assert mix.stride == (1,) * axes
 
 
 def test_unet_is_the_textbooks():

@@ -16,12 +16,13 @@ class Block(nn.Module):
             convolution(inputs, outputs, 3, stride, 1, bias=False), norm(outputs), nn.ReLU(),
             convolution(outputs, outputs, 3, 1, 1, bias=False), norm(outputs),
         )  # fmt: skip
-        # A stride of the 1 x 1 convolution itself, of less than 16 channels that lie last, makes oneDNN write past its
-        # memory while it trains (github.com/uxlfoundation/oneDNN/issues/6035).
-        self.every = (..., *[slice(None, None, stride)] * axes)
+        # A 1 x 1 convolution with a stride, of less than 16 channels that lie last, makes oneDNN write past its memory
+        # while it trains (github.com/uxlfoundation/oneDNN/issues/6035): there, every second cell is taken before it.
+        before = stride if inputs < 16 else 1
+        self.every = (..., *[slice(None, None, before)] * axes)
         self.shortcut = nn.Identity()
         if stride != 1 or inputs != outputs:
-            self.shortcut = nn.Sequential(convolution(inputs, outputs, 1, bias=False), norm(outputs))
+            self.shortcut = nn.Sequential(convolution(inputs, outputs, 1, stride // before, bias=False), norm(outputs))
 
     def forward(self, x: Tensor) -> Tensor:
         return relu(self.body(x) + self.shortcut(x[self.every]))

@@ -4,10 +4,8 @@ import signal
 import subprocess
 import sys
 import time
-from io import BytesIO
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 import yaml
@@ -16,7 +14,7 @@ from fakes import FakeSpecification, fake
 from radarize.errors import InputError
 from radarize.features.maps import MAPS
 from radarize.recording import Recording
-from radarsim.dataset.run import make
+from radarsim.dataset.run import INDEX, make
 from radarsim.dataset.specification import Specification
 from radarsim.scene.scene import Scene
 from radarsim.walk import Walk
@@ -31,22 +29,24 @@ PLAIN = {
 }
 
 
-def contents(folder: Path) -> dict[str, bytes]:
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+def differences(found: Path, expected: Path) -> dict[str, list[str]]:
+    """Recordings that are not the same to the byte, and what of them differs: attributes, data sets, or their layout.
+
+    Raises:
+        OSError: either folder has a file, apart from the index, that the other has not.
+    """
+    names = {path.name for folder in (found, expected) for path in folder.iterdir()} - {INDEX}
+    return {
+        name: _parts(found / name, expected / name)
+        for name in sorted(names)
+        if (found / name).read_bytes() != (expected / name).read_bytes()
+    }
 
 
-def differences(found: dict[str, bytes], expected: dict[str, bytes]) -> dict[str, list[str]]:
-    """Files that are not the same to the byte, and what of them differs: attributes, data sets, or how they lie."""
-    names = found.keys() | expected.keys()
-    return {name: _parts(found[name], expected[name]) for name in names if found[name] != expected[name]}
-
-
-def _parts(one: bytes, other: bytes) -> list[str]:
-    with h5py.File(BytesIO(one)) as a, h5py.File(BytesIO(other)) as b:
-        names: list[str] = []
-        a.visititems(lambda name, part: names.append(name) if isinstance(part, h5py.Dataset) else None)
-        attributes = [name for name in a.attrs if str(a.attrs[name]) != str(b.attrs.get(name))]
-        data = [name for name in names if name not in b or a[name][()].tobytes() != b[name][()].tobytes()]
+def _parts(found: Path, expected: Path) -> list[str]:
+    with Recording(found) as a, Recording(expected) as b:
+        attributes = [name for name, value in a.attributes.items() if value != b.attributes.get(name)]
+        data = [name for name in a.names() if not b.has(name) or a.read(name).tobytes() != b.read(name).tobytes()]
         return attributes + data or ["layout"]
 
 
@@ -63,14 +63,12 @@ def undisturbed(specification, tmp_path_factory):
     folder = tmp_path_factory.mktemp("undisturbed")
     for task in Specification.load(specification).tasks:
         task.make(folder)
-    return contents(folder)
+    return folder
 
 
-def test_a_recording_holds_what_was_asked_for(undisturbed, tmp_path):
-    assert sorted(undisturbed) == ["office_cart_00.h5", "office_robot_00.h5"]
-    path = tmp_path / "a.h5"
-    path.write_bytes(undisturbed["office_cart_00.h5"])
-    with Recording(path) as recording:
+def test_a_recording_holds_what_was_asked_for(undisturbed):
+    assert sorted(path.name for path in undisturbed.iterdir()) == ["office_cart_00.h5", "office_robot_00.h5"]
+    with Recording(undisturbed / "office_cart_00.h5") as recording:
         assert len(recording) == 15 and recording.attributes["platform"] == "cart"
         for name in ("truth/pose", "truth/scan", "truth/occupancy", "imu/gyroscope", *(f"maps/{m}" for m in MAPS)):
             assert recording.has(name)
@@ -153,8 +151,7 @@ def test_killed_and_resumed(specification, undisturbed, tmp_path):
     assert done.returncode == 0, done.stderr
     assert "1 recordings made, 1 were there" in done.stdout and "office_robot_00: 0." in done.stdout
     assert (tmp_path / "office_cart_00.h5").stat().st_mtime_ns == stamp
-    found = contents(tmp_path)
-    assert found.pop("dataset.json") and not differences(found, undisturbed)
+    assert (tmp_path / INDEX).read_bytes() and not differences(tmp_path, undisturbed)
 
 
 def test_a_ray_cluster_makes_the_same_bytes(cluster, specification, undisturbed, tmp_path):
@@ -163,8 +160,7 @@ def test_a_ray_cluster_makes_the_same_bytes(cluster, specification, undisturbed,
         Specification.load(specification), tmp_path, ray=cluster, progress=lambda *p: seen.append(p), say=lambda _: None
     )
     assert sorted(outcome.made) == ["office_cart_00", "office_robot_00"] and seen[-1] == (30, 30)
-    found = contents(tmp_path)
-    assert found.pop("dataset.json") and not differences(found, undisturbed)
+    assert (tmp_path / INDEX).read_bytes() and not differences(tmp_path, undisturbed)
 
 
 def test_ray_begins_the_task_of_a_killed_worker_again(cluster, tmp_path):

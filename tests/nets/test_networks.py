@@ -45,15 +45,15 @@ def test_resnet_of_the_paper_has_11_million_parameters():
 
 
 @pytest.mark.parametrize("axes", [1, 2])
-@pytest.mark.parametrize("channels", [3, 16])
-def test_a_shortcut_is_a_convolution_with_a_stride(axes, channels):
+@pytest.mark.parametrize(("channels", "stride"), [(3, 1), (16, 2)])
+def test_a_shortcut_is_a_convolution_with_a_stride(axes, channels, stride):
     """Though the one of few channels, in which oneDNN writes past its memory, has none itself."""
     block = Block(channels, 20, 2, axes).double().eval()
     x = torch.randn(2, channels, *(9, 12)[:axes], dtype=torch.float64)
     mix, norm = block.shortcut
     strided = (conv1d, conv2d)[axes - 1](x, mix.weight, stride=2)
     assert torch.allclose(block(x), relu(block.body(x) + norm(strided)), rtol=1e-12)
-    assert mix.stride == ((1, 2)[channels == 16],) * axes
+    assert mix.stride == (stride,) * axes
 
 
 def test_unet_is_the_textbooks():

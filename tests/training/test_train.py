@@ -87,7 +87,7 @@ def test_networks_learn(kind, tmp_path):
 
 def test_uncertainty_follows_what_is_seen(tmp_path):
     """Of maps that show nothing but noise, the network claims what is known without them."""
-    for k in range(4):
+    for k in range(4):  # mostly blank: one factor calibrates all claims
         write(tmp_path / "data" / f"{k}.h5", "velocity", 100, k, blank=0.6)
     settings = replace(QUICK["translation"], epochs=12)
     weights = train("translation", tmp_path / "data", tmp_path / "net.safetensors", settings=settings)

@@ -1,6 +1,7 @@
 """What apertures on a path leave of a wave, in Fresnel units: Kirchhoff's integral over polygons, rectangles."""
 
 import numpy as np
+from jaxtyping import Complex, Float
 from numba import njit
 
 from radarsim.physics.amplitudes import dot, minus
@@ -15,6 +16,38 @@ STRIP_FADE, STRIP_FAR = 2.0, 3.0
 CORNERS = 20
 
 
+def tails(
+    radius: Float[np.ndarray, "radius"], angle: Float[np.ndarray, "angle"]
+) -> Complex[np.ndarray, "radius angle"]:
+    """What an edge diffracts from a point of its line on, without the phase at that point:
+
+        int exp(j pi (t^2 - x^2) / 2) s / (s^2 + t^2) dt from x on,
+
+    with s = radius sin(angle), how far the edge's line is off the path, and x = radius cos(angle), where it begins,
+    Fresnel units. From x on the way turns by 45 deg into the complex plane, where the phase decays. Smooth in both,
+    since s / (s^2 + t^2) is an angle where the phase hardly turns: it is `angle` for none.
+    """
+    radius = np.maximum(radius, 1e-6)[:, None, None]
+    s, x = radius * np.sin(angle)[:, None], radius * np.cos(angle)[:, None]
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    around = radius  # as far as the pole at t = j s is from where it begins
+    last = np.arcsinh(4 / around)
+    u = last * (nodes + 1) / 2
+    turn = np.exp(0.25j * np.pi)
+    y = around * np.sinh(u) * turn
+    phase = np.exp(0.5j * np.pi * y * (2 * x + y))
+    return np.sum(weights * last / 2 * around * np.cosh(u) * turn * phase * s / (s * s + (x + y) ** 2), axis=2)
+
+
+def _tabulated() -> tuple[tuple[float, float], Complex[np.ndarray, "radius angle"]]:
+    """Steps of radius and angle, and `tails` up to `FAR` either way."""
+    radius, angle = np.linspace(0, np.sqrt(2) * FAR, 72), np.linspace(0, np.pi / 2, 36)
+    return (float(radius[1]), float(angle[1])), tails(radius, angle)
+
+
+_STEPS, _TAILS = _tabulated()
+
+
 @njit
 def depth(planes, count, x, y):
     """Distance of a point inside the nearest of some edges."""
@@ -27,28 +60,33 @@ def depth(planes, count, x, y):
 @njit(cache=True)
 def overlap(planes, count, polygon, spare):
     """Corners, counter-clockwise, of what half planes n . x <= s leave of a wide square; returns their number."""
-    wide = 50.0
-    polygon[0, 0], polygon[0, 1] = -wide, -wide
-    polygon[1, 0], polygon[1, 1] = wide, -wide
-    polygon[2, 0], polygon[2, 1] = wide, wide
-    polygon[3, 0], polygon[3, 1] = -wide, wide
-    corner = 4
+    wide, corner = 50.0, 4
+    for i in range(4):
+        polygon[i, 0], polygon[i, 1] = wide if 0 < i < 3 else -wide, wide if i > 1 else -wide
     for k in range(count):
         nx, ny, s = planes[k]
-        kept = 0
+        outside = 0
         for i in range(corner):
-            x0, y0 = polygon[i]
-            x1, y1 = polygon[(i + 1) % corner]
-            d0, d1 = nx * x0 + ny * y0 - s, nx * x1 + ny * y1 - s
-            if d0 <= 0:
-                spare[kept, 0], spare[kept, 1] = x0, y0
-                kept += 1
+            spare[i, 0], spare[i, 1] = polygon[i]
+            spare[i, 2] = nx * polygon[i, 0] + ny * polygon[i, 1] - s
+            outside += spare[i, 2] > 0
+        if outside == 0:
+            continue
+        if outside == corner:
+            return 0
+        kept, before = 0, corner - 1
+        for i in range(corner):
+            d0, d1 = spare[before, 2], spare[i, 2]
             if (d0 <= 0) != (d1 <= 0):
                 t = d0 / (d0 - d1)
-                spare[kept, 0], spare[kept, 1] = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
+                for axis in range(2):
+                    polygon[kept, axis] = spare[before, axis] + t * (spare[i, axis] - spare[before, axis])
                 kept += 1
+            if d1 <= 0:
+                polygon[kept, 0], polygon[kept, 1] = spare[i, 0], spare[i, 1]
+                kept += 1
+            before = i
         corner = kept
-        polygon[:corner] = spare[:corner]
         if corner < 3:
             return 0
     return corner
@@ -80,34 +118,52 @@ def side(x0, y0, x1, y1, size):
 
 @njit(cache=True)
 def diffracted(s, low, high):
-    """What a side takes from 2 pi times `kirchhoff`, but for the angle that it fills; far ones fade."""
-    weight = min(max((FAR - abs(s)) / (FAR - FADE), 0.0), 1.0)
-    if weight <= 0:
+    """What a side takes from 2 pi times `kirchhoff`, but for the angle that it fills; far ones fade.
+
+    It is int exp(j pi (s^2 + x^2) / 2) s / (s^2 + x^2) dx from low to high.
+    """
+    weight = _fading(s)
+    if weight == 0 or s == 0:
         return 0j
-    return weight * weight * (3 - 2 * weight) * _edge(s, max(low, -FAR), min(high, FAR))
+    if low >= 0:
+        return weight * (_tail(s, low) - _tail(s, high))
+    if high <= 0:
+        return weight * (_tail(s, -high) - _tail(s, -low))
+    return weight * (2 * _tail(s, 0.0) - _tail(s, -low) - _tail(s, high))
+
+
+@njit
+def _fading(distance):
+    """1 up to `FADE`, 0 from `FAR` on."""
+    weight = min(max((FAR - abs(distance)) / (FAR - FADE), 0.0), 1.0)
+    return weight * weight * (3 - 2 * weight)
 
 
 @njit(cache=True)
-def _edge(s, low, high):
-    """int exp(j pi (s^2 + x^2) / 2) s / (s^2 + x^2) dx, the part that is sharp for small s in closed form."""
-    if high <= low or s == 0:
+def _tail(s, x):
+    """The same integral from x >= 0 on, faded as x grows; odd in s."""
+    weight = _fading(x)
+    if weight == 0:
         return 0j
+    square = s * s + x * x
+    at_radius, at_angle = np.sqrt(square) / _STEPS[0], np.arctan2(abs(s), x) / _STEPS[1]
+    i, p = _cubic(at_radius, len(_TAILS))
+    j, q = _cubic(at_angle, _TAILS.shape[1])
     total = 0j
-    # Gauss-Legendre with four points on stretches over which the phase turns by a radian or less.
-    x = low
-    while x < high:
-        nearest = 0.0 if x < 0 < x + 0.5 else min(abs(x), abs(x + 0.5))
-        step = min(0.5, 1.2 / (nearest + 0.5), high - x)
-        for node, weight in ((-0.8611363116, 0.3478548451), (-0.3399810436, 0.6521451549),
-                             (0.3399810436, 0.6521451549), (0.8611363116, 0.3478548451)):  # fmt: skip
-            at = x + 0.5 * step * (1 + node)
-            angle = 0.5 * np.pi * at * at
-            # exp(j angle) - 1, without loss of digits
-            half = np.sin(angle / 2)
-            total += 0.5 * step * weight * (-2 * half * half + 1j * np.sin(angle)) * s / (s * s + at * at)
-        x += step
-    total += np.arctan(high / s) - np.arctan(low / s)
-    return total * np.exp(0.5j * np.pi * s * s)
+    for k in range(4):
+        row = _TAILS[i + k]
+        total += p[k] * (q[0] * row[j] + q[1] * row[j + 1] + q[2] * row[j + 2] + q[3] * row[j + 3])
+    angle = 0.5 * np.pi * square
+    return np.sign(s) * weight * total * complex(np.cos(angle), np.sin(angle))
+
+
+@njit
+def _cubic(at, count):
+    """Which four of `count` values at 0, 1, 2 ... lie about a place, and Lagrange's weights of them."""
+    first = min(max(int(at) - 1, 0), count - 4)
+    t = at - first
+    a, b, c = t - 1, t - 2, t - 3
+    return first, (-a * b * c / 6, t * b * c / 2, -t * a * c / 2, t * a * b / 6)
 
 
 @njit(cache=True)
@@ -169,3 +225,15 @@ def aperture(flat, m):
     return (
         vec(flat.center[m]), vec(flat.normal[m]), vec(flat.u[m]), vec(flat.v[m]), flat.half[m, 0], flat.half[m, 1]
     )  # fmt: skip
+
+
+@njit(cache=True)
+def outlines(flat):
+    """Least and largest offset of each flat reflector's corners from its centre along u, and along v, m."""
+    out = np.zeros((len(flat.center), 4))
+    for m in range(len(out)):
+        for k in range(4):
+            offset = minus(vec(flat.corners[m, k]), vec(flat.center[m]))
+            x, y = dot(offset, vec(flat.u[m])), dot(offset, vec(flat.v[m]))
+            out[m] = min(out[m, 0], x), max(out[m, 1], x), min(out[m, 2], y), max(out[m, 3], y)
+    return out

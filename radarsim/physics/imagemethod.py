@@ -39,10 +39,13 @@ from radarsim.physics.amplitudes import (
     write,
 )
 from radarsim.physics.amplitudes import vector as vec
-from radarsim.physics.apertures import CORNERS, FAR, depth, kirchhoff, overlap
+from radarsim.physics.apertures import CORNERS, FAR, depth, kirchhoff, outlines, overlap
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
 from radarsim.physics.table import Table, filled
+
+#: No aperture passes more than this of an amplitude: two slits of Cornu's 1.17.
+_MOST = 1.4
 
 
 @dataclass(frozen=True)
@@ -77,7 +80,7 @@ class _Room(NamedTuple):
 
     planes: Float[np.ndarray, "12 3"]
     polygon: Float[np.ndarray, "corner 2"]
-    spare: Float[np.ndarray, "corner 2"]
+    spare: Float[np.ndarray, "corner 3"]
 
 
 def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], search: Search, frame: int) -> Chains:
@@ -101,15 +104,16 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], search: Search, frame: 
 def _search(search, frame, flat, orders, found):
     """Tries all chains whose mirrors can follow one another; returns how many lead back, of which as many as fit."""
     p, rotation = vec(search.position[frame]), search.rotation[frame]
-    room = _Room(np.empty((12, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 2)))
+    room = _Room(np.empty((12, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 3)))
+    edges = outlines(flat)
     way = np.empty(3, np.int64)
     count = 0
     for b in range(len(flat.center)):
         firsts = orders.firsts[orders.start[b] : orders.start[b + 1]]
         for i in range(len(firsts)):
             a = firsts[i]
-            image_b = mirrored(p, vec(flat.center[a]), vec(flat.normal[a]))
-            image_b = mirrored(image_b, vec(flat.center[b]), vec(flat.normal[b]))
+            image_a = mirrored(p, vec(flat.center[a]), vec(flat.normal[a]))
+            image_b = mirrored(image_a, vec(flat.center[b]), vec(flat.normal[b]))
             for j in range(i - 1, len(firsts)):
                 order = 2 if j < i else 3
                 c = b if order == 2 else firsts[j]
@@ -122,15 +126,25 @@ def _search(search, frame, flat, orders, found):
                 if path > 2 * search.range or path < 0.05:
                     continue
                 back = (back[0] / path, back[1] / path, back[2] / path)
-                if not _passes(image, back, path, search.wavelength, flat.center[c], flat.normal[c], flat.corners[c]):
+                # Backwards over the mirrors, each with the radar's image behind it.
+                ray = back
+                if order == 3:
+                    if not _meets(image, ray, path, search.wavelength, flat, edges, c):
+                        continue
+                    ray = _turned(ray, flat, c)
+                if not _meets(image_b, ray, path, search.wavelength, flat, edges, b):
                     continue
-                gain = gain_towards((-back[0], -back[1], -back[2]), rotation, search)
-                strength = search.wavelength / (4 * np.pi * path) * gain
-                if strength * search.peak_gain <= search.threshold:
+                ray = _turned(ray, flat, b)
+                if not _meets(image_a, ray, path, search.wavelength, flat, edges, a):
+                    continue
+                ray = _turned(ray, flat, a)
+                taken = gain_towards((-back[0], -back[1], -back[2]), rotation, search)
+                strength = search.wavelength / (4 * np.pi * path) * taken * gain_towards(ray, rotation, search)
+                if _MOST * strength <= search.threshold:
                     continue
                 way[0], way[1], way[2] = a, b, c
-                value, ray, e1, e2, off = _chain(way[:order], p, path, back, search, frame, flat, room)
-                value *= strength * gain_towards(ray, rotation, search)
+                value, e1, e2, off = _chain(way[:order], p, path, ray, search, frame, flat, room)
+                value *= strength
                 if abs(value) <= search.threshold:
                     continue
                 if count < len(found.amplitude):
@@ -155,35 +169,48 @@ def _after(orders, a, b):
 
 
 @njit
-def _passes(image, back, path, wavelength, center, normal, corners):
-    """Whether the last stretch of a path comes from near its last mirror: a quick test before the full one."""
-    n, c = vec(normal), vec(center)
-    slope = dot(back, n)
-    if abs(slope) < 0.02:
+def _turned(ray, flat, m):
+    """A direction of travel, before a mirror or after it."""
+    n = vec(flat.normal[m])
+    return along(ray, -2 * dot(ray, n), n)
+
+
+@njit
+def _meets(image, ray, path, wavelength, flat, edges, m):
+    """Whether a straight path from the radar's image behind a mirror comes from near it: a quick test before `_chain`.
+
+    Args:
+        image: m.
+        ray: direction after the mirror.
+        path: the whole way, m.
+        edges: of all mirrors (`apertures.outlines`).
+        m: the mirror.
+    """
+    n = vec(flat.normal[m])
+    slope = dot(ray, n)
+    if slope < 0.02 and (slope > -0.02 or not flat.two_sided[m]):
         return False
-    t = dot(minus(c, image), n) / slope
-    if t <= 0 or t >= path:
+    center = vec(flat.center[m])
+    t = dot(minus(center, image), n) / slope
+    if t <= 0.005 or t >= path - 0.005:
         return False
-    margin = FAR * np.sqrt(wavelength * t * (path - t) / (2 * path)) / abs(slope)
-    offset = minus(along(image, t, back), c)
-    size = 0.0
-    for k in range(4):
-        size = max(size, length(minus(vec(corners[k]), c)))
-    return dot(offset, offset) < (size + margin) ** 2
+    low_u, high_u, low_v, high_v = edges[m]
+    offset = minus(along(image, t, ray), center)
+    x, y = dot(offset, vec(flat.u[m])), dot(offset, vec(flat.v[m]))
+    # The zone is widest half way: where an edge is nearer to that than the path is in the mirror's plane, it counts.
+    size = high_u - low_u + high_v - low_v
+    widest = min(max(path / 2, t - size), t + size)
+    margin = FAR * np.sqrt(wavelength * widest * (path - widest) / (2 * path)) / abs(slope)
+    return low_u - margin < x < high_u + margin and low_v - margin < y < high_v + margin
 
 
 @njit(cache=True)
-def _chain(way, p, path, back, search, frame, flat, room):
-    """F times the reflection coefficients of a chain, and where it starts: direction, transverse axes, aim in them."""
-    none = 0j, back, back, back, (0.0, 0.0)
+def _chain(way, p, path, ray, search, frame, flat, room):
+    """F times the reflection coefficients of a chain that begins along a ray: transverse axes there, and aim in them."""
+    none = 0j, ray, ray, (0.0, 0.0)
     normal, corners, planes, wavelength = flat.normal, flat.corners, room.planes, search.wavelength
     rotation = search.rotation[frame]
     up = upwards(rotation)
-    # The direction at the start is that at the end, taken back through the mirrors.
-    ray = back
-    for k in range(len(way) - 1, -1, -1):
-        n = vec(normal[way[k]])
-        ray = along(ray, -2 * dot(ray, n), n)
     aside = (0.0, 0.0, 1.0) if abs(ray[2]) < 0.7 else (1.0, 0.0, 0.0)
     e1 = unit(cross(aside, ray))
     e2 = cross(ray, e1)
@@ -248,7 +275,7 @@ def _chain(way, p, path, back, search, frame, flat, room):
         toward = step
         if depth(planes, count, step * mx, step * my) > 0.25:
             break
-    return value * share, ray, e1, e2, (toward * mx, toward * my)
+    return value * share, e1, e2, (toward * mx, toward * my)
 
 
 @njit(cache=True)

@@ -206,7 +206,7 @@ def _meets(image, ray, path, wavelength, flat, edges, m):
 
 @njit(cache=True)
 def _chain(way, p, path, ray, search, frame, flat, room):
-    """F times the reflection coefficients of a chain that begins along a ray: transverse axes there, and aim in them."""
+    """F times the reflection coefficients of a chain that sets out along a ray; axes across it, and aim in them."""
     none = 0j, ray, ray, (0.0, 0.0)
     normal, corners, planes, wavelength = flat.normal, flat.corners, room.planes, search.wavelength
     rotation = search.rotation[frame]

@@ -48,6 +48,7 @@ from radarsim.scene.materials import Material, constant, decibel, material
 from radarsim.scene.movers import Mover
 from radarsim.scene.objects import SceneObject
 from radarsim.scene.office import Office
+from radarsim.scene.squareness import out_of_square
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -266,7 +267,8 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
     try:
         objects = [SceneObject(o.name, o.mesh(folder), _material(o), o.solid) for o in description.objects]
         if description.building:
-            objects += description.building.build()
+            building = description.building
+            objects += out_of_square(building.build(), description.unevenness, building.seed)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     if not objects:

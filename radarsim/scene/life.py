@@ -9,7 +9,8 @@ class Life:
 
     Attributes:
         clutter: small things on walls, desks and shelves and under ceilings (`radarsim.physics.clutter`).
-        unevenness: how far walls, floors and ceilings are from their planes (`radarsim.physics.unevenness`).
+        unevenness: how far walls, floors and ceilings are from their planes (`radarsim.physics.unevenness`), and a
+            building's corners from square (`squareness`).
     """
 
     clutter: float = 0.0

@@ -22,8 +22,9 @@ OFFSET = 3e-3
 ASKEW = np.cos(np.deg2rad(12))
 #: A region whose radius of curvature is below this bends by more than lambda / 8 in a Fresnel zone at 2 m, m.
 STRAIGHT = 2.0
-#: A rectangle fills this share of the bounding rectangle of its region; other regions are cut into strips.
-SMALLEST_FILL = 0.97
+#: A region that fills this share of its bounding rectangle is taken for it, unless it is one trapezoid: walls that lean
+#: fill all but a thousandth, and meet without an overlap. Other regions are cut into strips.
+SMALLEST_FILL, EXACT_FILL = 0.97, 1 - 1e-6
 
 
 @dataclass(frozen=True)
@@ -164,11 +165,12 @@ def _cover(mesh, faces) -> list[Plate]:
         return []
     turn = sides[0] / lengths[0]
     turn = np.array([turn, [-turn[1], turn[0]]])
-    if mesh.area_faces[faces].sum() >= SMALLEST_FILL * lengths.prod():
-        quads = [shapely.get_coordinates(shapely.transform(outline, lambda xy: xy @ turn.T).envelope)[:4]]
-    else:
+    fill, quads = mesh.area_faces[faces].sum() / lengths.prod(), []
+    if fill < EXACT_FILL:
         region = shapely.union_all(shapely.polygons(flat @ turn.T), grid_size=1e-6)
         quads = trapezoids(shapely.simplify(region, OFFSET))
+    if fill >= SMALLEST_FILL and len(quads) != 1:
+        quads = [shapely.get_coordinates(shapely.transform(outline, lambda xy: xy @ turn.T).envelope)[:4]]
     u, v = turn @ axes
     found = []
     for quad in quads:

@@ -49,9 +49,9 @@ class Building(BaseModel):
         """All objects of the floor: walls, floors, ceilings, doors, windows, fittings, furniture."""
         plan, site = self.plan(), Site(self._rng(2), self.style.height)
         _surfaces(site, plan)
-        for number, opening in enumerate(plan.openings):
+        for opening in plan.openings:
             for name, mesh, what in joinery.fill(opening, self.style):
-                site.add(f"{opening.room.name} {opening.kind} {number + 1} {name}", mesh, what)
+                site.add(f"{opening.name} {name}", mesh, what)
         lamp = furniture.lamp(self.style.height, *self.style.lamp[:2])
         for room in plan.rooms:
             along_x = room.size[0] > room.size[1]

@@ -7,21 +7,17 @@ import shapely
 from shapely.geometry import LineString
 from shapely.geometry import box as area
 
-from radarsim.scene.rooms import Room, sorted_box
+from radarsim.scene.openings import DOOR, DOOR_HEIGHT, OPPOSITE, Opening, strip
+from radarsim.scene.rooms import Room
 from radarsim.scene.skeleton import Block, Skeleton
 from radarsim.scene.styles import Style
-from radarsim.scene.walls import Span
 
-DOOR, DOOR_HEIGHT = 1.0, 2.1  # m
 #: Narrowest and widest room, m; the usual width.
 NARROWEST, WIDEST, USUAL = 2.8, 8.4, 4.3
 #: From a corner to a door, m.
 JAMB = 0.35
 #: Floor kept free in front of a door, m.
 APPROACH = 1.25
-
-_ACROSS = {"n": (0.0, 1.0), "s": (0.0, -1.0), "e": (1.0, 0.0), "w": (-1.0, 0.0)}
-_OPPOSITE = {"n": "s", "s": "n", "e": "w", "w": "e"}
 
 
 @dataclass(frozen=True)
@@ -45,52 +41,6 @@ class Border:
     def length(self) -> float:
         """m."""
         return self.high - self.low
-
-
-@dataclass(frozen=True)
-class Opening:
-    """A hole in a wall.
-
-    Attributes:
-        room: into which a leaf opens.
-        side: of the room.
-        low, high: along the wall, m.
-        bottom, top: heights, m.
-        thickness: of the wall, m.
-        kind: ``door``, ``way`` (no leaf), ``window`` or ``glass wall``.
-        other: room behind; None: outside.
-        leaf: material of the door; "": none.
-        angle: of the leaf, rad; 0: shut.
-        hinge: at the low (-1) or high (+1) end.
-        bay: of a glass wall: low and high end of its door.
-    """
-
-    room: Room
-    side: str
-    low: float
-    high: float
-    bottom: float
-    top: float
-    thickness: float
-    kind: str
-    other: Room | None = None
-    leaf: str = ""
-    angle: float = 0.0
-    hinge: int = -1
-    bay: tuple[float, float] = (0.0, 0.0)
-
-    @property
-    def span(self) -> Span:
-        """As a box."""
-        x0, y0, x1, y1 = _strip(self.room, self.side, self.low, self.high, 0.0, self.thickness)
-        return x0, y0, self.bottom, x1, y1, self.top
-
-    @property
-    def passage(self) -> tuple[float, float] | None:
-        """Where one can walk through, along the wall, if no leaf shuts it."""
-        if self.kind == "window":
-            return None
-        return self.bay if self.kind == "glass wall" else (self.low, self.high)
 
 
 class FloorPlan:
@@ -218,7 +168,7 @@ class FloorPlan:
                 fronts[0], fronts[k] = fronts[k], fronts[0]
             self._front(fronts[0], number, must_open=room.name in joined)
             # Rooms between two corridors are short cuts, or have their second door shut.
-            across = [b for b in fronts[1:] if b.side == _OPPOSITE[fronts[0].side]]
+            across = [b for b in fronts[1:] if b.side == OPPOSITE[fronts[0].side]]
             if across and room.kind not in ("stairs", "toilet", "storage") and rng.random() < 0.5:
                 self._front(across[0], number, must_open=rng.random() < 0.6)
         for border in suites:
@@ -284,7 +234,8 @@ class FloorPlan:
         room, other = border.room, border.other
         thickness = self.style.outer if other is None else _gap(room, other, border.side)
         low, high = round(low, 3), round(high, 3)
-        self.openings.append(Opening(room, border.side, low, high, bottom, top, thickness, kind, other, **more))
+        name = f"{room.name} {kind} {len(self.openings) + 1}"
+        self.openings.append(Opening(name, room, border.side, low, high, bottom, top, thickness, kind, other, **more))
 
     def _windows(self) -> None:
         """Windows on the axes of the facade, in rooms and where a corridor meets it."""
@@ -308,7 +259,7 @@ class FloorPlan:
         """Whether there is more of the building outside of a wall: a shaft, or a wing close by."""
         thick = self.style.outer
         return self.skeleton.outline.intersects(
-            area(*_strip(border.room, border.side, border.low + 0.1, border.high - 0.1, thick + 0.02, thick + 1.0))
+            area(*strip(border.room, border.side, border.low + 0.1, border.high - 0.1, thick + 0.02, thick + 1.0))
         )
 
     def _keep_ways(self) -> None:
@@ -317,14 +268,14 @@ class FloorPlan:
         for o in self.openings:
             if o.passage is None:
                 continue
-            for room, side in ((o.room, o.side), (o.other, _OPPOSITE[o.side])):
+            for room, side in ((o.room, o.side), (o.other, OPPOSITE[o.side])):
                 if room is None:
                     continue
                 low, high = o.passage
                 margin = 0.1 if high - low < 1.5 else 0.0
                 depth = min(APPROACH, min(room.size) - 0.05)
-                room.kept.append(area(*_strip(room, side, low - margin, high + margin, -depth, 0.0)))
-                x0, y0, x1, y1 = _strip(room, side, low, high, -0.6, -0.6)
+                room.kept.append(area(*strip(room, side, low - margin, high + margin, -depth, 0.0)))
+                x0, y0, x1, y1 = strip(room, side, low, high, -0.6, -0.6)
                 spots.setdefault(room.name, []).append(((x0 + x1) / 2, (y0 + y1) / 2))
         for room in self.rooms:
             at = spots.get(room.name, [])
@@ -334,15 +285,6 @@ class FloorPlan:
             for k in range(1, len(at)):
                 nearest = min(at[:k], key=lambda p, q=at[k]: np.hypot(p[0] - q[0], p[1] - q[1]))
                 room.kept.append(LineString([nearest, at[k]]).buffer(0.55))
-
-
-def _strip(room: Room, side: str, low: float, high: float, near: float, far: float) -> tuple[float, ...]:
-    """Box along a wall of a room, from `near` to `far` (m) outward of its face."""
-    if side in "ns":
-        face, out = (room.y1, 1) if side == "n" else (room.y0, -1)
-        return sorted_box(low, face + out * near, high, face + out * far)
-    face, out = (room.x1, 1) if side == "e" else (room.x0, -1)
-    return sorted_box(face + out * near, low, face + out * far, high)
 
 
 def _gap(room: Room, other: Room, side: str) -> float:

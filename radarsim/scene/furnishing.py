@@ -4,11 +4,10 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from shapely.geometry import LineString
 from shapely.geometry import box as area
 
 from radarsim.scene import fittings, furniture, shapes
-from radarsim.scene.floorplan import FloorPlan, Opening
+from radarsim.scene.floorplan import FloorPlan
 from radarsim.scene.furniture import Piece
 from radarsim.scene.rooms import Room, Site, footprint
 
@@ -55,7 +54,7 @@ class _Layout:
         """The floor that door leaves stand over."""
         for o in self.openings:
             if o.leaf:
-                self.room.taken.append(_leaf_area(o))
+                self.room.taken.append(o.leaf_area())
 
     def at_windows(self) -> None:
         """Radiators below windows, pipes in a corner."""
@@ -288,19 +287,3 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
 def _in_front(room: Room, piece: Piece, place: tuple[float, float, float]) -> bool:
     """Whether what stands at a wall lies within the room along the wall; a lift reaches a little into the wall."""
     return room.floor.buffer(0.05).contains(footprint(piece, *place))
-
-
-def _leaf_area(o: Opening):
-    """Floor under an open leaf, and a little around."""
-    low, high = o.bay if o.kind == "glass wall" else (o.low, o.high)
-    hinge = low if o.hinge < 0 else high
-    reach = (np.cos(o.angle) * (-o.hinge) * (high - low), np.sin(o.angle) * (high - low))
-    ends = []
-    for along, deep in ((0.0, 0.0), reach):
-        if o.side in "ns":
-            face, out = (o.room.y1, -1) if o.side == "n" else (o.room.y0, 1)
-            ends.append((hinge + along, face + out * deep))
-        else:
-            face, out = (o.room.x1, -1) if o.side == "e" else (o.room.x0, 1)
-            ends.append((face + out * deep, hinge + along))
-    return LineString(ends).buffer(0.1)

@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from radarsim.scene import shapes
-from radarsim.scene.floorplan import DOOR_HEIGHT, Opening
+from radarsim.scene.openings import DOOR_HEIGHT, Opening
 from radarsim.scene.styles import Style
 
 LEAF = 0.04  # thickness of a door leaf, m

@@ -53,7 +53,7 @@ class _Layout:
     def take_leaves(self) -> None:
         """The floor that door leaves stand over."""
         for o in self.openings:
-            if o.leaf:
+            if o.angle:
                 self.room.taken.append(o.leaf_area())
 
     def at_windows(self) -> None:

@@ -96,6 +96,7 @@ class Style:
     fittings: dict[str, float]
     kinds: dict[str, float]
     core: dict[str, float]
+    plain: bool = False
 
     def floor(self, kind: str) -> str:
         """Floor material of a kind of room."""

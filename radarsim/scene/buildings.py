@@ -68,7 +68,7 @@ class Building(BaseModel):
 def surfaces(site: Site, plan: FloorPlan, labels: Labels, pillars: Sequence[Box] = ()) -> None:
     """Walls: the ground less the rooms and openings, their faces by label. Floors and ceilings by room."""
     style, height = plan.style, plan.style.height
-    boxes = plan.skeleton.ground(style.outer), [(*room.floor.bounds,) for room in plan.rooms], pillars
+    boxes = plan.skeleton.ground(style.outer), plan.spaces(), pillars
     solids, rooms, pillars = ([(x0, y0, 0.0, x1, y1, height) for x0, y0, x1, y1 in part] for part in boxes)
     spans = [o.span for o in plan.openings]
     found = walls.faces(solids, [*rooms, *spans], pillars)

@@ -9,7 +9,7 @@ from shapely.geometry import box as area
 
 from radarsim.scene.openings import DOOR, DOOR_HEIGHT, OPPOSITE, Opening, strip
 from radarsim.scene.rooms import Room
-from radarsim.scene.skeleton import Block, Skeleton
+from radarsim.scene.skeleton import Block, Box, Skeleton
 from radarsim.scene.styles import Style
 
 #: Narrowest and widest room, m; the usual width.
@@ -68,6 +68,10 @@ class FloorPlan:
         self._doors()
         self._windows()
         self._keep_ways()
+
+    def spaces(self) -> list[Box]:
+        """What the walls enclose: the rooms."""
+        return [(room.x0, room.y0, room.x1, room.y1) for room in self.rooms]
 
     # Rooms
 

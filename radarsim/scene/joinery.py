@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from radarsim.scene import shapes
-from radarsim.scene.openings import DOOR_HEIGHT, Opening
+from radarsim.scene.openings import DOOR, DOOR_HEIGHT, Opening
 from radarsim.scene.styles import Style
 
 LEAF = 0.04  # thickness of a door leaf, m
@@ -22,6 +22,10 @@ Part = tuple[str, trimesh.Trimesh, str]  # name, mesh, material
 
 def fill(opening: Opening, style: Style) -> Iterator[Part]:
     """What an opening is filled with, in the world."""
+    if style.plain:
+        if opening.kind != "way":
+            yield from _plain_leaf(opening) if opening.leaf else _casement(opening, style.windows.frame)
+        return
     x0, y0, _, x1, y1, _ = opening.span
     along_x = opening.side in "ns"
     origin = (x0, (y0 + y1) / 2, 0.0) if along_x else ((x0 + x1) / 2, y0, 0.0)
@@ -118,3 +122,45 @@ def _glazing(
         shapes.rectangle(((a + b) / 2, 0, (c + d) / 2), (b - a, d - c), (0, 1, 0)) for a, c, b, d in pieces
     ]  # fmt: skip
     return [("frame", shapes.joined(*bars), frame), ("pane", shapes.joined(*panes), "glass")]
+
+
+def _plain_leaf(o: Opening) -> list[Part]:
+    """In the world: a leaf that fills the wall's opening, or stands open with a handle right through it."""
+    width, height, (x0, y0, *_) = DOOR, DOOR_HEIGHT, o.span
+    if not o.angle:
+        middle = (x0 + width / 2, y0 + o.thickness / 2, height / 2)
+        return [("", shapes.box(middle, (width, LEAF, height), ("-x", "+x", "-z", "+z")), o.leaf)]
+    leaf = shapes.box((width / 2 - 0.02, 0, height / 2), (width - 0.06, LEAF, height - 0.03))
+    handle = shapes.box((width - 0.12, 0, 1.05), (0.12, LEAF + 0.10, 0.02))
+    face, inward = (o.room.y1, -1) if o.side == "n" else (o.room.y0, 1)
+    x, yaw = (o.low + 0.03, inward * o.angle) if o.hinge < 0 else (o.high - 0.03, np.pi - inward * o.angle)
+    place = (x, face + inward * 0.03, 0), (0, 0, yaw)
+    return [("leaf", shapes.placed(leaf, *place), o.leaf), ("handle", shapes.placed(handle, *place), "metal")]
+
+
+def _casement(o: Opening, frame: str) -> list[Part]:
+    """In the world: a frame of flat bars with a mullion, one pane on each side of it."""
+    along_x, (x0, y0, *_) = o.side in "ns", o.span
+    level, low, high = (y0 if along_x else x0) + o.thickness / 2, o.bottom + BAR, o.top - BAR
+
+    def bar(a: float, b: float, bottom: float, top: float, without: str) -> trimesh.Trimesh:
+        ends = (a, level - 0.035, bottom), (b, level + 0.035, top)
+        if not along_x:
+            ends, without = [(y, x, z) for x, y, z in ends], without.replace("x", "y")
+        return shapes.span(*ends, tuple(without.split()))
+
+    left, right, middle = o.low + BAR, o.high - BAR, (o.low + o.high) / 2
+    bars = [
+        bar(o.low, o.high, o.bottom, low, "-x +x -z"),
+        bar(o.low, o.high, high, o.top, "-x +x +z"),
+        bar(o.low, left, low, high, "-x -z +z"),
+        bar(right, o.high, low, high, "+x -z +z"),
+        bar(middle - BAR / 2, middle + BAR / 2, low, high, "-z +z"),
+    ]
+    panes = []
+    for a, b in ((left, middle - BAR / 2), (middle + BAR / 2, right)):
+        center, facing = ((a + b) / 2, level), (0, 1, 0)
+        if not along_x:
+            center, facing = center[::-1], (1, 0, 0)
+        panes.append(shapes.rectangle((*center, (low + high) / 2), (b - a, high - low), facing))
+    return [("frame", shapes.joined(*bars), frame), ("panes", shapes.joined(*panes), "glass")]

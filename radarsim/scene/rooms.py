@@ -111,9 +111,12 @@ class Site:
                 return yaw
         return None
 
-    def seat(self, room: Room, x: float, y: float, yaw: float, away: float = 0.82, ignore_kept: bool = False) -> None:
-        """A chair in front of what stands at a place, turned to it more or less."""
-        turn = yaw + np.pi + self.rng.uniform(-0.5, 0.5)
+    def seat(
+        self, room: Room, x: float, y: float, yaw: float, away: float = 0.82, sway: float = 0.5,
+        ignore_kept: bool = False,
+    ) -> None:  # fmt: skip
+        """A chair in front of what stands at a place, turned to it up to a `sway` (rad)."""
+        turn = yaw + np.pi + self.rng.uniform(-sway, sway)
         piece = furniture.chair(self.rng)
         x, y = x + away * np.cos(yaw), y + away * np.sin(yaw)
         if room.is_free(footprint(piece, x, y, turn), ignore_kept):

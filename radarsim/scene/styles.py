@@ -154,4 +154,14 @@ STYLES: dict[str, Style] = {
         kinds={"office": 5, "lab": 2, "meeting": 2, "lecture": 1.5, "lounge": 1},
         core={"storage": 2, "meeting": 1.5, "kitchen": 1, "office": 1, "library": 1},
     ),
+    "office": Style(
+        height=2.7, outer=0.30, inner=0.12, corridor=(2.0, 2.0), row=(4.6, 4.6), module=(2.4, 2.4),
+        facade="concrete", lining="plasterboard", partition="plasterboard", passage="plasterboard",
+        ceiling="ceiling board", floors={"": "vinyl", "office": "carpet", "meeting": "carpet", "lounge": "carpet"},
+        windows=Windows(sill=0.9, top=2.2, width=0.7, bays=2, transoms=0, frame="metal"),
+        doors=Doors(leaf={"wood": 1.0}, frame="plasterboard", closed=0.25, ajar=0.0),
+        glazed=0.0, suites=1.0, column=("", 0.0), lamp=(0.3, 1.2, 2.2), radiators=1.0, risers=0.0, mains=0,
+        storage=("metal", "wood"), fittings={},
+        kinds={"office": 2, "meeting": 1, "storage": 1, "lounge": 1}, core={}, plain=True,
+    ),
 }  # fmt: skip

@@ -50,7 +50,7 @@ class Office(BaseModel):
         plan, site = OfficePlan(self, rng), Site(rng, self.height)
         for opening in plan.openings:
             fit(site, plan, opening)
-            if opening.kind == "window" and opening.other is None and opening.room.kind != "corridor":
+            if opening.kind == "window" and opening.room.kind != "corridor":
                 width = plan.window(opening.room)[1]
                 piece = furniture.radiator(rng, width=min(1.2, width))
                 site.put(opening.room, piece, *opening.room.wall_place(opening.side, opening.low + width / 2, 0.1))
@@ -88,32 +88,24 @@ class OfficePlan(FloorPlan):
         self.rooms += row
 
     def _doors(self) -> None:
+        rng, thick = self._rng, self.style.inner
         for row, side in zip(self.rows, "ns", strict=True):
             for i, room in enumerate(row):
                 # Rooms 1-2, 3-4, ... share a doorway. The first pair of a side keeps both doors open: a loop to walk.
-                self._door(room, side, is_open=self._rng.random() < 1 - self.style.doors.closed or i < 2)
+                is_open = rng.random() < 1 - self.style.doors.closed or i < 2
+                low = round(rng.uniform(room.x0 + JAMB, room.x1 - JAMB - DOOR), 2)
+                hinge, swing = (rng.random(), rng.uniform(82, 112)) if is_open else (0.0, 0.0)
+                ends, leaf = (low, low + DOOR, 0.0, DOOR_HEIGHT), ("wood", np.deg2rad(swing), -1 if hinge < 0.5 else 1)
+                door = Opening(f"{room.name} door", room, side, *ends, thick, "door", self.corridors[0], *leaf)
+                self.openings.append(door)
+                if is_open:
+                    room.taken.append(door.leaf_area(0.03, 0.08))
             for left, right in zip(row[::2], row[1::2], strict=False):
                 # At least 1.3 m from the corridor wall, clear of the opened door leaves.
-                offset = self._rng.uniform(1.4, max(1.5, left.size[1] - DOOR - 0.7))
+                offset = rng.uniform(1.4, max(1.5, left.size[1] - DOOR - 0.7))
                 low = round(left.y1 - offset - DOOR if side == "n" else left.y0 + offset, 2)
-                gap = right.x0 - left.x1
-                self.openings.append(
-                    Opening(f"{left.name} way", left, "e", low, low + DOOR, 0.0, DOOR_HEIGHT, gap, "way", right)
-                )
-
-    def _door(self, room: Room, side: str, is_open: bool) -> None:
-        low = round(self._rng.uniform(room.x0 + JAMB, room.x1 - JAMB - DOOR), 2)
-        swing = {}
-        if is_open:
-            hinge = -1 if self._rng.random() < 0.5 else 1
-            swing = {"hinge": hinge, "angle": np.deg2rad(self._rng.uniform(82, 112))}
-        door = Opening(
-            f"{room.name} door", room, side, low, low + DOOR, 0.0, DOOR_HEIGHT, self.style.inner, "door",
-            self.corridors[0], "wood", **swing,
-        )  # fmt: skip
-        self.openings.append(door)
-        if is_open:
-            room.taken.append(door.leaf_area(0.03, 0.08))
+                door = Opening("", left, "e", low, low + DOOR, 0.0, DOOR_HEIGHT, right.x0 - left.x1, "way", right)
+                self.openings.append(door)
 
     def spaces(self) -> list[Box]:
         """Rooms end at whole centimetres, but the outer wall is where the length says."""
@@ -151,13 +143,12 @@ class OfficePlan(FloorPlan):
 
     def labels(self, found: list[Face]) -> Iterator[tuple[str, str]]:
         """Name and material of what each face of the walls belongs to; whatever is narrow counts as a reveal."""
-        style = self.style
         x0, y0, x1, y1 = self.skeleton.outline.bounds
         for face in found:
-            plane = f"{'xyz'[face.axis]} "
-            if (face.axis, face.level) in ((0, x0), (0, x1), (1, y0), (1, y1)):
-                yield f"facade {plane}{face.level:+.2f}", style.facade
-            elif min(face.high[0] - face.low[0], face.high[1] - face.low[1]) < style.outer + 0.01:
-                yield "reveals", style.lining
+            axis = "xyz"[face.axis]
+            if face.level in {"x": (x0, x1), "y": (y0, y1), "z": ()}[axis]:
+                yield f"facade {axis} {face.level:+.2f}", self.style.facade
+            elif min(np.subtract(face.high, face.low)) < self.style.outer + 0.01:
+                yield "reveals", self.style.lining
             else:
-                yield f"wall {plane}{face.sign * face.level:+.2f}", style.lining
+                yield f"wall {axis} {face.sign * face.level:+.2f}", self.style.lining

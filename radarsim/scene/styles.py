@@ -44,7 +44,7 @@ class Doors:
     ajar: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Style:
     """One style.
 

@@ -19,7 +19,7 @@ from radarsim.scene import furniture, joinery, shapes, walls
 from radarsim.scene.floorplan import FloorPlan
 from radarsim.scene.furnishing import furnish
 from radarsim.scene.objects import SceneObject
-from radarsim.scene.openings import Opening
+from radarsim.scene.openings import Opening, strip
 from radarsim.scene.rooms import Room, Site
 from radarsim.scene.skeleton import Box, Skeleton, skeleton
 from radarsim.scene.styles import STYLES, Style
@@ -153,17 +153,8 @@ def _columns(plan: FloorPlan) -> list[Box]:
         for border in plan.borders[room.name]:
             if border.other is not None or border.length < 3.5:
                 continue
-            found.append(_corner_column(room, border, width))
+            low = room.wall(border.side)[0]
+            column = strip(room, border.side, low, low + width, -0.6 * width, 0.0)
+            found.append(tuple(round(v, 3) for v in column))
             room.taken.append(shapely.box(*found[-1]).buffer(0.02))
     return found
-
-
-def _corner_column(room: Room, border, width: float) -> Box:
-    deep = 0.6 * width
-    x0, x1 = (room.x0, room.x0 + width) if border.side in "ns" else (room.x0, room.x0 + deep)
-    y0, y1 = (room.y0, room.y0 + deep) if border.side in "ns" else (room.y0, room.y0 + width)
-    if border.side == "n":
-        y0, y1 = room.y1 - deep, room.y1
-    if border.side == "e":
-        x0, x1 = room.x1 - deep, room.x1
-    return tuple(round(v, 3) for v in (x0, y0, x1, y1))

@@ -279,8 +279,7 @@ class FloorPlan:
                 margin = 0.1 if high - low < 1.5 else 0.0
                 depth = min(APPROACH, min(room.size) - 0.05)
                 room.kept.append(area(*strip(room, side, low - margin, high + margin, -depth, 0.0)))
-                x0, y0, x1, y1 = strip(room, side, low, high, -0.6, -0.6)
-                spots.setdefault(room.name, []).append(((x0 + x1) / 2, (y0 + y1) / 2))
+                spots.setdefault(room.name, []).append(room.wall_place(side, (low + high) / 2, 0.6)[:2])
         for room in self.rooms:
             at = spots.get(room.name, [])
             if room.kind in ("corridor", "stairs"):
@@ -303,12 +302,12 @@ def _borders(room: Room, rooms: list[Room], thickest: float) -> list[Border]:
     """
     found = []
     for side in "nsew":
-        low, high = (room.x0, room.x1) if side in "ns" else (room.y0, room.y1)
+        low, high = room.wall(side)
         free = LineString([(low, 0), (high, 0)])
         for other in rooms:
             if other is room or not -0.005 < _gap(room, other, side) < thickest + 1.0:
                 continue
-            a, b = (other.x0, other.x1) if side in "ns" else (other.y0, other.y1)
+            a, b = other.wall(side)
             a_in, b_in = max(a, low), min(b, high)
             gap = _gap(room, other, side)
             if b_in - a_in > 0.01 and 0.01 < gap < thickest:

@@ -73,7 +73,7 @@ class _Layout:
     ) -> list[tuple[float, float, float]]:
         """A row of pieces along a wall, from the window's end (or the low end), and the places they got."""
         room = self.room
-        low, high = (room.x0, room.x1) if side in "ns" else (room.y0, room.y1)
+        low, high = room.wall(side)
         downward = self.back in "ne" and side in (self.left, self.right)
         lit = any(o.side == side for o in self.windows)
         places, at, piece = [], start, make(self.rng)
@@ -261,7 +261,7 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
                 continue
             for _ in range(12):
                 side = str(rng.choice(["s", "n"] if along_x else ["w", "e"]))
-                low, high = (room.x0, room.x1) if along_x else (room.y0, room.y1)
+                low, high = room.wall(side)
                 along = rng.uniform(low + piece.width / 2, high - piece.width / 2)
                 # A lift's doors lie in the wall; all else stands before it.
                 off = 0.022 if what == "lift" else 0.02 + piece.depth / 2

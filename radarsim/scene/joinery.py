@@ -132,9 +132,9 @@ def _plain_leaf(o: Opening) -> list[Part]:
         return [("", shapes.box(middle, (width, LEAF, height), ("-x", "+x", "-z", "+z")), o.leaf)]
     leaf = shapes.box((width / 2 - 0.02, 0, height / 2), (width - 0.06, LEAF, height - 0.03))
     handle = shapes.box((width - 0.12, 0, 1.05), (0.12, LEAF + 0.10, 0.02))
-    face, inward = (o.room.y1, -1) if o.side == "n" else (o.room.y0, 1)
-    x, yaw = (o.low + 0.03, inward * o.angle) if o.hinge < 0 else (o.high - 0.03, np.pi - inward * o.angle)
-    place = (x, face + inward * 0.03, 0), (0, 0, yaw)
+    turn = o.angle if o.side == "s" else -o.angle
+    hinge, yaw = (o.low + 0.03, turn) if o.hinge < 0 else (o.high - 0.03, np.pi - turn)
+    place = (*o.room.wall_place(o.side, hinge, 0.03)[:2], 0), (0, 0, yaw)
     return [("leaf", shapes.placed(leaf, *place), o.leaf), ("handle", shapes.placed(handle, *place), "metal")]
 
 

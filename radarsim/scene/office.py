@@ -138,8 +138,8 @@ class OfficePlan(FloorPlan):
                     depth, middle = (1.1 if o.kind == "door" else 0.9), (o.low + o.high) / 2
                     room.kept.append(area(*strip(room, side, o.low - 0.1, o.high + 0.1, -depth, 0.0)))
                     # The way to the middle of the room stays walkable, through whichever doors there are.
-                    spot = strip(room, side, middle, middle, 0.0, 0.0)[:2]
-                    room.kept.append(LineString([spot, room.center]).buffer(0.5))
+                    way = LineString([room.wall_place(side, middle, 0.0)[:2], room.center])
+                    room.kept.append(way.buffer(0.5))
 
     def labels(self, found: list[Face]) -> Iterator[tuple[str, str]]:
         """Name and material of what each face of the walls belongs to; whatever is narrow counts as a reveal."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from shapely.geometry import LineString, Polygon
 
-from radarsim.scene.rooms import Room, sorted_box
+from radarsim.scene.rooms import Room
 from radarsim.scene.walls import Span
 
 DOOR, DOOR_HEIGHT = 1.0, 2.1  # m
@@ -65,14 +65,12 @@ class Opening:
         low, high = self.passage
         hinge = (low if self.hinge < 0 else high) - self.hinge * off
         tip = hinge - self.hinge * np.cos(self.angle) * (high - low), off + np.sin(self.angle) * (high - low)
-        ends = [strip(self.room, self.side, along, along, -deep, -deep)[:2] for along, deep in ((hinge, 0.0), tip)]
+        ends = [self.room.wall_place(self.side, *end)[:2] for end in ((hinge, 0.0), tip)]
         return LineString(ends).buffer(around)
 
 
 def strip(room: Room, side: str, low: float, high: float, near: float, far: float) -> tuple[float, ...]:
     """Box along a wall of a room, from `near` to `far` (m) outward of its face."""
-    if side in "ns":
-        face, out = (room.y1, 1) if side == "n" else (room.y0, -1)
-        return sorted_box(low, face + out * near, high, face + out * far)
-    face, out = (room.x1, 1) if side == "e" else (room.x0, -1)
-    return sorted_box(face + out * near, low, face + out * far, high)
+    face, out = {"n": (room.y1, 1), "s": (room.y0, -1), "e": (room.x1, 1), "w": (room.x0, -1)}[side]
+    a, b = sorted((face + out * near, face + out * far))
+    return (low, a, high, b) if side in "ns" else (a, low, b, high)

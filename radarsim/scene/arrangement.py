@@ -50,7 +50,7 @@ def _along_corridor(site: Site, room: Room, piece: Piece, plan: FloorPlan) -> No
 def _meeting(site: Site, room: Room) -> None:
     """A table where the ways through the room leave space, with chairs along its sides."""
     rng, piece = site.rng, furniture.table(site.rng)
-    for _ in range(60):
+    for _ in range(60 if min(room.size) > 2.4 else 0):
         x, y = rng.uniform(room.x0 + 1.2, room.x1 - 1.2), rng.uniform(room.y0 + 1.2, room.y1 - 1.2)
         yaw = rng.choice([0.0, np.pi / 2])
         if room.is_free(footprint(piece, x, y, yaw)):

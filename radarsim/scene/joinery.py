@@ -1,7 +1,7 @@
 """What is put into openings of walls: door leaves and their frames, windows, glass walls.
 
-Everything is made in the opening's own frame: x along the wall from the opening's low end, y across, 0 in the middle of
-the wall and `inward` (+1 or -1) into the room, z up; `placed` puts it into the world.
+What is not plain is made in the opening's own frame: x along the wall from the opening's low end, y across, 0 in the
+middle of the wall and `inward` (+1 or -1) into the room, z up; `placed` puts it into the world.
 """
 
 from collections.abc import Iterator

@@ -73,10 +73,11 @@ class OfficePlan(FloorPlan):
         super().__init__(Skeleton(corridors, blocks, outline=outline), style, rng)
 
     def _split(self, block: Block) -> None:
-        x0, y0, x1, y1 = block.box
-        count = max(2, round((x1 - x0) / block.pitch))
+        x0, y0, _, y1 = block.box
+        length = self.skeleton.outline.bounds[2] - 2 * x0
+        count = max(2, round(length / block.pitch))
         widths = self._rng.uniform(0.8, 1.2, count)
-        edges = (x0 + np.concatenate([[0], np.cumsum(widths / widths.sum())]) * (x1 - x0)).round(2)
+        edges = (x0 + np.concatenate([[0], np.cumsum(widths / widths.sum())]) * length).round(2)
         kinds = [kind for kind, number in self.style.kinds.items() for _ in range(number)]
         side, half = len(self.rows), self.style.inner / 2
         row = []
@@ -88,15 +89,17 @@ class OfficePlan(FloorPlan):
         self.rooms += row
 
     def _doors(self) -> None:
-        rng, thick = self._rng, self.style.inner
+        rng, thick, (leaf,) = self._rng, self.style.inner, self.style.doors.leaf
         for row, side in zip(self.rows, "ns", strict=True):
             for i, room in enumerate(row):
                 # Rooms 1-2, 3-4, ... share a doorway. The first pair of a side keeps both doors open: a loop to walk.
                 is_open = rng.random() < 1 - self.style.doors.closed or i < 2
                 low = round(rng.uniform(room.x0 + JAMB, room.x1 - JAMB - DOOR), 2)
                 hinge, swing = (rng.random(), rng.uniform(82, 112)) if is_open else (0.0, 0.0)
-                ends, leaf = (low, low + DOOR, 0.0, DOOR_HEIGHT), ("wood", np.deg2rad(swing), -1 if hinge < 0.5 else 1)
-                door = Opening(f"{room.name} door", room, side, *ends, thick, "door", self.corridors[0], *leaf)
+                door = Opening(
+                    f"{room.name} door", room, side, low, low + DOOR, 0.0, DOOR_HEIGHT, thick, "door",
+                    self.corridors[0], leaf, np.deg2rad(swing), -1 if hinge < 0.5 else 1,
+                )  # fmt: skip
                 self.openings.append(door)
                 if is_open:
                     room.taken.append(door.leaf_area(0.03, 0.08))

@@ -4,7 +4,7 @@
 
 The seed gives what the floors of a building share (`skeleton`): outline, corridors, stairs. The floor's number varies
 rooms, doors (`floorplan`) and what stands in them (`furnishing`). World origin at the south-west corner of the
-building's rooms, floor at z = 0.
+building's rooms, floor at z = 0. What stands on a plan is made by the same functions for the `office`.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

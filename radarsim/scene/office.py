@@ -6,28 +6,21 @@ A corridor runs along x with rooms on both sides. Neighbouring rooms are joined 
 loops to walk: corridor, room, neighbour, corridor. World origin at the floor's south-west corner, floor at z = 0.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
-from shapely.geometry import LineString
 from shapely.geometry import box as area
 
 from radarsim.scene import furniture
 from radarsim.scene.arrangement import arrange
 from radarsim.scene.buildings import equip, fit, surfaces
-from radarsim.scene.floorplan import JAMB, FloorPlan
 from radarsim.scene.objects import SceneObject
-from radarsim.scene.openings import DOOR, DOOR_HEIGHT, OPPOSITE, Opening, strip
-from radarsim.scene.rooms import Room, Site
-from radarsim.scene.skeleton import Block, Box, Skeleton
-from radarsim.scene.styles import STYLES
-from radarsim.scene.walls import Face
-
-#: Of a window in a room and of one at the corridor's ends, and least distance of two windows, m.
-WINDOW, END_WINDOW, PIER = 1.6, 1.2, 0.5
+from radarsim.scene.officeplan import OfficePlan
+from radarsim.scene.rooms import Site
+from radarsim.scene.skeleton import Block, Skeleton
+from radarsim.scene.styles import STYLES, Style
 
 
 class Office(BaseModel):
@@ -36,7 +29,7 @@ class Office(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: Literal["office"] = "office"
-    seed: int = 0
+    seed: Annotated[int, Field(ge=0)] = 0
     length: Annotated[float, Field(ge=8, le=200)] = 18.0  # along x, outside to outside, m
     depth: Annotated[float, Field(ge=8, le=40)] = 12.0  # along y
     height: Annotated[float, Field(ge=2.4, le=6)] = 2.7  # floor to ceiling
@@ -44,10 +37,25 @@ class Office(BaseModel):
     room: Annotated[float, Field(ge=2.8, le=12)] = 4.2  # mean width of a room
     furnished: bool = True
 
+    @property
+    def style(self) -> Style:
+        """Materials, sizes and densities."""
+        return replace(STYLES["office"], height=self.height)
+
+    def skeleton(self) -> Skeleton:
+        """A corridor between two blocks of rooms, the southern one first."""
+        thick, wall = self.style.outer, self.style.inner
+        low, far = self.depth / 2 - self.corridor / 2, self.length - thick
+        high = low + self.corridor
+        sides = (thick, low - wall), (high + wall, self.depth - thick)
+        blocks = [Block((thick, y0, far, y1), 0, "rooms", self.room) for y0, y1 in sides]
+        outline = area(0.0, 0.0, self.length, self.depth)
+        return Skeleton({"corridor": (thick, low, far, high)}, blocks, outline=outline)
+
     def build(self) -> list[SceneObject]:
         """All objects of the floor: doors, windows, walls, floors, ceilings, fittings, furniture."""
         rng = np.random.default_rng(self.seed)
-        plan, site = OfficePlan(self, rng), Site(rng, self.height)
+        plan, site = OfficePlan(self.skeleton(), self.style, rng), Site(rng, self.height)
         for opening in plan.openings:
             fit(site, plan, opening)
             if opening.kind == "window" and opening.room.kind != "corridor":
@@ -57,101 +65,3 @@ class Office(BaseModel):
         surfaces(site, plan, plan.labels)
         equip(site, plan, arrange if self.furnished else None)
         return site.objects
-
-
-class OfficePlan(FloorPlan):
-    """Two rows of rooms, the southern one first, and the corridor between them."""
-
-    def __init__(self, office: Office, rng: np.random.Generator):
-        style = replace(STYLES["office"], height=office.height)
-        low, far = office.depth / 2 - office.corridor / 2, office.length - style.outer
-        high = low + office.corridor
-        sides = (style.outer, low - style.inner), (high + style.inner, office.depth - style.outer)
-        blocks = [Block((style.outer, y0, far, y1), 0, "rooms", office.room) for y0, y1 in sides]
-        self.rows: list[list[Room]] = []
-        corridors, outline = {"corridor": (style.outer, low, far, high)}, area(0.0, 0.0, office.length, office.depth)
-        super().__init__(Skeleton(corridors, blocks, outline=outline), style, rng)
-
-    def _split(self, block: Block) -> None:
-        x0, y0, _, y1 = block.box
-        length = self.skeleton.outline.bounds[2] - 2 * x0
-        count = max(2, round(length / block.pitch))
-        widths = self._rng.uniform(0.8, 1.2, count)
-        edges = (x0 + np.concatenate([[0], np.cumsum(widths / widths.sum())]) * length).round(2)
-        kinds = [kind for kind, number in self.style.kinds.items() for _ in range(number)]
-        side, half = len(self.rows), self.style.inner / 2
-        row = []
-        for i, k in enumerate(self._rng.permutation(count)):
-            ends = edges[i] + (half if i else 0), edges[i + 1] - (half if i < count - 1 else 0)
-            name = f"{'north' if side else 'south'} {i + 1}"
-            row.append(Room(name, ends[0], y0, ends[1], y1, kinds[(k + side * 2) % len(kinds)]))
-        self.rows.append(row)
-        self.rooms += row
-
-    def _doors(self) -> None:
-        rng, thick, (leaf,) = self._rng, self.style.inner, self.style.doors.leaf
-        for row, side in zip(self.rows, "ns", strict=True):
-            for i, room in enumerate(row):
-                # Rooms 1-2, 3-4, ... share a doorway. The first pair of a side keeps both doors open: a loop to walk.
-                is_open = rng.random() < 1 - self.style.doors.closed or i < 2
-                low = round(rng.uniform(room.x0 + JAMB, room.x1 - JAMB - DOOR), 2)
-                hinge, swing = (rng.random(), rng.uniform(82, 112)) if is_open else (0.0, 0.0)
-                door = Opening(
-                    f"{room.name} door", room, side, low, low + DOOR, 0.0, DOOR_HEIGHT, thick, "door",
-                    self.corridors[0], leaf, np.deg2rad(swing), -1 if hinge < 0.5 else 1,
-                )  # fmt: skip
-                self.openings.append(door)
-                if is_open:
-                    room.taken.append(door.leaf_area(0.03, 0.08))
-            for left, right in zip(row[::2], row[1::2], strict=False):
-                # At least 1.3 m from the corridor wall, clear of the opened door leaves.
-                offset = rng.uniform(1.4, max(1.5, left.size[1] - DOOR - 0.7))
-                low = round(left.y1 - offset - DOOR if side == "n" else left.y0 + offset, 2)
-                door = Opening("", left, "e", low, low + DOOR, 0.0, DOOR_HEIGHT, right.x0 - left.x1, "way", right)
-                self.openings.append(door)
-
-    def spaces(self) -> list[Box]:
-        """Rooms end at whole centimetres, but the outer wall is where the length says."""
-        far = self.corridors[0].x1
-        return [(x0, y0, far if x1 > far - 0.01 else x1, y1) for x0, y0, x1, y1 in super().spaces()]
-
-    def window(self, room: Room) -> tuple[int, float]:
-        """Number and width (m) of a room's windows."""
-        count = max(1, round(room.size[0] / self.style.module[0]))
-        return count, min(WINDOW, room.size[0] / count - PIER)
-
-    def _windows(self) -> None:
-        places, hall, half = [], self.corridors[0], END_WINDOW / 2
-        for row, side in zip(self.rows, "sn", strict=True):
-            for room in row:
-                count, width = self.window(room)
-                for k in range(count):
-                    low = round(room.x0 + (k + 0.5) * (room.size[0] / count) - width / 2, 2)
-                    places.append((k + 1, room, side, low, low + width))
-        places += [(end, hall, end[0], hall.center[1] - half, hall.center[1] + half) for end in ("west", "east")]
-        w, thick = self.style.windows, self.style.outer
-        for name, room, side, low, high in places:
-            name = f"{room.name} window {name}"
-            self.openings.append(Opening(name, room, side, low, high, w.sill, w.top, thick, "window"))
-
-    def _keep_ways(self) -> None:
-        for o in self.openings:
-            for room, side in ((o.room, o.side), (o.other, OPPOSITE[o.side])):
-                if o.passage and room.kind != "corridor":
-                    depth, middle = (1.1 if o.kind == "door" else 0.9), (o.low + o.high) / 2
-                    room.kept.append(area(*strip(room, side, o.low - 0.1, o.high + 0.1, -depth, 0.0)))
-                    # The way to the middle of the room stays walkable, through whichever doors there are.
-                    way = LineString([room.wall_place(side, middle, 0.0)[:2], room.center])
-                    room.kept.append(way.buffer(0.5))
-
-    def labels(self, found: list[Face]) -> Iterator[tuple[str, str]]:
-        """Name and material of what each face of the walls belongs to; whatever is narrow counts as a reveal."""
-        x0, y0, x1, y1 = self.skeleton.outline.bounds
-        for face in found:
-            axis = "xyz"[face.axis]
-            if face.level in {"x": (x0, x1), "y": (y0, y1), "z": ()}[axis]:
-                yield f"facade {axis} {face.level:+.2f}", self.style.facade
-            elif min(np.subtract(face.high, face.low)) < self.style.outer + 0.01:
-                yield "reveals", self.style.lining
-            else:
-                yield f"wall {axis} {face.sign * face.level:+.2f}", self.style.lining

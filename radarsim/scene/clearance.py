@@ -78,7 +78,11 @@ def ground_level(scene: Scene) -> float:
     floor = _floor(scene, lowest + _DEEPEST)
     if not floor.any():
         return 0.0
-    heights, areas = corners[floor, :, 2].mean(axis=1), areas[floor]
+    return lowest_level(corners[floor, :, 2].mean(axis=1), areas[floor])
+
+
+def lowest_level(heights: Float[np.ndarray, "n"], areas: Float[np.ndarray, "n"]) -> float:
+    """Height of the lowest wide floor among level surfaces, m."""
     bins = ((heights - heights.min()) / 0.05).astype(int)
     wide = np.bincount(bins, areas)
     # A floor at the edge of a bin lies in two.

@@ -1,5 +1,6 @@
 """The plan of one floor: the skeleton's ground cut into rooms, and the doors, windows and glass walls between them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from radarsim.scene.openings import DOOR, DOOR_HEIGHT, OPPOSITE, Opening, strip
 from radarsim.scene.rooms import Room
 from radarsim.scene.skeleton import Block, Box, Skeleton
 from radarsim.scene.styles import Style
+from radarsim.scene.walls import Face
 
 #: Narrowest and widest room, m; the usual width.
 NARROWEST, WIDEST, USUAL = 2.8, 8.4, 4.3
@@ -54,6 +56,7 @@ class FloorPlan:
     Attributes:
         rooms: all of them, corridors (kind ``corridor``) last.
         openings: doors, windows, glass walls.
+        columns: half sunk into the facade, m.
     """
 
     def __init__(self, skeleton: Skeleton, style: Style, rng: np.random.Generator):
@@ -68,6 +71,7 @@ class FloorPlan:
         self._doors()
         self._windows()
         self._keep_ways()
+        self.columns = self._columns()
 
     def spaces(self) -> list[Box]:
         """What the walls enclose: the rooms."""
@@ -288,6 +292,52 @@ class FloorPlan:
             for k in range(1, len(at)):
                 nearest = min(at[:k], key=lambda p, q=at[k]: np.hypot(p[0] - q[0], p[1] - q[1]))
                 room.kept.append(LineString([nearest, at[k]]).buffer(0.55))
+
+    # Walls
+
+    def _columns(self) -> list[Box]:
+        """Where walls between rooms meet the facade, and in the corners of large rooms."""
+        (what, width), found = self.style.column, []
+        large = [r for r in self.rooms if r.kind not in ("corridor", "stairs", "toilet") and min(r.size) >= 3.5]
+        for border in (b for room in large for b in self.borders[room.name] if what):
+            if border.other is None and border.length >= 3.5:
+                low = border.room.wall(border.side)[0]
+                box = strip(border.room, border.side, low, low + width, -0.6 * width, 0.0)
+                found.append(tuple(round(v, 3) for v in box))
+                border.room.taken.append(area(*found[-1]).buffer(0.02))
+        return found
+
+    def labels(self, found: list[Face]) -> Iterator[tuple[str, str]]:
+        """Name and material of what each face of the walls belongs to."""
+        style = self.style
+        # Within the wall's thickness, short of its faces.
+        reveals = [
+            area(x0 - dx, y0 - dy, x1 + dx, y1 + dy)
+            for o in self.openings
+            for x0, y0, _, x1, y1, _ in [o.span]
+            for dx, dy in [(1e-3, -5e-3) if o.side in "ns" else (-5e-3, 1e-3)]
+        ]
+        points = shapely.points(np.array([face.corners.mean(axis=0)[:2] for face in found]))
+        near = shapely.distance(points, self.skeleton.outline.exterior)
+        in_reveal, in_corridor, at_column = (
+            shapely.covers(shapely.union_all(parts), points)
+            for parts in (reveals, [c.floor.buffer(0.01) for c in self.corridors], [area(*c) for c in self.columns])
+        )
+        for k, face in enumerate(found):
+            plane = f"{'xyz'[face.axis]} {face.sign * face.level:+.3f}"
+            if near[k] < 1e-3 and not in_reveal[k]:
+                yield f"facade {plane}", style.facade
+            elif at_column[k]:
+                yield f"column {plane}", style.column[0]
+            elif face.axis == 2 or in_reveal[k]:
+                what = style.lining if near[k] < style.outer else style.doors.frame
+                yield f"reveals {what}", what
+            elif near[k] < style.outer + 0.01:
+                yield f"outer wall {plane}", style.lining
+            elif in_corridor[k]:
+                yield f"corridor wall {plane}", style.passage
+            else:
+                yield f"wall {plane}", style.partition
 
 
 def _gap(room: Room, other: Room, side: str) -> float:

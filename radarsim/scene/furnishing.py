@@ -9,6 +9,7 @@ from shapely.geometry import box as area
 from radarsim.scene import fittings, furniture, shapes
 from radarsim.scene.floorplan import FloorPlan
 from radarsim.scene.furniture import Piece
+from radarsim.scene.openings import OPPOSITE
 from radarsim.scene.rooms import Room, Site, footprint
 
 Make = Callable[[np.random.Generator], Piece]
@@ -41,8 +42,8 @@ class _Layout:
         behind = [o for o in plan.openings if o.other is room]
         doors = [o.side for o in self.openings if o.kind in ("door", "glass wall")]
         entrances = [o.side for o in self.openings if o.kind == "way"]
-        self.front = (doors or entrances or ["nsew"["snwe".index(o.side)] for o in behind] or ["s"])[0]
-        self.back = "nsew"["snwe".index(self.front)]
+        self.front = (doors or entrances or [OPPOSITE[o.side] for o in behind] or ["s"])[0]
+        self.back = OPPOSITE[self.front]
         self.left, self.right = ("e", "w") if self.front in "ns" else ("n", "s")
         if self.rng.random() < 0.5:
             self.left, self.right = self.right, self.left
@@ -266,8 +267,8 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
                 # A lift's doors lie in the wall; all else stands before it.
                 off = 0.022 if what == "lift" else 0.02 + piece.depth / 2
                 place = room.wall_place(side, along, off)
-                spot = footprint(piece, *place).buffer(0.02)
-                if any(spot.intersects(a) for a in avoid) or not _in_front(room, piece, place):
+                spot = footprint(piece, *place)
+                if any(spot.buffer(0.02).intersects(a) for a in avoid) or not room.floor.buffer(0.05).contains(spot):
                     continue
                 site.put(room, piece, *place)
                 # Nothing else stands opposite.
@@ -282,8 +283,3 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
         x, y, yaw = room.wall_place(side, middle, 0.15 + 0.16 * k)
         for what, mesh in piece.parts.items():
             site.add(f"{room.name} pipe {k + 1}", shapes.placed(mesh, (x, y, 0), (0, 0, yaw)), what)
-
-
-def _in_front(room: Room, piece: Piece, place: tuple[float, float, float]) -> bool:
-    """Whether what stands at a wall lies within the room along the wall; a lift reaches a little into the wall."""
-    return room.floor.buffer(0.05).contains(footprint(piece, *place))

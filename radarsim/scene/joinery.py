@@ -140,14 +140,13 @@ def _plain_leaf(o: Opening) -> list[Part]:
 
 def _casement(o: Opening, frame: str) -> list[Part]:
     """In the world: a frame of flat bars with a mullion, one pane on each side of it."""
-    along_x, (x0, y0, *_) = o.side in "ns", o.span
-    level, low, high = (y0 if along_x else x0) + o.thickness / 2, o.bottom + BAR, o.top - BAR
+    (x0, y0, *_), low, high = o.span, o.bottom + BAR, o.top - BAR
+    axes, level = ([0, 1, 2], y0) if o.side in "ns" else ([1, 0, 2], x0)
+    level += o.thickness / 2
 
     def bar(a: float, b: float, bottom: float, top: float, without: str) -> trimesh.Trimesh:
-        ends = (a, level - 0.035, bottom), (b, level + 0.035, top)
-        if not along_x:
-            ends, without = [(y, x, z) for x, y, z in ends], without.replace("x", "y")
-        return shapes.span(*ends, tuple(without.split()))
+        ends = np.array([(a, level - 0.035, bottom), (b, level + 0.035, top)])[:, axes]
+        return shapes.span(*ends, tuple(without.replace("x", "xy"[axes[0]]).split()))
 
     left, right, middle = o.low + BAR, o.high - BAR, (o.low + o.high) / 2
     bars = [
@@ -159,8 +158,6 @@ def _casement(o: Opening, frame: str) -> list[Part]:
     ]
     panes = []
     for a, b in ((left, middle - BAR / 2), (middle + BAR / 2, right)):
-        center, facing = ((a + b) / 2, level), (0, 1, 0)
-        if not along_x:
-            center, facing = center[::-1], (1, 0, 0)
-        panes.append(shapes.rectangle((*center, (low + high) / 2), (b - a, high - low), facing))
+        center = np.array([(a + b) / 2, level, (low + high) / 2])[axes]
+        panes.append(shapes.rectangle(center, (b - a, high - low), np.eye(3)[axes[1]]))
     return [("frame", shapes.joined(*bars), frame), ("panes", shapes.joined(*panes), "glass")]

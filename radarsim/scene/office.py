@@ -62,6 +62,6 @@ class Office(BaseModel):
                 width = plan.window(opening.room)[1]
                 piece = furniture.radiator(rng, width=min(1.2, width))
                 site.put(opening.room, piece, *opening.room.wall_place(opening.side, opening.low + width / 2, 0.1))
-        surfaces(site, plan, plan.labels)
+        surfaces(site, plan)
         equip(site, plan, arrange if self.furnished else None)
         return site.objects

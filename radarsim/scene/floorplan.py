@@ -271,11 +271,13 @@ class FloorPlan:
         )
 
     def _keep_ways(self) -> None:
-        """Mark the floor in front of doors, and from door to door, as to be kept free."""
+        """Mark the floor under leaves as taken, and that before doors and from door to door as to be kept free."""
         spots: dict[str, list[tuple[float, float]]] = {}
         for o in self.openings:
             if o.passage is None:
                 continue
+            if o.angle:
+                o.room.taken.append(o.leaf_area())
             for room, side in ((o.room, o.side), (o.other, OPPOSITE[o.side])):
                 if room is None:
                     continue

@@ -24,7 +24,6 @@ def furnish(site: Site, room: Room, plan: FloorPlan) -> None:
         _corridor(site, room, plan)
         return
     layout = _Layout(site, room, plan)
-    layout.take_leaves()
     if room.kind == "stairs":
         layout.stairs()
         return
@@ -50,12 +49,6 @@ class _Layout:
         self.windows = [o for o in self.openings if o.kind == "window"]
         self.cabinet: Make = partial(furniture.cabinet, material=self.style.storage[0])
         self.shelf: Make = partial(furniture.shelf, material=self.style.storage[1])
-
-    def take_leaves(self) -> None:
-        """The floor that door leaves stand over."""
-        for o in self.openings:
-            if o.angle:
-                self.room.taken.append(o.leaf_area())
 
     def at_windows(self) -> None:
         """Radiators below windows, pipes in a corner."""

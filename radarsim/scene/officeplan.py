@@ -50,8 +50,6 @@ class OfficePlan(FloorPlan):
                     self.corridors[0], leaf, np.deg2rad(swing), -1 if hinge < 0.5 else 1,
                 )  # fmt: skip
                 self.openings.append(door)
-                if is_open:
-                    room.taken.append(door.leaf_area(0.03, 0.08))
             for left, right in zip(row[::2], row[1::2], strict=False):
                 # At least 1.3 m from the corridor wall, clear of the opened door leaves.
                 offset = rng.uniform(1.4, max(1.5, left.size[1] - DOOR - 0.7))
@@ -85,6 +83,8 @@ class OfficePlan(FloorPlan):
 
     def _keep_ways(self) -> None:
         for o in self.openings:
+            if o.angle:
+                o.room.taken.append(o.leaf_area(0.03, 0.08))
             for room, side in ((o.room, o.side), (o.other, OPPOSITE[o.side])):
                 if o.passage and room.kind != "corridor":
                     depth, middle = (1.1 if o.kind == "door" else 0.9), (o.low + o.high) / 2

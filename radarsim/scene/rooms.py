@@ -102,10 +102,10 @@ class Site:
             self.put(room, piece, x, y, yaw)
         return free
 
-    def against_wall(self, room: Room, piece: Piece, sides: str = "nsew", gap: float = 0.03) -> float | None:
+    def against_wall(self, room: Room, piece: Piece, gap: float = 0.03) -> float | None:
         """Put a piece with its back to a wall where there is room, and return its yaw, or None."""
         for _ in range(24):
-            side = sides[self.rng.integers(len(sides))]
+            side = "nsew"[self.rng.integers(4)]
             half = piece.width / 2 + 0.02
             low, high = room.wall(side)[0] + half, room.wall(side)[1] - half
             if low >= high:

@@ -4,19 +4,20 @@
 
 The seed gives what the floors of a building share (`skeleton`): outline, corridors, stairs. The floor's number varies
 rooms, doors (`floorplan`) and what stands in them (`furnishing`). World origin at the south-west corner of the
-building's rooms, floor at z = 0.
+building's rooms, floor at z = 0. What stands on a plan is made by the same functions for the `office`.
 """
 
+from collections.abc import Callable
 from typing import Annotated, Literal
 
 import numpy as np
-import shapely
 from pydantic import BaseModel, ConfigDict, Field
 
 from radarsim.scene import furniture, joinery, shapes, walls
 from radarsim.scene.floorplan import FloorPlan
 from radarsim.scene.furnishing import furnish
 from radarsim.scene.objects import SceneObject
+from radarsim.scene.openings import Opening
 from radarsim.scene.rooms import Room, Site
 from radarsim.scene.skeleton import Skeleton, skeleton
 from radarsim.scene.styles import STYLES, Style
@@ -48,60 +49,27 @@ class Building(BaseModel):
     def build(self) -> list[SceneObject]:
         """All objects of the floor: walls, floors, ceilings, doors, windows, fittings, furniture."""
         plan, site = self.plan(), Site(self._rng(2), self.style.height)
-        _surfaces(site, plan)
-        for number, opening in enumerate(plan.openings):
-            for name, mesh, what in joinery.fill(opening, self.style):
-                site.add(f"{opening.room.name} {opening.kind} {number + 1} {name}", mesh, what)
-        lamp = furniture.lamp(self.style.height, *self.style.lamp[:2])
-        for room in plan.rooms:
-            along_x = room.size[0] > room.size[1]
-            site.lamps(room, lamp, self.style.lamp[2], np.pi / 2 if along_x else 0.0)
-            if self.furnished:
-                furnish(site, room, plan)
+        surfaces(site, plan)
+        for opening in plan.openings:
+            fit(site, plan, opening)
+        equip(site, plan, furnish if self.furnished else None)
         return site.objects
 
     def _rng(self, purpose: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, ord(self.kind), self.floor, purpose])
 
 
-def _surfaces(site: Site, plan: FloorPlan) -> None:
-    """Walls: the ground less the rooms and openings, their faces by plane and material. Floors and ceilings by room."""
+def surfaces(site: Site, plan: FloorPlan) -> None:
+    """Walls: the ground less the rooms and openings, their faces by label. Floors and ceilings by room."""
     style, height = plan.style, plan.style.height
-    solids = [(x0, y0, 0.0, x1, y1, height) for x0, y0, x1, y1 in plan.skeleton.ground(style.outer)]
-    rooms = [(r.x0, r.y0, 0.0, r.x1, r.y1, height) for r in plan.rooms]
-    pillars = [(x0, y0, 0.0, x1, y1, height) for x0, y0, x1, y1 in _columns(plan)]
+    boxes = plan.skeleton.ground(style.outer), plan.spaces(), plan.columns
+    solids, rooms, pillars = ([(x0, y0, 0.0, x1, y1, height) for x0, y0, x1, y1 in part] for part in boxes)
     spans = [o.span for o in plan.openings]
-    planes: dict[tuple, list[walls.Face]] = {}
-    sheath = plan.skeleton.outline.exterior
-    # Within the wall's thickness, short of its faces.
-    depths = [(1e-3, -5e-3) if o.side in "ns" else (-5e-3, 1e-3) for o in plan.openings]
-    reveals = shapely.union_all(
-        [shapely.box(s[0] - dx, s[1] - dy, s[3] + dx, s[4] + dy) for s, (dx, dy) in zip(spans, depths, strict=True)]
-    )
     found = walls.faces(solids, [*rooms, *spans], pillars)
-    middles = np.array([face.corners.mean(axis=0) for face in found])
-    points = shapely.points(middles[:, :2])
-    near = shapely.distance(points, sheath)
-    in_reveal = shapely.covers(reveals, points)
-    in_corridor = shapely.covers(shapely.union_all([room.floor.buffer(0.01) for room in plan.corridors]), points)
-    at_column = shapely.covers(shapely.union_all([shapely.box(*p[:2], *p[3:5]) for p in pillars]), points)
-    for k, face in enumerate(found):
-        level = face.sign * face.level
-        if near[k] < 1e-3 and not in_reveal[k]:
-            key = ("facade", face.axis, level, style.facade)
-        elif at_column[k]:
-            key = ("column", face.axis, level, style.column[0])
-        elif face.axis == 2 or in_reveal[k]:
-            key = ("reveals", 0, 0.0, style.lining if near[k] < style.outer else style.doors.frame)
-        elif near[k] < style.outer + 0.01:
-            key = ("outer wall", face.axis, level, style.lining)
-        elif in_corridor[k]:
-            key = ("corridor wall", face.axis, level, style.passage)
-        else:
-            key = ("wall", face.axis, level, style.partition)
-        planes.setdefault(key, []).append(face)
-    for (kind, axis, level, what), parts in planes.items():
-        name = f"{kind} {what}" if kind == "reveals" else f"{kind} {'xyz'[axis]} {level:+.3f}"
+    planes: dict[tuple[str, str], list[walls.Face]] = {}
+    for face, label in zip(found, plan.labels(found), strict=True):
+        planes.setdefault(label, []).append(face)
+    for (name, what), parts in planes.items():
         site.add(name, walls.surface(parts), what)
     for room in plan.rooms:
         for name, z, facing, what in (
@@ -117,29 +85,18 @@ def _surfaces(site: Site, plan: FloorPlan) -> None:
     site.add("thresholds", shapes.joined(*sills), style.floor(""))
 
 
-def _columns(plan: FloorPlan) -> list[tuple[float, float, float, float]]:
-    """Columns half sunk into the facade where walls between rooms meet it, and in the corners of large rooms."""
-    what, width = plan.style.column
-    if not what:
-        return []
-    found = []
+def fit(site: Site, plan: FloorPlan, opening: Opening) -> None:
+    """Put into an opening what it is filled with."""
+    for name, mesh, what in joinery.fill(opening, plan.style):
+        site.add(f"{opening.name} {name}".rstrip(), mesh, what)
+
+
+def equip(site: Site, plan: FloorPlan, furnish: Callable[[Site, Room, FloorPlan], None] | None) -> None:
+    """Lamps in all rooms, and furniture where there is some."""
+    style = plan.style
+    lamp = furniture.lamp(style.height, *style.lamp[:2])
     for room in plan.rooms:
-        if room.kind in ("corridor", "stairs", "toilet") or min(room.size) < 3.5:
-            continue
-        for border in plan.borders[room.name]:
-            if border.other is not None or border.length < 3.5:
-                continue
-            found.append(_corner_column(room, border, width))
-            room.taken.append(shapely.box(*found[-1]).buffer(0.02))
-    return found
-
-
-def _corner_column(room: Room, border, width: float) -> tuple[float, float, float, float]:
-    deep = 0.6 * width
-    x0, x1 = (room.x0, room.x0 + width) if border.side in "ns" else (room.x0, room.x0 + deep)
-    y0, y1 = (room.y0, room.y0 + deep) if border.side in "ns" else (room.y0, room.y0 + width)
-    if border.side == "n":
-        y0, y1 = room.y1 - deep, room.y1
-    if border.side == "e":
-        x0, x1 = room.x1 - deep, room.x1
-    return tuple(round(v, 3) for v in (x0, y0, x1, y1))
+        along_x = style.plain or room.size[0] > room.size[1]
+        site.lamps(room, lamp, style.lamp[2], np.pi / 2 if along_x else 0.0)
+        if furnish:
+            furnish(site, room, plan)

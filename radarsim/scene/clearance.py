@@ -50,7 +50,7 @@ class Clearance:
 
         floor = raster(scene.triangles[_floor(scene, low)])
         free = floor if floor.any() else np.ones(shape, bool)
-        free &= ~raster(_between(scene.triangles, low, high))
+        free &= ~raster(between(scene.triangles, low, high))
         free[[0, -1]] = free[:, [0, -1]] = False
         # Drawing rounds to cells: what is drawn may lie up to one cell further out.
         distance = ndimage.distance_transform_edt(free) * RESOLUTION - RESOLUTION
@@ -78,7 +78,11 @@ def ground_level(scene: Scene) -> float:
     floor = _floor(scene, lowest + _DEEPEST)
     if not floor.any():
         return 0.0
-    heights, areas = corners[floor, :, 2].mean(axis=1), areas[floor]
+    return lowest_level(corners[floor, :, 2].mean(axis=1), areas[floor])
+
+
+def lowest_level(heights: Float[np.ndarray, "n"], areas: Float[np.ndarray, "n"]) -> float:
+    """Height of the lowest wide floor among level surfaces, m."""
     bins = ((heights - heights.min()) / 0.05).astype(int)
     wide = np.bincount(bins, areas)
     # A floor at the edge of a bin lies in two.
@@ -118,7 +122,7 @@ def _floor(scene: Scene, below: float) -> Bool[np.ndarray, "t"]:
     return (up > _LYING) & (scene.triangles[:, :, 2].max(axis=1) < below)
 
 
-def _between(triangles: Float[np.ndarray, "t 3 3"], low: float, high: float) -> Float[np.ndarray, "s 3 3"]:
+def between(triangles: Float[np.ndarray, "t 3 3"], low: float, high: float) -> Float[np.ndarray, "s 3 3"]:
     """The parts of triangles between two heights."""
     touching = (triangles[:, :, 2].max(axis=1) >= low) & (triangles[:, :, 2].min(axis=1) <= high)
     corners = triangles[touching].reshape(-1, 3)

@@ -1,5 +1,6 @@
 """The plan of one floor: the skeleton's ground cut into rooms, and the doors, windows and glass walls between them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,21 +8,18 @@ import shapely
 from shapely.geometry import LineString
 from shapely.geometry import box as area
 
-from radarsim.scene.rooms import Room, sorted_box
-from radarsim.scene.skeleton import Block, Skeleton
+from radarsim.scene.openings import DOOR, DOOR_HEIGHT, OPPOSITE, Opening, strip
+from radarsim.scene.rooms import Room
+from radarsim.scene.skeleton import Block, Box, Skeleton
 from radarsim.scene.styles import Style
-from radarsim.scene.walls import Span
+from radarsim.scene.walls import Face
 
-DOOR, DOOR_HEIGHT = 1.0, 2.1  # m
 #: Narrowest and widest room, m; the usual width.
 NARROWEST, WIDEST, USUAL = 2.8, 8.4, 4.3
 #: From a corner to a door, m.
 JAMB = 0.35
 #: Floor kept free in front of a door, m.
 APPROACH = 1.25
-
-_ACROSS = {"n": (0.0, 1.0), "s": (0.0, -1.0), "e": (1.0, 0.0), "w": (-1.0, 0.0)}
-_OPPOSITE = {"n": "s", "s": "n", "e": "w", "w": "e"}
 
 
 @dataclass(frozen=True)
@@ -47,52 +45,6 @@ class Border:
         return self.high - self.low
 
 
-@dataclass(frozen=True)
-class Opening:
-    """A hole in a wall.
-
-    Attributes:
-        room: into which a leaf opens.
-        side: of the room.
-        low, high: along the wall, m.
-        bottom, top: heights, m.
-        thickness: of the wall, m.
-        kind: ``door``, ``way`` (no leaf), ``window`` or ``glass wall``.
-        other: room behind; None: outside.
-        leaf: material of the door; "": none.
-        angle: of the leaf, rad; 0: shut.
-        hinge: at the low (-1) or high (+1) end.
-        bay: of a glass wall: low and high end of its door.
-    """
-
-    room: Room
-    side: str
-    low: float
-    high: float
-    bottom: float
-    top: float
-    thickness: float
-    kind: str
-    other: Room | None = None
-    leaf: str = ""
-    angle: float = 0.0
-    hinge: int = -1
-    bay: tuple[float, float] = (0.0, 0.0)
-
-    @property
-    def span(self) -> Span:
-        """As a box."""
-        x0, y0, x1, y1 = _strip(self.room, self.side, self.low, self.high, 0.0, self.thickness)
-        return x0, y0, self.bottom, x1, y1, self.top
-
-    @property
-    def passage(self) -> tuple[float, float] | None:
-        """Where one can walk through, along the wall, if no leaf shuts it."""
-        if self.kind == "window":
-            return None
-        return self.bay if self.kind == "glass wall" else (self.low, self.high)
-
-
 class FloorPlan:
     """One floor of a building.
 
@@ -104,6 +56,7 @@ class FloorPlan:
     Attributes:
         rooms: all of them, corridors (kind ``corridor``) last.
         openings: doors, windows, glass walls.
+        columns: half sunk into the facade, m.
     """
 
     def __init__(self, skeleton: Skeleton, style: Style, rng: np.random.Generator):
@@ -118,6 +71,11 @@ class FloorPlan:
         self._doors()
         self._windows()
         self._keep_ways()
+        self.columns = self._columns()
+
+    def spaces(self) -> list[Box]:
+        """What the walls enclose: the rooms."""
+        return [(room.x0, room.y0, room.x1, room.y1) for room in self.rooms]
 
     # Rooms
 
@@ -218,7 +176,7 @@ class FloorPlan:
                 fronts[0], fronts[k] = fronts[k], fronts[0]
             self._front(fronts[0], number, must_open=room.name in joined)
             # Rooms between two corridors are short cuts, or have their second door shut.
-            across = [b for b in fronts[1:] if b.side == _OPPOSITE[fronts[0].side]]
+            across = [b for b in fronts[1:] if b.side == OPPOSITE[fronts[0].side]]
             if across and room.kind not in ("stairs", "toilet", "storage") and rng.random() < 0.5:
                 self._front(across[0], number, must_open=rng.random() < 0.6)
         for border in suites:
@@ -284,7 +242,8 @@ class FloorPlan:
         room, other = border.room, border.other
         thickness = self.style.outer if other is None else _gap(room, other, border.side)
         low, high = round(low, 3), round(high, 3)
-        self.openings.append(Opening(room, border.side, low, high, bottom, top, thickness, kind, other, **more))
+        name = f"{room.name} {kind} {len(self.openings) + 1}"
+        self.openings.append(Opening(name, room, border.side, low, high, bottom, top, thickness, kind, other, **more))
 
     def _windows(self) -> None:
         """Windows on the axes of the facade, in rooms and where a corridor meets it."""
@@ -308,24 +267,25 @@ class FloorPlan:
         """Whether there is more of the building outside of a wall: a shaft, or a wing close by."""
         thick = self.style.outer
         return self.skeleton.outline.intersects(
-            area(*_strip(border.room, border.side, border.low + 0.1, border.high - 0.1, thick + 0.02, thick + 1.0))
+            area(*strip(border.room, border.side, border.low + 0.1, border.high - 0.1, thick + 0.02, thick + 1.0))
         )
 
     def _keep_ways(self) -> None:
-        """Mark the floor in front of doors, and from door to door, as to be kept free."""
+        """Mark the floor under leaves as taken, and that before doors and from door to door as to be kept free."""
         spots: dict[str, list[tuple[float, float]]] = {}
         for o in self.openings:
             if o.passage is None:
                 continue
-            for room, side in ((o.room, o.side), (o.other, _OPPOSITE[o.side])):
+            if o.angle:
+                o.room.taken.append(o.leaf_area())
+            for room, side in ((o.room, o.side), (o.other, OPPOSITE[o.side])):
                 if room is None:
                     continue
                 low, high = o.passage
                 margin = 0.1 if high - low < 1.5 else 0.0
                 depth = min(APPROACH, min(room.size) - 0.05)
-                room.kept.append(area(*_strip(room, side, low - margin, high + margin, -depth, 0.0)))
-                x0, y0, x1, y1 = _strip(room, side, low, high, -0.6, -0.6)
-                spots.setdefault(room.name, []).append(((x0 + x1) / 2, (y0 + y1) / 2))
+                room.kept.append(area(*strip(room, side, low - margin, high + margin, -depth, 0.0)))
+                spots.setdefault(room.name, []).append(room.wall_place(side, (low + high) / 2, 0.6)[:2])
         for room in self.rooms:
             at = spots.get(room.name, [])
             if room.kind in ("corridor", "stairs"):
@@ -335,14 +295,51 @@ class FloorPlan:
                 nearest = min(at[:k], key=lambda p, q=at[k]: np.hypot(p[0] - q[0], p[1] - q[1]))
                 room.kept.append(LineString([nearest, at[k]]).buffer(0.55))
 
+    # Walls
 
-def _strip(room: Room, side: str, low: float, high: float, near: float, far: float) -> tuple[float, ...]:
-    """Box along a wall of a room, from `near` to `far` (m) outward of its face."""
-    if side in "ns":
-        face, out = (room.y1, 1) if side == "n" else (room.y0, -1)
-        return sorted_box(low, face + out * near, high, face + out * far)
-    face, out = (room.x1, 1) if side == "e" else (room.x0, -1)
-    return sorted_box(face + out * near, low, face + out * far, high)
+    def _columns(self) -> list[Box]:
+        """Where walls between rooms meet the facade, and in the corners of large rooms."""
+        (what, width), found = self.style.column, []
+        large = [r for r in self.rooms if r.kind not in ("corridor", "stairs", "toilet") and min(r.size) >= 3.5]
+        for border in (b for room in large for b in self.borders[room.name] if what):
+            if border.other is None and border.length >= 3.5:
+                low = border.room.wall(border.side)[0]
+                box = strip(border.room, border.side, low, low + width, -0.6 * width, 0.0)
+                found.append(tuple(round(v, 3) for v in box))
+                border.room.taken.append(area(*found[-1]).buffer(0.02))
+        return found
+
+    def labels(self, found: list[Face]) -> Iterator[tuple[str, str]]:
+        """Name and material of what each face of the walls belongs to."""
+        style = self.style
+        # Within the wall's thickness, short of its faces.
+        reveals = [
+            area(x0 - dx, y0 - dy, x1 + dx, y1 + dy)
+            for o in self.openings
+            for x0, y0, _, x1, y1, _ in [o.span]
+            for dx, dy in [(1e-3, -5e-3) if o.side in "ns" else (-5e-3, 1e-3)]
+        ]
+        points = shapely.points(np.array([face.corners.mean(axis=0)[:2] for face in found]))
+        near = shapely.distance(points, self.skeleton.outline.exterior)
+        in_reveal, in_corridor, at_column = (
+            shapely.covers(shapely.union_all(parts), points)
+            for parts in (reveals, [c.floor.buffer(0.01) for c in self.corridors], [area(*c) for c in self.columns])
+        )
+        for k, face in enumerate(found):
+            plane = f"{'xyz'[face.axis]} {face.sign * face.level:+.3f}"
+            if near[k] < 1e-3 and not in_reveal[k]:
+                yield f"facade {plane}", style.facade
+            elif at_column[k]:
+                yield f"column {plane}", style.column[0]
+            elif face.axis == 2 or in_reveal[k]:
+                what = style.lining if near[k] < style.outer else style.doors.frame
+                yield f"reveals {what}", what
+            elif near[k] < style.outer + 0.01:
+                yield f"outer wall {plane}", style.lining
+            elif in_corridor[k]:
+                yield f"corridor wall {plane}", style.passage
+            else:
+                yield f"wall {plane}", style.partition
 
 
 def _gap(room: Room, other: Room, side: str) -> float:
@@ -357,12 +354,12 @@ def _borders(room: Room, rooms: list[Room], thickest: float) -> list[Border]:
     """
     found = []
     for side in "nsew":
-        low, high = (room.x0, room.x1) if side in "ns" else (room.y0, room.y1)
+        low, high = room.wall(side)
         free = LineString([(low, 0), (high, 0)])
         for other in rooms:
             if other is room or not -0.005 < _gap(room, other, side) < thickest + 1.0:
                 continue
-            a, b = (other.x0, other.x1) if side in "ns" else (other.y0, other.y1)
+            a, b = other.wall(side)
             a_in, b_in = max(a, low), min(b, high)
             gap = _gap(room, other, side)
             if b_in - a_in > 0.01 and 0.01 < gap < thickest:

@@ -4,12 +4,12 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from shapely.geometry import LineString
 from shapely.geometry import box as area
 
 from radarsim.scene import fittings, furniture, shapes
-from radarsim.scene.floorplan import FloorPlan, Opening
+from radarsim.scene.floorplan import FloorPlan
 from radarsim.scene.furniture import Piece
+from radarsim.scene.openings import OPPOSITE
 from radarsim.scene.rooms import Room, Site, footprint
 
 Make = Callable[[np.random.Generator], Piece]
@@ -24,7 +24,6 @@ def furnish(site: Site, room: Room, plan: FloorPlan) -> None:
         _corridor(site, room, plan)
         return
     layout = _Layout(site, room, plan)
-    layout.take_leaves()
     if room.kind == "stairs":
         layout.stairs()
         return
@@ -42,20 +41,14 @@ class _Layout:
         behind = [o for o in plan.openings if o.other is room]
         doors = [o.side for o in self.openings if o.kind in ("door", "glass wall")]
         entrances = [o.side for o in self.openings if o.kind == "way"]
-        self.front = (doors or entrances or ["nsew"["snwe".index(o.side)] for o in behind] or ["s"])[0]
-        self.back = "nsew"["snwe".index(self.front)]
+        self.front = (doors or entrances or [OPPOSITE[o.side] for o in behind] or ["s"])[0]
+        self.back = OPPOSITE[self.front]
         self.left, self.right = ("e", "w") if self.front in "ns" else ("n", "s")
         if self.rng.random() < 0.5:
             self.left, self.right = self.right, self.left
         self.windows = [o for o in self.openings if o.kind == "window"]
         self.cabinet: Make = partial(furniture.cabinet, material=self.style.storage[0])
         self.shelf: Make = partial(furniture.shelf, material=self.style.storage[1])
-
-    def take_leaves(self) -> None:
-        """The floor that door leaves stand over."""
-        for o in self.openings:
-            if o.leaf:
-                self.room.taken.append(_leaf_area(o))
 
     def at_windows(self) -> None:
         """Radiators below windows, pipes in a corner."""
@@ -74,7 +67,7 @@ class _Layout:
     ) -> list[tuple[float, float, float]]:
         """A row of pieces along a wall, from the window's end (or the low end), and the places they got."""
         room = self.room
-        low, high = (room.x0, room.x1) if side in "ns" else (room.y0, room.y1)
+        low, high = room.wall(side)
         downward = self.back in "ne" and side in (self.left, self.right)
         lit = any(o.side == side for o in self.windows)
         places, at, piece = [], start, make(self.rng)
@@ -262,13 +255,13 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
                 continue
             for _ in range(12):
                 side = str(rng.choice(["s", "n"] if along_x else ["w", "e"]))
-                low, high = (room.x0, room.x1) if along_x else (room.y0, room.y1)
+                low, high = room.wall(side)
                 along = rng.uniform(low + piece.width / 2, high - piece.width / 2)
                 # A lift's doors lie in the wall; all else stands before it.
                 off = 0.022 if what == "lift" else 0.02 + piece.depth / 2
                 place = room.wall_place(side, along, off)
-                spot = footprint(piece, *place).buffer(0.02)
-                if any(spot.intersects(a) for a in avoid) or not _in_front(room, piece, place):
+                spot = footprint(piece, *place)
+                if any(spot.buffer(0.02).intersects(a) for a in avoid) or not room.floor.buffer(0.05).contains(spot):
                     continue
                 site.put(room, piece, *place)
                 # Nothing else stands opposite.
@@ -283,24 +276,3 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
         x, y, yaw = room.wall_place(side, middle, 0.15 + 0.16 * k)
         for what, mesh in piece.parts.items():
             site.add(f"{room.name} pipe {k + 1}", shapes.placed(mesh, (x, y, 0), (0, 0, yaw)), what)
-
-
-def _in_front(room: Room, piece: Piece, place: tuple[float, float, float]) -> bool:
-    """Whether what stands at a wall lies within the room along the wall; a lift reaches a little into the wall."""
-    return room.floor.buffer(0.05).contains(footprint(piece, *place))
-
-
-def _leaf_area(o: Opening):
-    """Floor under an open leaf, and a little around."""
-    low, high = o.bay if o.kind == "glass wall" else (o.low, o.high)
-    hinge = low if o.hinge < 0 else high
-    reach = (np.cos(o.angle) * (-o.hinge) * (high - low), np.sin(o.angle) * (high - low))
-    ends = []
-    for along, deep in ((0.0, 0.0), reach):
-        if o.side in "ns":
-            face, out = (o.room.y1, -1) if o.side == "n" else (o.room.y0, 1)
-            ends.append((hinge + along, face + out * deep))
-        else:
-            face, out = (o.room.x1, -1) if o.side == "e" else (o.room.x0, 1)
-            ends.append((face + out * deep, hinge + along))
-    return LineString(ends).buffer(0.1)

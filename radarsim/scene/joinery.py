@@ -1,7 +1,7 @@
 """What is put into openings of walls: door leaves and their frames, windows, glass walls.
 
-Everything is made in the opening's own frame: x along the wall from the opening's low end, y across, 0 in the middle of
-the wall and `inward` (+1 or -1) into the room, z up; `placed` puts it into the world.
+What is not plain is made in the opening's own frame: x along the wall from the opening's low end, y across, 0 in the
+middle of the wall and `inward` (+1 or -1) into the room, z up; `placed` puts it into the world.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ import numpy as np
 import trimesh
 
 from radarsim.scene import shapes
-from radarsim.scene.floorplan import DOOR_HEIGHT, Opening
+from radarsim.scene.openings import DOOR, DOOR_HEIGHT, Opening
 from radarsim.scene.styles import Style
 
 LEAF = 0.04  # thickness of a door leaf, m
@@ -22,6 +22,10 @@ Part = tuple[str, trimesh.Trimesh, str]  # name, mesh, material
 
 def fill(opening: Opening, style: Style) -> Iterator[Part]:
     """What an opening is filled with, in the world."""
+    if style.plain:
+        if opening.kind != "way":
+            yield from _plain_leaf(opening) if opening.leaf else _casement(opening, style.windows.frame)
+        return
     x0, y0, _, x1, y1, _ = opening.span
     along_x = opening.side in "ns"
     origin = (x0, (y0 + y1) / 2, 0.0) if along_x else ((x0 + x1) / 2, y0, 0.0)
@@ -118,3 +122,42 @@ def _glazing(
         shapes.rectangle(((a + b) / 2, 0, (c + d) / 2), (b - a, d - c), (0, 1, 0)) for a, c, b, d in pieces
     ]  # fmt: skip
     return [("frame", shapes.joined(*bars), frame), ("pane", shapes.joined(*panes), "glass")]
+
+
+def _plain_leaf(o: Opening) -> list[Part]:
+    """In the world: a leaf that fills the wall's opening, or stands open with a handle right through it."""
+    width, height, (x0, y0, *_) = DOOR, DOOR_HEIGHT, o.span
+    if not o.angle:
+        middle = (x0 + width / 2, y0 + o.thickness / 2, height / 2)
+        return [("", shapes.box(middle, (width, LEAF, height), ("-x", "+x", "-z", "+z")), o.leaf)]
+    leaf = shapes.box((width / 2 - 0.02, 0, height / 2), (width - 0.06, LEAF, height - 0.03))
+    handle = shapes.box((width - 0.12, 0, 1.05), (0.12, LEAF + 0.10, 0.02))
+    turn = o.angle if o.side == "s" else -o.angle
+    hinge, yaw = (o.low + 0.03, turn) if o.hinge < 0 else (o.high - 0.03, np.pi - turn)
+    place = (*o.room.wall_place(o.side, hinge, 0.03)[:2], 0), (0, 0, yaw)
+    return [("leaf", shapes.placed(leaf, *place), o.leaf), ("handle", shapes.placed(handle, *place), "metal")]
+
+
+def _casement(o: Opening, frame: str) -> list[Part]:
+    """In the world: a frame of flat bars with a mullion, one pane on each side of it."""
+    (x0, y0, *_), low, high = o.span, o.bottom + BAR, o.top - BAR
+    axes, level = ([0, 1, 2], y0) if o.side in "ns" else ([1, 0, 2], x0)
+    level += o.thickness / 2
+
+    def bar(a: float, b: float, bottom: float, top: float, without: str) -> trimesh.Trimesh:
+        ends = np.array([(a, level - 0.035, bottom), (b, level + 0.035, top)])[:, axes]
+        return shapes.span(*ends, tuple(without.replace("x", "xy"[axes[0]]).split()))
+
+    left, right, middle = o.low + BAR, o.high - BAR, (o.low + o.high) / 2
+    bars = [
+        bar(o.low, o.high, o.bottom, low, "-x +x -z"),
+        bar(o.low, o.high, high, o.top, "-x +x +z"),
+        bar(o.low, left, low, high, "-x -z +z"),
+        bar(right, o.high, low, high, "+x -z +z"),
+        bar(middle - BAR / 2, middle + BAR / 2, low, high, "-z +z"),
+    ]
+    panes = []
+    for a, b in ((left, middle - BAR / 2), (middle + BAR / 2, right)):
+        center = np.array([(a + b) / 2, level, (low + high) / 2])[axes]
+        panes.append(shapes.rectangle(center, (b - a, high - low), np.eye(3)[axes[1]]))
+    return [("frame", shapes.joined(*bars), frame), ("panes", shapes.joined(*panes), "glass")]

@@ -8,6 +8,7 @@ import trimesh
 from jaxtyping import Float
 
 from radarsim.scene import shapes
+from radarsim.scene.clearance import between
 from radarsim.scene.materials import Material
 from radarsim.scene.scene import Scene
 from radarsim.scene.section import Section
@@ -84,14 +85,10 @@ def cut_open(scene: Scene) -> list[tuple[trimesh.Trimesh, Material | None]]:
     by_material: dict[str, list[np.ndarray]] = {}
     made = {}
     for item in scene.objects:
-        triangles = item.mesh.triangles
-        below = triangles[:, :, 2].min(axis=1) < level
-        if not below.any():
-            continue
-        corners, faces = triangles[below].reshape(-1, 3), np.arange(3 * below.sum()).reshape(-1, 3)
-        corners, faces, _ = trimesh.intersections.slice_faces_plane(corners, faces, [0, 0, -1], [0, 0, level])
-        by_material.setdefault(item.material.name, []).append(corners[faces])
-        made[item.material.name] = item.material
+        below = between(item.mesh.triangles, low - 1.0, level)
+        if len(below):
+            by_material.setdefault(item.material.name, []).append(below)
+            made[item.material.name] = item.material
     parts = [(_mesh(np.concatenate(t)), made[name]) for name, t in by_material.items()]
     caps = [
         shapes.polygon(area.buffer(0), (0, 0, level)) for area, _ in Section.of(scene, level - 2e-3).areas(scene)

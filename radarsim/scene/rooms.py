@@ -56,8 +56,12 @@ class Room:
         blocked = self.taken if ignore_kept else self.taken + self.kept
         return self.floor.contains(spot) and not any(spot.intersects(other) for other in blocked)
 
+    def wall(self, side: str) -> tuple[float, float]:
+        """Ends of the wall at a `side` ("n", "s", "e", "w"), m."""
+        return (self.x0, self.x1) if side in "ns" else (self.y0, self.y1)
+
     def wall_place(self, side: str, along: float, off: float) -> tuple[float, float, float]:
-        """Place and yaw of a piece with its back to the wall at a `side` ("n", "s", "e", "w"), `off` (m) its face."""
+        """Place and yaw of a piece with its back to the wall at a `side`, `off` (m) its face."""
         return {
             "s": (along, self.y0 + off, np.pi / 2),
             "n": (along, self.y1 - off, -np.pi / 2),
@@ -98,12 +102,12 @@ class Site:
             self.put(room, piece, x, y, yaw)
         return free
 
-    def against_wall(self, room: Room, piece: Piece, sides: str = "nsew", gap: float = 0.03) -> float | None:
+    def against_wall(self, room: Room, piece: Piece, gap: float = 0.03) -> float | None:
         """Put a piece with its back to a wall where there is room, and return its yaw, or None."""
         for _ in range(24):
-            side = sides[self.rng.integers(len(sides))]
+            side = "nsew"[self.rng.integers(4)]
             half = piece.width / 2 + 0.02
-            low, high = (room.x0 + half, room.x1 - half) if side in "ns" else (room.y0 + half, room.y1 - half)
+            low, high = room.wall(side)[0] + half, room.wall(side)[1] - half
             if low >= high:
                 continue
             x, y, yaw = room.wall_place(side, self.rng.uniform(low, high), gap + piece.depth / 2)
@@ -111,9 +115,12 @@ class Site:
                 return yaw
         return None
 
-    def seat(self, room: Room, x: float, y: float, yaw: float, away: float = 0.82, ignore_kept: bool = False) -> None:
-        """A chair in front of what stands at a place, turned to it more or less."""
-        turn = yaw + np.pi + self.rng.uniform(-0.5, 0.5)
+    def seat(
+        self, room: Room, x: float, y: float, yaw: float, away: float = 0.82, sway: float = 0.5,
+        ignore_kept: bool = False,
+    ) -> None:  # fmt: skip
+        """A chair in front of what stands at a place, turned to it up to a `sway` (rad)."""
+        turn = yaw + np.pi + self.rng.uniform(-sway, sway)
         piece = furniture.chair(self.rng)
         x, y = x + away * np.cos(yaw), y + away * np.sin(yaw)
         if room.is_free(footprint(piece, x, y, turn), ignore_kept):
@@ -135,8 +142,3 @@ def footprint(piece: Piece, x: float, y: float, yaw: float) -> Polygon:
     flat = area(-piece.depth / 2, -piece.width / 2, piece.depth / 2, piece.width / 2)
     c, s = np.cos(yaw), np.sin(yaw)
     return shapely.affinity.affine_transform(flat, [c, -s, s, c, x, y])
-
-
-def sorted_box(x0: float, y0: float, x1: float, y1: float) -> tuple[float, float, float, float]:
-    """Corners in ascending order."""
-    return min(x0, x1), min(y0, y1), max(x0, x1), max(y0, y1)

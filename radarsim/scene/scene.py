@@ -196,18 +196,19 @@ class Scene:
         middle = self.triangles.mean(axis=1)
         return np.concatenate([o.floors_and_ceilings(middle[a:b], self.normals[a:b]) for o, a, b in parts])
 
+    def cut(self, height: float) -> tuple[Float[np.ndarray, "n 2 2"], Int[np.ndarray, "n"]]:
+        """What the plane z = `height` cuts: ends of segments, m, and the triangle that each is of."""
+        flat = np.arange(3 * len(self.triangles)).reshape(-1, 3)
+        mesh = trimesh.Trimesh(self.triangles.reshape(-1, 3), flat, process=False)
+        # A cut through an edge or a horizontal face is ill defined; a nanometre up it is not.
+        lines, faces = trimesh.intersections.mesh_plane(mesh, [0, 0, 1], [0, 0, height + 1e-9], return_faces=True)
+        lines = np.round(np.asarray(lines, float)[..., :2].reshape(-1, 2, 2), 6)
+        some = np.any(lines[:, 0] != lines[:, 1], axis=1)
+        return lines[some], np.asarray(faces, int)[some]
+
     def floor_plan(self, height: float) -> Float[np.ndarray, "n 4"]:
         """Everything cut by the plane z = `height`, as segments x0 y0 x1 y1 in m; collinear pieces are joined."""
-        # A cut through an edge or a horizontal face is ill defined; a nanometre up it is not.
-        cut = trimesh.intersections.mesh_plane(
-            trimesh.Trimesh(
-                self.triangles.reshape(-1, 3), np.arange(3 * len(self.triangles)).reshape(-1, 3), process=False
-            ),
-            plane_normal=[0, 0, 1],
-            plane_origin=[0, 0, height + 1e-9],
-        )
-        lines = np.round(np.asarray(cut)[..., :2].reshape(-1, 2, 2), 6)
-        lines = lines[np.any(lines[:, 0] != lines[:, 1], axis=1)]
+        lines, _ = self.cut(height)
         if not len(lines):
             return np.zeros((0, 4))
         merged = shapely.simplify(shapely.line_merge(shapely.union_all(shapely.linestrings(lines))), 1e-6)

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-import trimesh
 from jaxtyping import Float, Int
 from shapely.geometry import Polygon
 
@@ -28,14 +27,8 @@ class Section:
     @classmethod
     def of(cls, scene: Scene, height: float) -> "Section":
         """The section at a height, m."""
-        flat = np.arange(3 * len(scene.triangles)).reshape(-1, 3)
-        mesh = trimesh.Trimesh(scene.triangles.reshape(-1, 3), flat, process=False)
-        # A cut through an edge or a horizontal face is ill defined; a nanometre up it is not.
-        lines, faces = trimesh.intersections.mesh_plane(mesh, [0, 0, 1], [0, 0, height + 1e-9], return_faces=True)
-        lines = np.round(np.asarray(lines, float)[..., :2].reshape(-1, 2, 2), 6)
-        some = np.any(lines[:, 0] != lines[:, 1], axis=1)
-        faces = np.asarray(faces, int)[some]
-        return cls(lines[some], scene.normals[faces, :2], scene.triangle_object[faces])
+        lines, faces = scene.cut(height)
+        return cls(lines, scene.normals[faces, :2], scene.triangle_object[faces])
 
     def areas(self, scene: Scene) -> list[tuple[Polygon, int]]:
         """Areas inside of bodies, each with the index of an object at its edge. Sheets have no inside."""

@@ -70,7 +70,7 @@ class Skeleton:
     def ground(self, wall: float) -> list[Box]:
         """Boxes whose union is the whole floor with outer walls of a thickness (m)."""
         boxes = [*self.corridors.values(), *(b.box for b in self.blocks), *self.solid]
-        return [_cm(x0 - wall, y0 - wall, x1 + wall, y1 + wall) for x0, y0, x1, y1 in boxes]
+        return [(x0 - wall, y0 - wall, x1 + wall, y1 + wall) for x0, y0, x1, y1 in boxes]
 
 
 def skeleton(style: Style, rng: np.random.Generator) -> Skeleton:

@@ -1,11 +1,11 @@
-"""The four styles of buildings, after the paper's: what they are made of, how large and how dense everything is.
+"""The styles of buildings: what they are made of, how large and how dense everything is.
 
-A: modern glass and metal; B: old wood and drywall; C: brick and metal; D: between B and C. A style is data: the same
-code builds all four. Lengths in m; a pair of numbers is a range that a building draws from; shares and chances lie in
-0...1; weights are relative.
+Four after the paper's, A: modern glass and metal; B: old wood and drywall; C: brick and metal; D: between B and C; and
+the plain `office`. A style is data: the same code builds all of them. Lengths in m; a pair of numbers is a range that a
+building draws from; shares and chances lie in 0...1; weights are relative.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Doors:
     ajar: float
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Style:
     """One style.
 
@@ -69,13 +69,14 @@ class Style:
         storage: material of cabinets and of shelves.
         fittings: pieces along corridors with their number per 10 m.
         kinds: weights of the kinds of rooms at a facade; `core`: of those inside.
+        plain: doors without casings, two panes to a window, all lamps along x.
     """
 
     height: float
     outer: float
     inner: float
-    corridor: tuple[float, float]
-    row: tuple[float, float]
+    corridor: tuple[float, float] = (0.0, 0.0)
+    row: tuple[float, float] = (0.0, 0.0)
     module: tuple[float, float]
     facade: str
     lining: str
@@ -85,17 +86,18 @@ class Style:
     floors: dict[str, str]
     windows: Windows
     doors: Doors
-    glazed: float
-    suites: float
-    column: tuple[str, float]
+    glazed: float = 0.0
+    suites: float = 0.0
+    column: tuple[str, float] = ("", 0.0)
     lamp: tuple[float, float, float]
-    radiators: float
-    risers: float
-    mains: int
-    storage: tuple[str, str]
-    fittings: dict[str, float]
+    radiators: float = 0.0
+    risers: float = 0.0
+    mains: int = 0
+    storage: tuple[str, str] = ("metal", "wood")
+    fittings: dict[str, float] = field(default_factory=dict)
     kinds: dict[str, float]
-    core: dict[str, float]
+    core: dict[str, float] = field(default_factory=dict)
+    plain: bool = False
 
     def floor(self, kind: str) -> str:
         """Floor material of a kind of room."""
@@ -152,5 +154,13 @@ STYLES: dict[str, Style] = {
                   "vending": 0.15},
         kinds={"office": 5, "lab": 2, "meeting": 2, "lecture": 1.5, "lounge": 1},
         core={"storage": 2, "meeting": 1.5, "kitchen": 1, "office": 1, "library": 1},
+    ),
+    "office": Style(  # its corridor and rows are as its parameters say
+        height=2.7, outer=0.30, inner=0.12, module=(2.4, 2.4),
+        facade="concrete", lining="plasterboard", partition="plasterboard", passage="plasterboard",
+        ceiling="ceiling board", floors={"": "vinyl", "office": "carpet", "meeting": "carpet", "lounge": "carpet"},
+        windows=Windows(sill=0.9, top=2.2, width=0.7, bays=2, transoms=0, frame="metal"),
+        doors=Doors(leaf={"wood": 1.0}, frame="plasterboard", closed=0.25, ajar=0.0),
+        lamp=(0.3, 1.2, 2.2), kinds={"office": 2, "meeting": 1, "storage": 1, "lounge": 1}, plain=True,
     ),
 }  # fmt: skip

@@ -61,12 +61,8 @@ def faces(solids: list[Span], openings: list[Span], pillars: Sequence[Span] = ()
     def cells(span: Float[np.ndarray, "6"]) -> tuple[slice, ...]:
         return tuple(slice(*(np.searchsorted(grid[k], [span[k], span[k + 3]]) + 1)) for k in range(3))
 
-    for span in boxes[: len(solids)]:
-        solid[cells(span)] = True
-    for span in boxes[len(solids) : len(solids) + len(openings)]:
-        solid[cells(span)] = False
-    for span in boxes[len(solids) + len(openings) :]:
-        solid[cells(span)] = True
+    for k, span in enumerate(boxes):
+        solid[cells(span)] = not len(solids) <= k < len(solids) + len(openings)
     found = []
     for axis in range(3):
         others = [k for k in range(3) if k != axis]

@@ -59,6 +59,7 @@ objects:
         ),
         ("building: {kind: castle}", "building.kind is 'castle'"),
         ("building: {kind: office, seed: x}", "building.seed is 'x'"),
+        ("building: {kind: office, seed: -1}", "building.seed is -1"),
         ("objects: [3]", r"objects\[0\]"),
         ("objects: 3", "objects is 3"),
     ],

@@ -1,5 +1,7 @@
 """The office: reproducible, walkable, and clean geometry."""
 
+import zlib
+
 import numpy as np
 import pytest
 import trimesh
@@ -18,6 +20,29 @@ def test_same_seed_same_bytes():
     assert all(a.mesh.vertices.tobytes() == b.mesh.vertices.tobytes() for a, b in zip(first, second, strict=True))
     assert all(a.mesh.faces.tobytes() == b.mesh.faces.tobytes() for a, b in zip(first, second, strict=True))
     assert any(a.mesh.vertices.tobytes() != b.mesh.vertices.tobytes() for a, b in zip(first, other, strict=False))
+
+
+#: Number of objects and of their corners, and sums of places that tell which object is where, and of what.
+KNOWN = {
+    Office(seed=7): (242, 6828, 144729.5261, 96162.4735, 19674.2278),
+    Office(seed=11, length=40, depth=9.6, corridor=2.4, room=4.0): (446, 13400, 1020956.4080, 255810.8518, 61207.7419),
+    Building(kind="B", seed=9, floor=1): (847, 25966, 3231261.2557, 2000244.4808, 217556.0269),
+    Building(kind="D", seed=4): (950, 26112, 3585067.5563, 2815691.2398, 271996.7872),
+}
+
+
+@pytest.mark.parametrize("building", KNOWN, ids=lambda b: f"{b.kind} {b.seed}")
+def test_floors_are_those_that_results_were_made_with(building):
+    objects = building.build()
+    told = [zlib.crc32(f"{o.name} {o.material.name} {o.solid}".encode()) / 2**32 for o in objects]
+    sums = np.arange(1, len(objects) + 1) * told @ np.array([o.mesh.vertices.mean(axis=0) for o in objects])
+    found = (len(objects), sum(len(o.mesh.vertices) for o in objects), *sums)
+    assert found == pytest.approx(KNOWN[building], abs=1e-3, rel=0)
+
+
+def test_a_meeting_room_may_be_narrow():
+    names = {o.name for o in Office(seed=656290, length=43, depth=24, room=3).build()}
+    assert any("table 1" in name for name in names)
 
 
 def test_walls_of_a_solid_with_a_window():

@@ -17,6 +17,7 @@ import yaml
 
 from radarize.errors import InputError, explained
 from radarize.replacing import replacing
+from radarsim.scene.clearance import lowest_level
 from radarsim.scene.importers import carmen, floorplan, meshes, mitsuba, rosmap
 from radarsim.scene.importers.cleaning import clean, decimate, edges_of_many
 from radarsim.scene.importers.flatten import flatten
@@ -276,17 +277,7 @@ def _floor_level(parts: list[Part]) -> float:
         level.append(part.mesh.triangles_center[flat, 2])
         area.append(part.mesh.area_faces[flat])
     level, area = np.concatenate(level), np.concatenate(area)
-    lowest = float(_corners(parts)[:, 2].min())
-    if not len(level):
-        return lowest
-    bins = ((level - lowest) / 0.05).astype(int)
-    share = np.bincount(bins, area)
-    share = share + np.append(share[1:], 0)  # a level that two bins share
-    start = int(np.flatnonzero(share >= 0.25 * share.max())[0])
-    near = (bins >= start) & (bins <= start + 1)
-    order = np.argsort(level[near])
-    half = np.searchsorted(np.cumsum(area[near][order]), area[near].sum() / 2)
-    return float(round(level[near][order][min(half, len(order) - 1)], 6))
+    return round(lowest_level(level, area), 6) if len(level) else float(_corners(parts)[:, 2].min())
 
 
 def _write(path: Path, parts: list[Part], source: Path) -> None:

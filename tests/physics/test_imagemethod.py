@@ -4,6 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
@@ -103,6 +104,21 @@ def test_kirchhoff_integral(seed):
     cell = np.prod(high - low) / n**2
     truth = np.sum(inside * np.exp(0.5j * np.pi * (x**2 + y[:, None] ** 2))) * cell / 2j
     assert apertures.kirchhoff(polygon, 5) == pytest.approx(truth, abs=3e-3)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_an_edge_diffracts(seed):
+    """The tabulated integral along an edge is the integral itself, near the path and away from it; it is odd."""
+    rng = np.random.default_rng(seed)
+    s, ends = rng.uniform(0, apertures.FADE) * 10.0 ** rng.uniform(-4, 0), rng.uniform(-1, 1, 2) * apertures.FADE
+    low, high = np.sort(ends)
+    peak = [t for t in (-s, 0.0, s) if low < t < high]
+    truth, _ = quad(
+        lambda t: np.exp(0.5j * np.pi * (s * s + t * t)) * s / (s * s + t * t), low, high,
+        points=peak or None, limit=500, complex_func=True,
+    )  # fmt: skip
+    assert apertures.diffracted(s, low, high) == pytest.approx(truth, abs=5e-4)
+    assert apertures.diffracted(-s, low, high) == -apertures.diffracted(s, low, high)
 
 
 def images_of_a_room(search):

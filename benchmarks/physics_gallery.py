@@ -40,6 +40,11 @@ LAWS = {
     "Plate": (reflectors.plate, "angle off the normal, deg", LEVEL),
     "Small mirrors": (reflectors.small_mirrors, "side, m", LEVEL),
     "Sphere and corners": (reflectors.round_and_corners, "angle off the axis, deg", "radar cross section, dBsm"),
+    "Corner out of square": (
+        reflectors.corner_out_of_square,
+        "angle over 90 deg, deg",
+        "echo over a square corner's, dB",
+    ),
     "Smooth surfaces": (reflectors.smooth_surfaces, "along the way", LEVEL),
     "Box room": (rooms.box_room, "path, m", "images up to it"),
     "Thin pole": (rooms.thin_pole, "offset of the pole, mm", "of the flash without it, dB"),

@@ -14,8 +14,18 @@ from radarsim.scene.materials import MATERIALS, material
 from radarsim.scene.objects import SceneObject
 from radarsim.scene.scene import Scene
 from tests.physics.brute_force import kirchhoff_mirror
-from tests.physics.corners import corner, cross_section, direction, seen_by_all, seen_by_both
-from tests.physics.rigs import Rig, burst, field, locate, polar
+from tests.physics.corners import (
+    both_ways,
+    corner,
+    cross_section,
+    direction,
+    image_out_of_square,
+    looking,
+    seen_by_all,
+    seen_by_both,
+)
+from tests.physics.corners import out_of_square as wedge
+from tests.physics.rigs import Rig, burst, field, isotropic, locate, polar
 from tests.physics.test_frontend import db
 from tests.physics.test_patches import capsule, ellipsoid, half_cylinder, rounded, stretched, tube
 from tests.physics.test_patches import field as smooth_field
@@ -126,6 +136,20 @@ def round_and_corners(axis) -> str:
         axis.plot(off, found, "o", ms=3.5, color=color, label=name)
         worst = max(worst, np.abs(found - theory).max())
     return f"Off by {worst:.2f} dB at most. That is the sphere: seen from 4 m, its near side is nearer than its centre."
+
+
+def corner_out_of_square(axis) -> str:
+    """Two walls that meet at nearly 90 deg make two images of the radar, one for each order of the walls, which are one
+    image for a square corner. Where the angle is larger, a gap opens between them; where it is smaller, both are whole.
+    Buildings with unevenness have such corners. Theory: Fresnel's diffraction by half a plane; 2 m from the edge."""
+    off, square = np.linspace(-1.0, 1.0, 31), LAMBDA / (4 * np.pi * 4.0)
+    theory, found = [], []
+    for angle in np.deg2rad(off):
+        theory.append(db(abs(2 * image_out_of_square(angle, 2.0)[1] / square) ** 2))
+        search = isotropic((2.0, 0.0, 0.0), LAMBDA, looking((-1.0, 0.0, 0.0)))
+        _, _, amplitude = both_ways(wedge(angle), search)  # both paths are equally long
+        found.append(db(abs(amplitude.sum() / square) ** 2))
+    return f"Off by {compare(axis, off, theory, found):.2f} dB at most."
 
 
 def smooth_surfaces(axis) -> str:

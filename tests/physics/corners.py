@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from scipy.special import fresnel
 
 from radarize.radar.presets import PRESETS
 from radarsim.physics import imagemethod, sight
@@ -25,6 +26,22 @@ def corner(count, a, b, triangles=False):
         shape = np.array([[0 * p, a * p, a * q, 0 * p] for p, q in legs])
         mirrors = replace(mirrors, corners=shape)
     return mirrors
+
+
+def out_of_square(angle, size=6.0):
+    """Two walls that meet in the z axis at 90 deg and an angle (rad), open towards x; each so wide, and 4 m high."""
+    half, z = np.pi / 4 + angle / 2, np.array([0.0, 0.0, 1.0])
+    one, two = (np.array([np.cos(half), side * np.sin(half), 0.0]) for side in (1, -1))
+    return conductors((size / 2 * one, one, z, (size / 2, 2.0)), (size / 2 * two, z, two, (2.0, size / 2)))
+
+
+def image_out_of_square(angle, distance):
+    """What either order of such walls makes of the radar, on x at a distance: an image turned by twice the angle, whose
+    path passes the edge at distance sin(angle), and half a plane leaves 1/2 + Fresnel's integral up to there of it
+    (Born and Wolf, 8.7.3). Its path, m, and amplitude."""
+    path = 2 * distance * np.cos(angle)
+    s, c = fresnel(-distance * np.sin(angle) / np.sqrt(LAMBDA * path / 8))
+    return path, LAMBDA / (4 * np.pi * path) * (0.5 + (c + 1j * s) / (1 + 1j))
 
 
 def looking(direction, roll=0.0):

@@ -7,6 +7,7 @@ from jaxtyping import Float
 from numba import njit, prange
 
 from radarsim.physics.movingtargets import MovingTargets
+from radarsim.scene.crossing import crossing
 from radarsim.scene.scene import Scene
 
 
@@ -72,57 +73,10 @@ class Sight:
 
 @njit(parallel=True, cache=True)
 def _meet(origins, directions, turn, center, half, capsule, distance):
-    """Shortens distances to the moving parts that rays meet, in each part's own frame."""
+    """Shortens distances to the moving parts that rays enter."""
     for f in range(len(origins)):
         for i in prange(directions.shape[1]):
-            way = directions[f, i]
             for p in range(len(half)):
-                towards = center[f, p] - origins[f]
-                along = np.dot(towards, way)
-                reach = half[p, 2] + half[p, 0] if capsule[p] else np.sqrt(np.dot(half[p], half[p]))
-                if np.dot(towards, towards) - along * along > reach * reach or along < -reach:
-                    continue
-                a = np.zeros(3)
-                d = np.zeros(3)
-                for k in range(3):
-                    for j in range(3):
-                        a[k] -= turn[f, p, j, k] * towards[j]
-                        d[k] += turn[f, p, j, k] * way[j]
-                found = _capsule(a, d, half[p]) if capsule[p] else _box(a, d, half[p])
-                distance[f, i] = min(distance[f, i], found)
-
-
-@njit
-def _box(a, d, half):
-    low, high = -np.inf, np.inf
-    for k in range(3):
-        if abs(d[k]) < 1e-12:
-            if abs(a[k]) > half[k]:
-                return np.inf
-            continue
-        first, second = (-half[k] - a[k]) / d[k], (half[k] - a[k]) / d[k]
-        low, high = max(low, min(first, second)), min(high, max(first, second))
-    return low if 0 < low <= high else np.inf
-
-
-@njit
-def _capsule(a, d, half):
-    """A cylinder about z, and a ball at either end: the nearest of the three."""
-    radius, length = half[0], half[2]
-    best = np.inf
-    across = d[0] * d[0] + d[1] * d[1]
-    b = a[0] * d[0] + a[1] * d[1]
-    root = b * b - across * (a[0] * a[0] + a[1] * a[1] - radius * radius)
-    if across > 1e-12 and root >= 0:
-        s = (-b - np.sqrt(root)) / across
-        if s > 0 and abs(a[2] + s * d[2]) <= length:
-            best = s
-    for end in (-length, length):
-        z = a[2] - end
-        b = a[0] * d[0] + a[1] * d[1] + z * d[2]
-        root = b * b - (a[0] * a[0] + a[1] * a[1] + z * z - radius * radius)
-        if root >= 0:
-            s = -b - np.sqrt(root)
-            if 0 < s < best:
-                best = s
-    return best
+                enters, _ = crossing(origins[f], directions[f, i], turn[f, p], center[f, p], half[p], capsule[p])
+                if enters > 0:
+                    distance[f, i] = min(distance[f, i], enters)

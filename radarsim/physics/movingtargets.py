@@ -13,6 +13,7 @@ from numba import njit, prange
 
 from radarsim.physics.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.physics.scatteringpattern import LAMBERT, weights
+from radarsim.scene.crossing import crossing
 from radarsim.scene.movers import MovingThing
 
 
@@ -116,7 +117,7 @@ class MovingTargets:
 
 @njit(parallel=True, cache=True)
 def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
-    """In each part's frame: a segment against a box by its slabs, against a capsule by the distance of two segments."""
+    """Whether segments, shortened at both ends, are anywhere inside a part."""
     for i in prange(len(origins)):
         way = targets[i] - origins[i]
         length = np.sqrt(np.dot(way, way))
@@ -124,48 +125,7 @@ def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
             continue
         way = way / length
         for p in range(len(center)):
-            # Quick rejection by the bounding sphere.
-            towards = center[p] - origins[i]
-            along = min(max(np.dot(towards, way), 0.0), length)
-            near = towards - along * way
-            reach = half[p, 2] + half[p, 0] if capsule[p] else np.sqrt(np.dot(half[p], half[p]))
-            if np.dot(near, near) > reach * reach:
-                continue
-            a = np.zeros(3)
-            d = np.zeros(3)
-            for k in range(3):
-                for j in range(3):
-                    a[k] -= turn[p, j, k] * (towards[j] - margin * way[j])
-                    d[k] += turn[p, j, k] * way[j]
-            span = length - 2 * margin
-            if _meets_capsule(a, d, span, half[p]) if capsule[p] else _meets_box(a, d, span, half[p]):
+            enters, leaves = crossing(origins[i], way, turn[p], center[p], half[p], capsule[p])
+            if enters <= length - margin and leaves >= margin:
                 hidden[i] = True
                 break
-
-
-@njit
-def _meets_box(a, d, span, half):
-    low, high = 0.0, span
-    for k in range(3):
-        if abs(d[k]) < 1e-12:
-            if abs(a[k]) > half[k]:
-                return False
-            continue
-        first, second = (-half[k] - a[k]) / d[k], (half[k] - a[k]) / d[k]
-        low, high = max(low, min(first, second)), min(high, max(first, second))
-    return low <= high
-
-
-@njit
-def _meets_capsule(a, d, span, half):
-    """Closest approach of the segment a + s d, 0 <= s <= span, to the axis |z| <= half length, by alternation."""
-    s = span / 2
-    across = d[0] * d[0] + d[1] * d[1]
-    if across > 1e-12:
-        s = min(max(-(a[0] * d[0] + a[1] * d[1]) / across, 0.0), span)
-    for _ in range(8):
-        z = min(max(a[2] + s * d[2], -half[2]), half[2])
-        s = min(max(-(a[0] * d[0] + a[1] * d[1] + (a[2] - z) * d[2]), 0.0), span)
-    z = min(max(a[2] + s * d[2], -half[2]), half[2])
-    x, y, w = a[0] + s * d[0], a[1] + s * d[1], a[2] + s * d[2] - z
-    return x * x + y * y + w * w < half[0] * half[0]

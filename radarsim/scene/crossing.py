@@ -1,0 +1,62 @@
+"""Where a ray is inside a rigid part of something that moves."""
+
+import numpy as np
+from numba import njit
+
+
+@njit
+def crossing(origin, way, turn, center, half, capsule):
+    """Where a ray enters a part and where it leaves it, m along the ray; inf and -inf where it misses.
+
+    Args:
+        origin, way: m, and unit direction, world.
+        turn, center: pose of the part: rotation to world, m.
+        half: half extents of a box, m; of a capsule about its z axis: radius, radius, half length (`movers.Part`).
+        capsule: whether it is one.
+    """
+    towards = center - origin
+    along = np.dot(towards, way)
+    reach = half[2] + half[0] if capsule else np.sqrt(np.dot(half, half))
+    if np.dot(towards, towards) - along * along > reach * reach:  # beside the ball around it
+        return np.inf, -np.inf
+    a, d = np.zeros(3), np.zeros(3)  # in the part's own frame
+    for k in range(3):
+        for j in range(3):
+            a[k] -= turn[j, k] * towards[j]
+            d[k] += turn[j, k] * way[j]
+    return _capsule(a, d, half) if capsule else _box(a, d, half)
+
+
+@njit
+def _box(a, d, half):
+    """By its three slabs."""
+    low, high = -np.inf, np.inf
+    for k in range(3):
+        if abs(d[k]) < 1e-12:
+            if abs(a[k]) > half[k]:
+                return np.inf, -np.inf
+            continue
+        first, second = (-half[k] - a[k]) / d[k], (half[k] - a[k]) / d[k]
+        low, high = max(low, min(first, second)), min(high, max(first, second))
+    return (low, high) if low <= high else (np.inf, -np.inf)
+
+
+@njit
+def _capsule(a, d, half):
+    """A cylinder about z and a ball at either end, which together are convex."""
+    radius, length = half[0], half[2]
+    low, high = np.inf, -np.inf
+    across = d[0] * d[0] + d[1] * d[1]
+    b = a[0] * d[0] + a[1] * d[1]
+    root = b * b - across * (a[0] * a[0] + a[1] * a[1] - radius * radius)
+    if across > 1e-12 and root >= 0:
+        for s in ((-b - np.sqrt(root)) / across, (-b + np.sqrt(root)) / across):
+            if abs(a[2] + s * d[2]) <= length:
+                low, high = min(low, s), max(high, s)
+    for end in (-length, length):
+        z = a[2] - end
+        c = b + z * d[2]
+        root = c * c - (a[0] * a[0] + a[1] * a[1] + z * z - radius * radius)
+        if root >= 0:
+            low, high = min(low, -c - np.sqrt(root)), max(high, -c + np.sqrt(root))
+    return low, high

@@ -48,6 +48,7 @@ from radarsim.scene.materials import Material, constant, decibel, material
 from radarsim.scene.movers import Mover
 from radarsim.scene.objects import SceneObject
 from radarsim.scene.office import Office
+from radarsim.scene.things import things
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -271,6 +272,7 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
         raise InputError(f"{source}: {error}") from error
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
+    objects += things(objects, description.clutter)
     return description.name, objects, description.moving, description.life, description.interferers
 
 

@@ -25,7 +25,7 @@ from radarsim.scene.scene import Scene
 
 #: Things a square metre at level 1: on walls (sockets, handles, pictures, cables), on what stands at the height of
 #: desks and shelves (cups, books, tools), under ceilings (sprinklers, sensors, grids), on the floor.
-ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 4.0, 16.0, 3.0, 1.0
+ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
 #: Mean radar cross section, m^2, and exponent of its distribution P(sigma > s) = exp(-(s / scale)^exponent).
 CROSS_SECTION, EXPONENT = 0.1, 0.7
 #: Mean distance from the surface, m, over the least: half the depth of what hangs or stands there.

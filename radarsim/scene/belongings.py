@@ -1,12 +1,12 @@
 """What people and builders leave in rooms: kinds of things with their number, sizes and shapes.
 
 Sizes of paper are those of ISO 216. Sockets and switches lie in the zones of DIN 18015-3: 0.3 m over the floor, and
-1.05 m; a frame is 81 mm wide for each. A sprinkler guards 12 m^2 at most (EN 12845, ordinary hazard), a point-type smoke
-detector some 60 m^2 (DIN VDE 0833-2). Other numbers are plain assumptions about offices and homes: a desk of 1.3 m^2
-has a dozen things on it, a wall has something every metre and a half.
+1.05 m; a frame is 81 mm wide for each. A sprinkler guards 12 m^2 at most (EN 12845, ordinary hazard), a point-type
+smoke detector some 60 m^2 (DIN VDE 0833-2). Other numbers are plain assumptions about offices: on a desk of 1.3 m^2 a
+dozen things are wanted, on a wall one every metre and a half; there is room for a third of the former.
 
 Every shape stands on its back: x along, y across, z off the surface, the face that touches it left out. None is of a
-material that waves pass, so a thing is the same by itself and as part of a larger mesh.
+material that waves pass, and closed ones are of metal, so a thing is the same by itself and as part of a larger mesh.
 """
 
 from collections.abc import Callable
@@ -31,19 +31,21 @@ def block(size: Size) -> trimesh.Trimesh:
 
 def stick(size: Size) -> trimesh.Trimesh:
     """A cylinder that stands."""
-    return cylinder((0, 0, size[2] / 2), size[0] / 2, size[2], SIDES, ("-z",))
+    return cylinder((0, 0, size[2] / 2), min(size[:2]) / 2, size[2], SIDES, ("-z",))
 
 
 def rod(size: Size) -> trimesh.Trimesh:
     """A cylinder that lies."""
-    return placed(cylinder((0, 0, 0), size[2] / 2, size[0], SIDES), (0, 0, size[2] / 2), (0, np.pi / 2, 0))
+    radius = min(size[1:]) / 2
+    return placed(cylinder((0, 0, 0), radius, size[0], SIDES), (0, 0, radius), (0, np.pi / 2, 0))
 
 
 def laptop(size: Size) -> trimesh.Trimesh:
     """A laptop, open by 110 deg."""
     along, across, high = size
     base = box((0, -across / 8, 0.01), (along, 0.75 * across, 0.02), ("-z",))
-    lid = placed(box((0, 0, high / 2), (along, 0.008, high - 0.025)), (0, across / 4, 0.02), (-np.deg2rad(20), 0, 0))
+    lid = box((0, 0, (high - 0.025) / 2 + 0.002), (along, 0.008, high - 0.025))
+    lid = placed(lid, (0, across / 4, 0.02), (-np.deg2rad(20), 0, 0))
     return joined(base, lid)
 
 
@@ -59,8 +61,8 @@ def lamp(size: Size) -> trimesh.Trimesh:
     """A desk lamp: foot, stem and shade."""
     high = size[2]
     foot = cylinder((0, 0, 0.01), 0.08, 0.02, SIDES, ("-z",))
-    stem = cylinder((0, 0, high / 2 - 0.02), 0.01, high - 0.08, SIDES, ("-z", "+z"))
-    return joined(foot, stem, cylinder((0, 0, high - 0.06), size[0] / 2, 0.12, SIDES))
+    stem = cylinder((0, 0, high / 2 - 0.05), 0.01, high - 0.14, SIDES, ("-z", "+z"))
+    return joined(foot, stem, cylinder((0, 0, high - 0.06), min(size[:2]) / 2, 0.12, SIDES))
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,7 @@ class Thing:
     Attributes:
         on: tops, walls or ceilings.
         often: at level 1: to a square metre of tops and ceilings, to a metre of wall.
-        least, most: along, across and off the surface, m. What stands upright is round or square: its second size is
-            the first.
+        least, most: along, across and off the surface, m; what is round is as thick as the box around it.
         shape: of such a size.
         material: of all of it.
         height: of its middle over the floor on a wall, lowest and highest, m.
@@ -139,5 +140,5 @@ THINGS: dict[str, Thing] = {
     "cup": Thing("top", 1.5, (0.07, 0.07, 0.08), (0.09, 0.09, 0.12), stick, "marble"),
     "bottle": Thing("top", 0.6, (0.06, 0.06, 0.2), (0.08, 0.08, 0.3), stick),
     "tool": Thing("top", 2.0, (0.05, 0.03, 0.02), (0.2, 0.08, 0.06)),
-    "cable": Thing("top", 0.8, (0.2, 0.008, 0.008), (0.6, 0.01, 0.01), rod),
+    "cable": Thing("top", 0.8, (0.2, 0.008, 0.008), (0.6, 0.01, 0.01), rod, "metal"),
 }

@@ -14,25 +14,41 @@ from radarsim.scene.objects import SceneObject
 
 #: Heights over the floor, m: of tops that people put things on, of ceilings, and of what is still there: only a wall.
 TOPS, CEILINGS, WALLS = (0.6, 2.0), 2.0, 2.25
+#: m: narrower walls are posts and the sides of openings; and gaps in walls that are none.
+NARROW, SEAM = 0.5, 0.02
 #: Cosines of what is level and of what is upright.
 LEVEL, UPRIGHT = 0.98, 0.05
-#: What people walk on, so nothing is put there: steps and landings of stairs are as high as tops.
-TRODDEN = {"concrete", "asphalt", "carpet", "floorboard"}
+#: What buildings are made of. Where it is as high as tops it is steps and landings, which people walk on, or the sill
+#: of an opening: nothing is put there.
+BUILT = {"concrete", "brick", "plasterboard", "ceiling board", "asphalt", "carpet", "floorboard"}
 #: m: from where a ray looks back at a surface, and how far from that surface it may end.
 LIFT, OFF = 0.01, 0.002
 #: m: as far from a wall or ceiling a ray looks for the floor.
 ASIDE = 0.08
+DOWN = np.array([0.0, 0.0, -1.0])
 #: m: as high as no ceiling is.
 _SKY = 1e3
 #: Where rays look at a back, as shares of its half sides.
 _GRID = np.array(list(product(np.linspace(-1, 1, 5), repeat=2)))
-#: Ends of rays through the space that a thing takes: shares of half its sides, and of how far it stands off.
+#: m: what is larger is looked through by more rays.
+_SMALL = 0.12
 _THREE, _OUT = (-1.0, 0.0, 1.0), (0.15, 0.55, 1.0)
-_LINES = np.array(
-    [[(x, y, 0.0), (x, y, 1.0)] for x, y in product(_THREE, repeat=2)]
-    + [[(-1.0, y, z), (1.0, y, z)] for y, z in product(_THREE, _OUT)]
-    + [[(x, -1.0, z), (x, 1.0, z)] for x, z in product(_THREE, _OUT)]
-)
+
+
+def _through(side: int) -> Float[np.ndarray, "ray 2 3"]:
+    """Ends of rays through the space that a thing takes, so many beside one another: shares of half its sides, and of
+    how far it stands off."""
+    rows = np.linspace(-1, 1, side)
+    return np.array(
+        [[(x, y, 0.0), (x, y, 1.0)] for x, y in product(_THREE, repeat=2)]
+        + [[(-1.0, y, z), (1.0, y, z)] for y, z in product(rows, _OUT)]
+        + [[(x, -1.0, z), (x, 1.0, z)] for x, z in product(rows, _OUT)]
+    )
+
+
+_FEW, _MANY = _through(5), _through(25)
+#: From where on a back rays look out of a body that all is inside of; one alone may graze a face.
+_EYES = np.array([(0.0, 0.0, 0.0), (0.31, 0.17, 0.0), (-0.23, 0.41, 0.0)])
 #: How far around a lamp's place there is no other, m.
 UNLIT = np.arange(0.2, 1.6, 0.2)
 
@@ -114,7 +130,7 @@ class Surroundings:
         double = np.linalg.norm(cross, axis=1)
         self._normals, self._areas = cross / np.maximum(double, 1e-300)[:, None], double / 2
         self._clear = np.repeat([o.material.clear for o in objects], counts)
-        self._trodden = np.repeat([o.material.name in TRODDEN for o in objects], counts)
+        self._built = np.repeat([o.material.name in BUILT for o in objects], counts)
         self._body = np.repeat([not o.two_sided for o in objects], counts)
         self._world = open3d.t.geometry.RaycastingScene()
         flat = self._corners.reshape(-1, 3).astype(np.float32)
@@ -135,7 +151,7 @@ class Surroundings:
     def tops(self) -> Int[np.ndarray, "triangle"]:
         """Triangles of tops."""
         height = self._corners[:, :, 2].mean(axis=1) - self.floor
-        able = ~(self._clear | self._trodden) & (height > TOPS[0]) & (height < TOPS[1])
+        able = ~(self._clear | self._built) & (height > TOPS[0]) & (height < TOPS[1])
         return np.flatnonzero(able & (self._normals[:, 2] > LEVEL))
 
     @cached_property
@@ -145,8 +161,15 @@ class Surroundings:
         return np.flatnonzero(~self._clear & above & (self._normals[:, 2] < -LEVEL))
 
     @cached_property
-    def walls(self) -> tuple[Float[np.ndarray, "wall 2 3"], Float[np.ndarray, "wall 3"]]:
-        """Walls: their lines on the floor, left to right, m, and normals. A line is as long as one triangle has it."""
+    def walls(self) -> tuple[Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall"]]:
+        """Walls: where each begins on the floor on its left, seen from before it, m; its normal; its length, m."""
+        begin, normal, length = _straight(*self._lines)
+        wide = length > NARROW
+        return begin[wide], normal[wide], length[wide]
+
+    @property
+    def _lines(self) -> tuple[Float[np.ndarray, "line 2 3"], Float[np.ndarray, "line 3"]]:
+        """What is still there so high up: lines on the floor, left to right, one of a triangle, m; and normals."""
         level = self.floor + WALLS
         up, z = np.abs(self._normals[:, 2]), self._corners[:, :, 2]
         rows = np.flatnonzero((up < UPRIGHT) & ~self._clear & (z.min(axis=1) < level) & (z.max(axis=1) > level))
@@ -192,27 +215,30 @@ class Surroundings:
         lifted = back + LIFT * spots.normal[:, None]
         away, on = self._hit(lifted, -spots.normal[:, None])
         lying = ((np.abs(away - LIFT) < OFF) & ~self._clear[on]).all(axis=1)
-        ends = spots.points(_LINES.reshape(-1, 3), (sides, front)).reshape(len(spots), len(_LINES), 2, 3)
-        ends += 0.003 * spots.normal[:, None, None]
-        way = ends[:, :, 1] - ends[:, :, 0]
-        length = np.linalg.norm(way, axis=2, keepdims=True)
-        clear = (self._hit(ends[:, :, 0], way / length)[0] > length[..., 0]).all(axis=1)
-        away, on = self._hit(spots.place + LIFT * spots.normal, spots.normal)
-        inside = np.isfinite(away) & self._body[on] & (np.einsum("nd,nd->n", self._normals[on], spots.normal) > 0)
-        return lying & clear & ~inside
+        small, clear = spots.size[:, :2].max(axis=1) < _SMALL, np.ones(len(spots), bool)
+        for some, rays in ((small, _FEW), (~small, _MANY)):
+            box = spots[some]
+            ends = box.points(rays.reshape(-1, 3), (sides, front)).reshape(len(box), len(rays), 2, 3)
+            ends += 0.003 * box.normal[:, None, None]
+            way = ends[:, :, 1] - ends[:, :, 0]
+            length = np.linalg.norm(way, axis=2)
+            clear[some] = (self._hit(ends[:, :, 0], way / length[..., None])[0] > length).all(axis=1)
+        away, on = self._hit(spots.points(_EYES) + LIFT * spots.normal[:, None], spots.normal[:, None])
+        behind = np.isfinite(away) & self._body[on] & (np.einsum("npd,nd->np", self._normals[on], spots.normal) > 0)
+        return lying & clear & ~behind.all(axis=1)
 
     def above_floor(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
         """Whether there is anything below: outside of a building there is not."""
-        return np.isfinite(self._hit(spots.place + ASIDE * spots.normal, np.array([0.0, 0.0, -1.0]))[0])
+        return np.isfinite(self._hit(spots.place + ASIDE * spots.normal, DOWN)[0])
 
     def on_floor(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
         """Whether the lower ends of what is on a wall stand on a floor."""
         foot = spots.points(np.array([(x, -1.0, 1.0) for x in _THREE])) + [0, 0, LIFT]
-        return (np.abs(self._hit(foot, np.array([0.0, 0.0, -1.0]))[0] - LIFT) < OFF).all(axis=1)
+        return (np.abs(self._hit(foot, DOWN)[0] - LIFT) < OFF).all(axis=1)
 
     def headroom(self, spots: Spots) -> Float[np.ndarray, "spot"]:
         """How high something is over what is on a wall, m; very high: nothing."""
-        return np.minimum(self._hit(spots.place + ASIDE * spots.normal, np.array([0.0, 0.0, 1.0]))[0], _SKY)
+        return np.minimum(self._hit(spots.place + ASIDE * spots.normal, -DOWN)[0], _SKY)
 
     def unlit(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
         """Whether nothing hangs from the ceiling near by: no lamp."""
@@ -220,12 +246,32 @@ class Surroundings:
         around = np.stack(np.broadcast_arrays(np.cos(turn)[:, None], np.sin(turn)[:, None], 0.0), axis=2)
         eye = spots.place - [0, 0, 0.3]
         seen = self._hit(eye[:, None], around[:, 0])[0][..., None] > UNLIT
-        above, _ = self._hit(eye[:, None, None] + UNLIT[:, None] * around, np.array([0.0, 0.0, 1.0]))
+        above, _ = self._hit(eye[:, None, None] + UNLIT[:, None] * around, -DOWN)
         return ~(seen & (above < 0.27)).any(axis=(1, 2))
 
-    def _hit(self, origins: Float[np.ndarray, "*n 3"], directions: Float[np.ndarray, "*n 3"]):
+    def _hit(
+        self, origins: Float[np.ndarray, "*#n 3"], directions: Float[np.ndarray, "*#n 3"]
+    ) -> tuple[Float[np.ndarray, "*#n"], Int[np.ndarray, "*#n"]]:
         """Distance to the first triangle (inf: none) and which it is (0 if none)."""
         rays = np.concatenate(np.broadcast_arrays(origins, directions), axis=-1).astype(np.float32)
         found = self._world.cast_rays(rays)
         triangle = found["primitive_ids"].numpy().astype(np.int64)
         return found["t_hit"].numpy().astype(float), np.where(triangle < len(self._corners), triangle, 0)
+
+
+def _straight(lines: Float[np.ndarray, "line 2 3"], normals: Float[np.ndarray, "line 3"]):
+    """Lines in line as one: where each begins on the left, its normal, its length."""
+    along = np.cross([0.0, 0.0, 1.0], normals)
+    offset, low, high = (
+        np.einsum("ld,ld->l", *pair) for pair in ((lines[:, 0], normals), (lines[:, 0], along), (lines[:, 1], along))
+    )
+    key = (np.column_stack([normals[:, :2], offset]) / 1e-3).round()
+    order = np.lexsort((low, *key.T))
+    found: list[list] = []
+    for k in order:
+        if found and np.array_equal(found[-1][0], key[k]) and low[k] < found[-1][2] + SEAM:
+            found[-1][2] = max(found[-1][2], high[k])
+        else:
+            found.append([key[k], k, high[k]])
+    first = np.array([k for _, k, _ in found], int)
+    return lines[first, 0], normals[first], np.array([end for *_, end in found]) - low[first]

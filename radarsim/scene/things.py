@@ -8,22 +8,19 @@ a scene, ray tests, cameras, planned ways and truth, finds them in it.
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
 
 from radarsim.scene.belongings import RUNS, THINGS, Run, Thing
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.objects import SceneObject
 from radarsim.scene.shapes import joined
-from radarsim.scene.spots import CEILINGS, WALLS, Spots, Surroundings
+from radarsim.scene.spots import WALLS, Spots, Surroundings
 
 #: m: runs are looked at in pieces so long.
 PIECE = 0.1
 #: m: above what is higher over a wall's line there is no ceiling.
 _HIGHEST = 20.0
-#: m: gaps between parts of walls in line that are none.
-SEAM = 0.02
 #: Rim and free space in front of what is on tops, walls and ceilings, m (`Surroundings.fits`).
-ROOM = {"top": (0.005, 0.02), "wall": (0.02, 0.1), "ceiling": (0.12, 0.05)}
+ROOM = {"top": (0.005, 0.02), "wall": (0.04, 0.1), "ceiling": (0.12, 0.05)}
 #: The same of runs, and how far to the sides.
 ALONG = (-0.003, 0.005, -0.005)
 
@@ -42,7 +39,9 @@ def things(objects: Sequence[SceneObject], level: float) -> list[SceneObject]:
             shape = told.shape(size)
             shape.vertices = shape.vertices @ axes + place
             meshes.setdefault(told.material, []).append(shape)
-    return [SceneObject(f"things of {what}", joined(*some), MATERIALS[what], solid=True) for what, some in meshes.items()]
+    return [
+        SceneObject(f"things of {what}", joined(*some), MATERIALS[what], solid=True) for what, some in meshes.items()
+    ]
 
 
 def placed(objects: Sequence[SceneObject], level: float) -> dict[str, Spots]:
@@ -81,17 +80,16 @@ def _scattered(thing: Thing, around: Surroundings, level: float, rng: np.random.
 
 def _on_walls(thing: Thing, around: Surroundings, level: float, rng: np.random.Generator):
     """Places on walls at a kind's height, and normals."""
-    (lines, normals) = around.walls
-    length = np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1)
+    begin, normal, length = around.walls
     on = np.repeat(np.arange(len(length)), rng.poisson(level * thing.often * length))
-    place = lines[on, 0] + rng.random(len(on))[:, None] * (lines[on, 1] - lines[on, 0])
+    place = begin[on] + (rng.random(len(on)) * length[on])[:, None] * np.cross([0.0, 0.0, 1.0], normal[on])
     place[:, 2] += rng.uniform(*thing.height, len(on))
-    return place, normals[on]
+    return place, normal[on]
 
 
 def _along(run: Run, around: Surroundings, level: float, rng: np.random.Generator) -> Spots:
     """Where something runs along walls: all of a wall that has it, as far as that is free."""
-    begin, normal, length = _straight(*around.walls)
+    begin, normal, length = around.walls
     wanted = (rng.random(len(length)) < level * run.share) & (length > run.least)
     begin, normal, length = begin[wanted], normal[wanted], length[wanted]
     count = np.ceil(length / PIECE).astype(int)
@@ -123,19 +121,3 @@ def _along(run: Run, around: Surroundings, level: float, rng: np.random.Generato
         np.column_stack([long, size[edge, 1:]]),
     )  # fmt: skip
     return whole[long > run.least]
-
-
-def _straight(lines: Float[np.ndarray, "wall 2 3"], normals: Float[np.ndarray, "wall 3"]):
-    """Walls in line as one: where each begins on the left, its normal, its length."""
-    along = np.cross([0.0, 0.0, 1.0], normals)
-    offset, low, high = (np.einsum("wd,wd->w", *pair) for pair in ((lines[:, 0], normals), (lines[:, 0], along), (lines[:, 1], along)))
-    key = np.column_stack([np.arctan2(normals[:, 1], normals[:, 0]) / 1e-3, offset / 1e-3]).round()
-    order = np.lexsort((low, *key.T))
-    found: list[list] = []
-    for k in order:
-        if found and np.array_equal(found[-1][0], key[k]) and low[k] < found[-1][2] + SEAM:
-            found[-1][2] = max(found[-1][2], high[k])
-        else:
-            found.append([key[k], k, high[k]])
-    first = np.array([k for _, k, _ in found], int)
-    return lines[first, 0], normals[first], np.array([end for *_, end in found]) - low[first]

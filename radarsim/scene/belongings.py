@@ -3,7 +3,7 @@
 Sizes of paper are those of ISO 216. Sockets and switches lie in the zones of DIN 18015-3: 0.3 m over the floor, and
 1.05 m; a frame is 81 mm wide for each. A sprinkler guards 12 m^2 at most (EN 12845, ordinary hazard), a point-type
 smoke detector some 60 m^2 (DIN VDE 0833-2). Other numbers are plain assumptions about offices: on a desk of 1.3 m^2 a
-dozen things are wanted, on a wall one every metre and a half; there is room for a third of the former.
+dozen things are wanted, on a wall one every 1.3 m. In furnished rooms there is room for a third to a half of them.
 
 Every shape stands on its back: x along, y across, z off the surface, the face that touches it left out. None is of a
 material that waves pass, and closed ones are of metal, so a thing is the same by itself and as part of a larger mesh.

@@ -23,8 +23,8 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
 ``clutter`` and ``unevenness`` say how far the place is from its drawing (see `life.Life`): 1 as in rooms that are
-lived in; left out, 0: not at all. ``interferers`` are other radars that send there (see `interferers`); levels change
-and add them, too.
+lived in; left out, 0: not at all. With clutter the scene has more objects (see `things`). ``interferers`` are other
+radars that send there (see `interferers`); levels change and add them, too.
 """
 
 import re

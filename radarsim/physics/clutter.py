@@ -25,8 +25,8 @@ from radarsim.physics.surface import Surface
 from radarsim.scene.scene import Scene
 
 #: Things a square metre at level 1: on walls (plugs, handles, screws, cables), on what stands at the height of desks
-#: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were drawn
-#: it was 4, 16 and 3; of those there are some 0.2, 3 and 0.1.
+#: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
+#: drawn it was 4, 16 and 3; of those there are some 0.2, 3 and 0.1.
 ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
 #: Mean radar cross section, m^2, and exponent of its distribution P(sigma > s) = exp(-(s / scale)^exponent).
 CROSS_SECTION, EXPONENT = 0.1, 0.7

@@ -9,6 +9,7 @@ each frame's strongest cell.
 
 import io
 import lzma
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from radarsim.batches import TOGETHER
 from radarsim.motion import Motion
 from radarsim.scenario import Scenario
 from radarsim.scene.description import find
+from radarsim.scene.life import DRAWN, Life
 from radarsim.scene.scene import Scene
 from radarsim.walk import Walk as WayThrough
 
@@ -68,19 +70,21 @@ def beam_misfit(pictures: UInt8[np.ndarray, "frame range azimuth"], antennas: in
 
 
 def simulated(
-    name: str, settings: dict[str, float], transmitters: tuple[int, ...], every: int, duration: float, seed: int
+    name: str, life: tuple[Life, Life], transmitters: tuple[int, ...], every: int, duration: float, seed: int
 ) -> tuple[tuple, Motion]:
     """Shares of a walk by cart, of every few frames, and the walk.
 
     Args:
         name: scene.
-        settings: of the scene, over those in its file.
+        life: how lived-in it is: its geometry (things), and what physics adds (points, unevenness).
         transmitters: of the pictures.
         every: of so many frames one is simulated.
         duration: s.
         seed: of walk and world.
     """
-    scene = Scene.of(read_yaml(find(name)) | settings, name)
+    drawn, added = life
+    scene = Scene.of(read_yaml(find(name)) | asdict(drawn), name)
+    scene = Scene(name, scene.objects, scene.movers, added)
     scenario = Scenario(scene, WayThrough("cart", duration).through(scene, seed), CONFIG, seed=seed)
     times = np.arange(0, duration, every * CONFIG.frame_period)
     parts = (times[k : k + TOGETHER] for k in range(0, len(times), TOGETHER))
@@ -99,11 +103,13 @@ def row(about: str, found: list[tuple[float, float, float]]) -> dict[str, object
 
 #: What is added to the rooms, step by step, and the transmitters of the pictures.
 STEPS = {
-    "bare rooms, eight antennas as published": ({}, polar.PUBLISHED),
-    "bare rooms, four antennas as measured": ({}, polar.MEASURED),
-    "uneven walls": ({"unevenness": 1.0}, polar.MEASURED),
-    "clutter": ({"clutter": 1.0}, polar.MEASURED),
-    "both": ({"clutter": 1.0, "unevenness": 1.0}, polar.MEASURED),
+    "bare rooms, eight antennas as published": ((DRAWN, DRAWN), polar.PUBLISHED),
+    "bare rooms, four antennas as measured": ((DRAWN, DRAWN), polar.MEASURED),
+    "uneven walls": ((DRAWN, Life(unevenness=1.0)), polar.MEASURED),
+    "things": ((Life(clutter=1.0), DRAWN), polar.MEASURED),
+    "points": ((DRAWN, Life(clutter=1.0)), polar.MEASURED),
+    "clutter: things and points": ((Life(clutter=1.0), Life(clutter=1.0)), polar.MEASURED),
+    "clutter and uneven walls": ((Life(1.0, 1.0), Life(1.0, 1.0)), polar.MEASURED),
 }
 PARSER = command_line(
     __doc__,
@@ -124,11 +130,11 @@ def main() -> None:
             if part == "train":
                 beams = {antennas: float(np.median(each)) for antennas, each in misfits.items()}
             walks += [Walk(f"RadarHD, {part}", None, None, simulated=False)] * len(found)
-        for number, (about, (settings, transmitters)) in enumerate(STEPS.items()):
+        for number, (about, (life, transmitters)) in enumerate(STEPS.items()):
             found = []
             for k, name in enumerate(SCENES):
                 report(number * len(SCENES) + k, len(STEPS) * len(SCENES))
-                kept, motion = simulated(name, settings, transmitters, options.every, options.duration, options.seed)
+                kept, motion = simulated(name, life, transmitters, options.every, options.duration, options.seed)
                 found.append(kept)
                 walks.append(walked(name, options.seed, motion))
             rows.append(row(about, found))

@@ -78,8 +78,8 @@ def convergence(axis) -> str:
 
 
 def small_things(axis) -> str:
-    """Small things are a Poisson process on every surface. Their cross sections follow Weibull's distribution,
-    P(> s) = exp(-(s / s0)^0.7)."""
+    """What is smaller than 2 cm is a Poisson process on every surface; larger things are drawn. Cross sections follow
+    Weibull's distribution, P(> s) = exp(-(s / s0)^0.7)."""
     wall = SceneObject("wall", shapes.rectangle((3, 0, 1.5), (40, 3), (-1, 0, 0)), material("wood"))
     things = Clutter(Scene("wall", [wall], life=Life(clutter=1)), np.random.default_rng(0))
     sigma = np.sort(things.near(np.zeros((1, 3)), 50.0).sigma)
@@ -88,7 +88,7 @@ def small_things(axis) -> str:
     axis.plot(dbsm, weibull.cdf(sigma), **THEORY)
     axis.plot(dbsm[::20], share[::20], **FOUND)
     return (
-        f"Things per square metre of wall: {len(sigma) / 120:.2f}, set to {ON_WALLS:g}. Their mean: "
+        f"Points per square metre of wall: {len(sigma) / 120:.2f}, set to {ON_WALLS:g}. Their mean: "
         f"{db(sigma.mean()):.1f} dBsm, set to {db(CROSS_SECTION):.1f}. Kolmogorov-Smirnov test: p = "
         f"{stats.kstest(sigma, weibull.cdf).pvalue:.2f}. The densities were chosen by comparison with RadarHD's "
         "training walks, never with its test walks (`benchmarks.realism`)."

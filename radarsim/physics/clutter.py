@@ -1,6 +1,7 @@
 """The small things that a room is full of, as points: on desks and shelves, on walls and under ceilings.
 
-Things too small to be drawn are met with as a Poisson process, so many a square metre of the surface that they stand or
+Down to 2 cm things are drawn (`radarsim.scene.things`). What is smaller, and what larger things are made of, handles,
+edges, screws and plugs, is met with as a Poisson process, so many a square metre of the surface that they stand or
 hang on, and their radar cross sections follow Weibull's law: so Ram, Singh and Ghatak (IEEE Open J. Signal Process. 2,
 2021) model the discrete clutter of rooms. The exponent of a cross section (1: Swerling's, the smaller the spikier)
 is that of strong indoor scatterers; log-normal laws that fit measured targets in halls (Azim et al., arXiv 2411.03206)
@@ -23,9 +24,10 @@ from radarsim.physics.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.physics.surface import Surface
 from radarsim.scene.scene import Scene
 
-#: Things a square metre at level 1: on walls (sockets, handles, pictures, cables), on what stands at the height of
-#: desks and shelves (cups, books, tools), under ceilings (sprinklers, sensors, grids), on the floor.
-ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 4.0, 16.0, 3.0, 1.0
+#: Things a square metre at level 1: on walls (plugs, handles, screws, cables), on what stands at the height of desks
+#: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
+#: drawn it was 4, 16 and 3; of those there are some 0.2, 3 and 0.1.
+ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
 #: Mean radar cross section, m^2, and exponent of its distribution P(sigma > s) = exp(-(s / scale)^exponent).
 CROSS_SECTION, EXPONENT = 0.1, 0.7
 #: Mean distance from the surface, m, over the least: half the depth of what hangs or stands there.

@@ -23,8 +23,8 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
 ``clutter`` and ``unevenness`` say how far the place is from its drawing (see `life.Life`): 1 as in rooms that are
-lived in; left out, 0: not at all. ``interferers`` are other radars that send there (see `interferers`); levels change
-and add them, too.
+lived in; left out, 0: not at all. With clutter the scene has more objects (see `things`). ``interferers`` are other
+radars that send there (see `interferers`); levels change and add them, too.
 """
 
 import re
@@ -49,6 +49,7 @@ from radarsim.scene.movers import Mover
 from radarsim.scene.objects import SceneObject
 from radarsim.scene.office import Office
 from radarsim.scene.squareness import out_of_square
+from radarsim.scene.things import things
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -267,12 +268,14 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
     try:
         objects = [SceneObject(o.name, o.mesh(folder), _material(o), o.solid) for o in description.objects]
         if description.building:
-            building = description.building
-            objects += out_of_square(building.build(), description.unevenness, building.seed)
+            objects += description.building.build()
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
+    objects += things(objects, description.clutter)
+    if description.building:
+        objects = out_of_square(objects, description.unevenness, description.building.seed)
     return description.name, objects, description.moving, description.life, description.interferers
 
 

@@ -8,9 +8,10 @@ class Life:
     """What tells a place from its drawing, as shares of what is usual; none: the drawing itself.
 
     Attributes:
-        clutter: small things on walls, desks and shelves and under ceilings (`radarsim.physics.clutter`).
-        unevenness: how far walls, floors and ceilings are from their planes (`radarsim.physics.unevenness`), and a
-            building's corners from square (`squareness`).
+        clutter: what is on walls, desks and shelves and under ceilings: down to 2 cm as geometry
+            (`radarsim.scene.things`), below that as points (`radarsim.physics.clutter`).
+        unevenness: how far walls, floors and ceilings are from their planes (`radarsim.physics.unevenness`), and
+            buildings from square (`radarsim.scene.squareness`).
     """
 
     clutter: float = 0.0

@@ -78,9 +78,9 @@ def test_cross_sections_are_weibulls():
 
 @pytest.mark.parametrize("weight", ["bounces", "bounces_twice"])
 def test_those_seen_over_mirrors_have_the_power_of_all(weight):
-    found = everything(clutter(room(20.0)))
+    found = everything(clutter(room(80.0)))
     weights = getattr(found, weight)
-    assert abs(np.sum(weights * found.sigma) / np.sum(found.sigma) - 1) < 0.03
+    assert abs(np.sum(weights * found.sigma) / np.sum(found.sigma) - 1) < 3 / np.sqrt(np.sum(weights > 0))
     assert np.mean(weights > 0) < 0.3
 
 

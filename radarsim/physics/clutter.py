@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import gammaincc
 
+from radarize.errors import InputError
 from radarsim.physics.grid import Grid
 from radarsim.physics.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.physics.surface import Surface
@@ -30,6 +31,8 @@ from radarsim.scene.scene import Scene
 ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
 #: Mean radar cross section, m^2, and exponent of its distribution P(sigma > s) = exp(-(s / scale)^exponent).
 CROSS_SECTION, EXPONENT = 0.1, 0.7
+#: Points of a scene, some 200 bytes each: a floor of the largest buildings has ten thousand.
+MOST = 5_000_000
 #: Mean distance from the surface, m, over the least: half the depth of what hangs or stands there.
 STANDOFF, NEAREST = 0.03, 0.01
 #: Below the first height over the lowest floor an upward face is a floor, above the second none is within reach, m.
@@ -42,13 +45,22 @@ class Clutter:
     Args:
         scene: the world; its `life.clutter` scales the densities.
         rng: draws them.
+
+    Raises:
+        InputError: there were to be more than `MOST`.
     """
 
     def __init__(self, scene: Scene, rng: np.random.Generator):
         corners, normals = scene.triangles, scene.normals
         sides = corners[:, 1:] - corners[:, :1]
         area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
-        count = rng.poisson(scene.life.clutter * densities(scene) * area)
+        mean = scene.life.clutter * densities(scene) * area
+        if mean.sum() > MOST:
+            raise InputError(
+                f"scene {scene.name}: clutter is {scene.life.clutter:g}, which makes {mean.sum():.2g} points, expected "
+                f"at most {MOST:g}"
+            )
+        count = rng.poisson(mean)
         on = np.repeat(np.arange(len(area)), count)
         share = rng.random((len(on), 2))
         share[share.sum(axis=1) > 1] = 1 - share[share.sum(axis=1) > 1]  # the other half of the parallelogram

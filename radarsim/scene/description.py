@@ -269,11 +269,11 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
         objects = [SceneObject(o.name, o.mesh(folder), _material(o), o.solid) for o in description.objects]
         if description.building:
             objects += description.building.build()
+        objects += things(objects, description.clutter)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
-    objects += things(objects, description.clutter)
     if description.building:
         objects = out_of_square(objects, description.unevenness, description.building.seed)
     return description.name, objects, description.moving, description.life, description.interferers

@@ -9,12 +9,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from radarize.errors import InputError
 from radarsim.scene.belongings import RUNS, THINGS, Run, Thing
 from radarsim.scene.materials import MATERIALS
 from radarsim.scene.objects import SceneObject
 from radarsim.scene.shapes import joined
 from radarsim.scene.spots import WALLS, Spots, Surroundings
 
+#: Things and pieces of runs that are tried for a place: a floor of the largest buildings takes some ten thousand.
+MOST = 200_000
 #: m: runs are looked at in pieces so long.
 PIECE = 0.1
 #: m: above what is higher over a wall's line there is no ceiling.
@@ -31,6 +34,9 @@ def things(objects: Sequence[SceneObject], level: float) -> list[SceneObject]:
     Args:
         objects: the drawing.
         level: 1: as many as is usual; 0: none.
+
+    Raises:
+        InputError: more than `MOST` were to be tried.
     """
     meshes: dict[str, list] = {}
     for kind, spots in placed(objects, level).items():
@@ -49,6 +55,8 @@ def placed(objects: Sequence[SceneObject], level: float) -> dict[str, Spots]:
     if level == 0 or not objects:
         return {}
     around = Surroundings(objects)
+    if (wanted := level * _wanted(around)) > MOST:
+        raise InputError(f"clutter is {level:g}, for which {wanted:.2g} things are tried, expected at most {MOST:g}")
     seed, found = around.seed, {}
     for number, (kind, told) in enumerate((RUNS | THINGS).items()):
         rng = np.random.default_rng([seed, number])
@@ -57,6 +65,14 @@ def placed(objects: Sequence[SceneObject], level: float) -> dict[str, Spots]:
     spots = Spots.joined(list(found.values()))
     kept = spots.apart()
     return {kind: spots[kept & (owner == kind)] for kind in found}
+
+
+def _wanted(around: Surroundings) -> float:
+    """How many things and pieces of runs are tried at level 1."""
+    length = around.walls[2].sum()
+    extent = {"top": around.area(around.tops), "ceiling": around.area(around.ceilings), "wall": length}
+    tried = sum(thing.often * extent[thing.on] for thing in THINGS.values())
+    return tried + sum(run.share for run in RUNS.values()) * length / PIECE
 
 
 def _scattered(thing: Thing, around: Surroundings, level: float, rng: np.random.Generator) -> Spots:

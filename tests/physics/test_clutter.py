@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 from scipy.special import gamma
 
+from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarsim.physics.antenna import ISOTROPIC
 from radarsim.physics.clutter import (
@@ -143,3 +144,10 @@ def test_none_at_level_nought():
     place = np.array([[3.0, 0.0, 1.0]])
     assert np.array_equal(both.near(place, 5.0).position, alone.near(place, 5.0).position)
     assert len(both) == len(alone)
+
+
+def test_more_than_memory_holds():
+    wall = SceneObject("wall", shapes.rectangle((0, 0, 0), (1900, 1900), (1, 0, 0)), MATERIALS["wood"])
+    place = Scene("plain", [wall], life=Life(clutter=10))
+    with pytest.raises(InputError, match="clutter is 10, which makes 1.3e.08 points"):
+        clutter(place)

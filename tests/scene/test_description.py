@@ -40,6 +40,10 @@ objects:
     assert np.ptp(scan.mesh.vertices, axis=0) == pytest.approx([1, 1, 1])
 
 
+PLAIN = "{name: top, shape: rectangle, size: [1900, 1900], position: [0, 0, 1], facing: [0, 0, 1], material: wood}"
+PLAIN += f", {PLAIN.replace('top', 'floor').replace('[0, 0, 1], f', '[0, 0, 0], f')}"
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
@@ -60,6 +64,7 @@ objects:
         ("building: {kind: castle}", "building.kind is 'castle'"),
         ("building: {kind: office, seed: x}", "building.seed is 'x'"),
         ("building: {kind: office, seed: -1}", "building.seed is -1"),
+        (f"objects: [{PLAIN}]\nclutter: 10", "clutter is 10, for which 3.*e.08 things are tried"),
         ("objects: [3]", r"objects\[0\]"),
         ("objects: 3", "objects is 3"),
     ],

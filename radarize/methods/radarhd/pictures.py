@@ -13,8 +13,8 @@ from radarize.methods.radarhd.network import DRAWN, RadarHdPictureNet
 from radarize.methods.radarhd.training import RadarHd, unlike
 from radarize.methods.task import Settings
 
-#: Choices for the probability from which a cell is a point.
-LEAST = torch.arange(0.05, 0.75, 0.05)
+#: Choices for the probability from which a cell is a point; one cell in 150 holds any.
+LEAST = torch.tensor([0.005, 0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6])
 
 
 class RadarHdPictures(Pictures):

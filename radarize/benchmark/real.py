@@ -27,6 +27,7 @@ from radarize.benchmark.realmotion import (
     surface_of,
     turn_errors,
 )
+from radarize.benchmark.realnetworks import READERS, readers
 from radarize.benchmark.realpoints import Distances, Judged, judge
 from radarize.benchmark.results import Data, Network, Results, command, machine
 from radarize.benchmark.results import Walk as Facts
@@ -34,9 +35,6 @@ from radarize.benchmark.table import Table
 from radarize.errors import InputError
 from radarize.jobs import Report, perform
 from radarize.methods.method import Weights
-from radarize.methods.pictures.network import PictureNet
-from radarize.nets.weights import load
-from radarize.radar.presets import PRESETS
 from radarize.walkclock import Clock
 from radarize.walkposes import at, poses_of, stamps
 from radarize.walks import PERIOD, Predictions, Walk
@@ -46,6 +44,8 @@ NOTES = (
     "independent frames as the errors' autocorrelation leaves.",
     "`network` has seen simulated walks alone, and nothing of it was chosen on test walks. Training walks of the set "
     "told what the model card names.",
+    "`radarhd-simulated` is RadarHD's network, trained on the simulated walks that `network` has seen, with its rule "
+    "for points: each cell above a probability. `RadarHD` is its authors' own, trained on 25 real walks.",
     "By number: with the lidar's picture of the same number, as the authors measure. By instant (`instant`): with the "
     "lidar's picture of the same time, see the table of clocks.",
     f"Turns over {SPAN * PERIOD:g} s, from pictures alone; `smoothed`: with those before and after them, by a Gaussian "
@@ -65,6 +65,8 @@ CLOCK_NOTE = (
     "correlation of pictures of one number, and of one instant; by how much two halves of the walk differ. By pictures "
     "alone (`radarize.walkclock`); without figures: too short, or nothing moved, and taken as numbered."
 )
+#: The network that tells turns.
+TURNS = "picture-turns"
 #: Columns that a terminal shows.
 SHOWN = (
     "walk", "method", "chamfer_m", "mod_hausdorff_m", "instant_chamfer_m", "yaw_rmse_deg", "instant_yaw_rmse_deg",
@@ -134,7 +136,9 @@ def real(
         Table("Between methods", _paired(errors)),
         Table("SLAM and maps", [row for one in each for row in one.maps], [MAP_NOTE]),
     ]
-    networks = tuple(Network.of(path) for path in _networks(options) if path.is_file())
+    kinds = [*(reader.network.kind for reader in READERS.values()), TURNS]
+    paths = [Weights(options.weights).of(kind) for kind in kinds]
+    networks = tuple(Network.of(path) for path in paths if path.is_file())
     results = Results("In the real world", tables, data_of, networks, options.command)
     results.write(Path(output), "real")
     return results
@@ -149,22 +153,15 @@ class _Compared(NamedTuple):
     apart: dict[tuple[int, str], list[Distances]]
 
 
-def _networks(options: Options) -> tuple[Path, Path]:
-    """Weights for points, and for turns."""
-    weights = Weights(options.weights)
-    return weights.of("pictures"), weights.of("picture-turns")
-
-
 def _compare(walk: Walk, options: Options, report: Report) -> _Compared:
     """All methods on a walk; `report` takes frames done."""
-    seen, turned = _networks(options)
-    scans = load(seen, PictureNet, PRESETS["radarhd"]) if seen.is_file() else None
+    weights = Weights(options.weights)
     poses = poses_of(walk, options.poses)
     others = {name: Predictions(folder).points(walk) for name, folder in options.predictions.items()}
     clock = Clock.of(walk)
-    judged = judge(walk, clock, scans, others, lambda done: report(done / 2))
+    judged = judge(walk, clock, readers(weights), others, lambda done: report(done / 2))
     told = {"shifted pictures": shifted_turns(judged.pictures)}
-    rates = network_rates(Weights(options.weights), judged.pictures) if turned.is_file() else None
+    rates = network_rates(weights, judged.pictures) if weights.of(TURNS).is_file() else None
     if rates is not None:
         told["network"] = SPAN * PERIOD * rates[:, 0]
     told |= {f"{name}, smoothed": smoothed(each) for name, each in told.items()}

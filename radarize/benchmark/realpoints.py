@@ -4,19 +4,12 @@ from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
-import torch
 from jaxtyping import Bool, Float, Int, UInt8
 
 from radarize import polar
+from radarize.benchmark.realnetworks import Reader
 from radarize.clouds import Apart
-from radarize.features.windows import Windows
-from radarize.methods.pictures.memory import Memory
-from radarize.methods.pictures.network import PictureNet
-from radarize.methods.pictures.points import first_surfaces, points
-from radarize.methods.pictures.scans import on_bearings
-from radarize.nets.weights import Header
 from radarize.points import Cfar, level_around
-from radarize.radar.presets import PRESETS
 from radarize.walkclock import Clock
 from radarize.walkposes import BEARINGS, scan, stamps
 from radarize.walks import FIRST, Walk
@@ -58,7 +51,7 @@ class Judged(NamedTuple):
 def judge(
     walk: Walk,
     clock: Clock,
-    network: tuple[PictureNet, Header] | None,
+    networks: dict[str, Reader],
     others: dict[str, dict[int, Float[np.ndarray, "point 2"]]],
     report: Callable[[float], None],
 ) -> Judged:
@@ -67,7 +60,7 @@ def judge(
     clouds = [polar.cartesian(walk.lidar(frame)) for frame in range(walk.frames)]
     found = Judged({}, {}, partner, clouds, np.empty((walk.frames, polar.ROWS, polar.COLUMNS), np.uint8))
     nothing = np.empty((0, 2))
-    for frame, picture, cells, first in _methods(walk, network):
+    for frame, picture, cells, first in _methods(walk, networks):
         same = clouds[partner[frame]] if partner[frame] >= 0 else nothing
         found.pictures[frame] = picture
         told = {name: polar.cartesian(each) for name, each in cells.items()}
@@ -87,33 +80,19 @@ def judge(
 
 
 def _methods(
-    walk: Walk, network: tuple[PictureNet, Header] | None
+    walk: Walk, networks: dict[str, Reader]
 ) -> Iterator[tuple[int, UInt8[np.ndarray, "range azimuth"], dict[str, Cells], dict[str, Ranges]]]:
     """A walk's pictures, frame by frame, where each method sees something in them, and scans of those that tell first
     surfaces themselves."""
-    windows, memory = (network[1].windows(PRESETS["radarhd"], network[0].maker), Memory()) if network else (None, None)
     times = stamps(walk.frames)
     for frames, pictures in walk.batches():
-        likely = _network(network[0], windows, memory, pictures, times[frames]) if network else None
+        seen = {name: network.see(pictures, times[frames]) for name, network in networks.items()}
         for k, picture in enumerate(pictures):
             stands = picture > level_around(picture.astype(float), _CFAR, 0, False) + _CFAR.threshold
             nearest = stands & (np.cumsum(stands, axis=0) == 1)
             cells, first = {"picture": picture > 0, "cfar": stands, "first-echo": nearest}, {}
-            if likely:
-                cells["network"], first["network"] = (each[k] for each in likely)
+            for name, (points, ranges) in seen.items():
+                cells[name] = points[k]
+                if ranges is not None:
+                    first[name] = ranges[k]
             yield frames.start + k, picture, cells, first
-
-
-@torch.inference_mode()
-def _network(
-    net: PictureNet,
-    windows: Windows,
-    memory: Memory,
-    pictures: UInt8[np.ndarray, "frame range azimuth"],
-    times: Float[np.ndarray, "frame"],
-) -> tuple[Bool[np.ndarray, "frame range column"], Float[np.ndarray, "frame bearing"]]:
-    """Points of a batch's frames, and their scans."""
-    shown = windows.push({"picture": pictures.astype(np.float16)}, times)[0]
-    likely = net.estimate(shown.maps)
-    # Maps average over time themselves: their scans are each frame's own.
-    return points(memory.push(likely, times), net.dense).numpy(), on_bearings(first_surfaces(likely), BEARINGS)

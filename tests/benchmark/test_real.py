@@ -19,6 +19,7 @@ from radarize.tum import planar_poses, write_tum
 from radarize.walkclock import Clock
 from radarize.walkposes import BEARINGS, scan, true_poses
 from radarize.walks import Walk
+from tests.methods.test_radarhd_pictures import repeating, weights
 from tests.twoclocks import MadeUp
 
 FRAMES = 46
@@ -72,6 +73,19 @@ def test_every_walk_and_method_has_a_row(clone, tmp_path, monkeypatch):
     assert found["picture"]["mod_hausdorff_m"] == pytest.approx(0.21, abs=0.04)
     assert found["picture"]["chamfer_m"] == pytest.approx(0.21, abs=0.06)
     assert "all real" in (tmp_path / "out" / "real.md").read_text()
+
+
+def test_networks_have_rows_where_their_weights_are(clone, tmp_path):
+    """One of RadarHD's kind that draws what the radar sees is as near as the picture itself."""
+    weights(repeating(), tmp_path / "radarhd-pictures.safetensors")
+    found = real(clone, tmp_path / "out", Options(weights=tmp_path))
+    rows, maps = ({row["method"]: row for row in found.tables[k].rows} for k in (0, 3))
+    assert "network" not in rows and rows["radarhd-simulated"]["frames"] == FRAMES - 40
+    for name in ("chamfer_m", "mod_hausdorff_m", "instant_chamfer_m"):
+        assert rows["radarhd-simulated"][name] == pytest.approx(rows["picture"][name], abs=0.02)
+    assert maps["radarhd-simulated"]["ate_m"] < 0.02
+    assert ("radarhd-simulated", "picture") in {(row["method"], row["against"]) for row in found.tables[2].rows}
+    assert [network.kind for network in found.networks] == ["radarhd-pictures"]
 
 
 def test_what_is_of_one_instant_is_nearer(tmp_path):

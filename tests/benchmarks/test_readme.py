@@ -50,7 +50,8 @@ def cells(method: str, column: str, places: Sequence[tuple[int, ...]]) -> str:
 
 
 @pytest.mark.parametrize(("page", "methods"), [
-    ("README.md", ("cfar", "network", "RadarHD")), ("docs/about/results.md", ("picture", "cfar", "network", "RadarHD")),
+    ("README.md", ("cfar", "network", "radarhd-simulated", "RadarHD")),
+    ("docs/about/results.md", ("picture", "cfar", "network", "radarhd-simulated", "RadarHD")),
 ])  # fmt: skip
 def test_distances_on_real_walks_are_those_of_the_results(page, methods):
     text = (ROOT / page).read_text().replace("**", "")
@@ -63,7 +64,7 @@ def test_turns_and_maps_of_real_walks_are_those_of_the_results():
     for method in ("network", "network, smoothed", "shifted pictures, smoothed"):
         assert f"| {cells(method, 'yaw_rmse_deg', PLACES[:2])} |" in text, method
     moving, maps = PLACES[0] + PLACES[1], real_rows("SLAM and maps")
-    for method in ("network", "RadarHD", "lidar"):
+    for method in ("network", "radarhd-simulated", "RadarHD", "lidar"):
         off, f1 = (mean(maps, method, column, moving) for column in ("ate_m", "map_f1_20cm"))
         assert f"| {off:.2f} | {100 * f1:.0f} |" in text, method
 

@@ -4,7 +4,7 @@ import pytest
 import torch
 
 from radarize.methods.milliego.network import MilliEgoNet
-from radarize.methods.radarhd.network import RadarHdNet
+from radarize.methods.radarhd.network import RadarHdNet, RadarHdPictureNet
 from radarize.methods.rnin.network import RninNet
 
 
@@ -16,6 +16,7 @@ def parameters(net: torch.nn.Module) -> int:
     ("net", "millions"),
     [
         (lambda: RadarHdNet(41, ("range_azimuth",), 64), 17.51),
+        (lambda: RadarHdPictureNet(41, ("picture",), 64), 17.51),
         (lambda: MilliEgoNet(6, width=64), 33.98),
         (lambda: RninNet(10, width=64), 5.36),
     ],

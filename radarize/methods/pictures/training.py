@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from torch import Generator, Tensor, nn
 
 from radarize import polar
@@ -30,15 +30,19 @@ UNKNOWN = -1.0
 
 
 class Pictures(PictureTask):
-    """Points of a lidar from polar pictures; labels are its pictures, packed."""
+    """Points of a lidar from polar pictures; labels are its pictures, packed.
 
-    network, truth = PictureNet, (Reading("lidar", "truth/lidar"),)
+    Attributes:
+        columns: that the network answers in.
+    """
+
+    network, truth, columns = PictureNet, (Reading("lidar", "truth/lidar"),), COLUMNS
     defaults = Settings(width=12, frames=5, epochs=20, batch=64, rate=2e-3, schedule="cosine")
 
     def augment(
         self, maps: Maps, label: Tensor, generator: Generator
     ) -> tuple[Float[Tensor, "item frame 1 range column"], Tensor]:
-        pictures, label = elsewhere(roughening.rough(maps, generator), unpacked(label), generator)
+        pictures, label = elsewhere(roughening.rough(maps, generator), unpacked(label, self.columns), generator)
         return biased(pictures[:, :, 0], uniform(generator, *BIAS, len(maps))), label
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
@@ -46,7 +50,7 @@ class Pictures(PictureTask):
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
         logits, label = net(validated(maps)), unpacked(label)
-        return torch.stack([entropy(logits, label), self._chamfer(logits.exp(), label, net.dense)], dim=1)
+        return torch.stack([entropy(logits, label), chamfer(points(logits.exp(), net.dense), label)], dim=1)
 
     def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
         loss, chamfer = means.tolist()
@@ -57,19 +61,18 @@ class Pictures(PictureTask):
         total = torch.zeros(len(DENSE), device=net.dense.device)
         for maps, label in batches:
             probability, label = net.estimate(validated(maps)), unpacked(label)
-            total += torch.stack([self._chamfer(probability, label, dense).sum() for dense in DENSE])
+            total += torch.stack([chamfer(points(probability, dense), label).sum() for dense in DENSE])
         net.dense.fill_(DENSE[int(total.argmin())])
 
-    @staticmethod
-    def _chamfer(probability: Tensor, label: Tensor, dense: float | Tensor) -> Float[Tensor, "item"]:
-        found = points(probability, dense).cpu().numpy()
-        apart = [
-            Apart.of_pictures(one, true).chamfer for one, true in zip(found, label.bool().cpu().numpy(), strict=True)
-        ]
-        return torch.tensor(np.nan_to_num(apart, nan=polar.REACH / 2), dtype=torch.float32, device=label.device)
+
+def chamfer(found: Bool[Tensor, "item row column"], label: Float[Tensor, "item row other"]) -> Float[Tensor, "item"]:
+    """Distance of points from a lidar's, m; half the reach of a picture where either has none."""
+    clouds = zip(found.cpu().numpy(), label.bool().cpu().numpy(), strict=True)
+    apart = np.nan_to_num([Apart.of_pictures(*each).chamfer for each in clouds], nan=polar.REACH / 2)
+    return torch.tensor(apart, dtype=torch.float32, device=label.device)
 
 
-def validated(maps: Maps) -> Maps:
+def validated(maps: Maps) -> Float[Tensor, "item frame 1 range column"]:
     """The same roughening in every epoch, and the middle of the bias."""
     seed = int(maps.abs().double().sum()) % 2**31
     pictures = roughening.rough(maps, Generator(maps.device).manual_seed(seed))
@@ -85,8 +88,8 @@ def elsewhere(
     label = torch.where(left[:, 0, 0], label.flip(2), label)[:, None]
     factor = uniform(generator, 1 - ZOOM, 1 + ZOOM, len(label))
     turn = uniform(generator, -TURN, TURN, len(label)).round().long()
-    # A label's columns are half as wide.
-    pictures, label = rolled(zoomed(pictures, factor), turn, 0.0), rolled(zoomed(label, factor), 2 * turn, UNKNOWN)
+    finer = label.shape[3] // pictures.shape[3]
+    pictures, label = rolled(zoomed(pictures, factor), turn, 0.0), rolled(zoomed(label, factor), finer * turn, UNKNOWN)
     return pictures[:, :, None], label[:, 0]
 
 
@@ -121,10 +124,10 @@ def _gathered(pictures: Tensor, place: Int[Tensor, "item row"]) -> Tensor:
     return found * inside[:, None, :, None]
 
 
-def unpacked(label: Tensor) -> Float[Tensor, "item row column"]:
-    """Pictures of a lidar on the network's columns: 1 where any of its beams has a point."""
+def unpacked(label: Tensor, columns: int = COLUMNS) -> Float[Tensor, "item row column"]:
+    """Pictures of a lidar on a network's columns: 1 where any of its beams has a point."""
     bits = (label[..., None].to(torch.uint8) >> torch.arange(7, -1, -1, dtype=torch.uint8, device=label.device)) & 1
-    return bits.flatten(2).unflatten(2, (COLUMNS, -1)).amax(dim=3).float()
+    return bits.flatten(2).unflatten(2, (columns, -1)).amax(dim=3).float()
 
 
 def entropy(logits: Float[Tensor, "item 257 column"], label: Float[Tensor, "item row column"]) -> Float[Tensor, "item"]:

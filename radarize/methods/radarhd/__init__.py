@@ -4,4 +4,4 @@ from radarize.methods.method import Method
 
 _PLACE = "radarize.methods.radarhd"
 SCANS = {"radarhd": Method("RadarHD", f"{_PLACE}.scans:scans", ("radarhd",))}
-TASKS = {"radarhd": f"{_PLACE}.training:RadarHd"}
+TASKS = {"radarhd": f"{_PLACE}.training:RadarHd", "radarhd-pictures": f"{_PLACE}.pictures:RadarHdPictures"}

@@ -1,8 +1,9 @@
-"""RadarHD: a U-Net that draws, from 41 frames of a radar's range-azimuth maps, what a lidar would have seen.
+"""RadarHD: a U-Net that draws, from two seconds of a radar's range-azimuth maps, what a lidar would have seen.
 
 Prabhakara et al., "High resolution point clouds from mmWave radar", ICRA 2023.
 """
 
+from abc import abstractmethod
 from collections import OrderedDict
 from collections.abc import Sequence
 
@@ -14,6 +15,7 @@ from torch.nn.functional import pad
 
 from radarize.features.maps import AZIMUTHS, Maps
 from radarize.mapping.scans import BEARINGS
+from radarize.methods.pictures.maps import PictureMaker
 from radarize.nets.unet import Up, double_convolution, through
 from radarize.nets.weights import Network
 
@@ -39,11 +41,8 @@ def _larger(*scale: float) -> nn.Upsample:
     return nn.Upsample(scale_factor=scale, mode="bilinear", align_corners=True)
 
 
-class RadarHdNet(Network):
-    """Range-azimuth maps to a picture of the first surfaces, of eight times as many columns.
-
-    The original sees 256 ranges, 64 directions of half a circle and a Bartlett beamformer's magnitudes; this one sees
-    the ranges of the radar, the field of its scans, and the map of Capon's beamformer that all networks share.
+class Drawing(Network):
+    """Range-azimuth maps to a picture of eight times as many columns.
 
     Args:
         frames: of a window, oldest first; 41 in the original.
@@ -51,7 +50,7 @@ class RadarHdNet(Network):
         width: channels of the first level; 64 in the original, with 17.51 M parameters.
     """
 
-    kind, outputs = "radarhd", ("probability",)
+    outputs = ("probability",)
 
     def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
         super().__init__(frames, maps, width)
@@ -66,19 +65,15 @@ class RadarHdNet(Network):
         self.sharpen = nn.Sequential(*map(nn.Sequential, sharper))
         self.head = nn.Conv2d(width, 1, 1)
         self.coarse = False  # whether training rounds convolutions to bfloat16, see `ResNet18`
-        resampling = np.stack([np.interp(columns(SEEN), AZIMUTHS, row) for row in np.eye(len(AZIMUTHS))])
-        self.register_buffer("resampling", torch.tensor(resampling, dtype=torch.float32), persistent=False)
         #: Probability from which a cell counts as a surface; training fits it on validation data.
         self.register_buffer("least", torch.tensor(0.5))
 
+    @abstractmethod
     def seen(self, maps: Maps) -> Float[Tensor, "item channel row column"]:
-        """The frames as the network sees them: the strongest 26 dB of each as 0...1, without leakage."""
-        image = (maps @ self.resampling).flatten(1, 2)[:, :, _LEAKAGE:]
-        image = (1 + (image - image.amax(dim=(2, 3), keepdim=True)) / _DEPTH).clamp_min(0)
-        return pad(image, (0, 0, _LEAKAGE, 0))
+        """The frames as the network sees them, 0...1."""
 
     def forward(self, maps: Maps) -> Float[Tensor, "item range direction"]:
-        """Logits of a surface in a cell of range and `columns(DRAWN)`."""
+        """Logits of a surface in a cell of range and of `DRAWN` columns."""
         x = self.seen(maps)
         with torch.autocast(x.device.type, torch.bfloat16, enabled=self.coarse and self.training):
             x = self.sharpen(through(x, self.down, self.up))
@@ -87,3 +82,35 @@ class RadarHdNet(Network):
     def estimate(self, maps: Maps) -> Float[Tensor, "item range direction"]:
         """Probability of the same."""
         return torch.sigmoid(self(maps))
+
+
+class RadarHdNet(Drawing):
+    """Capon's maps to a picture of the first surfaces on `columns(DRAWN)`.
+
+    The original sees 256 ranges, 64 directions of half a circle and a Bartlett beamformer's magnitudes; this one sees
+    the ranges of the radar, the field of its scans, and the map of Capon's beamformer that all networks share.
+    """
+
+    kind = "radarhd"
+
+    def __init__(self, frames: int, maps: Sequence[str], width: int = 64):
+        super().__init__(frames, maps, width)
+        resampling = np.stack([np.interp(columns(SEEN), AZIMUTHS, row) for row in np.eye(len(AZIMUTHS))])
+        self.register_buffer("resampling", torch.tensor(resampling, dtype=torch.float32), persistent=False)
+
+    def seen(self, maps: Maps) -> Float[Tensor, "item channel row column"]:
+        """The strongest 26 dB of each frame as 0...1, without leakage."""
+        image = (maps @ self.resampling).flatten(1, 2)[:, :, _LEAKAGE:]
+        image = (1 + (image - image.amax(dim=(2, 3), keepdim=True)) / _DEPTH).clamp_min(0)
+        return pad(image, (0, 0, _LEAKAGE, 0))
+
+
+class RadarHdPictureNet(Drawing):
+    """RadarHD's own pictures (`radarize.polar`) to those of its lidar, both of half a circle: columns are `AZIMUTHS`
+    and, as doubling them leaves the outer ones where they are, `BEAM_AZIMUTHS`."""
+
+    kind, maker = "radarhd-pictures", PictureMaker
+
+    def seen(self, maps: Maps) -> Float[Tensor, "item channel row column"]:
+        """Pictures are scaled and without leakage already."""
+        return maps.flatten(1, 2) / 255

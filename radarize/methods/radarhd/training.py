@@ -94,8 +94,15 @@ def drawn(label: Float[Tensor, "item bearing"], rows: int) -> Float[Tensor, "ite
 def pictured(
     logits: Float[Tensor, "item range direction"], label: Float[Tensor, "item bearing"]
 ) -> Float[Tensor, "item"]:
-    """0.9 cross-entropy and 0.1 Dice of pictures against scans in range bins."""
-    truth, likely = drawn(label, logits.shape[1]), torch.sigmoid(logits)
+    """How far pictures are from scans in range bins."""
+    return unlike(logits, drawn(label, logits.shape[1]))
+
+
+def unlike(
+    logits: Float[Tensor, "item range direction"], truth: Float[Tensor, "item range direction"]
+) -> Float[Tensor, "item"]:
+    """0.9 cross-entropy and 0.1 Dice of pictures."""
+    likely = torch.sigmoid(logits)
     entropy = binary_cross_entropy_with_logits(logits, truth, reduction="none").mean(dim=(1, 2))
     shared, total = (likely * truth).sum(dim=(1, 2)), (likely + truth).sum(dim=(1, 2))
     return 0.9 * entropy + 0.1 * (1 - (2 * shared + 1) / (total + 1))

@@ -24,6 +24,7 @@ from radarsim.physics.grid import Grid
 from radarsim.physics.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.physics.surface import Surface
 from radarsim.scene.scene import Scene
+from radarsim.scene.shapes import scattered
 
 #: Things a square metre at level 1: on walls (plugs, handles, screws, cables), on what stands at the height of desks
 #: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
@@ -62,10 +63,8 @@ class Clutter:
             )
         count = rng.poisson(mean)
         on = np.repeat(np.arange(len(area)), count)
-        share = rng.random((len(on), 2))
-        share[share.sum(axis=1) > 1] = 1 - share[share.sum(axis=1) > 1]  # the other half of the parallelogram
-        off = NEAREST + rng.exponential(STANDOFF, len(on))
-        place = corners[on, 0] + np.einsum("nk,nkd->nd", share, sides[on]) + off[:, None] * normals[on]
+        place = scattered(corners[on], rng)
+        place += (NEAREST + rng.exponential(STANDOFF, len(on)))[:, None] * normals[on]
         size = rng.exponential(1.0, len(on))
         self._points = replace(
             Scatterers.points(place, cross_section(size), rng.uniform(0, 2 * np.pi, len(on))),

@@ -8,6 +8,7 @@ from numba import njit, prange
 
 from radarsim.physics.amplitudes import along, dot, length, minus
 from radarsim.physics.amplitudes import vector as vec
+from radarsim.physics.apertures import outlines
 from radarsim.physics.obstacles import CLEARANCE
 from radarsim.physics.reflectors import Flat
 from radarsim.physics.search import Search
@@ -95,23 +96,12 @@ def _spread(flat: Flat, index, around, reach: float) -> tuple[Float[np.ndarray, 
     return center[owner] + at[:, :1] * u[owner] + at[:, 1:] * v[owner], owner
 
 
-@njit(inline="always")
-def _extent(corners, center, u, v):
-    """Least and largest offset of corners from a centre along u, and along v."""
-    low_u, high_u, low_v, high_v = 0.0, 0.0, 0.0, 0.0
-    for k in range(4):
-        offset = minus(vec(corners[k]), center)
-        x, y = dot(offset, u), dot(offset, v)
-        low_u, high_u, low_v, high_v = min(low_u, x), max(high_u, x), min(low_v, y), max(high_v, y)
-    return low_u, high_u, low_v, high_v
-
-
 @njit(parallel=True, cache=True)
 def _couple(flat, search, frame, firsts, found):
     """Which reflectors (columns) can follow the first ones (rows)."""
-    radius = _radius(flat.corners, flat.center)
+    radius, edges = _radius(flat.corners, flat.center), outlines(flat)
     for i in prange(len(firsts)):
-        _follow(flat, radius, search, frame, firsts[i], found[i])
+        _follow(flat, radius, search, frame, firsts[i], edges[firsts[i]], found[i])
 
 
 @njit(cache=True)
@@ -125,7 +115,7 @@ def _radius(corners, center):
 
 
 @njit(cache=True)
-def _follow(flat, radius, search, frame, a, found):
+def _follow(flat, radius, search, frame, a, window, found):
     """Either must stand before the other, and seen from the radar's image in the first, the second must overlap it, as
     a window."""
     p, ca, na = vec(search.position[frame]), vec(flat.center[a]), vec(flat.normal[a])
@@ -134,7 +124,6 @@ def _follow(flat, radius, search, frame, a, found):
     image = along(p, -2 * height, na)
     side = 1.0 if height > 0 else -1.0
     height = abs(height)
-    window = _extent(flat.corners[a], ca, ua, va)
     for b in range(len(radius)):
         if b == a:
             continue

@@ -133,3 +133,10 @@ def joined(*shapes: trimesh.Trimesh) -> trimesh.Trimesh:
     offsets = np.cumsum([0] + [len(s.vertices) for s in shapes[:-1]])
     faces = [s.faces + offset for s, offset in zip(shapes, offsets, strict=True)]
     return trimesh.Trimesh(np.concatenate([s.vertices for s in shapes]), np.concatenate(faces), process=False)
+
+
+def scattered(corners: Float[np.ndarray, "n 3 3"], rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:
+    """A random place on each of some triangles, m."""
+    share = rng.random((len(corners), 2))
+    share[share.sum(axis=1) > 1] = 1 - share[share.sum(axis=1) > 1]  # the other half of the parallelogram
+    return corners[:, 0] + np.einsum("nk,nkd->nd", share, corners[:, 1:] - corners[:, :1])

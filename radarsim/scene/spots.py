@@ -11,6 +11,7 @@ import shapely
 from jaxtyping import Bool, Float, Int
 
 from radarsim.scene.objects import SceneObject
+from radarsim.scene.shapes import scattered
 
 #: Heights over the floor, m: of tops that people put things on, of ceilings, and of what is still there: only a wall.
 TOPS, CEILINGS, WALLS = (0.6, 2.0), 2.0, 2.25
@@ -198,11 +199,9 @@ class Surroundings:
     ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
         """Random places on some triangles, and the normals there."""
         total = np.cumsum(self._areas[some])
-        which, share = rng.random(count), rng.random((count, 2))
+        which = rng.random(count)
         on = some[np.minimum(np.searchsorted(total, which * total[-1]), len(some) - 1)] if count else some[:0]
-        share[share.sum(axis=1) > 1] = 1 - share[share.sum(axis=1) > 1]  # the other half of the parallelogram
-        corners = self._corners[on]
-        return corners[:, 0] + np.einsum("nk,nkd->nd", share, corners[:, 1:] - corners[:, :1]), self._normals[on]
+        return scattered(self._corners[on], rng), self._normals[on]
 
     def fits(self, spots: Spots, rim: float, front: float, sides: float = 0.005) -> Bool[np.ndarray, "spot"]:
         """Whether whole backs lie on surfaces, and nothing is in the way.

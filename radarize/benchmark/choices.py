@@ -116,7 +116,21 @@ STRETCH = {
     "office": (375825190500141883, 7731343103967264058),
 }
 
-#: These and six of RadarHD's training walks; what score closures need, each in three or six variants of the other
+#: 60 s by hand and by cart in buildings of styles A to D with seeds 631 to 634, in the office of seed 635, and in the
+#: floor plan csail, where most walls are out of reach.
+BEARINGS = {
+    "A_0": (2247577326889971198, 7365974476725033376),
+    "A_1": (8537091727329532442,),
+    "B_0": (3881278284628967287, 7874717703389750089),
+    "B_1": (3714185869011686212,),
+    "C_0": (8923637384756785541, 2522798345798652330, 8739789426278040574),
+    "D_0": (6755935354606527698, 1449448262753671635),
+    "D_1": (5829101285874083295,),
+    "csail": (8552548879453857790, 4390975842827035232, 3052942117238848870),
+    "office": (2278561676866540566, 4493895637748088591, 7305807747917887394),
+}
+
+#: Those of `STRETCH` and six of RadarHD's training walks; what score closures need, each in three or six variants of the other
 #: settings, so that luck counts for less.
 CLOSURES = STRETCH | {Walk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
 
@@ -137,7 +151,8 @@ CHOICES = (
     Choice("what closures need and count for in the back end's preset radar, and its cells", CLOSURES),
     Choice("by how much larger sines of azimuth are taken to match turns", STRETCH),
     Choice("how many rays tell whether a mirrored path is partly clear", {"office": (3,), "buildings/b": (3,)}),
-    Choice("the compass and what tells speeds beyond the limit", {"office": (9501, 9502)}),
+    Choice("how bearings of strong echoes tell turns, and what turns claim", BEARINGS),
+    Choice("what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),
     Choice("scans and the back end's preset radar", {"office": (7,)}),

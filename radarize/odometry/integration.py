@@ -15,10 +15,6 @@ from radarize.pose import compose, exponential
 from radarize.radar.config import RadarConfig
 from radarize.stopwatch import stage
 
-#: Standard deviation of a step's heading as a share of its turn, on top of the estimator's own. A local map that lags
-#: in a turn lags in all its frames: errors of up to 6 deg a corner add up instead of averaging out, and independent
-#: steps can only say so if each claims more.
-TURN_SPREAD = 0.2
 #: m/s^1.5 and s: between two frames velocity is a random walk whose ends are known, and a smooth one over less than a
 #: second. What that adds to a step is within a fifth of what true velocities by hand do, over 0.2 to 2 s (data set
 #: odometry-choice: four handheld walks of 20 s in buildings A to D of seed 201).
@@ -44,7 +40,15 @@ class VelocityEstimator(Protocol):
 
 
 class RotationEstimator(Protocol):
-    """Yaw increments from frame to frame, given the filtered velocities."""
+    """Yaw increments from frame to frame, given the filtered velocities.
+
+    Attributes:
+        lag: standard deviation of a turn as a share of it, beside what is claimed of it. Who lags in a turn lags in all
+            of its frames: errors of up to 6 deg a corner add up instead of averaging out, and independent steps can
+            only say so if each claims more.
+    """
+
+    lag: float
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations: ...
 
@@ -158,7 +162,7 @@ class Odometry:
                 dt = times[i] - time
                 step[i] = exponential(dt * (last_velocity + velocity) / 2, rotations.yaw[i])
                 covariance[i, :2, :2] = dt**2 / np.tanh(dt / (2 * _LASTING)) * (last_spread + spread) / 2
-                covariance[i, 2, 2] = min(rotations.variance[i] + (TURN_SPREAD * rotations.yaw[i]) ** 2, np.pi**2)
+                covariance[i, 2, 2] = min(rotations.variance[i] + (self.rotation.lag * rotations.yaw[i]) ** 2, np.pi**2)
                 covariance[i, :2, :2] += np.eye(2) * _BRIDGED**2 * dt**3 / 12 * dt**2 / (dt**2 + _SMOOTH**2)
             self._last = (times[i], velocity, spread)
             self._pose = pose[i] = compose(self._pose, step[i])

@@ -5,6 +5,9 @@ lose their overlap in turns. A local map that forgets slowly has both spacings a
 at the position that the velocities predict, at a fan of yaws around the predicted one; the best correlation
 marks its yaw, and the map is renewed there. As long as landmarks stay in view, errors do not accumulate.
 
+What the map says joins what bearings of strong echoes and walls that are met again say (`radarize.odometry.bearings`)
+in one filter: of the heading, its rate, the angle at which the map lies, and what of echoes and walls is not known.
+
 Three things decide what a frame looks like to the matcher (`MapRotation.features`):
 
 - A wall's specular flash is no landmark: it follows the foot of the perpendicular as the sensor passes. It is 40 dB
@@ -24,8 +27,10 @@ from torch.nn.functional import avg_pool1d
 
 from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
-from radarize.odometry.compass import Compass, Strongest, Turn
+from radarize.odometry.bearings import OWN, YAW, Bearings
 from radarize.odometry.doppler import Velocities
+from radarize.odometry.echoes import Echo, Echoes
+from radarize.odometry.gaussian import Gaussian
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.ties import wandered
 from radarize.plain import Frozen, setting
@@ -41,15 +46,12 @@ _SIGMAS = 3.0
 _INDEPENDENT = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
 _ASTRAY = np.radians(45.0)
-#: Probability from which on an echo is a wall's flash to the map, and m to either side of it, where it hides the rest.
-_FLASH, _RING = 0.9, 0.1
-#: Of the variance of the yaw in the map, what stays in the sum of steps: the next frames, matched with the same map,
-#: take back the rest, and the more the longer it remembers. Chosen with `memory`, on the same walks.
-_LASTING = 0.2
-#: rad: standard deviation of the compass from which on it tells the turn even where no match does.
-_SURE = np.radians(0.3)
-#: s over which what is predicted may contradict the compass before it is believed less.
-_DISSENT = 0.33
+#: rad/s^0.5: claims of turns add up to the most that the heading has ever been unsure of, and to this much.
+_JITTER = np.radians(0.7)
+#: m to either side of a wall's flash, where it hides the rest.
+_RING = 0.1
+#: Places in the filter of the turning rate, and of the angle at which the map lies.
+_RATE, _MAP = 1, 2
 
 
 @dataclass(frozen=True)
@@ -93,8 +95,9 @@ class RotationConfig(Frozen):
     fastest: float = setting(np.radians(60.0), "rad/s, standard deviation of a rate not known at all", gt=0)
     yaw_noise: float = setting(np.radians(0.3), "rad, standard deviation of a match of correlation 1", gt=0)
     guided_yaw_noise: float = setting(
-        np.radians(0.8), "rad, the same beside a network: a map that lags in a turn misleads many matches alike", gt=0
+        np.radians(1.6), "rad, the same beside a network: a map that lags in a turn misleads many matches alike", gt=0
     )
+    doubt: float = setting(4.0, "by how much more the variance of a network's turn is than it says", ge=1)
     least_correlation: float = setting(0.15, "a match below it is not believed", ge=0, lt=1)
     unseen: float = setting(
         np.radians(20.0), "rad/s^0.5, by how much yaw may wander where no match is believed, beside what the filter or "
@@ -111,6 +114,9 @@ class MapRotation:
 
     Args:
         prior: estimator of turns, to start the search from.
+
+    Attributes:
+        lag: see `RotationEstimator`.
     """
 
     def __init__(
@@ -120,16 +126,17 @@ class MapRotation:
         self._sines = np.linspace(-s.field, s.field, s.columns)
         self._heatmaps = Heatmaps(heatmaps.config, np.arcsin(self._sines), heatmaps.settings)
         self._first = int(np.searchsorted(heatmaps.ranges, s.min_range))
-        self._bearings = s.stretch * self._sines  # sines of where the cells lie
+        self._bearing_sines = s.stretch * self._sines  # sines of where the cells lie
         self._ranges = heatmaps.ranges[:_RANGES][self._first :]
         self._map = LocalMap(self._ranges[-1], s.cell)
-        self._compass, self._dissent = Compass(heatmaps, self._first), 0.0
-        self._noise = s.yaw_noise if prior is None else s.guided_yaw_noise
+        self._state = Gaussian(np.zeros(OWN))
+        self._state.covariance[_RATE, _RATE] = s.fastest**2
+        self._echoes, self._bearings = Echoes(heatmaps, self._first), Bearings(heatmaps, self._state)
+        self._noise, self.lag = (s.yaw_noise, 0.2) if prior is None else (s.guided_yaw_noise, 0.0)
         self._time: float | None = None
         self._velocity = self._position = np.zeros(2)
-        self._heading = np.zeros(2)  # yaw in the map, rate
-        self._spread = np.diag([0.0, s.fastest**2])
         self._prior = prior
+        self._unsurest = 0.0  # rad^2, that the heading has ever been
 
     def features(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
@@ -146,97 +153,99 @@ class MapRotation:
         surroundings = _box_mean(_box_mean(level, _TEXTURE[1]).mT, _TEXTURE[0]).mT
         return (level - surroundings).contiguous().numpy()
 
-    def echoes(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> list[Strongest]:
+    def echoes(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> list[list[Echo]]:
         """The strongest of each frame."""
-        return [self._compass.strongest(cells) for cells in spectrum[:, :_RANGES].numpy()]
+        return [self._echoes.of(cells) for cells in spectrum[:, :_RANGES].numpy()]
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Yaw increments of the next frames, given their velocities."""
         told = None if self._prior is None else self._prior.estimate(batch, velocities)
         yaw, variance, seen = np.zeros(len(batch)), np.zeros(len(batch)), np.ones(len(batch), bool)
         shown = zip(self.features(batch.spectrum), self.echoes(batch.spectrum), strict=True)
-        for i, (feature, echo) in enumerate(shown):
-            view = View(feature, self._ranges, self._bearings)
+        for i, (feature, echoes) in enumerate(shown):
+            view = View(feature, self._ranges, self._bearing_sines)
             time, velocity = float(batch.centers[i]), velocities.velocity[i]
+            dt = self.settings.memory if self._time is None else time - self._time
             if self._time is not None:
                 turn = None if told is None else (told.yaw[i], told.variance[i])
-                yaw[i], variance[i], seen[i] = self._turn(view, time - self._time, velocity, turn, echo)
-            dt = self.settings.memory if self._time is None else time - self._time
-            self._position = self._map.follow(self._position)
-            self._map.blend(view, self._position, self._heading[0], -np.expm1(-dt / self.settings.memory))
+                yaw[i], variance[i], seen[i] = self._turn(view, time, dt, velocity, turn, echoes)
+            self._join(view, -np.expm1(-dt / self.settings.memory))
             self._time, self._velocity = time, velocity
         return Rotations(yaw, variance, seen if told is None else seen | told.seen)
 
     def _turn(
         self,
         view: View,
+        time: float,
         dt: float,
         velocity: Float[np.ndarray, "2"],
         told: tuple[float, float] | None,
-        echo: Strongest,
+        echoes: list[Echo],
     ) -> tuple[float, float, bool]:
-        """Yaw increment to a frame `dt` s after the last one, its variance, and whether a match was believed."""
-        start, known = self._heading[0], self._spread[0, 0]
+        """Yaw increment to a frame `dt` s after the last one, its variance, and whether anything told it."""
+        state, mean = self._state, (self._velocity + velocity) / 2
+        start, laid = state.mean[YAW], self._laid
         self._predict(dt, told)
-        turn = self._compass.turn(echo, dt, (self._velocity + velocity) / 2, self._heading[0] - start)
-        if turn is not None:
-            self._steer(start, known, dt, turn)
-            if turn.flash > _FLASH:  # no landmark: it slides along the wall as the sensor does
-                view.feature[np.abs(self._ranges - echo.range) < _RING] = 0.0
-        middle = (start + self._heading[0]) / 2
+        self._bearings.move(dt, mean)
+        seen = self._bearings.see(time, echoes, velocity)
+        middle = (laid + self._laid) / 2
         c, d = np.cos(middle), np.sin(middle)
-        self._position = self._position + dt * np.array([[c, -d], [d, c]]) @ ((self._velocity + velocity) / 2)
-        sure = turn is not None and turn.variance < _SURE**2
-        growth = max(self._spread[0, 0] - known, 0.0) + (0.0 if sure else self.settings.unseen**2 * dt)
-        if self._spread[0, 0] > _ASTRAY**2:
-            self._map.forget()
-            turned = self._heading[0] - start
-            self._heading, self._spread = np.zeros(2), np.diag([0.0, self.settings.fastest**2])
-            return turned, growth, False
-        offset, correlation = self._match(view)
-        if correlation < self.settings.least_correlation:
-            return self._heading[0] - start, growth, sure
-        gain = self._spread[:, 0] / (self._spread[0, 0] + (self._noise / correlation) ** 2)
-        self._heading = self._heading + gain * offset
-        self._spread = self._spread - np.outer(gain, self._spread[0])
-        return self._heading[0] - start, _LASTING * self._spread[0, 0], True
+        self._position = self._position + dt * np.array([[c, -d], [d, c]]) @ mean
+        seen = self._match(view) or seen
+        growth = max(state.covariance[YAW, YAW] - self._unsurest, 0.0)
+        self._unsurest += growth
+        wander = _JITTER**2 if seen else self.settings.unseen**2
+        return state.mean[YAW] - start, growth + wander * dt, seen
+
+    @property
+    def _laid(self) -> float:
+        """Yaw in the map."""
+        return float(self._state.mean[YAW] - self._state.mean[_MAP])
 
     def _predict(self, dt: float, told: tuple[float, float] | None) -> None:
         """Yaw and rate `dt` s later: by the rate, or by what another estimator says of the turn and its variance."""
+        state = self._state
         if told is None:
-            transition = np.array([[1.0, dt], [0.0, 1.0]])
-            self._heading = transition @ self._heading
-            self._spread = transition @ self._spread @ transition.T + wandered(self.settings.wander, dt)
+            state.replace(YAW, state.row({YAW: 1.0, _RATE: dt}))
+            state.covariance[: _RATE + 1, : _RATE + 1] += wandered(self.settings.wander, dt)
         else:
-            turn, variance = told
-            self._heading = np.array([self._heading[0] + turn, turn / dt])
-            self._spread = np.diag([self._spread[0, 0] + variance, variance / dt**2])
+            state.mean[YAW] += told[0]
+            state.covariance[YAW, YAW] += self.settings.doubt * told[1]
 
-    def _steer(self, start: float, known: float, dt: float, turn: Turn) -> None:
-        """Update the turn since the last frame, when the yaw was `start` and of variance `known`, by the compass.
+    def _join(self, view: View, share: float) -> None:
+        """A frame joins the map, which then lies as far wrong as its frames do on average."""
+        self._position = self._map.follow(self._position)
+        self._map.blend(view, self._position, self._laid, share)
+        lies = self._state.mean[_MAP]
+        self._state.replace(_MAP, self._state.row({YAW: share, _MAP: 1 - share}))
+        self._state.mean[_MAP] = lies  # where the frame was laid is no news
 
-        Where the prediction contradicts the compass for some time, it is wrong without knowing.
-        """
-        innovation = turn.yaw - (self._heading[0] - start)
-        self._dissent = np.exp(-dt / _DISSENT) * self._dissent + innovation
-        allowed = _SIGMAS**2 * turn.variance * _DISSENT / dt
-        doubt = dt / _DISSENT * max(self._dissent**2 - allowed, 0.0)
-        growth = max(self._spread[0, 0] - known, 0.0) + doubt
-        gain = growth / (growth + turn.variance)
-        self._spread[0, 0] += doubt
-        whole = self._spread[0, 0]
-        along = self._spread[:, 0] / whole
-        self._heading = self._heading + gain * innovation * along
-        self._spread = self._spread - min(gain * growth, whole) * np.outer(along, along)
+    def _match(self, view: View) -> bool:
+        """Correct the filter by how the frame lies in the map, and say whether that is known."""
+        for flash in self._bearings.flashes:  # no landmarks: they slide along walls as the sensor does
+            view.feature[np.abs(self._ranges - flash) < _RING] = 0.0
+        row = self._state.row({YAW: 1.0, _MAP: -1.0})
+        spread = np.sqrt(max(self._state.variance(row), 0.0))
+        if spread > _ASTRAY:
+            self._map.forget()
+            self._state.replace(_MAP, self._state.row({YAW: 1.0}))
+            self._state.replace(_RATE, self._state.row({}))
+            self._state.covariance[_RATE, _RATE] = self.settings.fastest**2
+            return False
+        offset, correlation = self._fit(view, spread)
+        if correlation < self.settings.least_correlation:
+            return False
+        self._state.update(row, offset, (self._noise / correlation) ** 2)
+        return True
 
-    def _match(self, view: View) -> tuple[float, float]:
+    def _fit(self, view: View, spread: float) -> tuple[float, float]:
         """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is
         none."""
         s = self.settings
-        fan = np.clip(_SIGMAS * np.sqrt(self._spread[0, 0]), s.fan, s.widest)
+        fan = np.clip(_SIGMAS * spread, s.fan, s.widest)
 
         def correlate(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return self._map.correlate(view, self._position, self._heading[0] + offsets)
+            return self._map.correlate(view, self._position, self._laid + offsets)
 
         coarse = 3 * s.step * np.arange(-np.ceil(fan / (3 * s.step)), np.ceil(fan / (3 * s.step)) + 1)
         correlation, overlap = correlate(coarse)

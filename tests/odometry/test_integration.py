@@ -184,6 +184,8 @@ def test_a_turn_that_nothing_is_seen_of_is_claimed():
 class Told:
     """Estimators whose answers are known: a velocity straight ahead, a rate of turning."""
 
+    lag = 0.2
+
     def __init__(self, speed=1.0, rate=0.0, lever=0.0, variance=1e-6):
         self.speed, self.rate, self.lever, self.variance, self.last = speed, rate, lever, variance, 0.0
 

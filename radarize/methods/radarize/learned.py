@@ -57,8 +57,11 @@ class LearnedRotation:
     one Gaussian state (`Ties`), which goes on at its rate where frames are lost.
 
     Attributes:
+        lag: see `RotationEstimator`.
         spacings: the radar's frames over which turns are measured, ascending.
     """
+
+    lag = 0.2
 
     def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):
         settings = settings or TurnConfig()

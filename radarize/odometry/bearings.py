@@ -1,0 +1,209 @@
+"""Turns told by the bearings of strong echoes that are followed from frame to frame, and by walls that are met again.
+
+The bearing of an echo in the world is the heading plus its bearing in the sensor's frame. For a post or a corner it
+moves by its parallax, the velocity across over the range; for a wall's specular flash it stays the wall's normal
+wherever the sensor goes. One number tells the two apart, the share of its parallax by which an echo moves: 1 or 0. It
+is a number of the filter, as is the echo's bearing in the world, so that whatever tells of turns tells which of the two
+an echo is, other echoes above all; and as long as it is followed it tells of the whole turn since it was first seen, so
+that errors do not add up from frame to frame. Range and Doppler shift cannot tell: a slide along a wall and a circle
+about a post look the same.
+
+Walls are remembered. Most of a building's stand at right angles, so one that is met says how far the heading has
+drifted since another one was seen. Which one that was is weighed as in a Chinese restaurant process (Aldous, 1985): a
+known direction by how many walls had it and how well it fits, a new one by a constant. Only what is hardly in doubt is
+used, so that in a building without right angles nothing is.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize.heatmaps import Heatmaps
+from radarize.odometry.echoes import Echo
+from radarize.odometry.gaussian import Gaussian, Row
+from radarize.pose import wrap
+
+#: Place of the heading in the filter, and where the numbers begin that are kept here.
+YAW, OWN = 0, 3
+#: m and m/s: by how much an echo may be off what is expected of it in the next frame to be taken for the same; of its
+#: bearing, standard deviations.
+_RANGE, _SPEED, _SIGMAS = 0.06, 0.25, 2.5
+#: Antennas in a row that tell directions apart; with fewer, two echoes look like one between them.
+_ANTENNAS = 4
+#: Standard deviation of a sine as a share of the beam's width, and rad/s^0.5: what a bearing in the world wanders.
+_NOISE, _WANDER = 0.04, np.radians(0.3)
+#: So many are followed at most, for so many s without being seen; nearer to each other, m and rad, they are one.
+_MOST, _LOST, _APART = 8, 0.21, (0.1, np.radians(10.0))
+#: Shares of parallax: standard deviations by which those of flashes and posts may differ from 0 and 1 until it is
+#: known which of them they are, and from then on, the post's for a range of 1 m beside `_OFF`, m, of its range.
+_SHARES, _ROUGH, _EXACT, _OFF = np.array([0.0, 1.0]), np.array([0.02, 0.06]), np.array([0.003, 0.015]), 0.02
+#: Log-odds from which on an echo is one of the two, its share being known this well, and standard deviations from both
+#: beyond which it is neither, such as a path over two walls or something that moves.
+_SURE, _KNOWN, _NEITHER = 10.0, 0.245, 3.5
+#: Frames in which a wall was seen before its normal counts; rad, by which normals of walls are not quite at right
+#: angles; walls that a new direction counts for; probability from which on one is met again; directions remembered.
+_LASTING, _SQUARE, _NEW, _CERTAIN, _DIRECTIONS = 5, np.radians(0.5), 0.5, 0.9, 6
+
+
+@dataclass
+class Followed:
+    """An echo that is followed.
+
+    Attributes:
+        echo: as it was seen last, its range kept up to now.
+        seen: when that was, s.
+        frames: in which it was.
+        parallax: rad, by what the bearing of a post would have moved since it was seen first.
+        kind: 0, a wall's flash; 1, a post; None as long as nobody knows.
+        met: its wall was looked up among those that are remembered.
+    """
+
+    echo: Echo
+    seen: float
+    frames: int = 1
+    parallax: float = 0.0
+    kind: int | None = None
+    met: bool = False
+
+
+class Bearings:
+    """Follows echoes; frames are pushed in order.
+
+    Args:
+        heatmaps: of the radar.
+        state: the filter, `OWN` numbers of which are others', the heading at `YAW`. Behind them stand normals of walls
+            that are remembered, then of each followed echo its bearing in the world at first, and its share.
+    """
+
+    def __init__(self, heatmaps: Heatmaps, state: Gaussian):
+        self._state = state
+        self._span = 2 * heatmaps.config.max_velocity
+        self._range = max(_RANGE, (heatmaps.ranges[1] - heatmaps.ranges[0]) / 2)
+        self._useful = len(heatmaps.row) >= _ANTENNAS
+        self._noise = _NOISE * 2 / max(len(heatmaps.row), 1)  # antennas stand half a wavelength apart
+        self._walls: list[int] = []  # how many had each of the directions
+        self._followed: list[Followed] = []
+        self._time = -np.inf
+
+    @property
+    def flashes(self) -> list[float]:
+        """Ranges of the walls' flashes in the last frame, m."""
+        return [each.echo.range for each in self._followed if each.kind == 0 and each.seen == self._time]
+
+    def move(self, dt: float, velocity: Float[np.ndarray, "2"]) -> None:
+        """Let `dt` s pass at a velocity (m/s, sensor frame); the heading has moved already."""
+        for k, each in enumerate(self._followed):
+            bearing = float(self._row(k) @ self._state.mean)
+            ahead = np.array([np.cos(bearing), np.sin(bearing)])
+            away = each.echo.range - dt * float(velocity @ ahead)
+            each.echo = each.echo._replace(range=away)
+            each.parallax -= dt * float(velocity[1] * ahead[0] - velocity[0] * ahead[1]) / max(away, 0.1)
+            self._state.covariance[self._place(k), self._place(k)] += _WANDER**2 * dt
+
+    def see(self, time: float, echoes: Sequence[Echo], velocity: Float[np.ndarray, "2"]) -> bool:
+        """Correct the filter by a frame's echoes; False if nothing known is among them, so that they tell no turn."""
+        self._time, told = time, False
+        self._keep([k for k, each in enumerate(self._followed) if time - each.seen < _LOST])
+        new = [echo for echo in echoes if self._stands(echo, velocity)] if self._useful else []
+        for k, each in enumerate(self._followed):
+            if (echo := self._again(k, each, new)) is not None:
+                new.remove(echo)
+                each.echo, each.seen, each.frames = echo, time, each.frames + 1
+                told |= each.kind is not None
+        self._keep([k for k, each in enumerate(self._followed) if self._judge(k, each)])
+        for echo in new:
+            if len(self._followed) < _MOST and not any(self._beside(echo, each) for each in self._followed):
+                self._follow(echo, time)
+        for k, each in enumerate(self._followed):
+            if each.kind == 0 and not each.met and each.seen == self._time and each.frames > _LASTING:
+                each.met = True
+                self._meet(k)
+        return told
+
+    def _place(self, k: int) -> int:
+        return OWN + len(self._walls) + 2 * k
+
+    def _row(self, k: int) -> Row:
+        """The k-th followed echo's bearing in the sensor's frame."""
+        place = self._place(k)
+        return self._state.row({place: 1.0, place + 1: self._followed[k].parallax, YAW: -1.0})
+
+    def _variance(self, echo: Echo) -> float:
+        return (self._noise / np.cos(echo.bearing)) ** 2
+
+    def _beside(self, echo: Echo, each: Followed) -> bool:
+        off = abs(each.echo.range - echo.range), abs(each.echo.bearing - echo.bearing)
+        return each.seen == self._time and off[0] < _APART[0] and off[1] < _APART[1]
+
+    def _stands(self, echo: Echo, velocity: Float[np.ndarray, "2"]) -> bool:
+        closing = velocity[0] * np.cos(echo.bearing) + velocity[1] * np.sin(echo.bearing)
+        return abs((echo.speed - closing + self._span / 2) % self._span - self._span / 2) < _SPEED
+
+    def _again(self, k: int, each: Followed, new: list[Echo]) -> Echo | None:
+        """Which of new echoes the k-th is, if any; the filter learns its bearing."""
+        near = [echo for echo in new if abs(echo.range - each.echo.range) < self._range]
+        if not near:
+            return None
+        row = self._row(k)
+        expected = float(row @ self._state.mean)
+        echo = min(near, key=lambda echo: abs(wrap(echo.bearing - expected)))
+        off, variance = float(wrap(echo.bearing - expected)), self._variance(echo)
+        if off**2 > _SIGMAS**2 * (self._state.variance(row) + variance):
+            return None
+        self._state.update(row, off, variance)
+        return echo
+
+    def _judge(self, k: int, each: Followed) -> bool:
+        """Say what the k-th is, once it is known; False if it is neither a flash nor a post."""
+        if each.kind is not None or each.parallax == 0:
+            return True
+        place = self._place(k) + 1
+        share, variance = self._state.mean[place], self._state.covariance[place, place]
+        odds = -((share - _SHARES) ** 2) / (variance + _ROUGH**2) / 2
+        if odds.max() < -(_NEITHER**2) / 2:
+            return False
+        if abs(odds[0] - odds[1]) > _SURE and variance < _KNOWN**2:
+            each.kind = int(odds.argmax())
+            off = np.hypot(_EXACT[each.kind], each.kind * _OFF / each.echo.range)
+            self._state.update(self._state.row({place: 1.0}), _SHARES[each.kind] - share, off**2)
+        return True
+
+    def _keep(self, stay: list[int]) -> None:
+        if len(stay) < len(self._followed):
+            places = [place for k in stay for place in (self._place(k), self._place(k) + 1)]
+            self._state.keep([*range(OWN + len(self._walls)), *places])
+            self._followed = [self._followed[k] for k in stay]
+
+    def _follow(self, echo: Echo, time: float) -> None:
+        """From now on; half of its parallax is as good a guess as any, and flashes and posts are half off."""
+        state, end = self._state, len(self._state.mean)
+        state.add(end, state.row({YAW: 1.0}), echo.bearing, self._variance(echo))
+        state.add(end + 1, state.row({}), 0.5, 0.5**2)
+        self._followed.append(Followed(echo, time))
+
+    def _meet(self, k: int) -> None:
+        """Look the k-th's wall up among the directions that are remembered."""
+        state, place = self._state, self._place(k)
+        rows = [state.row({place: 1.0, OWN + wall: -1.0}) for wall in range(len(self._walls))]
+        off = np.array([-_past_right_angle(row @ state.mean) for row in rows])
+        variances = np.array([state.variance(row) + _SQUARE**2 for row in rows])
+        likely = self._walls * np.exp(-(off**2) / variances / 2) / np.sqrt(2 * np.pi * variances)
+        share = likely / (likely.sum() + _NEW / (np.pi / 2))
+        best = int(share.argmax()) if len(share) else 0
+        if len(share) and share[best] > _CERTAIN:
+            state.update(rows[best], off[best], _SQUARE**2)
+            self._walls[best] += 1
+        elif share.sum() < 0.5:
+            if len(self._walls) == _DIRECTIONS:
+                rarest = int(np.argmin(self._walls))
+                state.keep([place for place in range(len(state.mean)) if place != OWN + rarest])
+                self._walls.pop(rarest)
+            state.add(OWN + len(self._walls), state.row({self._place(k): 1.0}), 0.0, 0.0)
+            self._walls.append(1)
+
+
+def _past_right_angle(angle: float) -> float:
+    """An angle less the nearest multiple of a right one."""
+    return float((angle + np.pi / 4) % (np.pi / 2) - np.pi / 4)

@@ -130,9 +130,11 @@ BEARINGS = {
     "office": (2278561676866540566, 4493895637748088591, 7305807747917887394),
 }
 
+REAL = {Walk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
+
 #: Those of `STRETCH` and six of RadarHD's training walks; what score closures need, each in three or six variants of
 #: the other settings, so that luck counts for less.
-CLOSURES = STRETCH | {Walk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
+CLOSURES = STRETCH | REAL
 
 #: RadarHD's training walks, one by one and all together.
 PICTURES = {Walk.radarhd(number).scene: (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
@@ -148,7 +150,8 @@ CHOICES = (
         "claim of velocities",
         RADARS,
     ),
-    Choice("what closures need and count for in the back end's preset radar, and its cells", CLOSURES),
+    Choice("what closures need in the back end's preset radar, and its cells", CLOSURES),
+    Choice("what matches and closures count for in the back end's preset radar", BEARINGS | REAL),
     Choice("by how much larger sines of azimuth are taken to match turns", STRETCH),
     Choice("how many rays tell whether a mirrored path is partly clear", {"office": (3,), "buildings/b": (3,)}),
     Choice("how bearings of strong echoes tell turns, and what turns claim", BEARINGS),

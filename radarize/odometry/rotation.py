@@ -46,8 +46,9 @@ _SIGMAS = 3.0
 _INDEPENDENT = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
 _ASTRAY = np.radians(45.0)
-#: rad/s^0.5: claims of turns add up to the most that the heading has ever been unsure of, and to this much.
-_JITTER = np.radians(0.7)
+#: rad/s^0.5, what every step claims; and s for which it is remembered by how much the heading became surer: what it
+#: loses of that is no news, so that claims of steps add up to how unsure of it the filter is.
+_JITTER, _SURER = np.radians(0.6), 10.0
 #: m to either side of a wall's flash, where it hides the rest.
 _RING = 0.1
 #: Places in the filter of the turning rate, and of the angle at which the map lies.
@@ -136,7 +137,7 @@ class MapRotation:
         self._time: float | None = None
         self._velocity = self._position = np.zeros(2)
         self._prior = prior
-        self._unsurest = 0.0  # rad^2, that the heading has ever been
+        self._surer = 0.0  # rad^2
 
     def features(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
@@ -184,7 +185,7 @@ class MapRotation:
     ) -> tuple[float, float, bool]:
         """Yaw increment to a frame `dt` s after the last one, its variance, and whether anything told it."""
         state, mean = self._state, (self._velocity + velocity) / 2
-        start, laid = state.mean[YAW], self._laid
+        start, laid, known = state.mean[YAW], self._laid, state.covariance[YAW, YAW]
         self._predict(dt, told)
         self._bearings.move(dt, mean)
         seen = self._bearings.see(time, echoes, velocity)
@@ -192,10 +193,10 @@ class MapRotation:
         c, d = np.cos(middle), np.sin(middle)
         self._position = self._position + dt * np.array([[c, -d], [d, c]]) @ mean
         seen = self._match(view) or seen
-        growth = max(state.covariance[YAW, YAW] - self._unsurest, 0.0)
-        self._unsurest += growth
-        wander = _JITTER**2 if seen else self.settings.unseen**2
-        return state.mean[YAW] - start, growth + wander * dt, seen
+        growth = state.covariance[YAW, YAW] - known - np.exp(-dt / _SURER) * self._surer
+        self._surer = max(-growth, 0.0)
+        wander = _JITTER if seen else self.settings.unseen
+        return state.mean[YAW] - start, max(growth, 0.0) + wander**2 * dt, seen
 
     @property
     def _laid(self) -> float:

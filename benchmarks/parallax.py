@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
-from scipy.ndimage import maximum_filter, uniform_filter1d
+from scipy.ndimage import convolve1d, maximum_filter
 
 from benchmarks.results import Data, command_line, publish
 from benchmarks.results import Walk as Facts
@@ -72,7 +72,7 @@ def followed(
     pictures: Iterator[UInt8[np.ndarray, "range azimuth"]], poses: Float[np.ndarray, "frame 3"]
 ) -> Iterator[Followed]:
     """Strong cells of pictures at poses (x, y, yaw; nan: not known), one every `PERIOD`."""
-    place = uniform_filter1d(poses[:, :2], _SMOOTH, axis=0, mode="nearest")
+    place = convolve1d(poses[:, :2], np.full(_SMOOTH, 1 / _SMOOTH), axis=0, mode="nearest")
     velocity = np.gradient(place, PERIOD, axis=0)
     kept: list[Followed] = []
     for frame, (picture, (x, y), yaw) in enumerate(zip(pictures, velocity, poses[:, 2], strict=True)):

@@ -171,7 +171,7 @@ PRESETS: dict[str, SlamConfig] = {
             alike=16,
         ),
         loop=LoopConfig(
-            radius=8.0, distance=3.0, angle=0.5, candidates=5, every=4, nodes=8, front=0.25, min_score=0.55,
+            radius=8.0, distance=3.0, angle=1.0, candidates=5, every=4, nodes=8, front=0.25, min_score=0.55,
             final_score=0.4, levels=4, sigma=2.0, translation_floor=0.02, rotation_floor=0.012,
         ),
     ),

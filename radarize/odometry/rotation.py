@@ -99,8 +99,8 @@ class RotationConfig(Frozen):
         np.radians(1.6), "rad, the same beside a network: a map that lags in a turn misleads many matches alike", gt=0
     )
     doubt: float = setting(
-        4.0, "by how much more the variance of a network's turn is than it says; chosen, as the noise beside it and what "
-        "bearings are believed, on 15 walks: heading is off by 0.9 instead of 3.0 deg on average", ge=1
+        4.0, "by how much more the variance of a network's turn is than it says; chosen with the noise above and with "
+        "what bearings are believed on 15 walks: heading is off by 0.9 deg on average instead of 3.0", ge=1
     )  # fmt: skip
     least_correlation: float = setting(0.15, "a match below it is not believed", ge=0, lt=1)
     unseen: float = setting(

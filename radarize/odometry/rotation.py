@@ -62,7 +62,8 @@ class Rotations:
     Attributes:
         yaw: (frame,) rad, positive to the left; zero for the very first frame.
         variance: (frame,) rad^2.
-        seen: (frame,) False where nothing was measured of it: the turn is what went before, or nothing.
+        seen: (frame,) False where nothing was measured of it: the turn is what went before, or what a network makes of
+            next to no echoes, which may be off by all that the sensor turned.
     """
 
     yaw: Float[np.ndarray, "frame"]
@@ -175,7 +176,7 @@ class MapRotation:
                 yaw[i], variance[i], seen[i] = self._turn(view, time, dt, velocity, turn, echoes)
             self._join(view, -np.expm1(-dt / self.settings.memory))
             self._time, self._velocity = time, velocity
-        return Rotations(yaw, variance, seen if told is None else seen | told.seen)
+        return Rotations(yaw, variance, seen)
 
     def _turn(
         self,

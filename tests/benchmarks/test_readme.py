@@ -79,3 +79,28 @@ def test_other_radars_are_those_of_the_results():
         figures = [f"{row[name]:.0f}" for name in ("map F1 %", "within 10 cm %") for row in (without, chosen)]
         line = " | ".join([without["SLAM m"], chosen["SLAM m"], *figures])
         assert f"| {line} |" in text, (radar, line)
+
+
+def test_walks_never_looked_at_are_those_of_the_results():
+    found = json.loads((ROOT / "benchmarks" / "results" / "unseen.json").read_text())["tables"]
+    rows = {row["on"]: row for row in found[0]["rows"]}
+    page, readme = ((ROOT / name).read_text() for name in ("docs/about/results.md", "README.md"))
+    for title, kind in (("fused odometry", "odometry"), ("SLAM with it", "SLAM")):
+        means = [rows[on][f"{kind} m"] for on in ("handheld", "cart", "robot", "all")]
+        worst = max(row[f"{kind} m"] for row in found[1]["rows"])
+        assert f"| {title} | {' | '.join(means)} | {worst:.3f} |" in page
+    odometry, slam = (float(rows["all"][f"{kind} m"].split()[0]) for kind in ("odometry", "SLAM"))
+    assert f"{odometry:.2f} and {slam:.3f} m" in readme.replace("\n", " ")
+
+
+def test_how_strong_echoes_move_is_that_of_the_results():
+    (row,) = json.loads((ROOT / "benchmarks" / "results" / "parallax.json").read_text())["tables"][0]["rows"]
+    text = " ".join((ROOT / "docs/about/results.md").read_text().split())
+    posts, flashes, between = (row[f"{share}, %"] for share in ("0.75 to 1.25", "-0.2 to 0.2", "0.2 to 0.5"))
+    assert f"{row['echoes']} strong echoes" in text
+    for words in (
+        f"For {posts:.0f} % of their frames",
+        f"for {flashes:.0f} % by none",
+        f"for {between:.0f} % by 0.2 to 0.5",
+    ):
+        assert words in text, words

@@ -122,6 +122,18 @@ def test_what_a_blind_second_claims_does_not_depend_on_the_frame_rate(rate):
     assert found.variance.sum() == pytest.approx(np.radians(5) ** 2 + s.wander**2 / 3 + s.unseen**2, rel=1e-6)
 
 
+def test_what_a_network_makes_of_nothing_is_no_sight():
+    """It goes on to tell turns, and sounds sure; whoever trusts them is told that nothing was seen."""
+    rotation = MapRotation(SIGNAL.heatmaps, prior=Unsure(np.zeros(31), 0))
+    shape = len(rotation._ranges), len(rotation._sines)
+    rotation.features = lambda frames: np.zeros((len(frames), *shape), np.float32)
+    rotation.echoes = lambda frames: [[]] * len(frames)
+    known = Velocities(np.zeros((31, 2)), np.tile(1e-4 * np.eye(2), (31, 1, 1)), np.full(31, 50), np.ones(31, bool))
+    found = rotation.estimate(of_spectrum(SIGNAL, np.arange(31), np.arange(31) / 30), known)
+    assert not found.seen[1:].any()
+    assert np.sqrt(found.variance.sum()) > rotation.settings.unseen
+
+
 def test_a_map_that_is_left_behind_is_empty():
     rng = np.random.default_rng(3)
     ranges, sines = np.arange(0.2, 4, 0.045), np.linspace(-0.85, 0.85, 69)

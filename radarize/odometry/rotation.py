@@ -209,13 +209,16 @@ class MapRotation:
 
     def _predict(self, dt: float, told: tuple[float, float] | None) -> None:
         """Yaw and rate `dt` s later: by the rate, or by what another estimator says of the turn and its variance."""
-        state = self._state
+        state, known = self._state, self._state.covariance[YAW, YAW]
         if told is None:
             state.replace(YAW, state.row({YAW: 1.0, _RATE: dt}))
             state.covariance[: _RATE + 1, : _RATE + 1] += wandered(self.settings.wander, dt)
         else:
             state.mean[YAW] += told[0]
             state.covariance[YAW, YAW] += self.settings.doubt * told[1]
+        if state.covariance[YAW, YAW] - known > np.pi**2:  # any heading; larger numbers would only cost digits
+            state.covariance[YAW], state.covariance[:, YAW] = 0.0, 0.0
+            state.covariance[YAW, YAW] = known + np.pi**2
 
     def _join(self, view: View, share: float) -> None:
         """A frame joins the map, which then lies as far wrong as its frames do on average."""

@@ -65,9 +65,10 @@ def test_an_array_that_reads_bearings_too_small_turns_as_far():
     assert turned[0] == pytest.approx(1, abs=0.004) and turned[1] < 0.987
 
 
-def test_fifteen_seconds_lost_leave_the_map():
+@pytest.mark.parametrize("seconds", [15, 86_400])
+def test_seconds_lost_leave_the_map(seconds):
     """At 1.2 m/s dead reckoning is 18 m from a map that reaches 6: it starts anew, and the turn is unknown."""
-    times = np.concatenate([np.arange(15), np.arange(15) + 465]) / 30
+    times = np.concatenate([np.arange(15), np.arange(15) + 15 + 30 * seconds]) / 30
     found = follow(times, np.stack([1.2 * times, np.zeros(30), np.zeros(30)], axis=1))
     assert not found.seen[15] and np.sqrt(found.variance[15]) > np.radians(90)
     after = slice(17, None)

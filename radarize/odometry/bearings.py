@@ -25,13 +25,11 @@ from radarize.odometry.echoes import Echo
 from radarize.odometry.gaussian import Gaussian, Row
 from radarize.pose import wrap
 
-#: Place of the heading in the filter, and where the numbers begin that are kept here.
-YAW, OWN = 0, 3
+#: Place of the heading in the filter.
+YAW = 0
 #: m and m/s: by how much an echo may be off what is expected of it in the next frame to be taken for the same; of its
 #: bearing, standard deviations.
 _RANGE, _SPEED, _SIGMAS = 0.06, 0.25, 2.5
-#: Antennas in a row that tell directions apart; with fewer, two echoes look like one between them.
-_ANTENNAS = 4
 #: Standard deviation of a sine as a share of the beam's width, and rad/s^0.5: what a bearing in the world wanders.
 _NOISE, _WANDER = 0.04, np.radians(0.3)
 #: So many are followed at most, for so many s without being seen; nearer to each other, m and rad, they are one.
@@ -73,15 +71,14 @@ class Bearings:
 
     Args:
         heatmaps: of the radar.
-        state: the filter, `OWN` numbers of which are others', the heading at `YAW`. Behind them stand normals of walls
+        state: the filter, whose numbers so far are others', the heading at `YAW`. Behind them stand normals of walls
             that are remembered, then of each followed echo its bearing in the world at first, and its share.
     """
 
     def __init__(self, heatmaps: Heatmaps, state: Gaussian):
-        self._state = state
+        self._state, self._first = state, len(state.mean)
         self._span = 2 * heatmaps.config.max_velocity
         self._range = max(_RANGE, (heatmaps.ranges[1] - heatmaps.ranges[0]) / 2)
-        self._useful = len(heatmaps.row) >= _ANTENNAS
         self._noise = _NOISE * 2 / max(len(heatmaps.row), 1)  # antennas stand half a wavelength apart
         self._walls: list[int] = []  # how many had each of the directions
         self._followed: list[Followed] = []
@@ -106,7 +103,7 @@ class Bearings:
         """Correct the filter by a frame's echoes; False if nothing known is among them, so that they tell no turn."""
         self._time, told = time, False
         self._keep([k for k, each in enumerate(self._followed) if time - each.seen < _LOST])
-        new = [echo for echo in echoes if self._stands(echo, velocity)] if self._useful else []
+        new = [echo for echo in echoes if self._stands(echo, velocity)]
         for k, each in enumerate(self._followed):
             if (echo := self._again(k, each, new)) is not None:
                 new.remove(echo)
@@ -115,15 +112,15 @@ class Bearings:
         self._keep([k for k, each in enumerate(self._followed) if self._judge(k, each)])
         for echo in new:
             if len(self._followed) < _MOST and not any(self._beside(echo, each) for each in self._followed):
-                self._follow(echo, time)
+                self._follow(echo)
         for k, each in enumerate(self._followed):
-            if each.kind == 0 and not each.met and each.seen == self._time and each.frames > _LASTING:
+            if each.kind == 0 and not each.met and each.seen == time and each.frames > _LASTING:
                 each.met = True
                 self._meet(k)
         return told
 
     def _place(self, k: int) -> int:
-        return OWN + len(self._walls) + 2 * k
+        return self._first + len(self._walls) + 2 * k
 
     def _row(self, k: int) -> Row:
         """The k-th followed echo's bearing in the sensor's frame."""
@@ -173,37 +170,37 @@ class Bearings:
     def _keep(self, stay: list[int]) -> None:
         if len(stay) < len(self._followed):
             places = [place for k in stay for place in (self._place(k), self._place(k) + 1)]
-            self._state.keep([*range(OWN + len(self._walls)), *places])
+            self._state.keep([*range(self._place(0)), *places])
             self._followed = [self._followed[k] for k in stay]
 
-    def _follow(self, echo: Echo, time: float) -> None:
+    def _follow(self, echo: Echo) -> None:
         """From now on; half of its parallax is as good a guess as any, and flashes and posts are half off."""
         state, end = self._state, len(self._state.mean)
         state.add(end, state.row({YAW: 1.0}), echo.bearing, self._variance(echo))
         state.add(end + 1, state.row({}), 0.5, 0.5**2)
-        self._followed.append(Followed(echo, time))
+        self._followed.append(Followed(echo, self._time))
 
     def _meet(self, k: int) -> None:
         """Look the k-th's wall up among the directions that are remembered."""
         state, place = self._state, self._place(k)
-        rows = [state.row({place: 1.0, OWN + wall: -1.0}) for wall in range(len(self._walls))]
+        rows = [state.row({place: 1.0, self._first + wall: -1.0}) for wall in range(len(self._walls))]
         off = np.array([-_past_right_angle(row @ state.mean) for row in rows])
         variances = np.array([state.variance(row) + _SQUARE**2 for row in rows])
         likely = self._walls * np.exp(-(off**2) / variances / 2) / np.sqrt(2 * np.pi * variances)
         share = likely / (likely.sum() + _NEW / (np.pi / 2))
-        best = int(share.argmax()) if len(share) else 0
-        if len(share) and share[best] > _CERTAIN:
+        if share.max(initial=0.0) > _CERTAIN:
+            best = int(share.argmax())
             state.update(rows[best], off[best], _SQUARE**2)
             self._walls[best] += 1
         elif share.sum() < 0.5:
             if len(self._walls) == _DIRECTIONS:
                 rarest = int(np.argmin(self._walls))
-                state.keep([place for place in range(len(state.mean)) if place != OWN + rarest])
+                state.keep([place for place in range(len(state.mean)) if place != self._first + rarest])
                 self._walls.pop(rarest)
-            state.add(OWN + len(self._walls), state.row({self._place(k): 1.0}), 0.0, 0.0)
+            state.add(self._place(0), state.row({self._place(k): 1.0}), 0.0, 0.0)
             self._walls.append(1)
 
 
 def _past_right_angle(angle: float) -> float:
     """An angle less the nearest multiple of a right one."""
-    return float((angle + np.pi / 4) % (np.pi / 2) - np.pi / 4)
+    return float(wrap(4 * angle)) / 4

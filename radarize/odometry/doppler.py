@@ -25,6 +25,7 @@ from numba import njit
 
 from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
+from radarize.odometry.parabola import vertex
 from radarize.plain import Frozen, setting
 from radarize.radar.array import virtual_positions
 
@@ -226,11 +227,9 @@ def _peaks(power, threshold, first):
 
 
 @njit(cache=True)
-def _vertex(left, middle, right):
-    """Offset in bins of a peak from the parabola through three log powers."""
-    a, b, c = np.log(left + 1e-30), np.log(middle + 1e-30), np.log(right + 1e-30)
-    bend = a - 2 * b + c
-    return 0.5 * (a - c) / bend if bend < -1e-9 else 0.0
+def _between(left, middle, right):
+    """Offset in bins of a peak, by three powers."""
+    return vertex(np.log(left + 1e-30), np.log(middle + 1e-30), np.log(right + 1e-30))
 
 
 @njit(cache=True)
@@ -242,8 +241,8 @@ def _refine(found, power, cells, array, beam):
     for i in range(len(found)):
         r, d, b = found[i]
         p = power[r, d, b]
-        speed_offset = bin_width * _vertex(power[r, (d - 1) % bins, b], p, power[r, (d + 1) % bins, b])
-        u_y = u[b] + (u[1] - u[0]) * _vertex(power[r, d, b - 1], p, power[r, d, b + 1])
+        speed_offset = bin_width * _between(power[r, (d - 1) % bins, b], p, power[r, (d + 1) % bins, b])
+        u_y = u[b] + (u[1] - u[0]) * _between(power[r, d, b - 1], p, power[r, d, b + 1])
         u_z, spread = 0.0, beam**2
         if len(pairs):
             lower, upper, total = 0.0j, 0.0j, 1e-30

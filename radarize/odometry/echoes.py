@@ -7,12 +7,15 @@ from jaxtyping import Complex64, Float
 from numba import njit
 
 from radarize.heatmaps import Heatmaps
+from radarize.odometry.parabola import vertex
 
 #: The power of a cell over the median's from which on it counts, and the share of it that comes from a single
 #: direction: two echoes in a cell have a bearing that wanders as they beat.
 _STRONG, _PURE = 1e4, 0.98
 #: So many of a frame at most, and direction cosines at which they are sought; those at the ends may lie beyond.
 _MOST, _BEAMS, _EDGE = 8, np.linspace(-0.9, 0.9, 91), 0.87
+#: Antennas in a row that tell directions apart; with fewer, two echoes look like one between them.
+_ANTENNAS = 4
 
 
 class Echo(NamedTuple):
@@ -37,26 +40,26 @@ class Echoes:
         self._steering = heatmaps.steering(self._row, _BEAMS).conj().T.astype(np.complex64)
 
     def of(self, cells: Complex64[np.ndarray, "range doppler antenna"]) -> list[Echo]:
-        """Of a frame's spectrum, the strongest first."""
+        """Of a frame's spectrum, the strongest first; none where the array's bearings are never sure."""
+        if len(self._row) < _ANTENNAS:
+            return []
         found = []
         for r, d in zip(*_peaks(cells, self._row, self._first), strict=True):
             wave = cells[r, d][self._row]
             beams = np.abs(self._steering @ wave) ** 2
             pure = beams.max() / len(self._row) / max(float(np.square(np.abs(wave)).sum()), 1e-30)
             k = int(np.clip(beams.argmax(), 1, len(_BEAMS) - 2))
-            sine = _BEAMS[k] + (_BEAMS[1] - _BEAMS[0]) * _vertex(beams[k - 1 : k + 2])
+            sine = _BEAMS[k] + (_BEAMS[1] - _BEAMS[0]) * _between(beams[k - 1 : k + 2])
             if pure > _PURE and abs(sine) < _EDGE:
                 powers = np.square(np.abs(cells[r - 1 : r + 2, d][:, self._row])).sum(axis=1)
-                away = self._ranges[r] + (self._ranges[1] - self._ranges[0]) * _vertex(powers)
+                away = self._ranges[r] + (self._ranges[1] - self._ranges[0]) * _between(powers)
                 found.append(Echo(float(away), float(self._speeds[d]), float(np.arcsin(sine))))
         return found
 
 
-def _vertex(powers: Float[np.ndarray, "3"]) -> float:
-    """Offset in bins of a peak from the parabola through three log powers."""
-    a, b, c = np.log(np.maximum(powers, 1e-30))
-    bend = a - 2 * b + c
-    return float(np.clip(0.5 * (a - c) / bend, -1, 1)) if bend < -1e-9 else 0.0
+def _between(powers: Float[np.ndarray, "3"]) -> float:
+    """Offset in bins of a peak, by three powers."""
+    return float(np.clip(vertex(*np.log(np.maximum(powers, 1e-30))), -1, 1))
 
 
 @njit(cache=True)

@@ -27,11 +27,12 @@ from torch.nn.functional import avg_pool1d
 
 from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
-from radarize.odometry.bearings import OWN, YAW, Bearings
+from radarize.odometry.bearings import YAW, Bearings
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
 from radarize.odometry.gaussian import Gaussian
 from radarize.odometry.localmap import LocalMap, View
+from radarize.odometry.parabola import vertex
 from radarize.odometry.ties import wandered
 from radarize.plain import Frozen, setting
 
@@ -51,6 +52,8 @@ _ASTRAY = np.radians(45.0)
 _JITTER, _SURER = np.radians(0.6), 10.0
 #: m to either side of a wall's flash, where it hides the rest.
 _RING = 0.1
+#: See `radarize.odometry.integration.RotationEstimator`, of those that do not know by how much they lag.
+LAG = 0.2
 #: Places in the filter of the turning rate, and of the angle at which the map lies.
 _RATE, _MAP = 1, 2
 
@@ -134,10 +137,9 @@ class MapRotation:
         self._bearing_sines = s.stretch * self._sines  # sines of where the cells lie
         self._ranges = heatmaps.ranges[:_RANGES][self._first :]
         self._map = LocalMap(self._ranges[-1], s.cell)
-        self._state = Gaussian(np.zeros(OWN))
-        self._state.covariance[_RATE, _RATE] = s.fastest**2
+        self._state = Gaussian(np.array([0.0, s.fastest**2, 0.0]))
         self._echoes, self._bearings = Echoes(heatmaps, self._first), Bearings(heatmaps, self._state)
-        self._noise, self.lag = (s.yaw_noise, 0.2) if prior is None else (s.guided_yaw_noise, 0.0)
+        self._noise, self.lag = (s.yaw_noise, LAG) if prior is None else (s.guided_yaw_noise, 0.0)
         self._time: float | None = None
         self._velocity = self._position = np.zeros(2)
         self._prior = prior
@@ -264,9 +266,7 @@ class MapRotation:
         if not 0 < best < len(fine) - 1:
             return 0.0, 0.0
         left, peak, right = correlation[best - 1 : best + 2]
-        bend = left - 2 * peak + right
-        slip = 0.5 * (left - right) / bend if bend < -1e-9 else 0.0
-        return float(fine[best] + s.step * np.clip(slip, -1, 1)), float(peak)
+        return float(fine[best] + s.step * np.clip(vertex(left, peak, right), -1, 1)), float(peak)
 
 
 def _essence(spectrum: torch.Tensor) -> torch.Tensor:

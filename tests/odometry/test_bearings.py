@@ -6,7 +6,7 @@ import torch
 
 from radarize.batch import Signal
 from radarize.heatmaps import Heatmaps
-from radarize.odometry.bearings import OWN, YAW, Bearings
+from radarize.odometry.bearings import YAW, Bearings
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
 from radarize.odometry.gaussian import Gaussian
@@ -17,6 +17,8 @@ from tests.batches import of_spectrum
 CONFIG, FIRST = PRESETS["radarize"], 5
 DT, COUNT = CONFIG.frame_period, 150
 MAPS = Heatmaps(CONFIG)
+#: Numbers of the filter that are others'.
+OWN = 3
 #: rad a frame that an estimator of turns claims to err by.
 CLAIM = np.radians(0.3)
 

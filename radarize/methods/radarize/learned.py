@@ -10,7 +10,7 @@ from radarize.batch import Batch
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
 from radarize.nets.weights import load
 from radarize.odometry.doppler import Velocities
-from radarize.odometry.rotation import Rotations
+from radarize.odometry.rotation import LAG, Rotations
 from radarize.odometry.settings import TurnConfig
 from radarize.odometry.ties import Ties
 from radarize.radar.config import RadarConfig
@@ -61,7 +61,7 @@ class LearnedRotation:
         spacings: the radar's frames over which turns are measured, ascending.
     """
 
-    lag = 0.2
+    lag = LAG
 
     def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):
         settings = settings or TurnConfig()

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import CLONE, POSES, Data, command_line, publish
 from benchmarks.results import Walk as Facts
 from radarize.benchmark.real import clocked_turn_errors
 from radarize.benchmark.realmotion import shifted_turns, smoothed
@@ -45,8 +45,8 @@ def draw(shown: list[tuple[Walk, Clock, Alike]]) -> None:
 
 PARSER = command_line(
     __doc__,
-    data=(Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"),
-    poses=("", "folder of poses, WALK.tum; by the lidar if none"),
+    data=CLONE,
+    poses=POSES,
 )
 
 

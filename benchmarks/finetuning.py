@@ -19,7 +19,7 @@ import torch
 from jaxtyping import UInt8
 from torch import Generator, Tensor
 
-from benchmarks.results import Data, Network, command_line, publish
+from benchmarks.results import CLONE, Data, Network, command_line, publish
 from benchmarks.results import Walk as Facts
 from radarize.clouds import Apart
 from radarize.console import progress
@@ -133,7 +133,7 @@ def dense(net: PictureNet, seen: Seen, window: int, every: int = 12) -> float:
 
 PARSER = command_line(
     __doc__,
-    data=(Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"),
+    data=CLONE,
     start=(Weights().of("pictures"), "weights that were trained in simulation"),
     steps=(0, "of each training; as many as it is worth if 0"),
     out=(Path("tuned"), "folder of the weights"),

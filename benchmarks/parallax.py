@@ -8,19 +8,18 @@ poses, are fitted by their parallax: the slope is the share of it by which they 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float, UInt8
 from scipy.ndimage import convolve1d, maximum_filter
 
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import CLONE, POSES, Data, command_line, publish
 from benchmarks.results import Walk as Facts
 from radarize.console import progress
 from radarize.polar import AZIMUTHS, LEAKAGE, RANGES
 from radarize.pose import wrap
 from radarize.walkclock import Clock
-from radarize.walkposes import at, poses_of, stamps
+from radarize.walkposes import by_instant, poses_of
 from radarize.walks import PERIOD, TRAINING, Walk
 
 #: Least value of a strong cell (255: the strongest of a frame), so many of a frame at most, and m that a radar's
@@ -80,24 +79,21 @@ def followed(
             continue
         new = [tuple(cell) for cell in strong(picture) if cell[0] > 0]
         for each in kept:
-            ahead = np.array([np.cos(each.bearings[-1]), np.sin(each.bearings[-1])])
-            each.range -= PERIOD * (x * ahead[0] + y * ahead[1])
-            each.parallax -= PERIOD * (y * ahead[0] - x * ahead[1]) / max(each.range, 0.2)
-            off = {cell: float(wrap(cell[1] + yaw - each.bearings[-1])) for cell in new if _alike(each, cell)}
-            if not off or abs(off[cell := min(off, key=lambda cell: abs(off[cell]))]) > _BEARING:
-                continue
-            new.remove(cell)
-            each.range, each.last = cell[0], frame
-            each.bearings.append(each.bearings[-1] + off[cell])
-            each.parallaxes.append(each.parallax)
+            cos, sin = np.cos(each.bearings[-1]), np.sin(each.bearings[-1])
+            each.range -= PERIOD * (x * cos + y * sin)
+            each.parallax -= PERIOD * (y * cos - x * sin) / max(each.range, 0.2)
+            bearing, near = each.bearings[-1], [cell for cell in new if abs(cell[0] - each.range) < _RANGE]
+            off = {cell: float(wrap(cell[1] + yaw - bearing)) for cell in near}
+            cell = min(off, key=lambda cell: abs(off[cell]), default=None)
+            if cell is not None and abs(off[cell]) <= _BEARING:
+                new.remove(cell)
+                each.range, each.last = cell[0], frame
+                each.bearings.append(bearing + off[cell])
+                each.parallaxes.append(each.parallax)
         yield from (each for each in kept if frame - each.last > _MISSING)
         kept = [each for each in kept if frame - each.last <= _MISSING]
         kept += [Followed(cell[0], frame, [cell[1] + yaw]) for cell in new]
     yield from kept
-
-
-def _alike(each: Followed, cell: tuple[float, float]) -> bool:
-    return abs(cell[0] - each.range) < _RANGE
 
 
 def row(name: str, found: list[Followed]) -> dict[str, object]:
@@ -114,8 +110,8 @@ def row(name: str, found: list[Followed]) -> dict[str, object]:
 
 PARSER = command_line(
     __doc__,
-    data=(Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"),
-    poses=("", "folder of poses, WALK.tum; by the lidar if none"),
+    data=CLONE,
+    poses=POSES,
 )
 
 
@@ -125,9 +121,7 @@ def main() -> None:
     walks, found = [Walk.find(options.data, number) for number in TRAINING], []
     with progress("walks") as report:
         for done, walk in enumerate(walks):
-            frames = Clock.of(walk).lidar(np.arange(walk.frames))
-            poses = at(PERIOD * frames, stamps(walk.frames), poses_of(walk, options.poses))
-            poses[(frames < 0) | (frames > walk.frames - 1)] = np.nan
+            poses = by_instant(poses_of(walk, options.poses), Clock.of(walk))
             found += followed(map(walk.radar, range(walk.frames)), poses)
             report(done + 1, len(walks))
     publish(

@@ -18,7 +18,7 @@ import torch
 from jaxtyping import Bool, UInt8
 
 from benchmarks.finetuning import window
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import CLONE, Data, command_line, publish
 from benchmarks.results import Walk as Facts
 from radarize.clouds import Apart
 from radarize.console import progress
@@ -172,7 +172,7 @@ def tried(
 
 PARSER = command_line(
     __doc__,
-    data=(Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"),
+    data=CLONE,
     simulated=(Path("radarhd"), "what `radarsim dataset radarhd` made"),
     steps=(500, "of each training"),
     every=(40, "of so many frames of the real walks one is judged"),

@@ -17,6 +17,9 @@ from radarsim.statistics import Statistics
 FOLDER = Path(__file__).parent / "results"
 #: Captures and logs that others made, beside the checkout.
 SHARED = Path(__file__).parents[2] / "shared" / "recordings"
+#: Options of scripts that judge real walks.
+CLONE = Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"
+POSES = "", "folder of poses, WALK.tum; by the lidar if none"
 T = TypeVar("T")
 machine()  # as things are now: sources may change while a script runs
 

@@ -15,7 +15,7 @@ import yaml
 from jaxtyping import Float, UInt8
 
 from benchmarks.realism import CONFIG, shares
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import CLONE, POSES, Data, command_line, publish
 from benchmarks.results import Walk as Facts
 from radarize import polar
 from radarize.console import progress
@@ -137,9 +137,9 @@ def compared(twin: Pictures, own: Pictures, other: Pictures) -> dict[str, float]
 
 PARSER = command_line(
     __doc__,
-    data=(Path("RadarHD/dataset_5"), "data set of a clone of RadarHD's repository"),
+    data=CLONE,
     walks=("112,113,120", "training walks, each beside the next one"),
-    poses=("", "folder of poses, WALK.tum; by the lidar if none"),
+    poses=POSES,
     every=(15, "of so many frames one is simulated"),
     seed=(0, "of clutter, unevenness and noise"),
 )

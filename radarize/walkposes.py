@@ -12,6 +12,7 @@ from radarize.pose import wrap
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.tum import planar, read_tum
+from radarize.walkclock import Clock
 from radarize.walks import PERIOD, Walk
 
 #: Bearings of scans that are made of points.
@@ -66,6 +67,14 @@ def at(
     columns = poses[:, 0], poses[:, 1], np.unwrap(poses[:, 2])
     x, y, yaw = (np.interp(times, known, column) for column in columns)
     return np.column_stack([x, y, wrap(yaw)])
+
+
+def by_instant(poses: Float[np.ndarray, "frame 3"], clock: Clock) -> Float[np.ndarray, "frame 3"]:
+    """Poses at the instants of the radar's frames, from those of the lidar's; nan where the lidar has none."""
+    frames = clock.lidar(np.arange(len(poses)))
+    found = at(PERIOD * frames, stamps(len(poses)), poses)
+    found[(frames < 0) | (frames > len(poses) - 1)] = np.nan
+    return found
 
 
 def scan(points: Float[np.ndarray, "point 2"]) -> Float[np.ndarray, "bearing"]:

@@ -130,10 +130,10 @@ BEARINGS = {
     "office": (2278561676866540566, 4493895637748088591, 7305807747917887394),
 }
 
+#: Six of RadarHD's training walks.
 REAL = {Walk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
 
-#: Those of `STRETCH` and six of RadarHD's training walks; what score closures need, each in three or six variants of
-#: the other settings, so that luck counts for less.
+#: What score closures need, each in three or six variants of the other settings, so that luck counts for less.
 CLOSURES = STRETCH | REAL
 
 #: RadarHD's training walks, one by one and all together.

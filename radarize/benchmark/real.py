@@ -36,7 +36,7 @@ from radarize.errors import InputError
 from radarize.jobs import Report, perform
 from radarize.methods.method import Weights
 from radarize.walkclock import Clock
-from radarize.walkposes import at, poses_of, stamps
+from radarize.walkposes import by_instant, poses_of
 from radarize.walks import PERIOD, Predictions, Walk
 
 NOTES = (
@@ -181,10 +181,8 @@ def clocked_turn_errors(
     found: Float[np.ndarray, "frame"], poses: Float[np.ndarray, "frame 3"], clock: Clock
 ) -> dict[str, float]:
     """Errors of turns up to each frame (rad), by number and by instant."""
-    frames = clock.lidar(np.arange(len(poses)))
-    same = at(PERIOD * frames, stamps(len(poses)), poses)
-    same[(frames < 0) | (frames > len(poses) - 1)] = np.nan
-    return turn_errors(found, poses) | {"instant_yaw_rmse_deg": turn_errors(found, same)["yaw_rmse_deg"]}
+    same = turn_errors(found, by_instant(poses, clock))
+    return turn_errors(found, poses) | {"instant_yaw_rmse_deg": same["yaw_rmse_deg"]}
 
 
 def _maps(

@@ -9,13 +9,14 @@ import torch
 from benchmarks.results import Data, command_line, publish
 from radarize.batch import Intake, Signal
 from radarize.features.maps import MapMaker, maps_of
+from radarize.features.occupancy import SURFACE
 from radarize.heatmaps import Heatmaps
 from radarize.methods.published import labels
 from radarize.methods.published import maps as published
 from radarize.methods.published.training import pooled_dice
 from radarize.methods.radarize.segmentation import SegmentationNet
 from radarize.methods.task import first_cell
-from radarize.nets.losses import SURFACE, surfaces
+from radarize.nets.losses import surfaces
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording

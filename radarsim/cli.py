@@ -32,6 +32,7 @@ def simulate(
     duration: Annotated[
         float | None, typer.Option(min=0.0, help="Length, s; else 40 of a tour, all of a trajectory or way-points.")
     ] = None,
+    people: Annotated[int, typer.Option(min=0, max=50, help="Who walk about near the radar's way.")] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
     frontend: Annotated[
@@ -63,7 +64,8 @@ def simulate(
     with keeping(output), progress(f"simulate {Path(scene).stem}") as report:
         written = simulate(
             scene, output, platform=platform, trajectory=trajectory, waypoints=waypoints, duration=duration, seed=seed,
-            mounting=Mounting.parse(mounting) if mounting else None, radar=radar, frontend=frontend, engine=engine,
+            people=people, mounting=Mounting.parse(mounting) if mounting else None, radar=radar, frontend=frontend,
+            engine=engine,
             sensors=[name.strip() for name in sensors.split(",") if name.strip()],
             workers=workers or default_workers(), progress=report,
         )  # fmt: skip

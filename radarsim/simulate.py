@@ -16,6 +16,8 @@ from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
 from radarize.recording import Recording, RecordingWriter, spare
 from radarsim.batches import Batch, Batches
+from radarsim.crowd import crowded
+from radarsim.draws import draws
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
@@ -41,7 +43,7 @@ def simulate(
             ``if __name__ == "__main__"``, as whatever starts processes does.
         progress: called with (frames done, frames in all).
         plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, engine, sensors, platform,
-            duration, trajectory, waypoints, mounting.
+            duration, trajectory, waypoints, mounting, people.
 
     Returns:
         the path written.
@@ -61,6 +63,7 @@ def planned(
     frontend: Path | FrontEndConfig | None = None,
     engine: str = "radarsim",
     sensors: Sequence[str] = (),
+    people: int = 0,
     **walk: object,
 ) -> tuple[Scenario, str, dict[str, object]]:
     """What `simulate` simulates.
@@ -75,6 +78,7 @@ def planned(
             speckle is drawn anew for every frame.
         sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
             are the same whatever is chosen.
+        people: who walk about near the radar's way (see `crowd`).
         walk: how the radar goes, by the fields of `Walk`: platform, duration, trajectory, waypoints, mounting.
 
     Returns:
@@ -88,8 +92,11 @@ def planned(
     way, names = Walk(**walk), tuple(chosen(sensors))
     settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
-    scenario = Scenario(world, way.through(world, seed), config, settings, seed, names, engine)
-    return scenario, cfg_text, {"platform": "trajectory" if way.trajectory is not None else way.platform}
+    motion = way.through(world, seed)
+    world = crowded(world, motion, people, draws(seed, "people"))
+    scenario = Scenario(world, motion, config, settings, seed, names, engine)
+    about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
+    return scenario, cfg_text, about | ({"people": people} if people else {})
 
 
 def record(

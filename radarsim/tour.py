@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy import ndimage
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
@@ -77,6 +77,14 @@ class Ground:
         graph = coo_array((costs, tuple(self.edges.T)), shape=(len(self.points),) * 2).tocsr()
         return dijkstra(graph, directed=False, indices=start, return_predecessors=True, limit=limit)
 
+    @staticmethod
+    def way(predecessor: Int[np.ndarray, "node"], goal: int) -> list[int]:
+        """Nodes from the start of a search to `goal`."""
+        nodes = [goal]
+        while predecessor[nodes[-1]] >= 0:
+            nodes.append(int(predecessor[nodes[-1]]))
+        return nodes[::-1]
+
     def around(self, nodes: Sequence[int]) -> Bool[np.ndarray, "node"]:
         """Nodes within half a metre of a path, apart from its ends."""
         path = self.points[nodes[10:-10] or nodes]
@@ -148,7 +156,7 @@ def route(clearance: Clearance, radius: float, places: Float[np.ndarray, "n 2"])
         cost, before = ground.search(int(start), limit=reach)
         if np.isinf(cost[end]):
             before = ground.search(int(start))[1]
-        nodes = _walk(before, int(end))[1:-1]
+        nodes = ground.way(before, int(end))[1:-1]
         path += [ground.points[nodes], place[None]]
         pins.append(pins[-1] + len(nodes) + 1)
     whole = np.concatenate(path)
@@ -159,22 +167,14 @@ def route(clearance: Clearance, radius: float, places: Float[np.ndarray, "n 2"])
     ]
 
 
-def _walk(predecessor: np.ndarray, goal: int) -> list[int]:
-    """Nodes from the start of a search to `goal`."""
-    nodes = [goal]
-    while predecessor[nodes[-1]] >= 0:
-        nodes.append(int(predecessor[nodes[-1]]))
-    return nodes[::-1]
-
-
 def _round(
     ground: Ground, home: int, goal: int, cost: float, before: np.ndarray
 ) -> tuple[int, tuple[list[int], list[int]], float]:
     """The goal, the ways there and back, and the share of the way back that is the way there."""
-    out = _walk(before, goal)
+    out = ground.way(before, goal)
     used = ground.around(out)
     # The way there costs so much as a way back.
-    back = _walk(ground.search(goal, used, limit=1.01 * _USED_COST * cost)[1], home)
+    back = ground.way(ground.search(goal, used, limit=1.01 * _USED_COST * cost)[1], home)
     return goal, (out, back), float(used[back].mean())
 
 

@@ -40,7 +40,7 @@ SIMULATOR = (
     "scene",
     "motion platforms band",
     "tour drive statistics",
-    "planner walk",
+    "planner walk crowd",
     "physics",
     "calibrate sight",
     "scenario",

@@ -31,6 +31,9 @@ def train(
     workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where a training was stopped.")] = False,
     onnx: Annotated[bool, typer.Option("--onnx", help="Write the network as ONNX as well.")] = False,
+    start: Annotated[
+        Path | None, typer.Option(help="Weights to begin with; recordings may then be of any radars.")
+    ] = None,
     settings: Annotated[Reading, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
 ):
     """Train a network on recordings; figures in brackets are the three tasks' defaults.
@@ -54,7 +57,7 @@ def train(
     hyper = replace(find_task(task).defaults, **given)
     with progress("train", "with --resume the same command goes on after the last whole epoch") as report:
         written = train(
-            task, data, output, hyper, Options(split, device, workers, resume, onnx),
+            task, data, output, hyper, Options(split, device, workers, resume, onnx, start),
             progress=report, say=lambda line: typer.echo(line, err=True),
         )  # fmt: skip
     print(written)

@@ -65,7 +65,7 @@ class Maker(ABC):
 
     Attributes:
         maps: by name, what they are.
-        names: of those that the array can make.
+        names: of all maps, in their order.
         history: frames before its own that a map needs.
         physical: rows are metres or m/s, so that a network can be shown those of any chirp, see `Resampling`.
     """
@@ -108,8 +108,8 @@ class Maker(ABC):
 class MapMaker(Maker):
     """Makes the maps of one radar configuration, dB.
 
-    Without antennas of two heights, `names` has only those of the row; whoever asks for the others all the same gets
-    the row's, by Bartlett as well: they differ in what is above and below.
+    Without antennas of two heights, maps near the horizon are the row's, by Bartlett as well: they differ in what is
+    above and below.
     """
 
     maps = MAPS
@@ -117,7 +117,7 @@ class MapMaker(Maker):
 
     def __init__(self, config: RadarConfig):
         self.heatmaps = Heatmaps(config, AZIMUTHS)
-        self.names = tuple(n for n in MAPS if self.heatmaps.pairs is not None or "elevation" not in n)
+        self.names = tuple(MAPS)
 
     @staticmethod
     def axes(config: RadarConfig, name: str) -> Axes:

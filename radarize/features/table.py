@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import psutil
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Float, Float16, Int
 from torch import Tensor
 
 from radarize.errors import InputError
-from radarize.features.grid import Grid
+from radarize.features.grid import Grid, Resampling
 from radarize.features.maps import Maker, MapMaker, maps_of
 from radarize.jobs import Report, attempt, perform
+from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.tum import planar
 
@@ -27,11 +28,13 @@ class Reading:
         name: of it.
         where: data set of the recording that it is made of.
         of: makes it of some of a recording's frames, a row a frame; None: it is those rows of the data set.
+        on_grid: brings rows that lie on a radar's grid (first) to another; None: they lie on none.
     """
 
     name: str
     where: str
     of: Callable[[Recording, slice], np.ndarray] | None = None
+    on_grid: Callable[[np.ndarray, Grid, Grid], np.ndarray] | None = None
 
     def rows(self, recording: Recording, frames: slice) -> np.ndarray:
         """A row for each of some frames."""
@@ -46,11 +49,10 @@ def _yaw(recording: Recording, frames: slice) -> np.ndarray:
     return planar(recording.read("truth/pose")[frames])[:, 2:].astype(np.float32)
 
 
-#: Truth that several methods learn from: m/s (forward, left); rad; m and quaternion; cells of `radarize.nets.losses`.
+#: Truth that several methods learn from: m/s (forward, left); rad; m and quaternion.
 VELOCITY = Reading("velocity", "truth/velocity", _velocity)
 YAW = Reading("yaw", "truth/pose", _yaw)
 POSE = Reading("pose", "truth/pose")
-OCCUPANCY = Reading("occupancy", "truth/occupancy")
 _BATCH = 32
 
 
@@ -84,22 +86,26 @@ class Table:
         maker: type[Maker] = MapMaker,
         workers: int = 1,
         progress: Callable[..., None] = lambda *where: None,
+        grid: Grid | None = None,
     ) -> "Table":
         """Read recordings of maps, or make the maps of recordings of samples.
 
         Args:
-            paths: recordings of one radar configuration.
+            paths: recordings, of one radar configuration unless there is a grid.
             maps: names of `maker`'s.
             truth, sensed: what else to read.
             maker: of the maps.
             workers: processes that read; more than one pays where maps have to be made.
             progress: called with (stage, recordings done, recordings in all).
+            grid: to which maps of any radar are brought; None: they lie on one already.
 
         Raises:
             InputError: a recording lacks something, differs from the others in its maps' grid, has truth that is all
                 unknown, or memory does not suffice.
         """
         lengths, periods, grids = zip(*(_open(path, maps, maker) for path in paths), strict=True)
+        if grid is not None:
+            grids = ({name: grid for name in maps},) * len(paths)
         for path, period, own in zip(paths, periods, grids, strict=True):
             if maps and (difference := grids[0][maps[0]].difference(own[maps[0]])):
                 raise InputError(f"{path}: has maps of {difference} as in {paths[0].name}, expected one radar's")
@@ -116,7 +122,7 @@ class Table:
         joined = {name: np.empty((sum(lengths), *shape), np.float16) for name, shape in shapes.items()}
         ends = np.cumsum(lengths)
         places = {str(path): slice(end - length, end) for path, end, length in zip(paths, ends, lengths, strict=True)}
-        todo = {str(path): partial(_read, path, tuple(maps), (*truth, *sensed), maker) for path in paths}
+        todo = {str(path): partial(_read, path, tuple(maps), (*truth, *sensed), maker, grid) for path in paths}
         if workers > 1 and len(paths) > 1:
             heard = (news for news in perform(todo, workers) if news.ended)
         else:
@@ -178,19 +184,33 @@ def _open(path: Path, maps: Sequence[str], maker: type[Maker]) -> tuple[int, flo
 
 
 def _read(
-    path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker], _: Report
+    path: Path, maps: tuple[str, ...], readings: tuple[Reading, ...], kind: type[Maker], grid: Grid | None, _: Report
 ) -> tuple[dict, dict]:
-    """Maps, and all else, of one recording."""
+    """Maps, and all else, of one recording, on a grid if there is one."""
     with Recording(path) as recording:
         maker, count = kind(recording.config), len(recording)
         stride = maker.stride(recording.config)
         size = _BATCH * stride
         starts = range(0, count if maps else 0, size)
         parts = [maps_of(recording, start, min(start + size, count), maps, maker, stride) for start in starts]
+        if grid is not None:
+            brought = partial(_brought, config=recording.config, kind=kind, grid=grid)
+            parts = [{name: brought(made, name) for name, made in part.items()} for part in parts]
         found, frames = {}, slice(0, count, stride)
         for reading in readings:
-            rows = found[reading.name] = reading.rows(recording, frames)
+            rows = reading.rows(recording, frames)
+            if grid is not None and reading.on_grid is not None:
+                rows = reading.on_grid(rows, Grid.of(recording.config, maps[0], kind), grid)
+            found[reading.name] = rows
             # Some may be unknown: a tracking camera is blind now and then.
             if len(rows) < -(-count // stride) or not np.isfinite(rows).any():
                 raise InputError(f"{path}: /{reading.where} lacks values or holds no numbers, expected {count} frames")
         return {name: np.concatenate([part[name] for part in parts]) for name in maps}, found
+
+
+def _brought(
+    made: Float16[np.ndarray, "frame row azimuth"], name: str, config: RadarConfig, kind: type[Maker], grid: Grid
+) -> Float16[np.ndarray, "frame known azimuth"]:
+    """Maps on a grid."""
+    resampling = Resampling.between(grid, Grid.of(config, name, kind), kind.axes(config, name).centred)
+    return made if resampling is None else resampling(torch.from_numpy(made).float()[:, None])[:, 0].half().numpy()

@@ -92,10 +92,14 @@ class Task(ABC):
         return build(self.network, self.header(settings, grid))
 
     def table(
-        self, paths: Sequence[Path], workers: int = 1, progress: Callable[..., None] = lambda *where: None
+        self,
+        paths: Sequence[Path],
+        workers: int = 1,
+        progress: Callable[..., None] = lambda *where: None,
+        grid: Grid | None = None,
     ) -> Table:
         """All that it reads of recordings, see `Table.read`."""
-        return Table.read(paths, self.maps, self.truth, self.sensed, self.network.maker, workers, progress)
+        return Table.read(paths, self.maps, self.truth, self.sensed, self.network.maker, workers, progress, grid)
 
     def optimise(self, parameters: Iterable[nn.Parameter], settings: Settings) -> torch.optim.Optimizer:
         """The algorithm, at work."""

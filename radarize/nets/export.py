@@ -7,6 +7,7 @@ from pathlib import Path
 import torch
 from torch import nn
 
+from radarize.nets.compiled import LENT, lent
 from radarize.nets.weights import Header, example
 from radarize.replacing import replacing
 
@@ -30,16 +31,40 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
     Raises:
         InputError: the file cannot be written.
     """
+    program = _program(net, header)
+    program.model.metadata_props["radarize"] = header.model_dump_json()
+    with replacing(path) as part:
+        program.save(part, external_data=False)
+    return path
+
+
+def export_graph(net: nn.Module, header: Header, path: Path) -> Path:
+    """Write the same without weights, for `radarize.nets.compiled`: whoever runs it lends it those of a file."""
+    import onnx  # not installed with every radarize
+
+    model = _program(net, header, optimize=False).model_proto  # which would mix weights into constants
+    missing = {f"net.{name}" for name in lent(net)}
+    for values in model.graph.initializer:
+        if values.name in missing:
+            values.ClearField("raw_data")
+            values.data_location = onnx.TensorProto.EXTERNAL
+            values.external_data.add(key="location", value=LENT)
+    for node in model.graph.node:  # where torch's source lies, and what it calls things
+        node.ClearField("metadata_props")
+        node.ClearField("doc_string")
+    model.graph.ClearField("value_info")
+    with replacing(path) as part:
+        part.write_bytes(model.SerializeToString(deterministic=True))
+    return path
+
+
+def _program(net: nn.Module, header: Header, **how: object) -> torch.onnx.ONNXProgram:
     # torch's exporter lists what it would do with torchvision.
     logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
     inputs, item = example(net, header), torch.export.Dim("item")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        program = torch.onnx.export(
+        return torch.onnx.export(
             Estimate(net).eval().cpu(), inputs, input_names=list(net.inputs), output_names=list(net.outputs),
-            dynamic_shapes=(tuple({0: item} for _ in inputs),), dynamo=True, verbose=False,
+            dynamic_shapes=(tuple({0: item} for _ in inputs),), dynamo=True, verbose=False, **how,
         )  # fmt: skip
-    program.model.metadata_props["radarize"] = header.model_dump_json()
-    with replacing(path) as part:
-        program.save(part, external_data=False)
-    return path

@@ -5,12 +5,11 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 from torch.nn.functional import softplus
 
+from radarize.features.occupancy import FREE, SURFACE
 from radarize.nets.gaussian import Gaussian
 
 #: See `Gaussian.negative_log_likelihood`.
 BETA = 0.5
-#: States of a cell of the occupancy label (`/truth/occupancy` says so).
-FREE, SURFACE, UNKNOWN = 0, 1, 2
 
 
 def likelihood(found: Gaussian, truth: Float[Tensor, "item dimension"]) -> Float[Tensor, "item"]:

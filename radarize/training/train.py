@@ -1,7 +1,7 @@
 """`radarize train`: from a folder of recordings to a file of weights."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -9,11 +9,12 @@ import numpy as np
 import pandas as pd
 
 from radarize.errors import InputError
+from radarize.features.grid import Grid
 from radarize.features.table import Table
 from radarize.methods.registry import find_task
 from radarize.methods.task import Settings, Task
 from radarize.nets.export import export_onnx
-from radarize.nets.weights import save
+from radarize.nets.weights import load, save
 from radarize.replacing import replacing
 from radarize.training.dataset import recordings
 from radarize.training.team import team
@@ -32,6 +33,8 @@ class Options:
         device: ``cpu`` or ``cuda``; a GPU where there is one if None.
         workers: processes that read.
         resume: go on from the checkpoint, if there is one.
+        start: weights to begin with, of a network of the same task, instead of random ones: width, frames and grid are
+            its own, and recordings may be of any radars.
         onnx: write the network as ONNX as well.
     """
 
@@ -40,6 +43,7 @@ class Options:
     workers: int = 1
     resume: bool = False
     onnx: bool = False
+    start: Path | None = None
 
 
 def train(
@@ -70,17 +74,24 @@ def train(
     """
     task, output, data, options = find_task(kind), Path(output), Path(data), options or Options()
     settings = settings or task.defaults
+    begun, before = load(options.start, task.network) if options.start else (None, None)
+    if before is not None:
+        settings = replace(settings, width=before.width, frames=before.frames)
     _check(kind, settings, output)
     checkpoint, log = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
     if checkpoint.exists() and not options.resume:
         raise InputError(f"{checkpoint}: is left of a training that did not end; --resume goes on, or remove it")
     network = task.network
     about = {"kind": network.kind, "setting": network.setting, "data": data.resolve().name, "split": options.split}
+    if before is not None:
+        about |= {"start": options.start.name, "data": f"{before.data}, then {about['data']}"}
     with team(options.device) as crew:
         lead = crew.rank == 0
         progress, say = (progress, say) if lead else (_nothing, _nothing)
-        parts = _read(task, data, options, settings.seed, progress)
+        parts = _read(task, data, options, settings.seed, progress, before and before.grid)
         trainer = Trainer(task, settings, *parts, crew)
+        if begun is not None:
+            trainer.net.load_state_dict(begun.state_dict())
         if options.resume and checkpoint.exists():
             trainer.restore(checkpoint, about)
             say(f"resuming after epoch {len(trainer.history)}")
@@ -96,7 +107,8 @@ def train(
             metrics = trainer.finish()
             header = task.header(
                 settings, trainer.training.grid, data=about["data"], split=options.split,
-                spacings=tuple(trainer.spacings), epochs=len(trainer.history), metrics=metrics,
+                spacings=tuple(trainer.spacings), metrics=metrics,
+                epochs=len(trainer.history) + (before.epochs if before else 0),
             )  # fmt: skip
             save(trainer.net, header, output)
             if options.onnx:
@@ -115,8 +127,10 @@ def _nothing(*where) -> None:
     pass
 
 
-def _read(task: Task, data: Path, options: Options, seed: int, progress: Callable[..., None]) -> tuple[Table, Table]:
-    """Training and validation data."""
+def _read(
+    task: Task, data: Path, options: Options, seed: int, progress: Callable[..., None], grid: Grid | None
+) -> tuple[Table, Table]:
+    """Training and validation data, on a grid if there is one."""
     if options.split is None:
         found = recordings(data)
         if len(found) < 2:
@@ -125,7 +139,7 @@ def _read(task: Task, data: Path, options: Options, seed: int, progress: Callabl
         parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
     else:
         parts = [recordings(data, options.split, part) for part in ("train", "validation")]
-    return task.table(parts[0] + parts[1], options.workers, progress).divide(len(parts[0]))
+    return task.table(parts[0] + parts[1], options.workers, progress, grid).divide(len(parts[0]))
 
 
 def _check(kind: str, settings: Settings, output: Path) -> None:

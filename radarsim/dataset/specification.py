@@ -8,7 +8,7 @@
       shop: shop.yaml                  # a scene of the project, or a scene file beside this one
     recordings:
       - {building: A, floors: [0, 1], platform: handheld, count: 15, duration: 60}
-      - {building: shop, platform: [cart, robot], count: 2, duration: 20}
+      - {building: shop, platform: [cart, robot], count: 2, duration: 20, people: 3, variants: [plain]}
     radar: radarize                    # preset or .cfg file
     frontend: board.yaml               # as `radarsim calibrate` writes it; an IWR1843BOOST's by default
     sensors: [depth, imu]              # or all, or none
@@ -67,6 +67,8 @@ class Recordings(Strict):
         count: recordings per platform.
         duration: s, each.
         waypoints: to go through instead of a tour, m.
+        people: who walk about near the radar's way in each.
+        variants: some of `Specification.variants`; all if none is named.
         attributes: of the recordings.
     """
 
@@ -76,6 +78,8 @@ class Recordings(Strict):
     count: int = Field(gt=0)
     duration: float = Field(gt=0)
     waypoints: Annotated[tuple[tuple[float, float], ...], Field(min_length=2)] | None = None
+    people: int = Field(0, ge=0, le=50)
+    variants: tuple[Name, ...] = ()
     attributes: Attributes = {}
 
     @property
@@ -116,6 +120,11 @@ class Specification(Strict):
                     f"recordings[{number}].building is {group.building!r}, expected one of buildings: "
                     f"{', '.join(self.buildings)}"
                 )
+            if unknown := set(group.variants) - self.variants.keys():
+                raise ValueError(
+                    f"recordings[{number}].variants names {min(unknown)!r}, expected some of variants: "
+                    f"{', '.join(self.variants) or 'there are none'}"
+                )
             if group.floors and isinstance(self.buildings[group.building], str):
                 raise ValueError(
                     f"recordings[{number}].floors is {list(group.floors)}, but building {group.building} is a scene "
@@ -155,17 +164,18 @@ class Specification(Strict):
         radar = self._beside(self.radar)
         frontend = None if self.frontend is None else self._beside(self.frontend)
         fixed = {"radar": radar, "frontend": frontend, "sensors": self._sensors(), "storage": self.storage}
-        variants = [("", Variant())] if not self.variants else [(f"_{key}", v) for key, v in self.variants.items()]
-        total = sum(group.count * len(group.platforms) for group in self.recordings) * len(variants)
+        variants = {f"_{key}": variant for key, variant in self.variants.items()} or {"": Variant()}
+        made_in = [[f"_{key}" for key in group.variants] or list(variants) for group in self.recordings]
+        total = sum(g.count * len(g.platforms) * len(keys) for g, keys in zip(self.recordings, made_in, strict=True))
         if total > MOST:
             raise InputError(f"recordings: stand for {total} recordings, expected at most {MOST}")
-        settings = {key: self._settings(key, variant, radar, frontend) for key, variant in variants}
+        settings = {key: self._settings(key, variant, radar, frontend) for key, variant in variants.items()}
         tasks, count, scenes = [], Counter(), {}
         for number, group in enumerate(self.recordings):
             for name, platform, floor in group.each(count):
                 seed = np.random.SeedSequence([self.seed, *name.encode()]).generate_state(1, np.uint64)[0]
-                for key, variant in variants:
-                    config, digest = settings[key]
+                for key in made_in[number]:
+                    variant, (config, digest) = variants[key], settings[key]
                     place = group.building, floor, variant.level
                     if place not in scenes:
                         scene = self._scene(*place)
@@ -180,7 +190,7 @@ class Specification(Strict):
                         Task(
                             name=name + key, building=group.building, floor=floor, platform=platform,
                             duration=group.duration, frames=frames, seed=int(seed >> np.uint64(1)), settings=digest,
-                            waypoints=group.waypoints, variant=variant,
+                            waypoints=group.waypoints, people=group.people, variant=variant,
                             attributes=self.attributes | group.attributes | variant.attributes,
                             **scenes[place], **fixed,
                         )

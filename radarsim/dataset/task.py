@@ -46,6 +46,7 @@ class Task:
         content: of the scene's file, see `content`; None: it has none.
         variant: what differs from other recordings of the same walk.
         attributes: of the recording.
+        people: who walk about near the radar's way.
     """
 
     name: str
@@ -65,6 +66,7 @@ class Task:
     content: dict[str, object] | None = None
     variant: Variant = Variant()
     attributes: Attributes = field(default_factory=dict)
+    people: int = 0
 
     @property
     def parameters(self) -> dict[str, object]:
@@ -73,6 +75,7 @@ class Task:
         for file in ("radar", "frontend"):
             found[file] = found[file] and Path(found[file]).name
         found["attributes"] = self.attributes or None  # older recordings know no such fields
+        found["people"] = self.people or None
         found["variant"] = self.variant.model_dump(mode="json", exclude_defaults=True) or None
         found["scene"] = found.pop("content") or self.scene
         return found
@@ -157,6 +160,8 @@ class Task:
 
     def _scenario(self):
         """The `Scenario` to record, and the radar's original configuration text."""
+        from radarsim.crowd import crowded
+        from radarsim.draws import draws
         from radarsim.scenario import Scenario
         from radarsim.scene.scene import Scene
         from radarsim.walk import Walk
@@ -168,6 +173,7 @@ class Task:
         config, cfg_text = load_config(self.variant.radar_of(self.radar))
         front_end = self.variant.frontend_of(self.frontend)
         motion = walk.through(mild, self.seed)
+        scene = crowded(scene, motion, self.people, draws(self.seed, "people"))
         return Scenario(scene, motion, config, front_end, self.seed, self.sensors), cfg_text
 
     def _late(self, folder: Path) -> list[str]:

@@ -6,9 +6,9 @@ import torch
 
 from radarize.features import augment
 from radarize.features.maps import AZIMUTHS, FLOOR
+from radarize.features.occupancy import FREE, SURFACE, UNKNOWN
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.registry import find_task
-from radarize.nets.losses import FREE, SURFACE, UNKNOWN
 from tests.training.ridges import CONFIG, ridge, walls
 
 VELOCITY = np.array([[0.7, 0.4]])

@@ -6,6 +6,7 @@ import torch
 
 from radarize.features.grid import Grid, Resampling
 from radarize.features.maps import AZIMUTHS, MAPS, MapMaker
+from radarize.features.occupancy import FREE, SURFACE, UNKNOWN, on_grid
 from radarize.radar.presets import PRESETS
 from tests.echoes import record
 
@@ -91,3 +92,24 @@ def test_what_a_radar_lacks():
         assert known.lack(fits, "m") is None
     assert known.lack(grid(30, 2.1), "m") == "bins of 2.1 m, expected at most 2 m"
     assert known.lack(grid(19, 1.0), "m/s") == "a reach of 19 m/s, expected at least 20 m/s"
+
+
+@pytest.mark.parametrize("own", [grid(60, 1.0), grid(30, 1.9), grid(90, 0.6), grid(200, 0.31)])
+def test_labels_of_another_radar(own):
+    """Against loops: each cell is the nearest's, and every surface is there, once its place is."""
+    known = grid(40, 1.0)
+    rng = np.random.default_rng(0)
+    first = rng.integers(0, own.rows, 50)
+    rows = np.arange(own.rows)
+    cells = np.where(rows < first[:, None], FREE, np.where(rows == first[:, None], SURFACE, UNKNOWN)).astype(np.uint8)
+    found = on_grid(cells[:, :, None], own, known)[:, :, 0]
+    for label, surface in zip(found, first, strict=True):
+        here = round(surface * own.step / known.step)
+        for row in range(known.rows):
+            nearest = round(row * known.step / own.step)
+            if row == here:
+                assert label[row] == SURFACE
+            elif nearest >= own.rows:
+                assert label[row] == UNKNOWN
+            else:
+                assert label[row] == (FREE if nearest < surface else SURFACE if nearest == surface else UNKNOWN)

@@ -5,8 +5,9 @@ import math
 import pytest
 import torch
 
+from radarize.features.occupancy import FREE, SURFACE, UNKNOWN
 from radarize.nets.gaussian import Gaussian
-from radarize.nets.losses import FREE, SURFACE, UNKNOWN, cyclic, surfaces
+from radarize.nets.losses import cyclic, surfaces
 
 
 def test_cyclic():

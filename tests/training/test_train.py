@@ -15,7 +15,9 @@ from typer.testing import CliRunner
 
 from radarize.cli import app
 from radarize.errors import InputError
-from radarize.features.table import OCCUPANCY, VELOCITY, YAW, Table
+from radarize.features.grid import Grid, Resampling
+from radarize.features.occupancy import OCCUPANCY, SURFACE, UNKNOWN
+from radarize.features.table import VELOCITY, YAW, Table
 from radarize.methods.registry import find_task
 from radarize.nets import losses
 from radarize.nets.weights import header_of, load, read
@@ -62,7 +64,7 @@ def hazards(weights: Path, recording: Path) -> tuple[float, float]:
     label = table.truth["occupancy"]
     with torch.no_grad():
         likely = net.estimate(table.window(table.starts(1)[:, None]))
-    return float((label == losses.SURFACE).sum()), float(likely[label != losses.UNKNOWN].sum())
+    return float((label == SURFACE).sum()), float(likely[label != UNKNOWN].sum())
 
 
 @pytest.mark.parametrize("kind", TASKS)
@@ -278,3 +280,39 @@ def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
         with h5py.File(path, "r+") as file:
             file["truth/velocity"][20:25] = np.nan
     train("translation", walk_with_gap, tmp_path / "net.safetensors", settings=TINY)
+
+
+#: Bins of 2/3 the size over Doppler, and of half the size over range.
+OTHER = CONFIG.model_copy(update={"loops": 24, "samples": 32, "slope": CONFIG.slope})
+
+
+def test_maps_of_any_radar_are_brought_to_a_grid(tmp_path):
+    """As networks are shown them; frames of the radar that has the grid stay as they are."""
+    paths = [write(tmp_path / "a.h5", "velocity", 5), write(tmp_path / "b.h5", "velocity", 6, config=OTHER)]
+    grid = Grid.of(CONFIG, "doppler_azimuth")
+    table = Table.read(paths, ("doppler_azimuth",), (VELOCITY,), grid=grid)
+    assert table.grid == grid and list(table.lengths) == [5, 6]
+    with Recording(paths[0]) as own, Recording(paths[1]) as other:
+        assert np.array_equal(table.maps["doppler_azimuth"][:5], own.read("maps/doppler_azimuth"))
+        made = torch.from_numpy(other.read("maps/doppler_azimuth")).float()[:, None]
+        shown = Resampling(grid, Grid.of(OTHER, "doppler_azimuth"), centred=True)(made)[:, 0]
+        assert torch.allclose(table.maps["doppler_azimuth"][5:].float(), shown, atol=0.02)
+
+
+def test_a_training_begins_with_weights_and_sees_any_radar(small, tmp_path):
+    """What the first has learned, the second goes on with: with no time to learn, it is as good."""
+    first = train("translation", small, tmp_path / "first.safetensors", QUICK["translation"])
+    mixed = tmp_path / "mixed"
+    mixed.mkdir()
+    for k, config in enumerate((CONFIG, OTHER, OTHER)):
+        write(mixed / f"{k}.h5", "velocity", 60, seed=20 + k, config=config)
+    short = replace(QUICK["translation"], width=3, frames=5, epochs=1, rate=1e-6)
+    again = train("translation", mixed, tmp_path / "again.safetensors", short, Options(start=first))
+    before, header = header_of(first), header_of(again)
+    assert (header.width, header.frames, header.grid) == (before.width, before.frames, before.grid)
+    assert header.data == "small0, then mixed" and header.epochs == before.epochs + 1
+    held = write(tmp_path / "held.h5", "velocity", 60, seed=30)
+    errors = [judged("translation", path, held)["rmse_m_s"] for path in (first, again)]
+    assert errors[0] < 0.3 and abs(errors[1] - errors[0]) < 0.05  # of 0.8 m/s RMS
+    with pytest.raises(InputError, match="is a network for 'translation' .*expected one for 'rotation'"):
+        train("rotation", mixed, tmp_path / "turns.safetensors", options=Options(start=first))

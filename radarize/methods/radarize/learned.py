@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from radarize.batch import Batch
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
-from radarize.nets.weights import load
+from radarize.nets.compiled import compiled
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import LAG, Rotations
 from radarize.odometry.settings import TurnConfig
@@ -33,8 +33,8 @@ class LearnedVelocity:
     lever = 0.0
 
     def __init__(self, radar: RadarConfig, weights: Path):
-        self._net, header = load(weights, TranslationNet, radar)
-        self._windows = header.windows(radar, self._net.maker)
+        self._net, header = compiled(weights, TranslationNet, radar)
+        self._windows = header.windows(radar, TranslationNet.maker)
         self.limit = header.grid.reach / 2
 
     @torch.inference_mode()
@@ -65,9 +65,9 @@ class LearnedRotation:
 
     def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):
         settings = settings or TurnConfig()
-        self._net, header = load(weights, RotationNet, radar)
+        self._net, header = compiled(weights, RotationNet, radar)
         known = header.spacings
-        self._windows = header.windows(radar, self._net.maker, [s for s in settings.spacings if s in known] or known)
+        self._windows = header.windows(radar, RotationNet.maker, [s for s in settings.spacings if s in known] or known)
         self.spacings = self._windows.spacings
         size = self.spacings[-1] + 1
         self._longest = (size - 0.5) * radar.frame_period

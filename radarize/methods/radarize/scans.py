@@ -10,7 +10,7 @@ from radarize.batch import Batch
 from radarize.mapping import echoes
 from radarize.mapping.scans import HeatmapScans
 from radarize.methods.radarize.segmentation import SegmentationNet
-from radarize.nets.weights import load
+from radarize.nets.compiled import compiled
 from radarize.radar.config import RadarConfig
 from radarize.stopwatch import stage
 
@@ -37,8 +37,8 @@ class Segmentation:
     """
 
     def __init__(self, radar: RadarConfig, weights: Path, first: bool = True, beyond: HeatmapScans | None = None):
-        self._net, header = load(weights, SegmentationNet, radar)
-        self._windows, self.ranges = header.windows(radar, self._net.maker), header.ranges(radar)
+        self._net, header = compiled(weights, SegmentationNet, radar)
+        self._windows, self.ranges = header.windows(radar, SegmentationNet.maker), header.ranges(radar)
         self.first = first
         self._beyond = beyond if radar.max_range > header.grid.reach else None
 

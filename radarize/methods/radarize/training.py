@@ -9,7 +9,8 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 
 from radarize.features import augment
 from radarize.features.maps import Maps
-from radarize.features.table import OCCUPANCY, VELOCITY, YAW, Table
+from radarize.features.occupancy import OCCUPANCY, SURFACE, UNKNOWN
+from radarize.features.table import VELOCITY, YAW, Table
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
 from radarize.methods.radarize.segmentation import SegmentationNet
 from radarize.methods.task import Motion, Settings, Task, first_cell, turns
@@ -84,7 +85,7 @@ class Segmentation(Task):
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         left = augment.chosen(maps, generator)
         maps = torch.where(left, augment.mirrored(maps), maps)
-        label = torch.where(left[:, :, 0, 0], augment.mirrored_columns(label, losses.UNKNOWN), label)
+        label = torch.where(left[:, :, 0, 0], augment.mirrored_columns(label, UNKNOWN), label)
         return augment.other_radar(maps, generator, doppler=False), label
 
     def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
@@ -92,7 +93,7 @@ class Segmentation(Task):
 
     def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Tensor:
         logits = net(maps)
-        return self._judged(losses.surfaces(logits, label), logits > 0, label == losses.SURFACE)
+        return self._judged(losses.surfaces(logits, label), logits > 0, label == SURFACE)
 
     def _judged(self, loss: Tensor, occupied: Tensor, surface: Tensor) -> Float[Tensor, "item 3"]:
         """Loss, first surfaces that are found nearly where they are, and first surfaces."""
@@ -108,9 +109,9 @@ class Segmentation(Task):
     def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
         """By plain likelihood: multiplied along a bearing, cells' probabilities are that of its first surface."""
         pairs = [(net(maps)[:, :, ::4], label[:, :, ::4]) for maps, label in batches]
-        known = [label != losses.UNKNOWN for _, label in pairs]
+        known = [label != UNKNOWN for _, label in pairs]
         logits = torch.cat([found[k] for (found, _), k in zip(pairs, known, strict=True)]).detach()
-        truth = torch.cat([label[k] for (_, label), k in zip(pairs, known, strict=True)]).eq(losses.SURFACE).float()
+        truth = torch.cat([label[k] for (_, label), k in zip(pairs, known, strict=True)]).eq(SURFACE).float()
         fit = torch.tensor([1.0, 0.0], device=logits.device, requires_grad=True)
         optimiser = torch.optim.LBFGS([fit], line_search_fn="strong_wolfe", max_iter=30)
 

@@ -8,6 +8,7 @@ Scaling, with amplitudes in ADC counts: a point echo of amplitude A reads A^2 at
 has no resolution in (Doppler in range-azimuth, range in Doppler-azimuth) are summed, so that echoes add in power.
 """
 
+from functools import cache, cached_property
 from typing import Literal
 
 import numpy as np
@@ -81,9 +82,10 @@ class Heatmaps:
         return self._tensor(self.steering(antennas, np.sin(self.azimuths)), torch.complex64)
 
     @staticmethod
-    def _taper(count: int) -> np.ndarray:
+    @cache
+    def _taper(count: int) -> Float32[torch.Tensor, "antenna 1"]:
         taper = windows.taylor(count, nbar=4, sll=25) if count > 2 else np.ones(count)
-        return taper / taper.sum()
+        return torch.as_tensor(taper / taper.sum()).float()[:, None]
 
     def spectrum(
         self,
@@ -136,13 +138,13 @@ class Heatmaps:
             weights = weights * torch.as_tensor(valid)
         return weights / weights.sum(dim=1, keepdim=True).clamp_min(1e-6)
 
-    @property
+    @cached_property
     def _loop_energy(self) -> float:
         """What the Doppler bins of a unit echo sum to: loops * sum(w^2) / sum(w)^2."""
         window = self._loop_window
         return float(self.config.loops * (window**2).sum() / window.sum() ** 2)
 
-    @property
+    @cached_property
     def _range_energy(self) -> float:
         """What the range bins of a unit echo sum to."""
         return float(self.config.samples * (self._range_window**2).sum())
@@ -207,7 +209,7 @@ class Heatmaps:
         return spectrum[..., torch.as_tensor(self.pairs)]
 
     def _bartlett(self, covariance: torch.Tensor, steering: torch.Tensor) -> torch.Tensor:
-        beams = steering * self._tensor(self._taper(len(steering)), torch.float32)[:, None]
+        beams = steering * self._taper(len(steering))
         return ((covariance @ beams) * beams.conj()).sum(dim=-2).real.clamp_min(0)
 
     def _capon(self, covariance: torch.Tensor) -> torch.Tensor:
@@ -227,7 +229,7 @@ class Heatmaps:
     ) -> Float32[torch.Tensor, "frame range doppler direction"]:
         """Windowed-sum power of chosen antennas (flat indices) for any `steering` phasors (antenna, direction)."""
         x = spectrum[..., torch.as_tensor(antennas)]
-        beams = steering.conj() * self._tensor(self._taper(len(antennas)), torch.float32)[:, None]
+        beams = steering.conj() * self._taper(len(antennas))
         y = x @ beams
         return y.real.square() + y.imag.square()
 

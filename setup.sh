@@ -6,7 +6,7 @@ set -eu
 cd "$(dirname "$0")"
 
 # Imported once after installing; looked for every time.
-NEEDED="torch numba h5py scipy gtsam evo open3d trimesh drjit mitsuba sionna plotly matplotlib typer pytest"
+NEEDED="torch onnxruntime numba h5py scipy gtsam evo open3d trimesh drjit mitsuba sionna plotly matplotlib typer pytest"
 
 find_python() {
     # PYTHON=... chooses another interpreter. 3.11 is what the lock file was written and tested with.

@@ -165,6 +165,17 @@ def test_variants_share_seed_and_name(tmp_path):
     assert found[1].variant.radar_of("radarize").samples == 48 and found[0].variant.radar_of("radarize") == "radarize"
 
 
+def test_recordings_may_name_their_variants_and_have_people(tmp_path):
+    groups = [GROUP | {"variants": ["coarse"], "people": 3}, GROUP]
+    variants = {"plain": {}, "coarse": {"radar": {"samples": 48}}}
+    found, alone = (load(tmp_path, recordings=each, variants=variants).tasks for each in (groups, groups[:1]))
+    ends = [task.name.rpartition("_")[2] for task in found]
+    first = len(alone)
+    assert set(ends[:first]) == {"coarse"} and ends[first : first + 2] == ["plain", "coarse"]
+    assert [task.people for task in found[: first + 1]] == [3] * first + [0]
+    assert found[:first] == alone and found[0].parameters["people"] == 3 and found[first].parameters["people"] is None
+
+
 def test_a_plain_recording_is_the_one_it_always_was(tmp_path):
     """Fields that data sets did not have before count as absent, so that finished recordings stay finished."""
     parameters = load(tmp_path).tasks[0].parameters
@@ -284,6 +295,11 @@ GROUP = PLAIN["recordings"][0]
         ({"variants": {"a": {"frontend": {"noize": 1}}}}, "variants.a: frontend: noize: unknown key"),
         ({"variants": {"a": {"mounting": [1, 2]}}}, "variants.a.mounting"),
         ({"splits": {"a": {"kind": "random", "train": 0.5}}}, "splits.a: train + validation + test is 0.8, expected 1"),
+        (
+            {"recordings": [GROUP | {"variants": ["a"]}]},
+            "recordings[0].variants names 'a', expected some of variants: there are none",
+        ),
+        ({"recordings": [GROUP | {"people": -1}]}, "recordings[0].people is -1"),
         ({"splits": {"a": {"kind": "x"}}}, "splits.a.kind is 'x', expected one of: random"),
         ({"splits": {"a": {"kind": "random", "folds": 0}}}, "splits.a.folds is 0"),
         ({"splits": {"a": {"kind": "random", "folds": 65536}}}, "splits.a.folds is 65536"),

@@ -33,9 +33,10 @@ def judged(task: Task, weights: Path, path: Path) -> dict[str, float]:
     table = task.table([path], grid=header.grid)
     spacing = max(task.spacings(table.frame_period))
     starts = table.starts((header.frames - 1) * spacing + 1)
-    frames = task.frames(starts, torch.full_like(starts, spacing), header.frames)
+    parts = []
     with torch.no_grad():
-        parts = [task.judge(net, task.inputs(table, f), task.label(table, f)) for f in frames.split(_ITEMS)]
+        for some in starts.split(_ITEMS):
+            parts.append(task.judge(net, *task.items(table, some, torch.full_like(some, spacing), header.frames)))
     return task.metrics(torch.cat(parts).double().mean(dim=0))
 
 
@@ -48,12 +49,8 @@ PARSER = command_line(
 
 def main() -> None:
     options = PARSER.parse_args()
-    paths, shipped, trained = (
-        recordings(options.data, "random-0", "validation"),
-        Networks(),
-        Networks("any", options.weights),
-    )
-    rows = []
+    paths, rows = recordings(options.data, "random-0", "validation"), []
+    shipped, trained = Networks(), Networks("any", options.weights)
     with progress("any radar") as report:
         for kind, (name, title, factor) in TOLD.items():
             task = find_task(kind)

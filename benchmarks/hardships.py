@@ -17,8 +17,6 @@ from radarsim.walk import Walk
 
 #: Counts, of one chirp: as strong as furniture at 2 m.
 _INTERFERER = 1000.0
-#: m from the middle to the walls of a hall, and of its ceiling above the floor.
-_HALL, _HIGH = 15.0, 8.0
 
 
 class Samples(NamedTuple):
@@ -174,18 +172,28 @@ def sidestepping(scenario: Scenario) -> Scenario:
     return replace(scenario, scene=Scene.load("stress/people"), motion=Motion(30.0, CubicSpline(times, place), turns))
 
 
+def _hollow(name: str, size: tuple[float, float, float], middle: tuple[float, float], **life: float) -> Scene:
+    """An empty box of concrete, of so many metres along x, y, z, on the floor about a place."""
+    length, width, height = size
+    objects = [
+        {
+            "name": side,
+            "size": [width if x else length, height],
+            "position": [middle[0] + x * length / 2, middle[1] + y * width / 2, height / 2],
+            "facing": [-x, -y, 0],
+        }
+        for side, (x, y) in {"west": (-1, 0), "east": (1, 0), "south": (0, -1), "north": (0, 1)}.items()
+    ] + [
+        {"name": "floor", "size": [length, width], "position": [*middle, 0], "facing": [0, 0, 1]},
+        {"name": "ceiling", "size": [length, width], "position": [*middle, height], "facing": [0, 0, -1]},
+    ]
+    wall = {"shape": "rectangle", "material": "concrete"}
+    return Scene.of({"objects": [wall | each for each in objects]} | life, name)
+
+
 def hall(scenario: Scenario) -> Scenario:
     """Round the middle of a hall, whose walls are out of reach."""
-    side, wall = 2 * _HALL, {"shape": "rectangle", "material": "concrete"}
-    walls = {"west": (-1, 0), "east": (1, 0), "south": (0, -1), "north": (0, 1)}
-    objects = [
-        {"name": name, "size": [side, _HIGH], "position": [x * _HALL, y * _HALL, _HIGH / 2], "facing": [-x, -y, 0]}
-        for name, (x, y) in walls.items()
-    ] + [
-        {"name": "floor", "size": [side, side], "position": [0, 0, 0], "facing": [0, 0, 1]},
-        {"name": "ceiling", "size": [side, side], "position": [0, 0, _HIGH], "facing": [0, 0, -1]},
-    ]
-    scene = Scene.of({"clutter": 1.0, "objects": [wall | each for each in objects]}, "hall")
+    scene = _hollow("hall", (30.0, 30.0, 8.0), (0.0, 0.0), clutter=1.0)
     times = np.arange(-1.0, 31.0, 0.05)
     course = 2 * np.pi / 25 * np.clip(times, 0, None)
     place = np.stack([4 * np.cos(course), 4 * np.sin(course), np.full_like(times, 1.2)], axis=1)
@@ -195,23 +203,14 @@ def hall(scenario: Scenario) -> Scenario:
 
 def corridor(scenario: Scenario) -> Scenario:
     """There and back through an empty one of 60 m by 2.2 m."""
-    wall = {"shape": "rectangle", "material": "concrete"}
-    objects = [
-        {"name": "left", "size": [60, 2.6], "position": [30, 1.1, 1.3], "facing": [0, -1, 0]},
-        {"name": "right", "size": [60, 2.6], "position": [30, -1.1, 1.3], "facing": [0, 1, 0]},
-        {"name": "near end", "size": [2.2, 2.6], "position": [0, 0, 1.3], "facing": [1, 0, 0]},
-        {"name": "far end", "size": [2.2, 2.6], "position": [60, 0, 1.3], "facing": [-1, 0, 0]},
-        {"name": "floor", "size": [60, 2.2], "position": [30, 0, 0], "facing": [0, 0, 1]},
-        {"name": "ceiling", "size": [60, 2.2], "position": [30, 0, 2.6], "facing": [0, 0, -1]},
-    ]
-    scene = Scene.of({"unevenness": 1.0, "objects": [wall | each for each in objects]}, "corridor of 60 m")
+    scene = _hollow("corridor of 60 m", (60.0, 2.2, 2.6), (30.0, 0.0), unevenness=1.0)
     places = np.array([[2.0, 0.2], [58.0, -0.2], [2.0, 0.2]])
     return replace(scenario, scene=scene, motion=Walk("handheld", waypoints=places).through(scene, scenario.seed))
 
 
 def crowd(scenario: Scenario) -> Scenario:
     """Five people walk about, 0.6 m away and more."""
-    return replace(scenario, scene=crowded(scenario.scene, scenario.motion, 5, np.random.default_rng(0)))
+    return replace(scenario, scene=crowded(scenario.scene, scenario.motion, 5, scenario.seed))
 
 
 def mounted(height: float = 1.2, pitch: float = 0.0, roll: float = 0.0) -> Callable[[Scenario], Scenario]:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from radarize.errors import InputError
+from radarsim.draws import draws
 from radarsim.motion import Motion
 from radarsim.scene.clearance import LOWEST, Clearance, ground_level
 from radarsim.scene.movers import Person
@@ -16,14 +17,14 @@ _NEAR, _WAY = (0.8, 3.5), (1.5, 5.0)
 _ATTEMPTS = 60
 
 
-def crowded(scene: Scene, motion: Motion, count: int, rng: np.random.Generator) -> Scene:
+def crowded(scene: Scene, motion: Motion, count: int, seed: int) -> Scene:
     """A scene with `count` people more.
 
     Args:
         scene: with room to walk.
         motion: of the radar, which they keep 0.6 m away from.
         count: of people; each comes within 3 m of the radar once.
-        rng: of their ways, speeds and heights.
+        seed: decides on their ways, speeds and heights.
 
     Raises:
         InputError: no room to move, or none that the radar does not need.
@@ -33,6 +34,7 @@ def crowded(scene: Scene, motion: Motion, count: int, rng: np.random.Generator) 
     floor, times = ground_level(scene), np.arange(0.0, motion.duration, 0.1)
     ground, radar = Ground.of(Clearance.of(scene, LOWEST, 1.8), _ROOM), motion.position(times)[:, :2]
     people: list[Person] = []
+    rng = draws(seed, "people")
     for attempt in range(_ATTEMPTS * count):
         if len(people) == count:
             break

@@ -17,7 +17,6 @@ from radarize.radar.presets import load_config
 from radarize.recording import Recording, RecordingWriter, spare
 from radarsim.batches import Batch, Batches
 from radarsim.crowd import crowded
-from radarsim.draws import draws
 from radarsim.physics.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
 from radarsim.scene.scene import Scene
@@ -93,7 +92,7 @@ def planned(
     settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     motion = way.through(world, seed)
-    world = crowded(world, motion, people, draws(seed, "people"))
+    world = crowded(world, motion, people, seed)
     scenario = Scenario(world, motion, config, settings, seed, names, engine)
     about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
     return scenario, cfg_text, about | ({"people": people} if people else {})

@@ -65,15 +65,18 @@ class Maker(ABC):
 
     Attributes:
         maps: by name, what they are.
-        names: of all maps, in their order.
         history: frames before its own that a map needs.
         physical: rows are metres or m/s, so that a network can be shown those of any chirp, see `Resampling`.
     """
 
     maps: dict[str, str]
-    names: tuple[str, ...]
     history = 0
     physical = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all maps."""
+        return tuple(self.maps)
 
     @staticmethod
     def stride(config: RadarConfig) -> int:
@@ -117,7 +120,6 @@ class MapMaker(Maker):
 
     def __init__(self, config: RadarConfig):
         self.heatmaps = Heatmaps(config, AZIMUTHS)
-        self.names = tuple(MAPS)
 
     @staticmethod
     def axes(config: RadarConfig, name: str) -> Axes:

@@ -15,7 +15,6 @@ from radarize.errors import InputError
 from radarize.features.grid import Grid, Resampling
 from radarize.features.maps import Maker, MapMaker, maps_of
 from radarize.jobs import Report, attempt, perform
-from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.tum import planar
 
@@ -103,9 +102,7 @@ class Table:
             InputError: a recording lacks something, differs from the others in its maps' grid, has truth that is all
                 unknown, or memory does not suffice.
         """
-        lengths, periods, grids = zip(*(_open(path, maps, maker) for path in paths), strict=True)
-        if grid is not None:
-            grids = ({name: grid for name in maps},) * len(paths)
+        lengths, periods, grids = zip(*(_open(path, maps, maker, grid) for path in paths), strict=True)
         for path, period, own in zip(paths, periods, grids, strict=True):
             if maps and (difference := grids[0][maps[0]].difference(own[maps[0]])):
                 raise InputError(f"{path}: has maps of {difference} as in {paths[0].name}, expected one radar's")
@@ -175,11 +172,11 @@ class Table:
         return torch.stack([values[frames] for values in self.maps.values()], dim=2).float()
 
 
-def _open(path: Path, maps: Sequence[str], maker: type[Maker]) -> tuple[int, float, dict[str, Grid]]:
-    """Frames that networks see, their period, and the grids of their maps."""
+def _open(path: Path, maps: Sequence[str], maker: type[Maker], grid: Grid | None) -> tuple[int, float, dict[str, Grid]]:
+    """Frames that networks see, their period, and the grids of their maps: that one, if they are brought to one."""
     with Recording(path) as recording:
         stride = maker.stride(recording.config)
-        grids = {name: Grid.of(recording.config, name, maker) for name in maps}
+        grids = {name: grid or Grid.of(recording.config, name, maker) for name in maps}
         return -(-len(recording) // stride), stride * recording.config.frame_period, grids
 
 
@@ -192,15 +189,17 @@ def _read(
         stride = maker.stride(recording.config)
         size = _BATCH * stride
         starts = range(0, count if maps else 0, size)
-        parts = [maps_of(recording, start, min(start + size, count), maps, maker, stride) for start in starts]
-        if grid is not None:
-            brought = partial(_brought, config=recording.config, kind=kind, grid=grid)
-            parts = [{name: brought(made, name) for name, made in part.items()} for part in parts]
+        own = {} if grid is None else {name: Grid.of(recording.config, name, kind) for name in maps}
+        bring = {n: Resampling.between(grid, g, kind.axes(recording.config, n).centred) for n, g in own.items()}
+        parts = []
+        for start in starts:
+            made = maps_of(recording, start, min(start + size, count), maps, maker, stride)
+            parts.append({name: _brought(values, bring.get(name)) for name, values in made.items()})
         found, frames = {}, slice(0, count, stride)
         for reading in readings:
             rows = reading.rows(recording, frames)
             if grid is not None and reading.on_grid is not None:
-                rows = reading.on_grid(rows, Grid.of(recording.config, maps[0], kind), grid)
+                rows = reading.on_grid(rows, own[maps[0]], grid)
             found[reading.name] = rows
             # Some may be unknown: a tracking camera is blind now and then.
             if len(rows) < -(-count // stride) or not np.isfinite(rows).any():
@@ -209,8 +208,7 @@ def _read(
 
 
 def _brought(
-    made: Float16[np.ndarray, "frame row azimuth"], name: str, config: RadarConfig, kind: type[Maker], grid: Grid
+    made: Float16[np.ndarray, "frame row azimuth"], resampling: Resampling | None
 ) -> Float16[np.ndarray, "frame known azimuth"]:
-    """Maps on a grid."""
-    resampling = Resampling.between(grid, Grid.of(config, name, kind), kind.axes(config, name).centred)
+    """Maps on another grid, if there is one."""
     return made if resampling is None else resampling(torch.from_numpy(made).float()[:, None])[:, 0].half().numpy()

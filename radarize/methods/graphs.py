@@ -1,13 +1,13 @@
 """Makes the graphs that `radarize.nets.compiled` runs: ``python -m radarize.methods.graphs``."""
 
 from radarize.methods.method import Weights
-from radarize.methods.registry import find_task
+from radarize.methods.registry import BEST, ODOMETRY, SCANS, find_task
 from radarize.nets.compiled import GRAPHS, graph_of
 from radarize.nets.export import export_graph
 from radarize.nets.weights import load
 
 #: Networks of the methods of choice.
-KINDS = ("translation", "rotation", "segmentation")
+KINDS = (*ODOMETRY[BEST["odometry"]].networks, *SCANS[BEST["scans"]].networks)
 
 
 def main() -> None:
@@ -16,7 +16,8 @@ def main() -> None:
     for former in GRAPHS.glob("*.onnx"):
         former.unlink()
     for kind in KINDS:
-        print(export_graph(*(found := load(Weights().of(kind), find_task(kind).network)), graph_of(found[1])))
+        net, header = load(Weights().of(kind), find_task(kind).network)
+        print(export_graph(net, header, graph_of(header)))
 
 
 if __name__ == "__main__":

@@ -123,6 +123,13 @@ class Task(ABC):
         """What the network should say of windows."""
         return table.truth[self.truth[0].name][frames[:, -1]]
 
+    def items(
+        self, table: Table, starts: Int[Tensor, "item"], spacing: Int[Tensor, "item"], count: int
+    ) -> tuple[Inputs, Tensor]:
+        """What the network reads of windows of so many frames, and what it should say."""
+        frames = self.frames(starts, spacing, count)
+        return self.inputs(table, frames), self.label(table, frames)
+
     @abstractmethod
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
         """Items as they might as well have been."""

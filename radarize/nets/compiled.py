@@ -17,8 +17,6 @@ from radarize.nets.weights import Header, Network, load
 from radarize.radar.config import RadarConfig
 
 GRAPHS = Path(__file__).parent / "graphs"
-#: What a graph names as the place of weights that it is lent.
-LENT = "weights"
 #: Of a header, what decides the graph.
 _SHAPE = ("kind", "setting", "frames", "maps", "width", "grid")
 #: onnxruntime tells of errors alone.
@@ -42,10 +40,8 @@ class Compiled:
     def estimate(self, *inputs: Tensor) -> Tensor | tuple[Tensor, ...]:
         """What the network's own `estimate` gives."""
         if self._session is None:
-            with torch.inference_mode():
-                return self.net.estimate(*inputs)
-        names = (each.name for each in self._session.get_inputs())
-        fed = {name: values.contiguous().numpy() for name, values in zip(names, inputs, strict=True)}
+            return self.net.estimate(*inputs)
+        fed = {name: values.contiguous().numpy() for name, values in zip(self.net.inputs, inputs, strict=True)}
         found = tuple(torch.from_numpy(values) for values in self._session.run(None, fed))
         return found if len(found) > 1 else found[0]
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from radarize.nets.compiled import LENT, lent
+from radarize.nets.compiled import lent
 from radarize.nets.weights import Header, example
 from radarize.replacing import replacing
 
@@ -48,7 +48,7 @@ def export_graph(net: nn.Module, header: Header, path: Path) -> Path:
         if values.name in missing:
             values.ClearField("raw_data")
             values.data_location = onnx.TensorProto.EXTERNAL
-            values.external_data.add(key="location", value=LENT)
+            values.external_data.add(key="location", value="weights")  # no file of that name is read
     for node in model.graph.node:  # where torch's source lies, and what it calls things
         node.ClearField("metadata_props")
         node.ClearField("doc_string")

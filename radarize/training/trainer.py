@@ -219,10 +219,10 @@ class Trainer:
         return Generator(self.team.device).manual_seed(int(seed[0] >> 1))
 
     def _items(self, table: Table, starts: Tensor, spacings: Tensor) -> tuple[Inputs, Tensor]:
-        frames, device = self.task.frames(starts, spacings, self.settings.frames), self.team.device
-        inputs = self.task.inputs(table, frames)
+        inputs, label = self.task.items(table, starts, spacings, self.settings.frames)
+        device = self.team.device
         inputs = tuple(each.to(device) for each in inputs) if isinstance(inputs, tuple) else inputs.to(device)
-        return inputs, self.task.label(table, frames).to(device)
+        return inputs, label.to(device)
 
     def _validation(self, rank: int, size: int) -> Iterator[tuple[Inputs, Tensor]]:
         mine = self._validated[rank::size]

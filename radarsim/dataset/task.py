@@ -161,7 +161,6 @@ class Task:
     def _scenario(self):
         """The `Scenario` to record, and the radar's original configuration text."""
         from radarsim.crowd import crowded
-        from radarsim.draws import draws
         from radarsim.scenario import Scenario
         from radarsim.scene.scene import Scene
         from radarsim.walk import Walk
@@ -173,7 +172,7 @@ class Task:
         config, cfg_text = load_config(self.variant.radar_of(self.radar))
         front_end = self.variant.frontend_of(self.frontend)
         motion = walk.through(mild, self.seed)
-        scene = crowded(scene, motion, self.people, draws(self.seed, "people"))
+        scene = crowded(scene, motion, self.people, self.seed)
         return Scenario(scene, motion, config, front_end, self.seed, self.sensors), cfg_text
 
     def _late(self, folder: Path) -> list[str]:

@@ -283,7 +283,7 @@ def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
 
 
 #: Bins of 2/3 the size over Doppler, and of half the size over range.
-OTHER = CONFIG.model_copy(update={"loops": 24, "samples": 32, "slope": CONFIG.slope})
+OTHER = CONFIG.model_copy(update={"loops": 24, "samples": 32})
 
 
 def test_maps_of_any_radar_are_brought_to_a_grid(tmp_path):

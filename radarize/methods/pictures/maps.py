@@ -25,7 +25,7 @@ class PictureMaker(Maker):
     }
 
     def __init__(self, config: RadarConfig):
-        self.config, self.names = config, tuple(self.maps)
+        self.config = config
 
     @staticmethod
     def axes(config: RadarConfig, name: str) -> Axes:

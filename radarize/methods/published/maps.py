@@ -58,7 +58,7 @@ class PublishedMaps(Maker):
     def __init__(self, config: RadarConfig):
         if len(config.tx) * len(config.rx) != 12:
             raise InputError(f"tx {config.tx} and rx {config.rx} are no 12 channels, which the published method needs")
-        self.config, self.names = config, tuple(self.maps)
+        self.config = config
         # The vector lists TX1, TX2, TX3; the artefact multiplies the first, second, third chirp with it.
         self._calibration = self._tensor(config.calibration.reshape(12, 1))
         slow, (rows, columns) = BURSTS * config.loops, DOPPLER_SIZE

@@ -47,9 +47,8 @@ _SIGMAS = 3.0
 _INDEPENDENT = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
 _ASTRAY = np.radians(45.0)
-#: rad/s^0.5, what every step claims; and s for which it is remembered by how much the heading became surer: what it
-#: loses of that is no news, so that claims of steps add up to how unsure of it the filter is.
-_JITTER, _SURER = np.radians(0.6), 10.0
+#: rad/s^0.5, what every step claims.
+_JITTER = np.radians(0.6)
 #: m to either side of a wall's flash, where it hides the rest.
 _RING = 0.1
 #: See `radarize.odometry.integration.RotationEstimator`, of those that do not know by how much they lag.
@@ -143,7 +142,6 @@ class MapRotation:
         self._time: float | None = None
         self._velocity = self._position = np.zeros(2)
         self._prior = prior
-        self._surer = 0.0  # rad^2
 
     def features(
         self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]
@@ -199,10 +197,11 @@ class MapRotation:
         c, d = np.cos(middle), np.sin(middle)
         self._position = self._position + dt * np.array([[c, -d], [d, c]]) @ mean
         seen = self._match(view) or seen
-        growth = state.covariance[YAW, YAW] - known - np.exp(-dt / _SURER) * self._surer
-        self._surer = max(-growth, 0.0)
+        # A heading that becomes surer is corrected, by as much as its variance falls, on average: by news of the steps
+        # before, which is no turn of this one. Whoever has corrected those steps by himself has to know of it.
+        change = abs(state.covariance[YAW, YAW] - known)
         wander = _JITTER if seen else self.settings.unseen
-        return state.mean[YAW] - start, max(growth, 0.0) + wander**2 * dt, seen
+        return state.mean[YAW] - start, change + wander**2 * dt, seen
 
     @property
     def _laid(self) -> float:

@@ -1,10 +1,13 @@
 """Yaw from a local map, in a world that is a texture: what a frame sees of it is known without any radar."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from radarize.batch import Signal
+from radarize.odometry.bearings import YAW
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
@@ -133,6 +136,35 @@ def test_what_a_network_makes_of_nothing_is_no_sight():
     found = rotation.estimate(of_spectrum(SIGNAL, np.arange(31), np.arange(31) / 30), known)
     assert not found.seen[1:].any()
     assert np.sqrt(found.variance.sum()) > rotation.settings.unseen
+
+
+def test_a_correction_claims_what_it_takes_back():
+    """A wall tells the heading every third of a second. The step there is off by all that had drifted before: who found
+    that out by himself would take it for a turn."""
+    rng, frames, noise = np.random.default_rng(5), 1500, np.radians(0.5)
+    settings = RotationConfig(unseen=0)
+    drift = np.radians(1.0) * rng.normal(size=frames)
+    claimed = np.full(frames, np.radians(1.0) ** 2 / settings.doubt)
+    prior = SimpleNamespace(estimate=lambda *_: Rotations(drift, claimed, np.ones(frames, bool)))
+    rotation = MapRotation(SIGNAL.heatmaps, settings, prior)
+    shape = len(rotation._ranges), len(rotation._sines)
+    rotation.features = lambda some: np.zeros((len(some), *shape), np.float32)
+    rotation.echoes = lambda some: [[]] * len(some)
+    state, count = rotation._state, iter(range(1, frames))
+
+    def see(*_) -> bool:
+        if there := next(count) % 10 == 0:
+            state.update(state.row({YAW: 1.0}), noise * rng.normal() - state.mean[YAW], noise**2)
+        return there
+
+    rotation._bearings.see = see
+    known = Velocities(
+        np.zeros((frames, 2)), np.tile(1e-4 * np.eye(2), (frames, 1, 1)), np.full(frames, 50), np.ones(frames, bool)
+    )
+    found = rotation.estimate(of_spectrum(SIGNAL, np.arange(frames), np.arange(frames) / 30), known)
+    told = found.seen & (np.arange(frames) > 0)  # and the radar never turned
+    assert told.sum() == 149
+    assert np.mean(found.yaw[told] ** 2 / found.variance[told]) == pytest.approx(1, abs=0.25)
 
 
 def test_a_map_that_is_left_behind_is_empty():

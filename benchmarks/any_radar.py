@@ -1,8 +1,10 @@
-r"""What the shipped networks gained when they went on learning from many radars: walks of `any-radar` that validate.
+"""What the shipped networks gained when they went on learning from many radars: walks of `any-radar` that validate.
 
-radarsim dataset any-radar -o any-radar
-mkdir former && git archive 57c7245 radarize/weights | tar -x --strip-components 2 -C former
-python -m benchmarks.any_radar --data any-radar --former former
+    radarsim dataset any-radar -o any-radar
+    mkdir former && git archive 57c7245 radarize/weights | tar -x --strip-components 2 -C former
+    python -m benchmarks.any_radar --data any-radar --former former
+
+The former networks had learned from the preset alone.
 """
 
 from pathlib import Path

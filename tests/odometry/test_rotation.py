@@ -48,6 +48,22 @@ def follow(times: np.ndarray, poses: np.ndarray, prior=None, settings=None) -> R
     return rotation.estimate(of_spectrum(SIGNAL, poses, times - CONFIG.burst_center), known)
 
 
+def sightless(settings=None, prior=None) -> MapRotation:
+    """One whose frames are empty."""
+    rotation = MapRotation(SIGNAL.heatmaps, settings, prior)
+    shape = len(rotation._ranges), len(rotation._sines)
+    rotation.features = lambda frames: np.zeros((len(frames), *shape), np.float32)
+    rotation.echoes = lambda frames: [[]] * len(frames)
+    return rotation
+
+
+def standing(frames: int) -> Velocities:
+    """Of a sensor that is known not to move."""
+    return Velocities(
+        np.zeros((frames, 2)), np.tile(1e-4 * np.eye(2), (frames, 1, 1)), np.full(frames, 50), np.ones(frames, bool)
+    )
+
+
 @pytest.mark.parametrize("rate", [5, 10, 15, 30])
 def test_swinging_to_and_fro_at_any_frame_rate(rate):
     """40 deg to either side at 0.4 Hz: up to 20 deg from frame to frame at 5 Hz, and to 100 deg/s."""
@@ -111,11 +127,7 @@ def test_the_search_goes_as_far_as_the_prior_is_unsure():
 
 @pytest.mark.parametrize("rate", [5, 15, 30])
 def test_what_a_blind_second_claims_does_not_depend_on_the_frame_rate(rate):
-    rotation = MapRotation(SIGNAL.heatmaps)
-    shape = len(rotation._ranges), len(rotation._sines)
-    rotation.features = lambda frames: np.zeros((len(frames), *shape), np.float32)
-    rotation.echoes = lambda frames: [[]] * len(frames)
-    count = rate + 1
+    rotation, count = sightless(), rate + 1
     nothing = Velocities(
         np.zeros((count, 2)), np.tile(np.eye(2), (count, 1, 1)), np.zeros(count, int), np.zeros(count, bool)
     )
@@ -128,12 +140,8 @@ def test_what_a_blind_second_claims_does_not_depend_on_the_frame_rate(rate):
 
 def test_what_a_network_makes_of_nothing_is_no_sight():
     """It goes on to tell turns, and sounds sure; whoever trusts them is told that nothing was seen."""
-    rotation = MapRotation(SIGNAL.heatmaps, prior=Unsure(np.zeros(31), 0))
-    shape = len(rotation._ranges), len(rotation._sines)
-    rotation.features = lambda frames: np.zeros((len(frames), *shape), np.float32)
-    rotation.echoes = lambda frames: [[]] * len(frames)
-    known = Velocities(np.zeros((31, 2)), np.tile(1e-4 * np.eye(2), (31, 1, 1)), np.full(31, 50), np.ones(31, bool))
-    found = rotation.estimate(of_spectrum(SIGNAL, np.arange(31), np.arange(31) / 30), known)
+    rotation = sightless(prior=Unsure(np.zeros(31), 0))
+    found = rotation.estimate(of_spectrum(SIGNAL, np.arange(31), np.arange(31) / 30), standing(31))
     assert not found.seen[1:].any()
     assert np.sqrt(found.variance.sum()) > rotation.settings.unseen
 
@@ -146,10 +154,7 @@ def test_a_correction_claims_what_it_takes_back():
     drift = np.radians(1.0) * rng.normal(size=frames)
     claimed = np.full(frames, np.radians(1.0) ** 2 / settings.doubt)
     prior = SimpleNamespace(estimate=lambda *_: Rotations(drift, claimed, np.ones(frames, bool)))
-    rotation = MapRotation(SIGNAL.heatmaps, settings, prior)
-    shape = len(rotation._ranges), len(rotation._sines)
-    rotation.features = lambda some: np.zeros((len(some), *shape), np.float32)
-    rotation.echoes = lambda some: [[]] * len(some)
+    rotation = sightless(settings, prior)
     state, count = rotation._state, iter(range(1, frames))
 
     def see(*_) -> bool:
@@ -158,10 +163,7 @@ def test_a_correction_claims_what_it_takes_back():
         return there
 
     rotation._bearings.see = see
-    known = Velocities(
-        np.zeros((frames, 2)), np.tile(1e-4 * np.eye(2), (frames, 1, 1)), np.full(frames, 50), np.ones(frames, bool)
-    )
-    found = rotation.estimate(of_spectrum(SIGNAL, np.arange(frames), np.arange(frames) / 30), known)
+    found = rotation.estimate(of_spectrum(SIGNAL, np.arange(frames), np.arange(frames) / 30), standing(frames))
     told = found.seen & (np.arange(frames) > 0)  # and the radar never turned
     assert told.sum() == 149
     assert np.mean(found.yaw[told] ** 2 / found.variance[told]) == pytest.approx(1, abs=0.25)

@@ -1,4 +1,4 @@
-"""Networks as graphs that onnxruntime runs: single items take 0.6 to 0.75 of torch's time, batches as much.
+"""Networks as graphs that onnxruntime runs, norms folded into convolutions.
 
 The graphs, without weights, come with the package for the networks that run live (`radarize.methods.graphs` makes
 them). No graph is ever taken from a file of weights or from beside it. Networks of other shapes run in torch.
@@ -13,6 +13,7 @@ import onnxruntime
 import torch
 from torch import Tensor, nn
 
+from radarize.nets.folded import folded
 from radarize.nets.weights import Header, Network, load
 from radarize.radar.config import RadarConfig
 
@@ -31,11 +32,11 @@ class Compiled:
         header: of its file.
 
     Attributes:
-        net, header: the same.
+        net: the same network, folded; header: the same.
     """
 
     def __init__(self, net: nn.Module, header: Header):
-        self.net, self.header = net, header
+        self.net, self.header = folded(net), header
 
     def estimate(self, *inputs: Tensor) -> Tensor | tuple[Tensor, ...]:
         """What the network's own `estimate` gives."""
@@ -54,7 +55,7 @@ class Compiled:
         options.log_severity_level = _ERRORS
         options.intra_op_num_threads = torch.get_num_threads()
         options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # others need the processor
-        weights = {f"net.{name}": values.numpy() for name, values in lent(self.net).items()}
+        weights = {f"net.{name}": values.numpy() for name, values in self.net.state_dict().items()}
         values = [onnxruntime.OrtValue.ortvalue_from_numpy(each) for each in weights.values()]
         options.add_external_initializers(list(weights), values)
         return onnxruntime.InferenceSession(file.read_bytes(), options, providers=["CPUExecutionProvider"])
@@ -68,11 +69,6 @@ def compiled(path: Path, network: type[Network], config: RadarConfig | None = No
     """
     net, header = load(path, network, config)
     return Compiled(net, header), header
-
-
-def lent(net: nn.Module) -> dict[str, Tensor]:
-    """The weights of a network that its graph lacks, by name: all but the counts of a training."""
-    return {name: values for name, values in net.state_dict().items() if values.is_floating_point()}
 
 
 def graph_of(header: Header) -> Path:

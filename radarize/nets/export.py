@@ -7,7 +7,7 @@ from pathlib import Path
 import torch
 from torch import nn
 
-from radarize.nets.compiled import lent
+from radarize.nets.folded import folded
 from radarize.nets.weights import Header, example
 from radarize.replacing import replacing
 
@@ -31,7 +31,7 @@ def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
     Raises:
         InputError: the file cannot be written.
     """
-    program = _program(net, header)
+    program = _program(folded(net), header)
     program.model.metadata_props["radarize"] = header.model_dump_json()
     with replacing(path) as part:
         program.save(part, external_data=False)
@@ -42,8 +42,9 @@ def export_graph(net: nn.Module, header: Header, path: Path) -> Path:
     """Write the same without weights, for `radarize.nets.compiled`: whoever runs it lends it those of a file."""
     import onnx  # not installed with every radarize
 
+    net = folded(net)
     model = _program(net, header, optimize=False).model_proto  # which would mix weights into constants
-    missing = {f"net.{name}" for name in lent(net)}
+    missing = {f"net.{name}" for name in net.state_dict()}
     for values in model.graph.initializer:
         if values.name in missing:
             values.ClearField("raw_data")
@@ -65,6 +66,6 @@ def _program(net: nn.Module, header: Header, **how: object) -> torch.onnx.ONNXPr
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return torch.onnx.export(
-            Estimate(net).eval().cpu(), inputs, input_names=list(net.inputs), output_names=list(net.outputs),
+            Estimate(net).cpu(), inputs, input_names=list(net.inputs), output_names=list(net.outputs),
             dynamic_shapes=(tuple({0: item} for _ in inputs),), dynamo=True, verbose=False, **how,
         )  # fmt: skip

@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 import scipy.fft
 from jaxtyping import Bool, Float32, Int16
-from scipy.signal import windows
+
+from radarize.radar import windows
 
 #: A chirp is off whose level is more than so many times the others', or so small a part of it. Undisturbed ones of 20 s
 #: walks in buildings A to D, by hand, on a cart and on a robot, lie between 0.8 and 1.7.

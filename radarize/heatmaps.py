@@ -14,10 +14,10 @@ from typing import Literal
 import numpy as np
 import torch
 from jaxtyping import Bool, Complex64, Float32, Int, Real
-from scipy.signal import windows
 
 from radarize.errors import InputError
 from radarize.plain import Frozen, setting
+from radarize.radar import windows
 from radarize.radar.array import azimuth_row, elevation_pairs, virtual_positions
 from radarize.radar.config import RadarConfig
 
@@ -84,7 +84,7 @@ class Heatmaps:
     @staticmethod
     @cache
     def _taper(count: int) -> Float32[torch.Tensor, "antenna 1"]:
-        taper = windows.taylor(count, nbar=4, sll=25) if count > 2 else np.ones(count)
+        taper = windows.taylor(count)
         return torch.as_tensor(taper / taper.sum()).float()[:, None]
 
     def spectrum(

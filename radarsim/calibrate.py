@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Complex, Float
 from scipy.optimize import minimize
-from scipy.signal import windows
 
 from radarize.errors import InputError
+from radarize.radar import windows
 from radarize.radar.array import BOARDS, virtual_positions
 from radarize.radar.config import RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
@@ -163,7 +163,7 @@ def find_leakage(
     config = front_end.config
     static = signal.mean(axis=(0, 1), dtype=complex)
     n = config.samples
-    window = windows.hann(n, sym=False)
+    window = windows.hann(n, periodic=True)
     t = (np.arange(n) - (n - 1) / 2) / config.sample_rate
     low = np.exp(-2j * np.pi * np.outer(np.arange(5), np.arange(n)) / n) * window  # the five lowest bins
     seen = static.reshape(-1, n) @ low.T
@@ -223,7 +223,7 @@ def fit_channels(
 def _snapshots(signal, config: RadarConfig, floor: float) -> list[Complex[np.ndarray, "virtual"]]:
     """The strongest cells of all frames' range-Doppler maps, as if all channels had been sampled at once."""
     loops, n = signal.shape[1], config.samples
-    slow, fast = windows.hann(loops, sym=False), windows.hann(n, sym=False)
+    slow, fast = windows.hann(loops, periodic=True), windows.hann(n, periodic=True)
     cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
     cycles = np.fft.fftfreq(loops)[:, None] * np.array(config.slot) / len(config.slot)  # a slot's share of a loop
     cube = cube * np.exp(-2j * np.pi * cycles)[:, :, None, None]

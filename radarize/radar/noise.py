@@ -2,7 +2,8 @@
 
 import numpy as np
 from jaxtyping import Complex, Float
-from scipy.signal import windows
+
+from radarize.radar import windows
 
 
 def noise_profile(signal: Complex[np.ndarray, "frame loop tx rx sample"]) -> Float[np.ndarray, "sample"]:
@@ -11,7 +12,7 @@ def noise_profile(signal: Complex[np.ndarray, "frame loop tx rx sample"]) -> Flo
     The median over fast Doppler bins: a few movers do not lift it, and of exponential noise it is ln 2 of the mean.
     """
     loops, n = signal.shape[1], signal.shape[-1]
-    slow, fast = windows.hann(loops, sym=False), windows.hann(n, sym=False)
+    slow, fast = windows.hann(loops, periodic=True), windows.hann(n, periodic=True)
     cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
     cube = cube[:, loops // 4 : loops - loops // 4 + 1]
     power = np.abs(cube) ** 2 / (np.sum(slow**2) * np.sum(fast**2))

@@ -12,7 +12,7 @@ from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from radarize.pose import between, compose
 from radarize.slam.config import LoopConfig
@@ -131,7 +131,7 @@ class Jury:
 
     def __init__(self, graph: PoseGraph, drift: Drift, config: LoopConfig):
         self.graph, self.drift, self.config = graph, drift, config
-        self._limit = float(chi2.ppf(config.inlier_probability, 3))
+        self._limit = float(chdtri(3, 1 - config.inlier_probability))
         self._doubtful: deque[tuple[int, Closure]] = deque(maxlen=4 * config.support)
 
     def forget(self) -> None:

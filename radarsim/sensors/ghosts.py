@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Complex, Float, Float32, Int, UInt8
 from numba import njit, prange
-from scipy.signal import windows
 
+from radarize.radar import windows
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.recording import Product, Stream
@@ -115,7 +115,7 @@ class CauseMaps:
 
     def __init__(self, config: RadarConfig):
         self.config, self.row = config, azimuth_row(config)
-        self.taper = windows.taylor(len(self.row), nbar=4, sll=25) if len(self.row) > 2 else np.ones(len(self.row))
+        self.taper = windows.taylor(len(self.row))
         self.taper /= self.taper.sum()
         y = virtual_positions(config).reshape(-1, 3)[self.row, 1]
         steering = np.exp(2j * np.pi / config.wavelength * y[:, None] * np.sin(AZIMUTHS))

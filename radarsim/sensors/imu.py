@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.signal import lfilter
 
 from radarize.recording import Product, Stream
 from radarsim.motion import turned
@@ -91,6 +90,8 @@ class Triad:
     bias: Float[np.ndarray, "tick 3"]
 
     def __init__(self, errors: Errors, rng: np.random.Generator, count: int):
+        from scipy.signal import lfilter  # which takes long to load
+
         self._errors = errors
         start, drive = rng.standard_normal((2, 3)), rng.standard_normal((count, 3, 3))
         keep = np.exp(-1 / (RATE * errors.correlation_time))

@@ -86,7 +86,7 @@ class Batch:
     def __len__(self) -> int:
         return len(self.stamps)
 
-    @property
+    @cached_property
     def centers(self) -> Float[np.ndarray, "frame"]:
         """Burst centres, s: the instants that motion and scans belong to."""
         return self.stamps + self.signal.radar.burst_center

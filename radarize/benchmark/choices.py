@@ -106,6 +106,14 @@ LASTING = {
 #: 20 s by hand in a building of style A, seed 301, and by cart in C, seed 303, as up to eleven radars see them.
 RADARS = {"A_0": (4309744100947278613,), "C_0": (2078735959714348781,)}
 
+#: 20 s by hand and by cart in buildings of styles A and C with seeds 651 and 652, and in the floor plan csail, each as
+#: the presets long-range and radarhd see it.
+FARTHER = {
+    "A_0": (3066841380677396802, 8247674105515224821),
+    "C_0": (3504239006966917070, 8856944910352557103),
+    "csail": (1087032148287752839, 6762958810614420727),
+}
+
 #: 60 s by hand and by cart in buildings of styles A to D with seeds 611 to 614, and as many in A to D and the office
 #: with seeds 621 to 625.
 STRETCH = {
@@ -145,11 +153,8 @@ CHOICES = (
     Choice("what odometry claims of its errors, and its fusion with the network", ODOMETRY),
     Choice("how long the map of turns remembers, and what the network's turns count for", TURNS),
     Choice("how long errors of velocities are claimed to last", LASTING),
-    Choice(
-        "how coarse maps of other radars may be, which radars turn without networks, and what arrays that tell little "
-        "claim of velocities",
-        RADARS,
-    ),
+    Choice("how coarse maps of other radars may be, and what arrays that tell little claim of velocities", RADARS),
+    Choice("that radars which see far turn with networks, too", FARTHER),
     Choice("what closures need in the back end's preset radar, and its cells", CLOSURES),
     Choice("what matches and closures count for in the back end's preset radar", BEARINGS | REAL),
     Choice("by how much larger sines of azimuth are taken to match turns", STRETCH),

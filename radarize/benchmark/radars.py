@@ -1,4 +1,4 @@
-"""Networks that were trained with one radar, on others: walks that several radars see alike (data set `radars`)."""
+"""The same networks on several radars: walks that all of them see alike (data set `radars`)."""
 
 import pandas as pd
 
@@ -19,9 +19,9 @@ MEANS = {
 }
 SHARES = {"map F1 %": "map.f1", "returned %": "scans.returned", "within 10 cm %": "scans.within_10cm"}
 NOTES = (
-    "Every walk is made once for each radar, with the same seed and scatterers. The networks were trained with chirps "
-    "of the `radarize` preset alone. Means over walks and their standard errors. Returned: of bearings with a surface "
-    "in the radar's reach, so the farther a radar sees, the more it has to return. Within 10 cm: of returned bearings.",
+    "Every walk is made once for each radar, with the same seed and scatterers. Means over walks and their standard "
+    "errors. Returned: of bearings with a surface in the radar's reach, so the farther a radar sees, the more it has "
+    "to return. Within 10 cm: of returned bearings.",
     "chosen: what `radarize run` takes for that radar if nothing is asked for.",
 )
 

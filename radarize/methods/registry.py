@@ -9,7 +9,7 @@ from radarize.methods import doppler, milliego, pictures, published, radarhd, ra
 from radarize.methods.configuration import Configuration
 from radarize.methods.method import Inputs, Method, Weights, load
 from radarize.methods.task import Task
-from radarize.nets.weights import check, header_of
+from radarize.nets.weights import check
 from radarize.pipeline import Follower, Pipeline, Scanner
 from radarize.polar import pictured
 from radarize.radar.config import RadarConfig
@@ -29,10 +29,6 @@ TASKS: dict[str, str | Callable[[], Task]] = _all("TASKS")
 BEST = {"odometry": "fused", "scans": "segmentation"}
 #: Methods without networks, for radars that the shipped ones do not fit.
 CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
-#: Radars that see so many times farther than the networks turn by all that they see: with the presets long-range and
-#: radarhd, odometry was off by 0.04 m without networks, and by 0.05 m with them; with radars that see no farther, by
-#: 0.10 and 0.08 m. Chosen on two walks of 20 s, by hand in a building of style A, seed 301, by cart in C, seed 303.
-FARTHER = 2.0
 #: Methods for recordings of pictures.
 PICTURED = {"odometry": "pictures", "scans": "pictures"}
 
@@ -100,11 +96,6 @@ def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
         except InputError as error:
             chosen[what] = CLASSICAL[what]
             why.append(str(error))
-    if chosen["odometry"] == BEST["odometry"]:
-        seen = header_of(weights.of("rotation")).grid
-        if seen and radar.max_range > FARTHER * seen.reach:
-            chosen["odometry"] = CLASSICAL["odometry"]
-            why.append(f"the radar sees {radar.max_range:.0f} m, and the network that tells turns {seen.reach:.1f} m")
     return chosen, "; ".join(why)
 
 

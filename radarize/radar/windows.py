@@ -8,7 +8,7 @@ Window = Float[np.ndarray, "count"]
 
 def hann(count: int, periodic: bool = False) -> Window:
     """Whose sidelobes fall by 18 dB an octave; one period of it, for spectra, or symmetric, as the others here."""
-    return np.hanning(count + periodic)[:count]
+    return np.hanning(_last(count, periodic))[:count]
 
 
 def hamming(count: int) -> Window:
@@ -18,7 +18,7 @@ def hamming(count: int) -> Window:
 
 def blackman(count: int, periodic: bool = False) -> Window:
     """Whose sidelobes are 58 dB down; see `hann`."""
-    return np.blackman(count + periodic)[:count]
+    return np.blackman(_last(count, periodic))[:count]
 
 
 def taylor(count: int, near: int = 4, level: float = 25.0) -> Window:
@@ -34,3 +34,8 @@ def taylor(count: int, near: int = 4, level: float = 25.0) -> Window:
     waves = -((-1.0) ** m) * (1 - squares / zeros).prod(axis=1) / others.prod(axis=1)  # twice the book's F_m
     place = (np.arange(count) - (count - 1) / 2) / count
     return (1 + waves @ np.cos(2 * np.pi * m[:, None] * place)) / (1 + waves.sum())
+
+
+def _last(count: int, periodic: bool) -> int:
+    """Of a period, the next one's first value comes as well; a single value is 1."""
+    return count + (periodic and count > 1)

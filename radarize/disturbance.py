@@ -12,8 +12,6 @@ import numpy as np
 import scipy.fft
 from jaxtyping import Bool, Float32, Int16
 
-from radarize.radar import windows
-
 #: A chirp is off whose level is more than so many times the others', or so small a part of it. Undisturbed ones of 20 s
 #: walks in buildings A to D, by hand, on a cart and on a robot, lie between 0.8 and 1.7.
 _OFF = 3.0
@@ -53,7 +51,7 @@ def find_flaws(
 ) -> Flaws:
     """Compare the chirps and receivers of each frame; lost chirps, `valid` being False, have no say."""
     count = samples.shape[4]
-    window = windows.hann(count).astype(np.float32)
+    window = np.hanning(count).astype(np.float32)
     signal = samples.astype(np.float32).view(np.complex64)[..., 0]
     profile = scipy.fft.fft(signal * window, axis=-1)
     power = profile.real**2 + profile.imag**2

@@ -17,9 +17,9 @@ from jaxtyping import Bool, Complex64, Float32, Int, Real
 
 from radarize.errors import InputError
 from radarize.plain import Frozen, setting
-from radarize.radar import windows
 from radarize.radar.array import azimuth_row, elevation_pairs, virtual_positions
 from radarize.radar.config import RadarConfig
+from radarize.radar.windows import taylor
 
 #: Default azimuth grid: -60...60 deg, ascending (left is positive); the antenna's gain is 15 dB down at its ends.
 AZIMUTHS = np.radians(np.arange(-60.0, 61.0))
@@ -56,9 +56,9 @@ class Heatmaps:
         bins = np.arange(config.loops) - config.loops // 2
         self.velocities = bins * config.velocity_resolution
 
-        self._range_window = self._tensor(windows.hann(config.samples), torch.float32)
+        self._range_window = self._tensor(np.hanning(config.samples), torch.float32)
         self._range_window /= self._range_window.sum()
-        self._loop_window = self._tensor(windows.hamming(config.loops), torch.float32)
+        self._loop_window = self._tensor(np.hamming(config.loops), torch.float32)
         # A closing target's phase falls: frequency -2 v / wavelength. A slot's delay is turned back at that rate.
         delay = np.asarray(config.slot) * config.chirp_time
         turn = np.exp(4j * np.pi / config.wavelength * self.velocities[:, None] * delay)
@@ -84,7 +84,7 @@ class Heatmaps:
     @staticmethod
     @cache
     def _taper(count: int) -> Float32[torch.Tensor, "antenna 1"]:
-        taper = windows.taylor(count)
+        taper = taylor(count)
         return torch.as_tensor(taper / taper.sum()).float()[:, None]
 
     def spectrum(

@@ -20,9 +20,9 @@ from scipy.ndimage import maximum_filter
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.plain import Frozen
-from radarize.radar import windows
 from radarize.radar.array import azimuth_row, rows, virtual_positions
 from radarize.radar.config import RadarConfig
+from radarize.radar.windows import periodic
 
 #: Columns of a point cloud.
 COLUMNS = ("x", "y", "z", "velocity", "snr", "noise")
@@ -97,8 +97,8 @@ class PointClouds:
         self.ranges = spacing * np.arange(self._bins) - config.range_bias
         step = config.velocity_resolution * config.loops / self._dopplers
         self.velocities = step * (np.arange(self._dopplers) - self._dopplers // 2)
-        window = windows.blackman(config.samples, periodic=True)
-        loops = windows.hann(config.loops, periodic=True)
+        window = periodic(np.blackman, config.samples)
+        loops = periodic(np.hanning, config.loops)
         self._range_window = (window / window.sum()).astype(np.float32)
         self._loop_window = (loops / loops.sum()).astype(np.float32)[:, None, None, None]
         delay = np.asarray(config.slot) * config.chirp_time

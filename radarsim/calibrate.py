@@ -14,10 +14,10 @@ from jaxtyping import Complex, Float
 from scipy.optimize import minimize
 
 from radarize.errors import InputError
-from radarize.radar import windows
 from radarize.radar.array import BOARDS, virtual_positions
 from radarize.radar.config import RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
+from radarize.radar.windows import periodic
 from radarize.recording import Recording
 from radarsim.physics.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
 from radarsim.physics.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, PhaseNoise
@@ -163,7 +163,7 @@ def find_leakage(
     config = front_end.config
     static = signal.mean(axis=(0, 1), dtype=complex)
     n = config.samples
-    window = windows.hann(n, periodic=True)
+    window = periodic(np.hanning, n)
     t = (np.arange(n) - (n - 1) / 2) / config.sample_rate
     low = np.exp(-2j * np.pi * np.outer(np.arange(5), np.arange(n)) / n) * window  # the five lowest bins
     seen = static.reshape(-1, n) @ low.T
@@ -223,7 +223,7 @@ def fit_channels(
 def _snapshots(signal, config: RadarConfig, floor: float) -> list[Complex[np.ndarray, "virtual"]]:
     """The strongest cells of all frames' range-Doppler maps, as if all channels had been sampled at once."""
     loops, n = signal.shape[1], config.samples
-    slow, fast = windows.hann(loops, periodic=True), windows.hann(n, periodic=True)
+    slow, fast = periodic(np.hanning, loops), periodic(np.hanning, n)
     cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
     cycles = np.fft.fftfreq(loops)[:, None] * np.array(config.slot) / len(config.slot)  # a slot's share of a loop
     cube = cube * np.exp(-2j * np.pi * cycles)[:, :, None, None]

@@ -4,8 +4,6 @@ from copy import deepcopy
 from itertools import pairwise
 
 from torch import nn
-from torch.nn.modules.batchnorm import _BatchNorm
-from torch.nn.modules.conv import _ConvNd
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 
@@ -15,6 +13,6 @@ def folded(net: nn.Module) -> nn.Module:
     for module in net.modules():
         if isinstance(module, nn.Sequential):
             for place, (layer, norm) in enumerate(pairwise(module)):
-                if isinstance(layer, _ConvNd) and isinstance(norm, _BatchNorm):
+                if isinstance(layer, nn.Conv1d | nn.Conv2d) and isinstance(norm, nn.BatchNorm1d | nn.BatchNorm2d):
                     module[place], module[place + 1] = fuse_conv_bn_eval(layer, norm), nn.Identity()
     return net

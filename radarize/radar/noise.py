@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Complex, Float
 
-from radarize.radar import windows
+from radarize.radar.windows import periodic
 
 
 def noise_profile(signal: Complex[np.ndarray, "frame loop tx rx sample"]) -> Float[np.ndarray, "sample"]:
@@ -12,7 +12,7 @@ def noise_profile(signal: Complex[np.ndarray, "frame loop tx rx sample"]) -> Flo
     The median over fast Doppler bins: a few movers do not lift it, and of exponential noise it is ln 2 of the mean.
     """
     loops, n = signal.shape[1], signal.shape[-1]
-    slow, fast = windows.hann(loops, periodic=True), windows.hann(n, periodic=True)
+    slow, fast = periodic(np.hanning, loops), periodic(np.hanning, n)
     cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
     cube = cube[:, loops // 4 : loops - loops // 4 + 1]
     power = np.abs(cube) ** 2 / (np.sum(slow**2) * np.sum(fast**2))

@@ -1,4 +1,6 @@
-"""Windows against sidelobes. scipy.signal has them as well, but loading it is a fifth of every command's start."""
+"""Windows that numpy lacks. scipy.signal has them, but loading it is a fifth of every command's start."""
+
+from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import Float
@@ -6,19 +8,9 @@ from jaxtyping import Float
 Window = Float[np.ndarray, "count"]
 
 
-def hann(count: int, periodic: bool = False) -> Window:
-    """Whose sidelobes fall by 18 dB an octave; one period of it, for spectra, or symmetric, as the others here."""
-    return np.hanning(_last(count, periodic))[:count]
-
-
-def hamming(count: int) -> Window:
-    """Whose sidelobes are 43 dB down."""
-    return np.hamming(count)
-
-
-def blackman(count: int, periodic: bool = False) -> Window:
-    """Whose sidelobes are 58 dB down; see `hann`."""
-    return np.blackman(_last(count, periodic))[:count]
+def periodic(window: Callable[[int], Window], count: int) -> Window:
+    """One period of a window of numpy's, which are symmetric: for spectra."""
+    return window(count + (count > 1))[:count]  # the next period's first value comes as well; a single value is 1
 
 
 def taylor(count: int, near: int = 4, level: float = 25.0) -> Window:
@@ -34,8 +26,3 @@ def taylor(count: int, near: int = 4, level: float = 25.0) -> Window:
     waves = -((-1.0) ** m) * (1 - squares / zeros).prod(axis=1) / others.prod(axis=1)  # twice the book's F_m
     place = (np.arange(count) - (count - 1) / 2) / count
     return (1 + waves @ np.cos(2 * np.pi * m[:, None] * place)) / (1 + waves.sum())
-
-
-def _last(count: int, periodic: bool) -> int:
-    """Of a period, the next one's first value comes as well; a single value is 1."""
-    return count + (periodic and count > 1)

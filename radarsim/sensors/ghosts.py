@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Complex, Float, Float32, Int, UInt8
 from numba import njit, prange
 
-from radarize.radar import windows
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+from radarize.radar.windows import taylor
 from radarize.recording import Product, Stream
 from radarsim.physics.echoes import Provenance
 from radarsim.physics.synthesis import BurstClock, _sincos_cycles
@@ -41,7 +41,7 @@ class Ghosts(Sensor):
         super().__init__(scenario)
         config, front_end = scenario.config, scenario.board
         self._maps = CauseMaps(config)
-        window = windows.hann(config.samples)
+        window = np.hanning(config.samples)
         window /= window.sum()
         taper = self._maps.taper
         self._floor = 10 * np.log10(front_end.counts**2 * front_end.noise_power * np.sum(window**2) * np.sum(taper**2))
@@ -115,18 +115,18 @@ class CauseMaps:
 
     def __init__(self, config: RadarConfig):
         self.config, self.row = config, azimuth_row(config)
-        self.taper = windows.taylor(len(self.row))
+        self.taper = taylor(len(self.row))
         self.taper /= self.taper.sum()
         y = virtual_positions(config).reshape(-1, 3)[self.row, 1]
         steering = np.exp(2j * np.pi / config.wavelength * y[:, None] * np.sin(AZIMUTHS))
         self._steering = (steering * self.taper[:, None]).astype(np.complex64)
         clock, n = BurstClock.of(config), config.samples
-        window = windows.hann(n)
+        window = np.hanning(n)
         offset = np.arange(-_WIDTH * _FINE, _WIDTH * _FINE + 1) / _FINE
         turns = np.cos(2 * np.pi * offset[:, None] * (np.arange(n) - (n - 1) / 2) / n)
         kernel = (turns @ window / window.sum()).astype(np.float32)
         # Loops count by the square of their weight: instants that split it evenly stand for all of them.
-        share = np.cumsum(windows.hamming(max(config.loops, 2)) ** 2)
+        share = np.cumsum(np.hamming(max(config.loops, 2)) ** 2)
         even = (np.arange(_INSTANTS) + 0.5) / _INSTANTS
         instants = np.interp(even, share / share[-1], np.linspace(-1, 1, len(share)))
         wavenumber = config.center_frequency / SPEED_OF_LIGHT

@@ -32,6 +32,7 @@ def estimates(one, inputs: list[torch.Tensor]) -> list[np.ndarray]:
 def test_a_graph_says_what_the_network_says(kind):
     net, header = altered(kind)
     asked = Compiled(net, header)
+    assert graph_of(header).is_file()
     assert b"BatchNormalization" not in graph_of(header).read_bytes()  # a third of the time
     two = example(net, header)
     for inputs in (two, [each[:1] for each in two], [torch.cat([each, each[:1]]) for each in two]):
@@ -47,7 +48,9 @@ def test_a_network_of_another_shape_is_asked_in_torch():
     asked = Compiled(net, header)
     assert not graph_of(header).is_file()
     inputs = example(net, header)
-    assert np.allclose(estimates(asked, inputs)[0], estimates(net, inputs)[0], atol=1e-5)
+    found = estimates(asked, inputs)[0]
+    assert np.array_equal(found, estimates(asked.net, inputs)[0])
+    assert np.allclose(found, estimates(net, inputs)[0], atol=1e-5)
 
 
 def test_the_shipped_weights_are_lent():

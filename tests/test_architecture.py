@@ -154,7 +154,7 @@ def loaded(code: str) -> set[str]:
 
 
 def test_the_pipeline_loads_no_method_and_no_training():
-    found = loaded("import radarize.pipeline")
+    found = loaded("import radarize.pipeline, radarize.report.run")
     assert "radarize.pipeline" in found
     methods = {path.parent.name for path in (ROOT / "radarize" / "methods").glob("*/__init__.py")}
     assert methods

@@ -4,10 +4,10 @@ As in the paper (section 6): association within 10 ms, alignment without scale, 
 published tables, relative rotation is a true relative error. Transformations and error matrices are evo's.
 """
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
-import pandas as pd
 from evo.core.metrics import APE, RPE, PoseRelation
 from evo.core.trajectory import PoseTrajectory3D
 from jaxtyping import Float
@@ -17,6 +17,11 @@ from radarize.evaluation.trajectory import Association, alignment, matched, move
 
 #: Relative errors are taken between poses this far apart; a pair counts if it is within this share of it.
 SECOND, METRE, TOLERANCE = 1.0, 1.0, 0.1
+
+
+def over(values: np.ndarray, statistic: Callable[[np.ndarray], float] = np.mean) -> float:
+    """A statistic of values; NaN where there are none."""
+    return float(statistic(values)) if np.size(values) else np.nan
 
 
 @dataclass(frozen=True)
@@ -31,8 +36,8 @@ class Statistics:
     @classmethod
     def of(cls, errors: np.ndarray) -> "Statistics":
         """Statistics of finite errors."""
-        errors = pd.Series(errors, dtype=float)  # whose mean of nothing is NaN
-        return cls(errors.mean(), float(np.sqrt((errors**2).mean())), errors.max(), len(errors))
+        rmse = float(np.sqrt(over(np.square(errors))))
+        return cls(over(errors), rmse, over(errors, np.max), len(errors))
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,10 @@ uncertainties are honest.
 """
 
 import numpy as np
-import pandas as pd
 from jaxtyping import Float
 
 from radarize.evaluation.claims import normalised
-from radarize.evaluation.metrics import Statistics
+from radarize.evaluation.metrics import Statistics, over
 from radarize.pose import wrap
 
 #: m/s: from this speed on, there is a direction of motion.
@@ -34,7 +33,7 @@ def velocity_errors(
     """
     known = np.isfinite(estimate).all(axis=1) & np.isfinite(true).all(axis=1)
     difference, motion = (estimate - true)[known], true[known]
-    length, speed = pd.Series(np.linalg.norm(difference, axis=1)), np.linalg.norm(motion, axis=1)
+    length, speed = np.linalg.norm(difference, axis=1), np.linalg.norm(motion, axis=1)
     moving = speed > MOVING
     along = (difference[moving] * motion[moving]).sum(axis=1) / speed[moving]
     statistics = Statistics.of(length)
@@ -42,12 +41,12 @@ def velocity_errors(
         "mean": statistics.mean,
         "rmse": statistics.rmse,
         "max": statistics.max,
-        "median": length.median(),
-        "p90": length.quantile(0.9),
+        "median": over(length, np.median),
+        "p90": over(length, lambda lengths: np.quantile(lengths, 0.9)),
         "forward": Statistics.of(difference[:, 0]).rmse,
         "left": Statistics.of(difference[:, 1]).rmse,
         "bias": Statistics.of(along).mean,
-        "missing": 1 - pd.Series(known).mean(),
+        "missing": 1 - over(known),
     }
     if covariance is not None and len(length):
         try:

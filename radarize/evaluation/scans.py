@@ -6,10 +6,10 @@ Where the truth has no surface in reach, whatever is measured is too short.
 from collections.abc import Sequence
 
 import numpy as np
-import pandas as pd
 from jaxtyping import Float, Int, UInt8
 
 from radarize.evaluation.mapping import TOLERANCE
+from radarize.evaluation.metrics import over
 
 #: m: free space is carved through a surface if the bearing ends farther behind it than this, a map's cells and a
 #: wall's thickness.
@@ -43,15 +43,15 @@ def scan_errors(measured: Float[np.ndarray, "scan beam"], true: Float[np.ndarray
     hit, reach = _returned(measured), np.isfinite(true)
     length = np.where(hit, measured, 0.0)
     far, distance = _beside(length, true)
-    difference = pd.Series(np.where(reach, length - np.where(reach, true, 0), -np.inf)[hit])
+    difference = np.where(reach, length - np.where(reach, true, 0), -np.inf)[hit]
     return {
-        "within_10cm": (difference.abs() <= TOLERANCE).mean(),
-        "beside": pd.Series(distance[hit] <= TOLERANCE).mean(),
-        "returned": pd.Series(hit[reach]).mean(),
-        "median": difference.abs().median(),
-        "beyond": (difference > TOLERANCE).mean(),
-        "short": (difference < -TOLERANCE).mean(),
-        "through": pd.Series((hit & (length > far + THROUGH))[reach]).mean(),
+        "within_10cm": over(np.abs(difference) <= TOLERANCE),
+        "beside": over(distance[hit] <= TOLERANCE),
+        "returned": over(hit[reach]),
+        "median": over(np.abs(difference), np.median),
+        "beyond": over(difference > TOLERANCE),
+        "short": over(difference < -TOLERANCE),
+        "through": over((hit & (length > far + THROUGH))[reach]),
     }
 
 
@@ -85,7 +85,8 @@ def wrong_by_cause(
     column = _nearest(cause_azimuths, azimuths)[beam]
     found = cause[scan, row, column]
     counts = np.bincount(np.minimum(found, len(names)), minlength=len(names) + 1)
-    return (pd.Series(counts, [*names, "noise"]) / hit.sum()).to_dict()
+    returned = float(hit.sum()) or np.nan
+    return {name: float(count / returned) for name, count in zip([*names, "noise"], counts, strict=True)}
 
 
 def _returned(measured: np.ndarray) -> np.ndarray:

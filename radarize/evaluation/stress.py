@@ -8,11 +8,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-import pandas as pd
 from jaxtyping import Float
 
 from radarize.evaluation.figures import Figure
 from radarize.evaluation.mapping import TOLERANCE
+from radarize.evaluation.metrics import over
 from radarize.evaluation.scans import wrong_by_cause
 from radarize.recording import Recording
 
@@ -51,7 +51,7 @@ def missed(measured: Float[np.ndarray, "scan beam"], true: Float[np.ndarray, "sc
     """
     reach = np.isfinite(true)
     seen = np.isfinite(measured) & (measured > 0) & (measured <= true + TOLERANCE)
-    return 1 - pd.Series(seen[reach]).mean()
+    return 1 - over(seen[reach])
 
 
 def sources(scans: Mapping[str, np.ndarray], true: Float[np.ndarray, "scan beam"], recording: Path) -> dict[str, float]:

@@ -50,11 +50,11 @@ class LocalMap:
         self._grid = Grid(*np.zeros((2, side, side), np.float32), cell)
 
     def correlate(
-        self, view: View, position: Float[np.ndarray, "2"], yaws: Float[np.ndarray, "yaw"]
+        self, view: View, positions: Float[np.ndarray, "yaw 2"], yaws: Float[np.ndarray, "yaw"]
     ) -> tuple[Float[np.ndarray, "yaw"], Float[np.ndarray, "yaw"]]:
-        """Correlation (-1...1) of a frame with the map, seen from a position (m) at each yaw, and how much of the
+        """Correlation (-1...1) of a frame with the map, seen at each yaw from its position (m), and how much of the
         frame's area (0...1) the map knows there."""
-        return _correlate(view, self._grid, position, yaws)
+        return _correlate(view, self._grid, positions, yaws)
 
     def blend(self, view: View, position: Float[np.ndarray, "2"], yaw: float, share: float) -> None:
         """A frame joins the map: where it had been seen often, the frame's share of the cell's mean is `share`."""
@@ -75,12 +75,11 @@ class LocalMap:
 
 
 @njit(cache=True, fastmath=True)
-def _correlate(view, grid, position, yaws):
+def _correlate(view, grid, positions, yaws):
     """Normalised correlation of a polar map with the grid, and their overlap; cells weigh by area."""
     (feature, ranges, sines), (mean, count, cell) = view, grid
     side = mean.shape[0]
     correlation, overlap = np.zeros(len(yaws)), np.zeros(len(yaws))
-    origin_x, origin_y = position[0] / cell + side / 2, position[1] / cell + side / 2
     ahead, left = np.empty(feature.shape, np.float32), np.empty(feature.shape, np.float32)
     for i in range(len(ranges)):
         for j in range(len(sines)):
@@ -88,6 +87,7 @@ def _correlate(view, grid, position, yaws):
             left[i, j] = ranges[i] / cell * sines[j]
     for k in range(len(yaws)):
         c, s = np.cos(yaws[k]), np.sin(yaws[k])
+        origin_x, origin_y = positions[k, 0] / cell + side / 2, positions[k, 1] / cell + side / 2
         n = sum_f = sum_m = sum_ff = sum_mm = sum_fm = 0.0
         for i in range(len(ranges)):
             w = ranges[i]

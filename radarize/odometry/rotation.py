@@ -140,7 +140,7 @@ class MapRotation:
         self._echoes, self._bearings = Echoes(heatmaps, self._first), Bearings(heatmaps, self._state)
         self._noise, self.lag = (s.yaw_noise, LAG) if prior is None else (s.guided_yaw_noise, 0.0)
         self._time: float | None = None
-        self._velocity = self._position = np.zeros(2)
+        self._velocity = self._position = self._step = np.zeros(2)
         self._prior = prior
 
     def features(
@@ -172,7 +172,9 @@ class MapRotation:
             time, velocity = float(batch.centers[i]), velocities.velocity[i]
             dt = self.settings.memory if self._time is None else time - self._time
             if self._time is not None:
-                turn = None if told is None else (told.yaw[i], told.variance[i])
+                # Where frames are missing no network speaks, but what is known of how turning rates wander.
+                doubt = self.settings.doubt if told is not None and told.seen[i] else 1.0
+                turn = None if told is None else (told.yaw[i], doubt * told.variance[i])
                 yaw[i], variance[i], seen[i] = self._turn(view, time, dt, velocity, turn, echoes)
             self._join(view, -np.expm1(-dt / self.settings.memory))
             self._time, self._velocity = time, velocity
@@ -193,9 +195,8 @@ class MapRotation:
         self._predict(dt, told)
         self._bearings.move(dt, mean)
         seen = self._bearings.see(time, echoes, velocity)
-        middle = (laid + self._laid) / 2
-        c, d = np.cos(middle), np.sin(middle)
-        self._position = self._position + dt * np.array([[c, -d], [d, c]]) @ mean
+        self._step = _turned(dt * mean, (laid + self._laid) / 2)
+        self._position = self._position + self._step
         seen = self._match(view) or seen
         # A heading that becomes surer is corrected, by as much as its variance falls, on average: by news of the steps
         # before, which is no turn of this one. Whoever has corrected those steps by himself has to know of it.
@@ -216,7 +217,7 @@ class MapRotation:
             state.covariance[: _RATE + 1, : _RATE + 1] += wandered(self.settings.wander, dt)
         else:
             state.mean[YAW] += told[0]
-            state.covariance[YAW, YAW] += self.settings.doubt * told[1]
+            state.covariance[YAW, YAW] += told[1]
         if state.covariance[YAW, YAW] - known > np.pi**2:  # any heading; larger numbers would only cost digits
             state.covariance[YAW], state.covariance[:, YAW] = 0.0, 0.0
             state.covariance[YAW, YAW] = known + np.pi**2
@@ -244,8 +245,15 @@ class MapRotation:
         offset, correlation = self._fit(view, spread)
         if correlation < self.settings.least_correlation:
             return False
+        laid = self._laid
         self._state.update(row, offset, (self._noise / correlation) ** 2)
+        self._position = self._seen_from(self._laid - laid)
         return True
+
+    def _seen_from(self, offset: float | Float[np.ndarray, "offset"]) -> Float[np.ndarray, "*offset 2"]:
+        """Position in the map if the yaw is off by so much: the step there was taken along the mean of the headings at
+        both ends."""
+        return self._position - self._step + _turned(self._step, np.asarray(offset) / 2)
 
     def _fit(self, view: View, spread: float) -> tuple[float, float]:
         """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is
@@ -254,7 +262,7 @@ class MapRotation:
         fan = np.clip(_SIGMAS * spread, s.fan, s.widest)
 
         def correlate(offsets: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return self._map.correlate(view, self._position, self._laid + offsets)
+            return self._map.correlate(view, self._seen_from(offsets), self._laid + offsets)
 
         coarse = 3 * s.step * np.arange(-np.ceil(fan / (3 * s.step)), np.ceil(fan / (3 * s.step)) + 1)
         correlation, overlap = correlate(coarse)
@@ -266,6 +274,11 @@ class MapRotation:
             return 0.0, 0.0
         left, peak, right = correlation[best - 1 : best + 2]
         return float(fine[best] + s.step * np.clip(vertex(left, peak, right), -1, 1)), float(peak)
+
+
+def _turned(vector: Float[np.ndarray, "2"], angle: float | Float[np.ndarray, "angle"]) -> Float[np.ndarray, "*angle 2"]:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]], axis=-1)
 
 
 def _essence(spectrum: torch.Tensor) -> torch.Tensor:

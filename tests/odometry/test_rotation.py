@@ -118,11 +118,25 @@ class Unsure:
 
 def test_the_search_goes_as_far_as_the_prior_is_unsure():
     times, turn = np.arange(40) / 30, np.full(40, np.radians(1.0))
-    turn[20] = np.radians(35)  # claimed: 20, which count for twice as much
+    turn[20] = np.radians(35)  # claimed: 20
     yaw = np.cumsum(turn)
     found = follow(times, np.stack([np.zeros(40), np.zeros(40), yaw], axis=1), Unsure(turn, 20))
     assert np.degrees(found.yaw[20]) == pytest.approx(35, abs=1.5)
     assert found.seen[20] and found.variance[20] < np.radians(5) ** 2
+
+
+@pytest.mark.parametrize("off", np.radians([-30, 0, 30]))
+def test_a_second_lost_in_a_bend(off):
+    """Nobody told how far the sensor has turned meanwhile, nor, what comes to the same, in which direction it went: by
+    0.26 m at 30 deg. No network's word is to be doubted, for none has spoken."""
+    times, rate, speed = np.concatenate([np.arange(30), np.arange(30) + 60]) / 30, np.radians(50), 1.0
+    yaw = rate * times
+    poses = np.stack([speed / rate * np.sin(yaw), speed / rate * (1 - np.cos(yaw)), yaw], axis=1)
+    turn, claimed, seen = np.diff(yaw, prepend=0.0), np.full(60, 1e-5), np.ones(60, bool)
+    turn[30], claimed[30], seen[30] = turn[30] + off, np.radians(41) ** 2, False
+    found = follow(times, poses, SimpleNamespace(estimate=lambda *_: Rotations(turn, claimed, seen)))
+    assert np.degrees(found.yaw[30:33].sum() - (yaw[32] - yaw[29])) == pytest.approx(0, abs=2)
+    assert found.seen[30] and found.variance[30] < np.radians(5) ** 2
 
 
 @pytest.mark.parametrize("rate", [5, 15, 30])
@@ -176,16 +190,16 @@ def test_a_map_that_is_left_behind_is_empty():
     view = View(feature, ranges, sines)
     grid, yaws = LocalMap(4.0, CELL), np.zeros(1)
     grid.blend(view, np.zeros(2), 0.0, 0.05)
-    assert grid.correlate(view, np.zeros(2), yaws)[0][0] > 0.5
+    assert grid.correlate(view, np.zeros((1, 2)), yaws)[0][0] > 0.5
     near = grid.follow(np.array([1.5, 0.0]))
     assert np.abs(near).max() < CELL
-    assert grid.correlate(view, near - [1.5, 0.0], yaws)[0][0] > 0.5
+    assert grid.correlate(view, near[None] - [1.5, 0.0], yaws)[0][0] > 0.5
     for far in ([18.0, 0.0], [-6.0, 400.0], [0.0, -11.9]):
         place = grid.follow(np.array(far))
         assert np.abs(place).max() < CELL
-        assert grid.correlate(view, place, yaws)[0][0] == 0
+        assert grid.correlate(view, place[None], yaws)[0][0] == 0
         grid.blend(view, place, 0.0, 0.05)
-        assert grid.correlate(view, place, yaws)[0][0] > 0.5
+        assert grid.correlate(view, place[None], yaws)[0][0] > 0.5
 
 
 def test_a_corner_of_the_map_that_fits_by_chance_is_no_match():

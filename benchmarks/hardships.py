@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int16
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
+from radarize.radar.noise import noise_floor, noise_profile
 from radarsim.crowd import crowded
 from radarsim.motion import Motion
 from radarsim.scenario import Scenario
@@ -66,11 +67,10 @@ def _multiplied(samples: Samples, channels: np.ndarray) -> Samples:
 
 
 def noisier(samples: Samples, rng: np.random.Generator) -> Samples:
-    """By 6 dB: thrice the noise power, which is that of the last range bins, once more."""
+    """By 6 dB: thrice the noise power is added."""
     shape = samples.adc.shape[:-1]
     signal = samples.adc.astype(np.float32).view(np.complex64)[..., 0]
-    bins = np.fft.fft(signal[:, ::8], axis=-1)[..., -shape[-1] // 4 : -shape[-1] // 8]
-    sigma = np.sqrt(3 * np.median(np.abs(bins) ** 2) / np.log(2) / shape[-1] / 2)
+    sigma = np.sqrt(3 * noise_floor(noise_profile(signal)) / 2)
     return _added(samples, sigma * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)))
 
 

@@ -38,6 +38,16 @@ def test_channels_are_off_alike_in_all_frames(name, gain_db, degrees):
         assert 0.6 * most <= found <= 1.01 * most + 0.01
 
 
+def test_noise_grows_by_six_decibels_whatever_stands_in_the_room():
+    """Walls at any range, next to the farthest ones, too, are no noise."""
+    rng, shape = np.random.default_rng(0), (2, 32, 3, 4, 96)
+    walls = 2000 * np.exp(2j * np.pi * np.outer(rng.uniform(0, 96, 40), np.arange(96)) / 96).sum(axis=0) / 8
+    noise = 8.0 * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
+    adc = np.rint((walls + noise)[..., None].view(float)).astype(np.int16)
+    hurt = CONDITIONS["noise + 6 dB"].hurt(Samples(adc, np.arange(2.0), np.ones(shape[:3], bool)), rng).adc
+    assert (hurt.astype(float) - adc).std() == pytest.approx(8.0 * np.sqrt(3), rel=0.05)
+
+
 def test_a_mounting_tilts_the_sensor_whichever_way_it_looks(plain):
     times = np.linspace(0, 2, 7)
     for change, axis in (({"pitch": 10.0}, [1, 0, 0]), ({"roll": 10.0}, [0, 1, 0])):

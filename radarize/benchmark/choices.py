@@ -114,6 +114,18 @@ FARTHER = {
     "csail": (1087032148287752839, 6762958810614420727),
 }
 
+#: 60 s by hand and by cart in buildings of styles A to D with seeds 641 to 644 and in the office of seed 645, a second
+#: of every six without frames.
+GAPS = {
+    "A_0": (7181035311901936072,),
+    "A_1": (7527069841251442446,),
+    "B_0": (2692997763506710727,),
+    "C_0": (6113195880381026831, 8990614938645045882),
+    "D_0": (3722464561806302037,),
+    "D_1": (8188092335115746072,),
+    "office": (7648158696642559674,),
+}
+
 #: 60 s by hand and by cart in buildings of styles A to D with seeds 611 to 614, and as many in A to D and the office
 #: with seeds 621 to 625.
 STRETCH = {
@@ -159,6 +171,7 @@ CHOICES = (
     Choice("what matches and closures count for in the back end's preset radar", BEARINGS | REAL),
     Choice("by how much larger sines of azimuth are taken to match turns", STRETCH),
     Choice("how many rays tell whether a mirrored path is partly clear", {"office": (3,), "buildings/b": (3,)}),
+    Choice("what is known of a turn while frames are missing", GAPS),
     Choice("how bearings of strong echoes tell turns, and what turns claim", BEARINGS),
     Choice("what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),

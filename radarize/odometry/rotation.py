@@ -2,7 +2,7 @@
 
 Pairs of frames force a choice: close together they measure every increment with the noise of one match, far apart they
 lose their overlap in turns. A local map that forgets slowly has both spacings at once. Each frame is laid into the map
-at the position that the velocities predict, at a fan of yaws around the predicted one; the best correlation
+at a fan of yaws around the predicted one, each at the position to which the velocities then lead; the best correlation
 marks its yaw, and the map is renewed there. As long as landmarks stay in view, errors do not accumulate.
 
 What the map says joins what bearings of strong echoes and walls that are met again say (`radarize.odometry.bearings`)

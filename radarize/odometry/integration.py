@@ -11,7 +11,7 @@ from radarize.errors import InputError
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
 from radarize.plain import Frozen, setting
-from radarize.pose import compose, exponential
+from radarize.pose import compose, exponential, inverse
 from radarize.radar.config import RadarConfig
 from radarize.stopwatch import stage
 
@@ -61,7 +61,7 @@ class Track:
         time: (frame,) burst centres, s.
         pose: (frame, 3) x, y (m) and yaw (rad, wrapped), the first frame of all being the origin.
         step: (frame, 3) motion since the frame before, in its sensor frame: x, y (m), yaw (rad).
-        covariance: (frame, 3, 3) of `step`.
+        covariance: (frame, 3, 3) of `step`, in the frame at its end.
         velocity: (frame, 2) filtered, m/s, sensor frame.
         velocity_covariance: (frame, 2, 2), m^2/s^2.
         velocity_seen, turn_seen: (frame,) False where odometry was blind: nothing determined the velocity at the frame,
@@ -161,8 +161,12 @@ class Odometry:
                 time, last_velocity, last_spread = self._last
                 dt = times[i] - time
                 step[i] = exponential(dt * (last_velocity + velocity) / 2, rotations.yaw[i])
-                covariance[i, :2, :2] = dt**2 / np.tanh(dt / (2 * _LASTING)) * (last_spread + spread) / 2
-                covariance[i, 2, 2] = min(rotations.variance[i] + (self.rotation.lag * rotations.yaw[i]) ** 2, np.pi**2)
+                # Who has turned by more than is thought has gone into another direction, too, by half as much.
+                x, y, _ = inverse(step[i])
+                turned = np.array([y / 2, -x / 2, 1.0])
+                unsure = min(rotations.variance[i] + (self.rotation.lag * rotations.yaw[i]) ** 2, np.pi**2)
+                covariance[i] = unsure * np.outer(turned, turned)
+                covariance[i, :2, :2] += dt**2 / np.tanh(dt / (2 * _LASTING)) * (last_spread + spread) / 2
                 covariance[i, :2, :2] += np.eye(2) * _BRIDGED**2 * dt**3 / 12 * dt**2 / (dt**2 + _SMOOTH**2)
             self._last = (times[i], velocity, spread)
             self._pose = pose[i] = compose(self._pose, step[i])

@@ -1,6 +1,7 @@
 """Odometry of a handheld walk through a room of point scatterers, and its parts against closed forms."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from radarize.errors import InputError
 from radarize.odometry.doppler import DopplerVelocity, Velocities
 from radarize.odometry.integration import Odometry, VelocityConfig, VelocityFilter
 from radarize.odometry.rotation import MapRotation, Rotations
-from radarize.pose import compose, exponential
+from radarize.pose import between, compose, exponential
 from radarize.radar.presets import PRESETS
 from tests.batches import batch, of_spectrum
 from tests.echoes import record
@@ -246,6 +247,21 @@ def test_a_gap_is_claimed_by_its_length(gap):
     by_hand = {0.2: 0.0015, 0.5: 0.018, 1.0: 0.072, 2.0: 0.263}
     assert spread[10] == pytest.approx(by_hand[gap], rel=0.25)
     assert (spread[1:10] < 2e-4).all()
+
+
+def test_an_unknown_turn_leaves_the_direction_unknown():
+    """A turn of 40 deg over a gap of a second, unsure by 6: it adds to what is claimed as poses scatter that turned
+    otherwise."""
+    sigma, told, draws = np.radians(6), np.radians(40), np.random.default_rng(7).normal(size=4000)
+    found = []
+    for spread in (0.0, sigma):
+        turns = Rotations(np.array([0, told]), np.array([0, spread**2]), np.ones(2, bool))
+        rotation = SimpleNamespace(lag=0.0, estimate=lambda *_, turns=turns: turns)
+        times = np.array([0.0, 1.0])
+        found.append(Odometry(CONFIG, Told().velocity(), rotation).follow(of_spectrum(SIGNAL, times, times)))
+    otherwise = [exponential(np.array([1.0, 0.0]), told + sigma * draw) for draw in draws]
+    scatter = np.cov(np.stack([between(found[0].step[1], each) for each in otherwise]).T)
+    assert np.abs(found[1].covariance[1] - found[0].covariance[1] - scatter).max() < 0.15 * scatter[1, 2]
 
 
 @pytest.mark.parametrize("rate", [5, 15, 30])

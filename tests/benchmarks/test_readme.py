@@ -81,6 +81,16 @@ def test_other_radars_are_those_of_the_results():
         assert f"| {line} |" in text, (radar, line)
 
 
+def test_hard_conditions_are_those_of_the_results():
+    text = (ROOT / "docs/about/results.md").read_text()
+    shown = text[text.index("## Under hard conditions") : text.index("## The back end alone")]
+    found = json.loads((ROOT / "benchmarks" / "results" / "conditions.json").read_text())["tables"][0]["rows"]
+    times = "times the plain walks'"
+    lines = {f"| {row['condition']} | {row['odometry m']} | {row['SLAM m']} | {row[times]:.1f} |" for row in found}
+    table = [line for line in shown.splitlines() if " +- " in line]
+    assert len(table) > 10 and lines.issuperset(table)
+
+
 def test_walks_never_looked_at_are_those_of_the_results():
     found = json.loads((ROOT / "benchmarks" / "results" / "unseen.json").read_text())["tables"]
     rows = {row["on"]: row for row in found[0]["rows"]}

@@ -1,11 +1,9 @@
 """Hard conditions (`benchmarks.hardships`): the same walks plain, and under each."""
 
 from collections import Counter
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -18,10 +16,11 @@ from radarize.benchmark.networks import Networks
 from radarize.benchmark.table import NONE, with_error
 from radarize.console import progress
 from radarize.effort import BATCH
+from radarize.errors import InputError
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
 from radarize.evaluation.trajectory import trajectory
 from radarize.health import Health
-from radarize.jobs.threads import use_threads
+from radarize.jobs import Job, Report, perform
 from radarize.methods.method import Inputs
 from radarize.methods.registry import BEST, ODOMETRY, SCANS, Workshop
 from radarize.radar.presets import PRESETS
@@ -34,11 +33,10 @@ from radarsim.simulate import record
 from radarsim.walk import Walk
 
 WALKS = Path(__file__).with_suffix(".yaml")
-T = TypeVar("T")
 
 
 class Trial(NamedTuple):
-    """A walk of `WALKS` under a condition, and the folder of its recording."""
+    """A walk of `WALKS` under a condition, and the folder of its recording; its methods are jobs."""
 
     walk: dict
     condition: str
@@ -50,7 +48,7 @@ class Trial(NamedTuple):
         name = self.condition if CONDITIONS[self.condition].scenario else "plain"
         return self.folder / f"{self.walk['seed']}-{name.replace(' ', '-').replace('/', '-')}.h5"
 
-    def record(self) -> None:
+    def record(self, _: Report) -> None:
         """Make the recording if it is not there."""
         if self.recording.is_file():
             return
@@ -60,7 +58,7 @@ class Trial(NamedTuple):
         plain, harder = Scenario(scene, motion, PRESETS["radarize"], seed=seed), CONDITIONS[self.condition].scenario
         record(Batches.of(harder(plain) if harder else plain), self.recording)
 
-    def outcome(self) -> "Outcome":
+    def outcome(self, _: Report) -> "Outcome":
         """Of the whole pipeline."""
         hurt, rng, tracks = CONDITIONS[self.condition].hurt, np.random.default_rng(0), []
         with Recording(self.recording) as recording:
@@ -93,10 +91,8 @@ class Outcome(NamedTuple):
 
 def row(name: str, found: Sequence[Outcome], plain: Sequence[Outcome]) -> dict[str, object]:
     """Errors over walks, beside those of the plain walks."""
-    odometry, slam, before = (
-        pd.Series([each.position.mean for each in errors])
-        for errors in ([o.odometry for o in found], [o.slam for o in found], [o.slam for o in plain])
-    )
+    odometry = pd.Series([each.odometry.position.mean for each in found])
+    slam, before = (pd.Series([each.slam.position.mean for each in outcomes]) for outcomes in (found, plain))
     said = Counter(kind for each in found for kind in each.said)
     return {
         "condition": name,
@@ -108,6 +104,23 @@ def row(name: str, found: Sequence[Outcome], plain: Sequence[Outcome]) -> dict[s
         "claimed at the end deg": np.degrees(np.mean([each.claimed for each in found])),
         f"health, in so many of {len(found)}": ", ".join(f"{k} {n}" for k, n in sorted(said.items())) or NONE,
     }
+
+
+def results(jobs: Mapping[str, Job], workers: int, title: str) -> list:
+    """Of all jobs, in their order.
+
+    Raises:
+        InputError: one of them fails.
+    """
+    found = {}
+    with progress(title) as report:
+        for news in perform(jobs, workers):
+            if news.error is not None:
+                raise InputError(news.error)
+            if news.ended:
+                found[news.name] = news.result
+                report(len(found), len(jobs))
+    return [found[name] for name in jobs]
 
 
 PARSER = command_line(
@@ -123,26 +136,17 @@ def main() -> None:
     walks, wanted = yaml.safe_load(WALKS.read_text()), options.only.split(",") if options.only else CONDITIONS
     names = [name for name in CONDITIONS if name == "plain" or name in wanted]
     trials = [Trial(walk, name, options.folder) for name in names for walk in walks]
-    paths = {trial.recording: trial for trial in trials}
-
-    def of_all(work: Callable[[Trial], T], trials: Sequence[Trial], title: str) -> list[T]:
-        with ProcessPoolExecutor(options.workers, get_context("spawn"), use_threads, (1,)) as pool:
-            with progress(title) as report:
-                done = []
-                for each in pool.map(work, trials):
-                    done.append(each)
-                    report(len(done), len(trials))
-        return done
-
+    recordings = {str(trial.recording): trial.record for trial in trials}
     options.folder.mkdir(parents=True, exist_ok=True)
-    of_all(Trial.record, [*paths.values()], "recordings")
-    found = of_all(Trial.outcome, trials, "runs")
+    results(recordings, options.workers, "recordings")
+    runs = {f"{trial.condition}, {trial.walk['seed']}": trial.outcome for trial in trials}
+    found = results(runs, options.workers, "runs")
     outcomes = {name: found[k * len(walks) : (k + 1) * len(walks)] for k, name in enumerate(names)}
     publish(
         "conditions",
         "Hard conditions",
         [row(name, each, outcomes["plain"]) for name, each in outcomes.items()],
-        data=Data.of("walks of benchmarks/conditions.yaml and their hard versions", sorted(paths)),
+        data=Data.of("walks of benchmarks/conditions.yaml and their hard versions", sorted(map(Path, recordings))),
         networks=Networks().used((*ODOMETRY[BEST["odometry"]].networks, *SCANS[BEST["scans"]].networks)),
         notes=[
             f"Mean errors after alignment, of {len(walks)} walks, +- standard error; yaw: the largest error of "

@@ -5,6 +5,7 @@ import shapely
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
+from radarize.evaluation.metrics import over
 from radarize.pose import inverse, transform
 from radarize.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
@@ -100,7 +101,7 @@ def agreement(
     Returns:
         ``precision`` and ``recall``, the shares of cells and points that do, and ``f1``, their harmonic mean.
     """
-    precision = np.mean(off_surface <= near) if len(off_surface) else np.nan
+    precision = over(off_surface <= near)
     recall = np.mean(off_map <= near)
     return {"precision": precision, "recall": recall, "f1": 2 * precision * recall / max(precision + recall, 1e-12)}
 

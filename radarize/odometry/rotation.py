@@ -18,7 +18,7 @@ Three things decide what a frame looks like to the matcher (`MapRotation.feature
   2 to 3 % short. Elevations measured per cell are too unsure to help; all sines are taken larger by one factor.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -35,6 +35,7 @@ from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.parabola import vertex
 from radarize.odometry.ties import wandered
 from radarize.plain import Frozen, setting
+from radarize.pose import compose
 
 #: Range and Doppler bins at most: what a frame takes is bounded for every chirp that the chip can send.
 _RANGES, _SPEEDS = 256, 64
@@ -140,7 +141,8 @@ class MapRotation:
         self._echoes, self._bearings = Echoes(heatmaps, self._first), Bearings(heatmaps, self._state)
         self._noise, self.lag = (s.yaw_noise, LAG) if prior is None else (s.guided_yaw_noise, 0.0)
         self._time: float | None = None
-        self._velocity = self._position = self._step = np.zeros(2)
+        self._velocity = self._position = np.zeros(2)
+        self._start = self._way = np.zeros(3)  # pose before the last step, on its mean heading, and the step
         self._prior = prior
 
     def features(
@@ -164,7 +166,7 @@ class MapRotation:
 
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Yaw increments of the next frames, given their velocities."""
-        told = None if self._prior is None else self._prior.estimate(batch, velocities)
+        told = None if self._prior is None else self._doubted(self._prior.estimate(batch, velocities))
         yaw, variance, seen = np.zeros(len(batch)), np.zeros(len(batch)), np.ones(len(batch), bool)
         shown = zip(self.features(batch.spectrum), self.echoes(batch.spectrum), strict=True)
         for i, (feature, echoes) in enumerate(shown):
@@ -172,13 +174,16 @@ class MapRotation:
             time, velocity = float(batch.centers[i]), velocities.velocity[i]
             dt = self.settings.memory if self._time is None else time - self._time
             if self._time is not None:
-                # Where frames are missing no network speaks, but what is known of how turning rates wander.
-                doubt = self.settings.doubt if told is not None and told.seen[i] else 1.0
-                turn = None if told is None else (told.yaw[i], doubt * told.variance[i])
+                turn = None if told is None else (told.yaw[i], told.variance[i])
                 yaw[i], variance[i], seen[i] = self._turn(view, time, dt, velocity, turn, echoes)
             self._join(view, -np.expm1(-dt / self.settings.memory))
             self._time, self._velocity = time, velocity
         return Rotations(yaw, variance, seen)
+
+    def _doubted(self, told: Rotations) -> Rotations:
+        """What a network says; where frames are missing none has spoken, but what is known of how turning rates
+        wander."""
+        return replace(told, variance=np.where(told.seen, self.settings.doubt, 1.0) * told.variance)
 
     def _turn(
         self,
@@ -195,8 +200,8 @@ class MapRotation:
         self._predict(dt, told)
         self._bearings.move(dt, mean)
         seen = self._bearings.see(time, echoes, velocity)
-        self._step = _turned(dt * mean, (laid + self._laid) / 2)
-        self._position = self._position + self._step
+        self._start, self._way = np.array([*self._position, (laid + self._laid) / 2]), np.array([*(dt * mean), 0.0])
+        self._position = self._seen_from(0.0)
         seen = self._match(view) or seen
         # A heading that becomes surer is corrected, by as much as its variance falls, on average: by news of the steps
         # before, which is no turn of this one. Whoever has corrected those steps by himself has to know of it.
@@ -251,9 +256,9 @@ class MapRotation:
         return True
 
     def _seen_from(self, offset: float | Float[np.ndarray, "offset"]) -> Float[np.ndarray, "*offset 2"]:
-        """Position in the map if the yaw is off by so much: the step there was taken along the mean of the headings at
+        """Position in the map if the yaw is off by so much: the way there was taken along the mean of the headings at
         both ends."""
-        return self._position - self._step + _turned(self._step, np.asarray(offset) / 2)
+        return compose(self._start + np.multiply.outer(offset, [0.0, 0.0, 0.5]), self._way)[..., :2]
 
     def _fit(self, view: View, spread: float) -> tuple[float, float]:
         """Offset (rad) of the yaw that fits the map best and is likely beforehand, and its correlation; 0 if there is
@@ -274,11 +279,6 @@ class MapRotation:
             return 0.0, 0.0
         left, peak, right = correlation[best - 1 : best + 2]
         return float(fine[best] + s.step * np.clip(vertex(left, peak, right), -1, 1)), float(peak)
-
-
-def _turned(vector: Float[np.ndarray, "2"], angle: float | Float[np.ndarray, "angle"]) -> Float[np.ndarray, "*angle 2"]:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.stack([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]], axis=-1)
 
 
 def _essence(spectrum: torch.Tensor) -> torch.Tensor:

@@ -81,6 +81,22 @@ def test_other_radars_are_those_of_the_results():
         assert f"| {line} |" in text, (radar, line)
 
 
+def test_walks_in_unseen_buildings_are_those_of_the_results():
+    def rows(page: str, title: str) -> list[dict]:
+        tables = json.loads((ROOT / "benchmarks" / "results" / f"{page}.json").read_text())["tables"]
+        return next(table["rows"] for table in tables if table["title"] == title)
+
+    text = (ROOT / "docs/about/results.md").read_text()
+    by_platform = rows("odometry", "Steps and trajectories, by platform and building")
+    slam = rows("buildings", "SLAM in each building, slips mended")
+    for title, method in (("fused", "fused"), ("without networks", "doppler")):
+        off = {row["on"]: row["ATE m"] for row in by_platform if row["odometry"] == method}
+        figures = [off[on] for on in ("handheld", "cart", "robot", "all")]
+        figures += [row["ATE m"] for row in slam if row["odometry"] == method and row["building"] == "mean"]
+        line = " | ".join(f"{figure:.3f}" for figure in figures)
+        assert f"| {title} | {line} |" in text, line
+
+
 def test_hard_conditions_are_those_of_the_results():
     text = (ROOT / "docs/about/results.md").read_text()
     shown = text[text.index("## Under hard conditions") : text.index("## The back end alone")]

@@ -5,6 +5,8 @@
 # make lowest: tests, in an environment of their own, with the lowest versions that pyproject.toml allows
 # make documents: types every command of docs, too, as `make test` does of README, and where nothing is compiled yet
 RUN := runs/demo
+# What is imported stays compiled, as setup.sh says.
+unexport PYTHONDONTWRITEBYTECODE
 # A file's tests share what it makes; files begin in the order of tests/conftest.py. A worker that crashes ends the run
 # with a failure: with another in its place, xdist waits for ever.
 PYTEST := .venv/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder --max-worker-restart 0

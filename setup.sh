@@ -4,6 +4,9 @@
 # repairs what is not: a .venv of another checkout, of a vanished Python, or with packages of other versions.
 set -eu
 cd "$(dirname "$0")"
+# What is imported here is compiled for good, as in an installation, though the shell may forbid that elsewhere (as
+# many containers do): otherwise every command compiles thousands of modules anew, which takes as long as loading them.
+unset PYTHONDONTWRITEBYTECODE
 
 # Imported once after installing; looked for every time.
 NEEDED="torch onnxruntime numba h5py scipy gtsam evo open3d trimesh drjit mitsuba sionna plotly matplotlib typer pytest"

@@ -135,6 +135,13 @@ def test_a_second_setup_does_nothing():
     assert min(seconds) < 1
 
 
+def test_what_is_imported_stays_compiled_though_the_shell_forbids_it():
+    told = ["make", "-sC", ROOT, "--eval", "told: ; @echo $${PYTHONDONTWRITEBYTECODE-nothing}", "told"]
+    environment = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
+    assert subprocess.run(told, env=environment, capture_output=True, text=True).stdout == "nothing\n"
+    assert "\nunset PYTHONDONTWRITEBYTECODE\n" in (ROOT / "setup.sh").read_text()
+
+
 def test_without_python_setup_says_what_to_type(tmp_path):
     shutil.copy(ROOT / "setup.sh", tmp_path)
     tools = tmp_path / "tools"

@@ -161,6 +161,7 @@ GIVEN: dict[str, Callable[[Path], object]] = {
     "intel-corrected.log.gz": _carmen,
     "replica/mesh_semantic.ply": _mesh,
     "RadarHD/dataset_5": _clone,
+    "any-radar": lambda path: shutil.copytree(path.with_name("small"), path),
     "iq1m/indoor/baker/baker.1.fwd": write_sequence,
     "mine.yaml": lambda path: path.write_text(Configuration().text()),
     "materials.yaml": lambda path: path.write_text('"*": brick\n'),

@@ -22,10 +22,10 @@ BENCHMARKS: dict[str, Benchmark] = {
         draw=_PATHS,
     ),
     "odometry-platforms": Benchmark(
-        "Odometry on unseen platforms",
+        "Odometry on other platforms",
         "Tested on platforms that, with --train, no training saw (the paper's table 3).",
         Chosen.by_odometry,
-        partial(odometry.tables, paper=odometry.PAPER_PLATFORMS),
+        odometry.platform_tables,
         "platform",
         draw=_PATHS,
     ),

@@ -15,6 +15,7 @@ import pytest
 from radarize import cli
 from radarize.benchmark import identity, networks
 from radarize.benchmark.dataset import DataSet
+from radarize.benchmark.odometry import SEEN
 from radarize.benchmark.protocol import PROTOCOLS
 from radarize.benchmark.registry import BENCHMARKS
 from radarize.benchmark.run import benchmark
@@ -81,6 +82,16 @@ def test_means_are_over_trajectories_then_splits_or_each_once(rooms, toys, tmp_p
     assert steps["all"]["bias"] == pytest.approx(expected, rel=0.05)
     only = benchmark("odometry", rooms, tmp_path, Options(toys, protocol="mended"))["odometry"]
     assert [table.title for table in only.tables] == ["Odometry, slips mended", found.tables[2].title]
+
+
+def test_platforms_that_shipped_networks_have_seen_are_not_called_unseen(rooms, toys, tmp_path):
+    """Beside the paper's figures, whose networks had seen the handheld platform alone."""
+    compared = BENCHMARKS["odometry-platforms"]
+    assert SEEN in benchmark("odometry-platforms", rooms, tmp_path, Options(toys))["odometry-platforms"].tables[0].notes
+    study = Study.plan(compared, DataSet.load(rooms), tmp_path, Options(toys))
+    study.results = {run: kept(run, tmp_path) for _, run in study.runs}
+    for own in (Options(toys, trained=True), Options(toys, weights=tmp_path)):
+        assert SEEN not in compared.tables(replace(study, options=own))[0].notes
 
 
 def test_what_cannot_run_is_a_dash_with_a_reason(rooms, toys, tmp_path):

@@ -95,6 +95,11 @@ def test_walks_in_unseen_buildings_are_those_of_the_results():
         figures += [row["ATE m"] for row in slam if row["odometry"] == method and row["building"] == "mean"]
         line = " | ".join(f"{figure:.3f}" for figure in figures)
         assert f"| {title} | {line} |" in text, line
+    shares = ("within 10 cm %", "returned %", "through a wall %", "ghosts left %", "map F1 %")
+    for row in rows("mapping", "Scans and maps"):
+        if row["on"] == "all":
+            line = " | ".join(f"{row[share]:.1f}" for share in shares)
+            assert f"| {row['scans']} | {line} | {row['SLAM ATE m']:.3f} |" in text, line
 
 
 def test_hard_conditions_are_those_of_the_results():

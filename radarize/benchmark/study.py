@@ -55,6 +55,11 @@ class Options:
             raise InputError(f"weights {self.weights} are given with --train, expected one of the two")
 
     @property
+    def shipped(self) -> bool:
+        """Whether networks are those that come with the package."""
+        return not self.trained and self.weights is None
+
+    @property
     def protocols(self) -> list[Protocol]:
         """Ways to compare trajectories."""
         return [PROTOCOLS[self.protocol]] if self.protocol else list(PROTOCOLS.values())
@@ -84,8 +89,7 @@ class Chosen:
     @classmethod
     def of(cls, options: Options, data: DataSet) -> "Chosen":
         """Methods of choice are those without networks where the shipped ones do not fit the radar."""
-        own = options.trained or options.weights is not None
-        partner = BEST if own else best_methods(data.cases[0].config)[0]
+        partner = best_methods(data.cases[0].config)[0] if options.shipped else BEST
         named = [tuple(name for name in options.methods if name in known) for known in (ODOMETRY, SCANS)]
         return cls(named[0] or tuple(ODOMETRY), named[1] or tuple(SCANS), Pair(**partner))
 

@@ -17,11 +17,16 @@ COLUMNS = {
 }
 
 
+def rows(page: str, title: str | None = None) -> list[dict]:
+    """Of a page's table; of its first one unless told."""
+    tables = json.loads((ROOT / "benchmarks" / "results" / f"{page}.json").read_text())["tables"]
+    return next(table["rows"] for table in tables if title in (None, table["title"]))
+
+
 def test_the_ranking_is_that_of_the_stress_test():
-    results = json.loads((ROOT / "benchmarks" / "results" / "multipath.json").read_text())
-    rows = [row for row in results["tables"][0]["rows"] if row["levels"] == "most severe"]
+    ranking = [row for row in rows("multipath") if row["levels"] == "most severe"]
     lines = ["| scans by | " + " | ".join(COLUMNS.values()) + " |", "|---" * (1 + len(COLUMNS)) + "|"]
-    for row in rows:
+    for row in ranking:
         digits = {name: 3 if name.endswith(", m") else 1 for name in COLUMNS}
         lines.append(f"| {row['scans']} | " + " | ".join(f"{row[name]:.{digits[name]}f}" for name in COLUMNS) + " |")
     assert "\n".join(lines) in (ROOT / "docs" / "about" / "results.md").read_text(), "\n".join(lines)
@@ -31,21 +36,16 @@ def test_the_ranking_is_that_of_the_stress_test():
 PLACES = ((117, 132), (227, 230, 233, 237, 242), (248, 250))
 
 
-def real_rows(title: str) -> list[dict]:
-    tables = json.loads((ROOT / "benchmarks" / "results" / "real.json").read_text())["tables"]
-    return next(table["rows"] for table in tables if table["title"] == title)
-
-
-def mean(rows: list[dict], method: str, column: str, walks: tuple[int, ...]) -> float:
-    values = [row[column] for row in rows if row["method"] == method and row["walk"] in walks]
+def mean(found: list[dict], method: str, column: str, walks: tuple[int, ...]) -> float:
+    values = [row[column] for row in found if row["method"] == method and row["walk"] in walks]
     assert len(values) == len(walks)
     return sum(values) / len(values)
 
 
 def cells(method: str, column: str, places: Sequence[tuple[int, ...]]) -> str:
     """By instant, and in brackets by number."""
-    rows = real_rows("Real walks")
-    both = [[mean(rows, method, by + column, walks) for by in ("instant_", "")] for walks in places]
+    found = rows("real", "Real walks")
+    both = [[mean(found, method, by + column, walks) for by in ("instant_", "")] for walks in places]
     return " | ".join(f"{instant:.2f} ({number:.2f})" for instant, number in both)
 
 
@@ -63,7 +63,7 @@ def test_turns_and_maps_of_real_walks_are_those_of_the_results():
     text = (ROOT / "docs/about/results.md").read_text()
     for method in ("network", "network, smoothed", "shifted pictures, smoothed"):
         assert f"| {cells(method, 'yaw_rmse_deg', PLACES[:2])} |" in text, method
-    moving, maps = PLACES[0] + PLACES[1], real_rows("SLAM and maps")
+    moving, maps = PLACES[0] + PLACES[1], rows("real", "SLAM and maps")
     for method in ("network", "radarhd-simulated", "RadarHD", "lidar"):
         off, f1 = (mean(maps, method, column, moving) for column in ("ate_m", "map_f1_20cm"))
         assert f"| {off:.2f} | {100 * f1:.0f} |" in text, method
@@ -72,7 +72,7 @@ def test_turns_and_maps_of_real_walks_are_those_of_the_results():
 def test_other_radars_are_those_of_the_results():
     """Without networks, and what is chosen for each radar."""
     text = (ROOT / "docs/about/results.md").read_text()
-    found = json.loads((ROOT / "benchmarks" / "results" / "radars.json").read_text())["tables"][0]["rows"]
+    found = rows("radars")
     for radar in {row["radar"] for row in found}:
         without = next(row for row in found if row["radar"] == radar and row["scans"] == "first-echo")
         chosen = next(row for row in found if row["radar"] == radar and row["chosen"])
@@ -82,10 +82,6 @@ def test_other_radars_are_those_of_the_results():
 
 
 def test_walks_in_unseen_buildings_are_those_of_the_results():
-    def rows(page: str, title: str) -> list[dict]:
-        tables = json.loads((ROOT / "benchmarks" / "results" / f"{page}.json").read_text())["tables"]
-        return next(table["rows"] for table in tables if table["title"] == title)
-
     text = (ROOT / "docs/about/results.md").read_text()
     by_platform = rows("odometry", "Steps and trajectories, by platform and building")
     slam = rows("buildings", "SLAM in each building, slips mended")
@@ -96,7 +92,7 @@ def test_walks_in_unseen_buildings_are_those_of_the_results():
         line = " | ".join(f"{figure:.3f}" for figure in figures)
         assert f"| {title} | {line} |" in text, line
     shares = ("within 10 cm %", "returned %", "through a wall %", "ghosts left %", "map F1 %")
-    for row in rows("mapping", "Scans and maps"):
+    for row in rows("mapping"):
         if row["on"] == "all":
             line = " | ".join(f"{row[share]:.1f}" for share in shares)
             assert f"| {row['scans']} | {line} | {row['SLAM ATE m']:.3f} |" in text, line
@@ -105,27 +101,28 @@ def test_walks_in_unseen_buildings_are_those_of_the_results():
 def test_hard_conditions_are_those_of_the_results():
     text = (ROOT / "docs/about/results.md").read_text()
     shown = text[text.index("## Under hard conditions") : text.index("## The back end alone")]
-    found = json.loads((ROOT / "benchmarks" / "results" / "conditions.json").read_text())["tables"][0]["rows"]
     times = "times the plain walks'"
-    lines = {f"| {row['condition']} | {row['odometry m']} | {row['SLAM m']} | {row[times]:.1f} |" for row in found}
+    lines = {
+        f"| {row['condition']} | {row['odometry m']} | {row['SLAM m']} | {row[times]:.1f} |"
+        for row in rows("conditions")
+    }
     table = [line for line in shown.splitlines() if " +- " in line]
     assert len(table) > 10 and lines.issuperset(table)
 
 
 def test_walks_never_looked_at_are_those_of_the_results():
-    found = json.loads((ROOT / "benchmarks" / "results" / "unseen.json").read_text())["tables"]
-    rows = {row["on"]: row for row in found[0]["rows"]}
+    means = {row["on"]: row for row in rows("unseen")}
     page, readme = ((ROOT / name).read_text() for name in ("docs/about/results.md", "README.md"))
     for title, kind in (("fused odometry", "odometry"), ("SLAM with it", "SLAM")):
-        means = [rows[on][f"{kind} m"] for on in ("handheld", "cart", "robot", "all")]
-        worst = max(row[f"{kind} m"] for row in found[1]["rows"])
-        assert f"| {title} | {' | '.join(means)} | {worst:.3f} |" in page
-    odometry, slam = (float(rows["all"][f"{kind} m"].split()[0]) for kind in ("odometry", "SLAM"))
+        line = " | ".join(means[on][f"{kind} m"] for on in ("handheld", "cart", "robot", "all"))
+        worst = max(row[f"{kind} m"] for row in rows("unseen", "Walk by walk"))
+        assert f"| {title} | {line} | {worst:.3f} |" in page
+    odometry, slam = (float(means["all"][f"{kind} m"].split()[0]) for kind in ("odometry", "SLAM"))
     assert f"{odometry:.2f} and {slam:.3f} m" in readme.replace("\n", " ")
 
 
 def test_how_strong_echoes_move_is_that_of_the_results():
-    (row,) = json.loads((ROOT / "benchmarks" / "results" / "parallax.json").read_text())["tables"][0]["rows"]
+    (row,) = rows("parallax")
     text = " ".join((ROOT / "docs/about/results.md").read_text().split())
     posts, flashes, between = (row[f"{share}, %"] for share in ("0.75 to 1.25", "-0.2 to 0.2", "0.2 to 0.5"))
     assert f"{row['echoes']} strong echoes" in text

@@ -48,7 +48,7 @@ def test_rooms_that_nobody_went_to_again_stay():
     corner = walk([[1.5, 1.5], [5, 1.5], [1.5, 1.5]], 0.1, 0.15)
     slam, made, rng = Slam(SlamConfig.preset("radar"), endless=True), [], np.random.default_rng(1)
     add, slam.graph.add_node = slam.graph.add_node, lambda pose: (made.append(pose), add(pose))
-    play(slam, ring(), np.concatenate([corridor, *[corner] * 10]), rng)
+    play(slam, ring(), np.concatenate([corridor, *[corner] * 15]), rng)
     assert len(made) > len(slam.nodes) + 50
     there = slam.graph.poses[:, :2]
     away = np.hypot(*(there[:, None] - corridor[None, ::20, :2]).transpose(2, 0, 1)).min(axis=0)

@@ -17,7 +17,7 @@ from radarize.benchmark.runs import Pair
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
-from radarize.methods.registry import CLASSICAL, Inputs, best_methods
+from radarize.methods.registry import CLASSICAL, Inputs, best_methods, pace
 from radarize.stopwatch import Stopwatch
 from radarsim.simulate import simulate
 
@@ -32,12 +32,13 @@ def look_on(url: str) -> None:
 def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     """One replay; a row of the table."""
     stream = Replay(path)
-    inputs, watch = prepare(Inputs(stream.config), methods), Stopwatch()
+    every = pace(methods["odometry"], stream.config)
+    inputs, watch = prepare(Inputs(stream.config.every(every)), methods), Stopwatch()
     with Page("127.0.0.1:0") as page, stream:
         viewer = threading.Thread(target=look_on, args=(page.url,), daemon=True)
         viewer.start()
         (reader,) = [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
-        live, last, instants = Live(inputs, methods, page), [0.0], []
+        live, last, instants = Live(inputs, methods, page, every=every), [0.0], []
 
         def note(done: int, total: int) -> None:
             instants.append((time.monotonic(), done))
@@ -55,6 +56,7 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     frames, counts = max(live.losses.frames, 1), stream.counts
     return {
         "odometry, scans": f"{methods['odometry']}, {methods['scans']}",
+        "follows": "all frames" if every == 1 else f"one of {every}",
         "frames/s": (final - first) / (ended - began),
         "dropped": f"{counts.dropped} of {counts.frames}",
         "ms a frame": 1e3 * live.busy / frames,

@@ -57,7 +57,6 @@ class Batch:
         stamps: starts of the frames' first chirps, s.
         valid: False where a chirp was lost; all true if None.
         numbers: of the frames, counted as the radar delivered them; from 0 if None.
-        before: stamp of the frame before the first, s; None if there was none.
         maps: that are known already, such as pictures of a radar whose samples nobody kept.
 
     Attributes:
@@ -73,13 +72,11 @@ class Batch:
         stamps: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
         numbers: Int[np.ndarray, "frame"] | None = None,
-        before: float | None = None,
         maps: Mapping[str, Shaped[np.ndarray, "frame row azimuth"]] | None = None,
     ):
         self.signal, self.samples, self.valid = signal, samples, valid
         self.stamps = np.asarray(stamps, float)
         self.numbers = np.arange(len(self.stamps)) if numbers is None else numbers
-        self.before = before
         self._maps = dict(maps or {})
         self._made: dict[Callable, object] = {}
 
@@ -90,11 +87,6 @@ class Batch:
     def centers(self) -> Float[np.ndarray, "frame"]:
         """Burst centres, s: the instants that motion and scans belong to."""
         return self.stamps + self.signal.radar.burst_center
-
-    @property
-    def gaps(self) -> Float[np.ndarray, "frame"]:
-        """Seconds since the frame before; not-a-number for the first of all."""
-        return np.diff(self.stamps, prepend=np.nan if self.before is None else self.before)
 
     @cached_property
     def folded(self) -> Complex64[torch.Tensor, "frame range doppler antenna"]:
@@ -144,43 +136,61 @@ class Batch:
 class Intake:
     """Makes batches of what a radar delivers.
 
+    Args:
+        signal: of a radar that delivers no more than what is taken; see `RadarConfig.every`.
+        every: only frames are taken whose number is a multiple of it.
+
     Attributes:
         taken: frames so far.
         lost: of these, frames that are lost, nearly lost, or silent: left out, for a gap says more than nothing does.
         disturbed: chirps that were disturbed, which count as lost.
     """
 
-    def __init__(self, signal: Signal):
-        self.signal = signal
+    def __init__(self, signal: Signal, every: int = 1):
+        self.signal, self.every = signal, every
         self.taken = self.lost = self.disturbed = 0
-        self._before: float | None = None
+        self._next = 0
 
     def take(
         self,
         samples: Int16[np.ndarray, "frame loop tx rx sample 2"],
         stamps: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+        numbers: Int[np.ndarray, "frame"] | None = None,
     ) -> Batch:
-        """The next frames, without those that are left out; arguments are those of `Batch`."""
+        """The next frames, without those that are left out.
+
+        Args:
+            samples, stamps, valid: see `Batch`.
+            numbers: of the frames; if None, those after the frames before.
+        """
+        numbers = self._count(len(samples)) if numbers is None else numbers
+        stamps = np.asarray(stamps, float)
         valid = np.ones(samples.shape[:3], bool) if valid is None else valid
+        if self.every > 1:
+            wanted = numbers % self.every == 0
+            samples, stamps, valid, numbers = samples[wanted], stamps[wanted], valid[wanted], numbers[wanted]
         flaws = find_flaws(samples, valid)
         valid = valid & ~flaws.disturbed
-        used = samples.reshape(len(samples), -1).any(axis=1) & (valid.mean(axis=(1, 2)) >= LEAST_SHARE)
-        numbers = self.taken + np.flatnonzero(used)
+        used = samples.any(axis=(1, 2, 3, 4, 5)) & (valid.mean(axis=(1, 2)) >= LEAST_SHARE)
         self.taken += len(used)
         self.lost += int(np.count_nonzero(~used))
         self.disturbed += int(np.count_nonzero(flaws.disturbed))
-        batch = Batch(self.signal, samples[used], np.asarray(stamps, float)[used], valid[used], numbers, self._before)
+        batch = Batch(self.signal, samples[used], stamps[used], valid[used], numbers[used])
         batch.flaws = flaws.of(used)
-        if len(batch):
-            self._before = float(batch.stamps[-1])
         return batch
 
     def take_maps(
         self, maps: Mapping[str, Shaped[np.ndarray, "frame row azimuth"]], stamps: Float[np.ndarray, "frame"]
     ) -> Batch:
         """The next frames of a recording that holds maps and no samples."""
-        numbers = self.taken + np.arange(len(stamps))
-        batch = Batch(self.signal, None, stamps, numbers=numbers, before=self._before, maps=maps)
-        self.taken, self._before = self.taken + len(stamps), float(batch.stamps[-1])
-        return batch
+        numbers = self._count(len(stamps))
+        wanted = numbers % self.every == 0
+        self.taken += int(np.count_nonzero(wanted))
+        shown = {name: each[wanted] for name, each in maps.items()}
+        return Batch(self.signal, None, stamps[wanted], numbers=numbers[wanted], maps=shown)
+
+    def _count(self, frames: int) -> Int[np.ndarray, "frame"]:
+        """Numbers of the next frames."""
+        self._next += frames
+        return np.arange(self._next - frames, self._next)

@@ -57,7 +57,7 @@ def find_flaws(
     power = profile.real**2 + profile.imag**2
     broad = (power.sum(axis=-1) * valid[..., None]).sum(axis=(1, 2))
     end = np.iinfo(np.int16)
-    spans = samples.reshape(*samples.shape[:4], -1)
+    spans = samples.reshape(*samples.shape[:4], 2 * count)
     clipped = (spans.max(axis=-1) == end.max) | (spans.min(axis=-1) == end.min)
     return Flaws(
         _disturbed(power.sum(axis=3) + samples.shape[3] * _ROUNDING * float(window @ window), valid),

@@ -25,6 +25,7 @@ def run(
     scans: str | None = None,
     weights: Path | None = None,
     configuration: Configuration | None = None,
+    every: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> Path:
     """Run the pipeline on a recording.
@@ -36,19 +37,20 @@ def run(
         odometry, scans: methods by name; if None, networks where they fit the radar, else the classical ones.
         weights: folder of the networks' weights; the shipped ones if None.
         configuration: of the pipeline.
+        every: use every so many-th frame.
         progress: called with (frames done, frames in all).
 
     Raises:
         InputError: unusable recording or unknown method.
     """
     with Recording(recording) as source:
-        best, why = (BEST, "") if weights else best_methods(source.config)
+        best, why = (BEST, "") if weights else best_methods(source.config.every(every))
         if pictured(source):
             best, why = PICTURED, ""
     pairs = {Path(output): (odometry or best["odometry"], scans or best["scans"])}
     failed = run_each(
         recording, pairs, weights=weights, configuration=configuration,
-        facts={"no networks": why} if why else None, progress=progress,
+        facts={"no networks": why} if why else None, every=every, progress=progress,
     )  # fmt: skip
     for error in failed.values():
         raise error
@@ -62,6 +64,7 @@ def run_each(
     weights: Path | None = None,
     configuration: Configuration | None = None,
     facts: Mapping[str, str] | None = None,
+    every: int = 1,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> dict[Path, InputError]:
     """Run the pipeline with several methods on a recording, at once: what they have in common is made once.
@@ -69,7 +72,7 @@ def run_each(
     Args:
         recording: ``.h5`` file.
         pairs: odometry and scans by name, for each folder to write; see `run`.
-        weights, configuration, progress: see `run`.
+        weights, configuration, every, progress: see `run`.
         facts: what ``run.json`` says of the methods beside their names.
 
     Returns:
@@ -99,12 +102,13 @@ def run_each(
 
     def end(folder: Path) -> None:
         if intake.lost == intake.taken:
-            frames = f"all its {len(source)} frames are lost or silent"
+            frames = f"all its {-(-len(source) // every)} frames are lost or silent"
             raise InputError(f"{source.path}: {frames}, expected one with samples")
         pipeline, writer = pipelines[folder], writers[folder]
         pipeline.finish()
         writer.describe(source, inputs.signal.heatmaps)
         told = {
+            "every": every,
             "frames_lost": intake.lost,
             "chirps_disturbed": intake.disturbed,
             "methods": dict(zip(("odometry", "scans"), pairs[folder], strict=True)) | dict(facts or {}),
@@ -117,8 +121,8 @@ def run_each(
     with Recording(recording) as source, ExitStack() as stack:
         if not len(source):
             raise InputError(f"{source.path}: has no whole frame, expected at least one")
-        inputs = Inputs(source.config, configuration or Configuration(), Weights(weights), source)
-        workshop, intake = Workshop(inputs), Intake(inputs.signal)
+        inputs = Inputs(source.config.every(every), configuration or Configuration(), Weights(weights), source)
+        workshop, intake = Workshop(inputs), Intake(inputs.signal, every)
         each(make, pairs)
         for done, batch in _batches(source, intake):
             if not pipelines:

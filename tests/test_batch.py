@@ -1,4 +1,4 @@
-"""What goes through the pipeline: which frames, how long after one another, and that each thing is made once."""
+"""What goes through the pipeline: which frames, and that each thing is made once."""
 
 import numpy as np
 import pytest
@@ -60,8 +60,8 @@ def test_what_was_lost_is_told_to_the_spectrum(signal, adc):
 
 
 @pytest.mark.parametrize("size", [1, 5, FRAMES])
-def test_gaps_are_since_the_frame_before_whatever_was_lost(signal, adc, size):
-    """Silent, lost, or nearly lost frames are left out; numbers go on counting them, and gaps bridge them."""
+def test_lost_frames_are_left_out(signal, adc, size):
+    """Silent, lost, or nearly lost frames; numbers go on counting them."""
     adc, valid = adc.copy(), np.ones((FRAMES, 16, 3), bool)
     stamps = 10.0 + np.cumsum(np.linspace(0.03, 0.06, FRAMES))
     adc[0] = 0
@@ -73,14 +73,34 @@ def test_gaps_are_since_the_frame_before_whatever_was_lost(signal, adc, size):
     used = np.array([1, 2, 3, 7, 8, 10, 11])
     assert (intake.taken, intake.lost) == (FRAMES, 5)
     assert [bool(one) for one in batches] == [len(one) > 0 for one in batches]
-    numbers, gaps, centers = (
-        np.concatenate([getattr(one, name) for one in batches]) for name in ("numbers", "gaps", "centers")
-    )
+    numbers, centers = (np.concatenate([getattr(one, name) for one in batches]) for name in ("numbers", "centers"))
     assert numbers.tolist() == used.tolist()
-    assert np.isnan(gaps[0]) and gaps[1:] == pytest.approx(np.diff(stamps[used]))
     assert centers == pytest.approx(stamps[used] + CONFIG.burst_center)
     assert np.array_equal(np.concatenate([one.samples for one in batches]), adc[used])
     assert np.array_equal(np.concatenate([one.valid for one in batches]), valid[used])
+
+
+@pytest.mark.parametrize("size", [1, 2, 5, FRAMES])
+def test_every_third_frame(signal, adc, size):
+    """The same ones whatever the batches, by the radar's own numbers where some never came; lost ones are counted among
+    them alone."""
+    valid, numbers = np.ones((FRAMES, 16, 3), bool), np.delete(np.arange(FRAMES + 2), [3, 7])
+    valid[[4, 5]] = False  # numbers 5, 6
+    for told, taken, lost, used in ((None, 4, 0, [0, 3, 6, 9]), (numbers, 4, 1, [0, 9, 12])):
+        intake = Intake(signal, every=3)
+        parts = [slice(start, start + size) for start in range(0, FRAMES, size)]
+        kept = [
+            intake.take(adc[at], 1.0 * np.arange(FRAMES)[at], None if told is None else valid[at],
+                        None if told is None else told[at])
+            for at in parts
+        ]  # fmt: skip
+        assert (intake.taken, intake.lost) == (taken, lost)
+        assert np.concatenate([one.numbers for one in kept]).tolist() == used
+        rows = used if told is None else np.searchsorted(numbers, used)
+        assert np.array_equal(np.concatenate([one.samples for one in kept]), adc[rows])
+        assert np.concatenate([one.stamps for one in kept]).tolist() == list(rows)
+    with pytest.raises(InputError, match="every is 0, expected 1"):
+        CONFIG.every(0)
 
 
 def test_batches_keep_their_samples(signal, adc):
@@ -96,7 +116,9 @@ def test_maps_alone(signal):
     shown = np.arange(24.0).reshape(2, 3, 4)
     intake = Intake(signal)
     first, second = (intake.take_maps({"picture": shown}, np.array([t, t + 1.0])) for t in (5.0, 7.0))
-    assert first.maps(("picture",))["picture"] is shown and len(first) == 2
-    assert np.array_equal(second.numbers, [2, 3]) and second.before == 6.0 and intake.lost == 0
+    assert np.array_equal(first.maps(("picture",))["picture"], shown) and len(first) == 2
+    assert np.array_equal(second.numbers, [2, 3]) and len(second) == 2 and intake.lost == 0
+    third = Intake(signal, every=2).take_maps({"picture": shown}, np.array([5.0, 6.0]))
+    assert np.array_equal(third.maps(("picture",))["picture"], shown[:1]) and third.stamps.tolist() == [5.0]
     with pytest.raises(InputError, match=r"frames from 7.000 s on have no samples, only picture"):
         _ = second.spectrum

@@ -18,6 +18,7 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter, Stream
 from radarize.run import run
+from radarize.runfolder import RunFolder
 from radarize.tum import read_tum
 from radarsim.simulate import simulate
 from tests.batches import stream
@@ -179,6 +180,26 @@ def test_a_run_over_lost_frames_keeps_rows_and_truth_together(walk, tmp_path):
         assert len(file["time"]) == len(file["ranges"]) == len(file["truth/velocity"]) == 50
         error = np.abs(file["velocity"][:] - file["truth/velocity"][:, :2])
     assert (np.median(error, axis=0) < 0.05).all()
+
+
+def test_every_second_frame_is_a_radar_of_half_the_rate(walk, tmp_path):
+    """The same as of a recording that has no others: poses, scans, and truth beside them."""
+    with Recording(walk) as source:
+        adc, times, truth = source.adc(0, 60), source.times[:60], source.read("truth/velocity")[:60]
+    streams = {"truth/velocity": Stream((6,), "f8", "m/s", "", "radar/time")}
+    for name, count in (("whole", 1), ("half", 2)):
+        with RecordingWriter(tmp_path / f"{name}.h5", PRESETS["radarize"].every(count), streams=streams) as writer:
+            writer.append(adc[::count], times[::count], rows={"truth/velocity": truth[::count]})
+    one = run(tmp_path / "whole.h5", tmp_path / "one", every=2)
+    other = run(tmp_path / "half.h5", tmp_path / "other")
+    facts = json.loads((one / "run.json").read_text())
+    assert facts["every"] == 2 and facts["frames_lost"] == 0 and facts["methods"]["odometry"] == "fused"
+    found, wanted = RunFolder(one), RunFolder(other)
+    assert found.scans["frames"].tolist() == list(range(0, 60, 2)) and len(wanted.scans["frames"]) == 30
+    for name in ("ranges", "velocity", "truth/velocity"):
+        assert found.scans[name] == pytest.approx(wanted.scans[name], abs=1e-3, nan_ok=True)
+    for name in ("odometry", "trajectory"):
+        assert read_tum(one / f"{name}.tum")[1] == pytest.approx(read_tum(other / f"{name}.tum")[1], abs=1e-3)
 
 
 def test_silence_is_survived(tmp_path):

@@ -27,7 +27,7 @@ from radarize.capture.replay import Replay
 from radarize.capture.sensor import Sensor
 from radarize.capture.stream import follow
 from radarize.mapping.scans import BEARINGS
-from radarize.methods.registry import Inputs, Workshop, best_methods
+from radarize.methods.registry import Inputs, Workshop, best_methods, pace
 from radarize.pose import adjoint, between, compose, inverse
 from radarize.radar.presets import load_config
 from radarize.runfolder import OccupancyMap
@@ -54,7 +54,8 @@ class RadarizeNode(Node):
             self.stream = Sensor(config, text, given["config"] or "radarize", given["port"])
         radar, best = self.stream.config, best_methods(self.stream.config)[0]
         methods = {kind: given[kind] or best[kind] for kind in ("odometry", "scans")}
-        self.inputs = prepare(Inputs(radar), methods)
+        self.every = pace(methods["odometry"], radar)
+        self.inputs = prepare(Inputs(radar.every(self.every)), methods)
         self.pipeline = Workshop(self.inputs).pipeline(**methods, endless=True)
         self.scans = self.create_publisher(LaserScan, "scan", 10)
         self.odometry = self.create_publisher(Odometry, "odom", 10)
@@ -64,10 +65,10 @@ class RadarizeNode(Node):
 
     def run(self, stopping: threading.Event) -> None:
         """Follow the radar until it ends or ROS does."""
-        intake = Intake(self.inputs.signal)
+        intake = Intake(self.inputs.signal, self.every)
         with self.stream:
             for came in follow(self.stream, stopping, most=TOGETHER):
-                if batch := intake.take(came["adc"], came["time"], came["valid"]):
+                if batch := intake.take(came["adc"], came["time"], came["valid"], came["number"]):
                     self.publish(self.pipeline.push(batch), batch.centers)
                 if not rclpy.ok():
                     stopping.set()

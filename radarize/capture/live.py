@@ -37,6 +37,7 @@ class Live:
         methods: odometry and scans by name.
         page: shows it.
         foxglove: shows it, too.
+        every: the pipeline follows every so many-th frame; of a radar that delivers these alone `inputs` are made.
 
     Attributes:
         losses: of the frames that came.
@@ -44,9 +45,11 @@ class Live:
         busy: s spent on the frames so far, showing them included.
     """
 
-    def __init__(self, inputs: Inputs, methods: dict[str, str], page: Page, foxglove: "Server | None" = None):
+    def __init__(
+        self, inputs: Inputs, methods: dict[str, str], page: Page, foxglove: "Server | None" = None, every: int = 1
+    ):
         self.pipeline, self.page, self.foxglove = Workshop(inputs).pipeline(**methods, endless=True), page, foxglove
-        self.intake = Intake(inputs.signal)
+        self.intake = Intake(inputs.signal, every)
         self.view = View(self.pipeline, inputs.signal)
         self.losses, self.health = Losses(), Health(inputs.radar)
         self._keeper: Keeper | None = None
@@ -79,7 +82,7 @@ class Live:
         for came in follow(stream, stopping, most=TOGETHER, frames=frames):
             start = time.monotonic()
             adc, stamps, valid = came["adc"], came["time"], came["valid"]
-            if batch := self.intake.take(adc, stamps, valid):
+            if batch := self.intake.take(adc, stamps, valid, came["number"]):
                 result = self.pipeline.push(batch)
                 self.health.add(result)
                 with stage("page"):

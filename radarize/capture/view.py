@@ -77,7 +77,8 @@ class View:
     def add(self, result: Result) -> None:
         """Take what a batch gave: the sink of a live pipeline."""
         if len(result.frames):
-            self.newest, self._frames = result, int(result.frames[-1]) + 1
+            self.newest = result
+            self._frames += len(result.frames)
 
     def facts(self) -> dict[str, object]:
         """What does not change: axes of the heat maps, the budget."""

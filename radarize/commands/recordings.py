@@ -151,6 +151,9 @@ def live(
     frames: FrameCount = None,
     odometry: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
     scans: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
+    every: Annotated[
+        int | None, typer.Option(min=1, help="Follow every so many-th frame; by default as the networks were taught.")
+    ] = None,
     address: Annotated[str, typer.Option(help="Where to show the page; port 0 is any.")] = "127.0.0.1:8470",
     foxglove: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Serve Foxglove as well, e.g. 127.0.0.1:8765.")
@@ -164,7 +167,7 @@ def live(
     from radarize.capture.page import Page
     from radarize.capture.record import recording
     from radarize.capture.replay import Replay
-    from radarize.methods.registry import Inputs, best_methods
+    from radarize.methods.registry import Inputs, best_methods, pace
     from radarize.recording import spare
 
     if output and not overwrite:
@@ -174,16 +177,16 @@ def live(
     stream = Replay(replay) if replay else _sensor(config, port, baud, host, dca, command_port, data_port)
     radar, methods = stream.config, best_methods(stream.config)[0]
     chosen = {"odometry": odometry or methods["odometry"], "scans": scans or methods["scans"]}
-    keeper = None
+    every, keeper = every or pace(chosen["odometry"], radar), None
     with until_interrupted() as stopping, ExitStack() as stack:
         with working("warming up"):
-            inputs = prepare(Inputs(radar), chosen)
+            inputs = prepare(Inputs(radar.every(every)), chosen)
         server = None
         if foxglove is not None:
             from radarize.foxglove import Server
 
             server = stack.enter_context(Server(foxglove))
-        live = Live(inputs, chosen, stack.enter_context(Page(address)), server)
+        live = Live(inputs, chosen, stack.enter_context(Page(address)), server, every)
         report = stack.enter_context(progress("live"))
         stack.enter_context(stream)
         print(f"page: {live.page.url}", flush=True)

@@ -36,6 +36,7 @@ def run_(
         Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
     ] = None,
     config: Annotated[Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")] = None,
+    every: Annotated[int, typer.Option(min=1, help="Use every so many-th frame.")] = 1,
 ):
     """Estimate trajectory and map of a recording."""
     from radarize.effort import effort
@@ -56,7 +57,7 @@ def run_(
     with progress("run", f"{output} is as it was before, and so is the recording") as report:
         written = run(
             recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,
-            progress=report,
+            every=every, progress=report,
         )  # fmt: skip
     warn(RunFolder(written).warnings)
     print(written)

@@ -9,7 +9,7 @@ from radarize.methods import doppler, milliego, pictures, published, radarhd, ra
 from radarize.methods.configuration import Configuration
 from radarize.methods.method import Inputs, Method, Weights, load
 from radarize.methods.task import Task
-from radarize.nets.weights import check
+from radarize.nets.weights import check, header_of
 from radarize.pipeline import Follower, Pipeline, Scanner
 from radarize.polar import pictured
 from radarize.radar.config import RadarConfig
@@ -99,6 +99,21 @@ def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
     return chosen, "; ".join(why)
 
 
+def pace(odometry: str, radar: RadarConfig) -> int:
+    """Every so many-th frame is enough for odometry: a network of turns was taught at a rate of its own, and with it
+    odometry is no better where frames come more often. Without one, every frame counts.
+
+    Raises:
+        InputError: unknown name.
+    """
+    if odometry not in ODOMETRY:
+        raise InputError(f"odometry is {odometry!r}, expected one of {', '.join(ODOMETRY)}")
+    if "rotation" not in ODOMETRY[odometry].networks:
+        return 1
+    taught = header_of(Weights().of("rotation")).grid
+    return max(1, int(taught.frame_period / radar.frame_period * (1 + 1e-3))) if taught else 1
+
+
 def find_task(kind: str) -> Task:
     """A network's training by name.
 
@@ -113,5 +128,5 @@ def find_task(kind: str) -> Task:
 
 __all__ = [
     "BEST", "CLASSICAL", "ODOMETRY", "PICTURED", "SCANS", "TASKS", "Configuration", "Inputs", "Method", "Weights",
-    "Workshop", "best_methods", "find_task",
+    "Workshop", "best_methods", "find_task", "pace",
 ]  # fmt: skip

@@ -194,6 +194,16 @@ class RadarConfig(BaseModel):
         """Mean of `chirp_times`, s: the instant that a single-frame product belongs to."""
         return float(self.chirp_times.mean())
 
+    def every(self, count: int) -> "RadarConfig":
+        """The radar of which only every so many-th frame is used.
+
+        Raises:
+            InputError: `count` is not positive.
+        """
+        if count < 1:
+            raise InputError(f"every is {count}, expected 1 (all frames) or more")
+        return self.model_copy(update={"frame_period": count * self.frame_period})
+
     @property
     def max_velocity(self) -> float:
         """Unambiguous radial speed, m/s: wavelength / (4 loop_time)."""

@@ -20,6 +20,7 @@ from radarize.methods.registry import (
     Workshop,
     best_methods,
     find_task,
+    pace,
 )
 from radarize.radar.presets import PRESETS
 from tests.batches import batch
@@ -121,6 +122,16 @@ def test_networks_where_they_fit_and_classical_methods_elsewhere(tmp_path):
     assert best_methods(PRESETS["two-tx"]) == best_methods(PRESETS["long-range"]) == (BEST, "")
     with pytest.raises(InputError, match="translation.safetensors: no such file"):
         Workshop(Inputs(CONFIG, weights=Weights(tmp_path))).odometry("learned", "threshold")
+
+
+def test_frames_come_as_often_as_networks_need_them():
+    """15 a second, or the next more that the radar gives; where the map alone tells turns, all."""
+    periods = {1: (1 / 15, 0.1, 1 / 20), 2: (33.333e-3, 1 / 30, 1 / 40), 4: (1 / 60,)}
+    for every, many in periods.items():
+        assert {pace("fused", CONFIG.model_copy(update={"frame_period": period})) for period in many} == {every}
+    assert pace("doppler", CONFIG) == 1
+    with pytest.raises(InputError, match="odometry is 'magic', expected one of fused"):
+        pace("magic", CONFIG)
 
 
 def test_without_weights_methods_are_classical(tmp_path, monkeypatch):

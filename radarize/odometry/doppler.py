@@ -95,6 +95,8 @@ class DopplerVelocity:
 
     Attributes:
         lever: m, see `VelocityEstimator`.
+        rough: of the speed, standard deviation of what echoes share where the array tells no elevation or has short
+            rows; else zero.
     """
 
     def __init__(self, heatmaps: Heatmaps, settings: DopplerConfig | None = None):
@@ -110,7 +112,7 @@ class DopplerVelocity:
         self.lever = float(virtual_positions(self.config).reshape(-1, 3)[self.row, 1].mean()) / 2
         self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
         flat, short = self.pairs is None, len(self.row) < _ROW
-        self._rough = self.settings.rough * (2 if short else 1 if flat else 0)
+        self.rough = self.settings.rough * (2 if short else 1 if flat else 0)
         # One table of random numbers for all frames: the same frame gives the same answer in any batch.
         self._draws = np.random.default_rng(0).random((self.settings.hypotheses, 2))
 
@@ -130,7 +132,7 @@ class DopplerVelocity:
         s = self.settings
         across = np.stack([-velocity[:, 1], velocity[:, 0]], axis=1)
         along, side = (v[:, :, None] * v[:, None] for v in (velocity, across))
-        scale, course = (noise**2 + self._rough**2 for noise in (s.scale_noise, s.course_noise))
+        scale, course = (noise**2 + self.rough**2 for noise in (s.scale_noise, s.course_noise))
         return scale * along + course * side + s.floor**2 * np.eye(2)
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 6"]:

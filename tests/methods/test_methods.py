@@ -7,6 +7,7 @@ from radarize.batch import Intake
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS, HeatmapScans
+from radarize.methods.radarize.fused import FusedVelocity
 from radarize.methods.registry import (
     BEST,
     CLASSICAL,
@@ -22,6 +23,7 @@ from radarize.methods.registry import (
     find_task,
     pace,
 )
+from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.presets import PRESETS
 from tests.batches import batch
 
@@ -117,7 +119,7 @@ def test_networks_where_they_fit_and_classical_methods_elsewhere(tmp_path):
     assert methods == {"odometry": CLASSICAL["odometry"], "scans": BEST["scans"]}
     assert "translation.safetensors: does not fit this radar" in why and "segmentation" not in why
     with pytest.raises(InputError, match="does not fit this radar"):
-        Workshop(Inputs(coarse)).odometry("fused", "threshold")
+        Workshop(Inputs(coarse)).odometry("learned", "threshold")
     assert best_methods(CONFIG.model_copy(update={"tx_order": (0,), "rx": (0, 1)}))[0] == CLASSICAL
     assert best_methods(PRESETS["two-tx"]) == best_methods(PRESETS["long-range"]) == (BEST, "")
     with pytest.raises(InputError, match="translation.safetensors: no such file"):
@@ -132,6 +134,17 @@ def test_frames_come_as_often_as_networks_need_them():
     assert pace("doppler", CONFIG) == 1
     with pytest.raises(InputError, match="odometry is 'magic', expected one of fused"):
         pace("magic", CONFIG)
+
+
+def test_velocities_are_the_networks_too_where_the_array_tells_little():
+    """Without elevation, or in short rows; the preset's whole array needs no network for them."""
+
+    def velocity(config):
+        return type(Workshop(Inputs(config)).odometry("fused", "threshold").velocity)
+
+    aop = CONFIG.model_copy(update={"board": "iwr6843aop", "start_frequency": 60e9})
+    assert velocity(CONFIG) is DopplerVelocity
+    assert velocity(PRESETS["two-tx"]) is velocity(aop) is FusedVelocity
 
 
 def test_without_weights_methods_are_classical(tmp_path, monkeypatch):

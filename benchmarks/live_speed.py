@@ -1,8 +1,12 @@
-"""`radarize live` on a replay in real time, somebody looking on: frames dropped, and what a frame costs.
+"""`radarize live` on a replay in real time, somebody looking on: frames dropped, and what a frame costs; and at the
+virtual radar, while it records, with a browser on its page, all of this on one machine.
 
 Wall time says whether this machine keeps up with whatever else it does; processor time what it takes of a free one.
 """
 
+import re
+import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -11,15 +15,18 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.results import Data, command_line, publish, surroundings
+from benchmarks.results import Data, command_line, publish, same, surroundings
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.replay import Replay
 from radarize.methods.registry import CLASSICAL, Inputs, best_methods, pace
+from radarize.recording import Losses, Recording
 from radarize.stopwatch import Stopwatch
 from radarsim.simulate import simulate
+from tests.capture.browser import Browser
+from tests.virtual import BOARD, COMPUTER, emulator
 
 
 def look_on(url: str) -> None:
@@ -56,7 +63,7 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     frames, counts = max(live.losses.frames, 1), stream.counts
     return {
         "odometry, scans": f"{methods['odometry']}, {methods['scans']}",
-        "follows": "all frames" if every == 1 else f"one of {every}",
+        "follows": _follows(every),
         "frames/s": (final - first) / (ended - began),
         "dropped": f"{counts.dropped} of {counts.frames}",
         "ms a frame": 1e3 * live.busy / frames,
@@ -67,9 +74,45 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     }
 
 
+def together(path: Path, frames: int, folder: Path) -> dict[str, object]:
+    """A session at the virtual radar, which plays a recording again and again; a row of the table."""
+    output, config = folder / "live.h5", Replay(path).config
+    (best, _), losses = best_methods(config), Losses()
+    with emulator(path, folder, "--loop") as board:
+        time.sleep(3)  # frames are made ahead
+        command = [
+            sys.executable, "-m", "radarize.cli", "live", "--config", "radarize", "--port", board.port, "--host",
+            COMPUTER, "--dca", BOARD, "--command-port", board.command_port, "--data-port", board.data_port, "--frames",
+            frames, "--address", "127.0.0.1:0", "-o", output,
+        ]  # fmt: skip
+        streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        with subprocess.Popen([*map(str, command)], text=True, **streams) as session:
+            url = re.match(r"page: (\S+)", session.stdout.readline())[1]
+            with Browser(url, folder / "profile"):
+                said, warned = session.communicate()
+    with Recording(output) as recording:
+        for where, _ in recording.batches(64):
+            losses.add(recording.valid(where.start, where.stop))
+    dropped = re.search(r"(\d+) of \d+ frames were dropped", warned)
+    return {
+        "odometry, scans": f"{best['odometry']}, {best['scans']}, all together",
+        "follows": _follows(pace(best["odometry"], config)),
+        "dropped": f"{dropped[1] if dropped else 0} of {frames}",
+        "not recorded": frames - losses.frames,
+        "chirps lost": losses.lost_chirps,
+        "ms a frame": float(re.search(r"frames, (\S+) ms each", said)[1]),
+        "budget, ms": 1e3 * config.frame_period,
+    }
+
+
+def _follows(every: int) -> str:
+    return "all frames" if every == 1 else f"one of {every}"
+
+
 PARSER = command_line(
     __doc__,
     duration=(20.0, "of the simulated recording, s"),
+    frames=(9000, "of the session at the virtual radar; 0: none"),
     seed=(0, "of it"),
 )
 PARSER.add_argument("recording", nargs="?", type=Path, help="a recording; by default one is simulated")
@@ -84,15 +127,19 @@ def main() -> None:
         chosen = dict.fromkeys((Pair(**CLASSICAL), Pair(**best_methods(Replay(path).config)[0])))
         rows = [measure(path, {"odometry": pair.odometry, "scans": pair.scans}) for pair in chosen]
         data = Data.of(path.stem, [path], options.seed)
+        if options.frames:
+            rows.append(together(path, options.frames, Path(folder)))
     publish(
         "live_speed",
-        "radarize live on a replay in real time, preset radarize",
-        rows,
+        "radarize live in real time, preset radarize",
+        same(rows),
         data=data,
         networks=Networks().used([kind for pair in chosen for kind in pair.networks]),
         notes=[
             "A browser's stream of events is read all the time. Dropped frames are whole ones that found no room "
             "because this machine was too slow for them; processor time is that of the main process.",
+            "All together: `radarsim emulate` plays the recording over UDP again and again, `live` follows and "
+            "records, and headless Chromium shows its page.",
             surroundings(),
         ],
     )

@@ -8,6 +8,7 @@ from collections import deque
 import matplotlib
 import numpy as np
 from jaxtyping import Float, UInt8
+from PIL import Image
 
 from radarize.batch import Signal
 from radarize.heatmaps import Heatmaps
@@ -53,10 +54,8 @@ def colored(
 
 def png(pixels: UInt8[np.ndarray, "row column ..."]) -> str:
     """A picture as a data URL."""
-    from matplotlib.image import imsave
-
     buffer = io.BytesIO()
-    imsave(buffer, pixels, format="png", cmap="gray", vmin=0, vmax=255)
+    Image.fromarray(pixels).save(buffer, "png", compress_level=1)
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 

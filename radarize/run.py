@@ -107,11 +107,13 @@ def run_each(
         pipeline, writer = pipelines[folder], writers[folder]
         pipeline.finish()
         writer.describe(source, inputs.signal.heatmaps)
+        made = dict(zip(("odometry", "scans"), pairs[folder], strict=True)) | dict(facts or {})
+        if every > 1:
+            made["frames"] = f"one of {every}"
         told = {
-            "every": every,
             "frames_lost": intake.lost,
             "chirps_disturbed": intake.disturbed,
-            "methods": dict(zip(("odometry", "scans"), pairs[folder], strict=True)) | dict(facts or {}),
+            "methods": made,
             "configuration": inputs.configuration.model_dump(),
         }
         if len(pairs) == 1:  # what several share is nobody's

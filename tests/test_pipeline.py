@@ -17,6 +17,7 @@ from radarize.pipeline import Pipeline, Result
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter, Stream
+from radarize.report.run import methods
 from radarize.run import run
 from radarize.runfolder import RunFolder
 from radarize.tum import read_tum
@@ -193,8 +194,9 @@ def test_every_second_frame_is_a_radar_of_half_the_rate(walk, tmp_path):
     one = run(tmp_path / "whole.h5", tmp_path / "one", every=2)
     other = run(tmp_path / "half.h5", tmp_path / "other")
     facts = json.loads((one / "run.json").read_text())
-    assert facts["every"] == 2 and facts["frames_lost"] == 0 and facts["methods"]["odometry"] == "fused"
+    assert facts["frames"] == 60 and facts["frames_lost"] == 0
     found, wanted = RunFolder(one), RunFolder(other)
+    assert methods(found) == "fused + segmentation + one of 2" and methods(wanted) == "fused + segmentation"
     assert found.scans["frames"].tolist() == list(range(0, 60, 2)) and len(wanted.scans["frames"]) == 30
     for name in ("ranges", "velocity", "truth/velocity"):
         assert found.scans[name] == pytest.approx(wanted.scans[name], abs=1e-3, nan_ok=True)

@@ -65,7 +65,8 @@ def report_run(run: Path, output: Path | None = None, beside: Sequence[Path] = (
 
 def methods(run: RunFolder) -> str:
     """What a run was made with, in short."""
-    return " + ".join(run.methods[name] for name in ("odometry", "scans") if name in run.methods) or run.path.name
+    told = ("odometry", "scans", "frames")
+    return " + ".join(run.methods[name] for name in told if name in run.methods) or run.path.name
 
 
 def _about(run: RunFolder, errors: dict[str, TrajectoryErrors]) -> str:

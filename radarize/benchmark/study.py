@@ -182,7 +182,8 @@ class Study:
     @property
     def kinds(self) -> list[str]:
         """Networks that they need."""
-        return list(dict.fromkeys(kind for pair in self.pairs for kind in pair.networks))
+        cases = self.data.cases
+        return list(dict.fromkeys(kind for pair in self.pairs for case in cases for kind in pair.networks(case.config)))
 
     @property
     def cases(self) -> list[Case]:
@@ -195,7 +196,7 @@ class Study:
         """All runs with their splits, recording by recording, so that each is read from memory after the first time."""
         return [
             # Methods without networks are the same in every split.
-            (split, Run(case, pair, self.networks[split] if pair.networks else Networks()))
+            (split, Run(case, pair, self.networks[split] if pair.networks(case.config) else Networks()))
             for split, cases in self.splits.items()
             for case in cases
             for pair in self.pairs

@@ -10,6 +10,7 @@ from typing import TypeVar, cast
 from radarize.batch import Signal
 from radarize.errors import InputError
 from radarize.methods.configuration import Configuration
+from radarize.radar.array import is_whole
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 
@@ -82,6 +83,7 @@ class Method:
             is loaded when the method is asked for. Raises InputError where something is lacking, such as weights for
             this radar or a stream.
         networks: kinds of weights that it needs.
+        whole: those of them that it needs where the array is whole (`radarize.radar.array.is_whole`); all if None.
         scans: this odometry is made from scans.
         pictures: it reads polar pictures (`radarize.polar`), so it needs no samples.
         options: further arguments of `make`.
@@ -90,9 +92,14 @@ class Method:
     title: str
     make: str | Callable
     networks: tuple[str, ...] = ()
+    whole: tuple[str, ...] | None = None
     scans: bool = False
     pictures: bool = False
     options: Mapping[str, object] = field(default_factory=dict)
+
+    def needed(self, radar: RadarConfig) -> tuple[str, ...]:
+        """Kinds of weights that it needs for a radar."""
+        return self.networks if self.whole is None or not is_whole(radar) else self.whole
 
     @property
     def maker(self) -> Callable:

@@ -91,7 +91,7 @@ def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
     chosen, why, weights = dict(BEST), [], Weights()
     for what, known in (("odometry", ODOMETRY), ("scans", SCANS)):
         try:
-            for kind in known[BEST[what]].networks:
+            for kind in known[BEST[what]].needed(radar):
                 check(weights.of(kind), radar)
         except InputError as error:
             chosen[what] = CLASSICAL[what]

@@ -27,7 +27,7 @@ from radarize.batch import Batch
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.parabola import vertex
 from radarize.plain import Frozen, setting
-from radarize.radar.array import virtual_positions
+from radarize.radar.array import ROW, virtual_positions
 
 
 @dataclass(frozen=True)
@@ -95,8 +95,6 @@ class DopplerVelocity:
 
     Attributes:
         lever: m, see `VelocityEstimator`.
-        rough: of the speed, standard deviation of what echoes share where the array tells no elevation or has short
-            rows; else zero.
     """
 
     def __init__(self, heatmaps: Heatmaps, settings: DopplerConfig | None = None):
@@ -111,8 +109,8 @@ class DopplerVelocity:
         # An echo's phase turns with its way to the transmitter and back to the receiver: it is the middle that moves.
         self.lever = float(virtual_positions(self.config).reshape(-1, 3)[self.row, 1].mean()) / 2
         self._first = int(np.searchsorted(heatmaps.ranges, self.settings.min_range))
-        flat, short = self.pairs is None, len(self.row) < _ROW
-        self.rough = self.settings.rough * (2 if short else 1 if flat else 0)
+        flat, short = self.pairs is None, len(self.row) < ROW
+        self._rough = self.settings.rough * (2 if short else 1 if flat else 0)
         # One table of random numbers for all frames: the same frame gives the same answer in any batch.
         self._draws = np.random.default_rng(0).random((self.settings.hypotheses, 2))
 
@@ -132,7 +130,7 @@ class DopplerVelocity:
         s = self.settings
         across = np.stack([-velocity[:, 1], velocity[:, 0]], axis=1)
         along, side = (v[:, :, None] * v[:, None] for v in (velocity, across))
-        scale, course = (noise**2 + self.rough**2 for noise in (s.scale_noise, s.course_noise))
+        scale, course = (noise**2 + self._rough**2 for noise in (s.scale_noise, s.course_noise))
         return scale * along + course * side + s.floor**2 * np.eye(2)
 
     def echoes(self, spectrum: Complex64[torch.Tensor, "range doppler antenna"]) -> Float[np.ndarray, "echo 6"]:
@@ -196,8 +194,6 @@ UNKNOWN_SPEED = 10.0
 _ECHOES, _DETERMINED = 4, 0.3
 #: Standard deviations from which a velocity is not zero: a walk that sets in is slow, but its speed is well known.
 _SIGMAS = 3.0
-#: Antennas of the row that claims were fitted to.
-_ROW = 8
 #: A weaker peak beside a stronger one of the same range and Doppler may be its sidelobe (-25 dB, and mismatch).
 SIDELOBE = 0.1
 

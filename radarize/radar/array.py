@@ -94,6 +94,10 @@ def _half(config: RadarConfig) -> float:
     return SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
 
 
+#: Antennas of a row that is not short.
+ROW = 8
+
+
 def _lattice(config: RadarConfig) -> Int[np.ndarray, "antenna 2"]:
     """Left and up of the virtual antennas, flat (tx, rx), in half wavelengths."""
     return np.rint(virtual_positions(config).reshape(-1, 3)[:, 1:] / _half(config)).astype(int)
@@ -129,3 +133,8 @@ def elevation_pairs(config: RadarConfig) -> Int[np.ndarray, "pair 2"] | None:
         left_of_upper = {grid[u, 0]: u for u in upper}
         pairs += [(low, left_of_upper[grid[low, 0]]) for low in lower if grid[low, 0] in left_of_upper]
     return np.asarray(pairs) if pairs else None
+
+
+def is_whole(config: RadarConfig) -> bool:
+    """Whether the array tells elevation and has a row of eight antennas, as the IWR1843's with all transmitters."""
+    return elevation_pairs(config) is not None and len(azimuth_row(config)) >= ROW

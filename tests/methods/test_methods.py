@@ -115,7 +115,8 @@ def test_unknown_names():
 def test_networks_where_they_fit_and_classical_methods_elsewhere(tmp_path):
     assert best_methods(CONFIG) == (BEST, "")
     coarse = CONFIG.model_copy(update={"loops": CONFIG.loops // 3})
-    methods, why = best_methods(coarse)
+    assert best_methods(coarse) == (BEST, "")  # the network of velocities does not fit, and is not needed
+    methods, why = best_methods(PRESETS["two-tx"].model_copy(update={"loops": PRESETS["two-tx"].loops // 4}))
     assert methods == {"odometry": CLASSICAL["odometry"], "scans": BEST["scans"]}
     assert "translation.safetensors: does not fit this radar" in why and "segmentation" not in why
     with pytest.raises(InputError, match="does not fit this radar"):
@@ -150,7 +151,7 @@ def test_velocities_are_the_networks_too_where_the_array_tells_little():
 def test_without_weights_methods_are_classical(tmp_path, monkeypatch):
     monkeypatch.setattr(Weights, "of", lambda self, kind: tmp_path / f"{kind}.safetensors")
     methods, why = best_methods(CONFIG)
-    assert methods == CLASSICAL and "translation.safetensors: no such file" in why
+    assert methods == CLASSICAL and "rotation.safetensors: no such file" in why
 
 
 def test_every_choice_is_in_the_registry():

@@ -4,7 +4,7 @@ from radarize.methods.method import Method
 
 _PLACE = "radarize.methods.radarize"
 ODOMETRY = {
-    "fused": Method("networks and Doppler", f"{_PLACE}.making:fused", ("translation", "rotation")),
+    "fused": Method("networks and Doppler", f"{_PLACE}.making:fused", ("translation", "rotation"), whole=("rotation",)),
     "learned": Method("networks", f"{_PLACE}.making:learned", ("translation", "rotation")),
 }
 SCANS = {

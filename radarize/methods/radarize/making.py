@@ -8,6 +8,7 @@ from radarize.methods.radarize.scans import Segmentation
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.odometry.integration import Odometry
 from radarize.odometry.rotation import MapRotation
+from radarize.radar.array import is_whole
 
 
 def learned(inputs: Inputs) -> Odometry:
@@ -26,7 +27,7 @@ def fused(inputs: Inputs) -> Odometry:
     settings, heatmaps = inputs.configuration, inputs.signal.heatmaps
     doppler = DopplerVelocity(heatmaps, settings.doppler)
     rotation = MapRotation(heatmaps, settings.rotation, _turns(inputs))
-    if not doppler.rough:
+    if is_whole(inputs.radar):
         return Odometry(inputs.radar, doppler, rotation, settings.velocity)
     alone = LearnedVelocity(inputs.radar, inputs.weights.of("translation"))
     return Odometry(inputs.radar, FusedVelocity(alone, doppler, settings.fusion), rotation, settings.velocity)

@@ -151,6 +151,15 @@ ARRAYS = {
     "office": (8963430395485689203, *EVERY["office"]),
 }
 
+#: 20 s by hand in buildings of styles A and C with seeds 671 and 673, and by cart in B and D with 672 and 674, by the
+#: preset radarize with frames at 5 Hz, and with 10 loops.
+COARSE = {
+    "A_0": (3806646801936172637,),
+    "B_0": (7483608823468009466,),
+    "C_0": (139721640175536573,),
+    "D_0": (73293609840241371,),
+}
+
 #: 60 s by hand and by cart in buildings of styles A to D with seeds 611 to 614, and as many in A to D and the office
 #: with seeds 621 to 625.
 STRETCH = {
@@ -194,6 +203,7 @@ CHOICES = (
     Choice("that radars which see far turn with networks, too", FARTHER),
     Choice("that odometry in real time follows every second frame", EVERY),
     Choice("with which arrays velocities are the network's, too", ARRAYS),
+    Choice("that radars whose speeds or frames are too coarse for the network of velocities turn by the other", COARSE),
     Choice("what closures need in the back end's preset radar, and its cells", CLOSURES),
     Choice("what matches and closures count for in the back end's preset radar", BEARINGS | REAL),
     Choice("by how much larger sines of azimuth are taken to match turns", STRETCH),

@@ -13,7 +13,6 @@ from benchmarks.hardships import CONDITIONS, Samples
 from benchmarks.results import Data, command_line, publish
 from radarize.batch import Intake
 from radarize.benchmark.networks import Networks
-from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import NONE, with_error
 from radarize.console import progress
 from radarize.effort import BATCH
@@ -23,7 +22,7 @@ from radarize.evaluation.trajectory import trajectory
 from radarize.health import Health
 from radarize.jobs import Job, Report, perform
 from radarize.methods.method import Inputs
-from radarize.methods.registry import BEST, Workshop
+from radarize.methods.registry import BEST, ODOMETRY, SCANS, Workshop
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarize.tum import planar_poses
@@ -148,7 +147,7 @@ def main() -> None:
         "Hard conditions",
         [row(name, each, outcomes["plain"]) for name, each in outcomes.items()],
         data=Data.of("walks of benchmarks/conditions.yaml and their hard versions", sorted(map(Path, recordings))),
-        networks=Networks().used(Pair(**BEST).networks(PRESETS["radarize"])),
+        networks=Networks().used((*ODOMETRY[BEST["odometry"]].networks, *SCANS[BEST["scans"]].networks)),
         notes=[
             f"Mean errors after alignment, of {len(walks)} walks, +- standard error; yaw: the largest error of "
             "odometry after alignment, and the standard deviation of the last yaw that it claims, given the first, "

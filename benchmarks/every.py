@@ -68,8 +68,7 @@ PARSER = command_line(__doc__, data=(Path, "data set, such as `evaluation`"), wo
 
 def main() -> None:
     options = PARSER.parse_args()
-    cases = DataSet.load(options.data).cases
-    paths = [case.path for case in cases]
+    paths = [case.path for case in DataSet.load(options.data).cases]
     trials = [Trial(*each) for each in itertools.product(paths, PAIRS, EVERY)]
     found = results({str(trial): trial.figures for trial in trials}, options.workers, "every")
     of = {
@@ -81,7 +80,7 @@ def main() -> None:
         "Every frame, or every second one",
         [row(pair, every, each, of[pair, 1]) for (pair, every), each in of.items()],
         data=Data.of(options.data.name, paths),
-        networks=Networks().used(PAIRS[0].networks(cases[0].config)),
+        networks=Networks().used(PAIRS[0].networks),
         notes=[
             "Mean errors after alignment, mean over walks +- standard error; differences are walk by walk. "
             "`radarize live` follows every second frame of a radar of 30 Hz with networks, and all frames without.",

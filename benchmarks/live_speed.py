@@ -124,8 +124,7 @@ def main() -> None:
         path = options.recording or simulate(
             "office", Path(folder) / "office.h5", duration=options.duration, seed=options.seed
         )
-        config = Replay(path).config
-        chosen = dict.fromkeys((Pair(**CLASSICAL), Pair(**best_methods(config)[0])))
+        chosen = dict.fromkeys((Pair(**CLASSICAL), Pair(**best_methods(Replay(path).config)[0])))
         rows = [measure(path, {"odometry": pair.odometry, "scans": pair.scans}) for pair in chosen]
         data = Data.of(path.stem, [path], options.seed)
         if options.frames:
@@ -135,7 +134,7 @@ def main() -> None:
         "radarize live in real time, preset radarize",
         same(rows),
         data=data,
-        networks=Networks().used([kind for pair in chosen for kind in pair.networks(config)]),
+        networks=Networks().used([kind for pair in chosen for kind in pair.networks]),
         notes=[
             "A browser's stream of events is read all the time. Dropped frames are whole ones that found no room "
             "because this machine was too slow for them; processor time is that of the main process.",

@@ -17,7 +17,6 @@ from radarize.jsonfile import read_json
 from radarize.log import Log
 from radarize.methods.registry import BEST
 from radarize.pose import between, compose, wrap
-from radarize.radar.presets import PRESETS
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarize.tum import planar, read_tum
@@ -205,7 +204,7 @@ def main() -> None:
         "SLAM back end",
         rows,
         data=Data("lidar logs of Radish and radar walks", tuple(walks), options.seed),
-        networks=Networks().used(Pair(**BEST).networks(PRESETS["radarize"])) if options.data else (),
+        networks=Networks().used(Pair(**BEST).networks) if options.data else (),
         beside=[THEIRS],
         notes=[
             "Mean errors after alignment; closures: believed / found. One preset for all logs, one for all radar runs. "

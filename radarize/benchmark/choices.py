@@ -139,7 +139,8 @@ EVERY = {
 }
 
 #: 20 s by hand and by cart, five people about, in buildings of styles A to D with seeds 661 to 664 and in the office of
-#: seed 665, each as the presets radarize and two-tx and two boards at 60 GHz see it; and the walks above, by radarize.
+#: seed 665, each as the presets radarize and two-tx and two boards at 60 GHz see it; and the walks above and the
+#: demo's, by radarize.
 ARRAYS = {
     "A_0": (6781302003198438093, 5360434777983573593, *EVERY["A_0"]),
     "A_1": EVERY["A_1"],
@@ -148,7 +149,7 @@ ARRAYS = {
     "C_0": (149259419967774665, *EVERY["C_0"]),
     "D_0": (7161252487565831501, *EVERY["D_0"]),
     "D_1": EVERY["D_1"],
-    "office": (8963430395485689203, *EVERY["office"]),
+    "office": (8963430395485689203, *EVERY["office"], *TURNS["office"]),
 }
 
 #: 20 s by hand in buildings of styles A and C with seeds 671 and 673, and by cart in B and D with 672 and 674, by the

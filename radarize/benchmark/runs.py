@@ -19,7 +19,6 @@ from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import missed, sources
 from radarize.methods.registry import ODOMETRY, SCANS, Inputs, Workshop
 from radarize.pipeline import Pipeline
-from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.run import run_each
 from radarize.runfolder import RunFolder
@@ -43,10 +42,10 @@ class Pair:
     def __str__(self) -> str:
         return f"{self.odometry}+{self.scans}"
 
-    def networks(self, radar: RadarConfig) -> tuple[str, ...]:
-        """Kinds of weights that they need for a radar."""
-        methods = ODOMETRY[self.odometry], SCANS[self.scans]
-        return tuple(dict.fromkeys(kind for method in methods for kind in method.needed(radar)))
+    @property
+    def networks(self) -> tuple[str, ...]:
+        """Kinds of weights that they need."""
+        return tuple(dict.fromkeys((*ODOMETRY[self.odometry].networks, *SCANS[self.scans].networks)))
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class _Step:
     def identity(self) -> dict[str, object]:
         return {
             "recording": of_file(self.case.path),
-            "networks": self.networks.identity(self.pair.networks(self.case.config)),
+            "networks": self.networks.identity(self.pair.networks),
             "code": of_code(ODOMETRY[self.pair.odometry].maker, SCANS[self.pair.scans].maker),
         }
 

@@ -182,8 +182,7 @@ class Study:
     @property
     def kinds(self) -> list[str]:
         """Networks that they need."""
-        cases = self.data.cases
-        return list(dict.fromkeys(kind for pair in self.pairs for case in cases for kind in pair.networks(case.config)))
+        return list(dict.fromkeys(kind for pair in self.pairs for kind in pair.networks))
 
     @property
     def cases(self) -> list[Case]:
@@ -196,7 +195,7 @@ class Study:
         """All runs with their splits, recording by recording, so that each is read from memory after the first time."""
         return [
             # Methods without networks are the same in every split.
-            (split, Run(case, pair, self.networks[split] if pair.networks(case.config) else Networks()))
+            (split, Run(case, pair, self.networks[split] if pair.networks else Networks()))
             for split, cases in self.splits.items()
             for case in cases
             for pair in self.pairs

@@ -216,7 +216,7 @@ class Says:
             velocity, np.tile(covariance, (count, 1, 1)), np.full(count, 3), np.full(count, seen, bool)
         )
 
-    def estimate(self, batch):
+    def estimate(self, batch, asked=None):
         return self.answer
 
 

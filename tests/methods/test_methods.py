@@ -1,5 +1,7 @@
 """The registry: every name makes something that works, what is made is made once, and what cannot work says why."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,7 +25,7 @@ from radarize.methods.registry import (
     find_task,
     pace,
 )
-from radarize.odometry.doppler import DopplerVelocity
+from radarize.odometry.doppler import DopplerVelocity, Velocities
 from radarize.radar.presets import PRESETS
 from tests.batches import batch
 
@@ -137,15 +139,27 @@ def test_frames_come_as_often_as_networks_need_them():
         pace("magic", CONFIG)
 
 
-def test_velocities_are_the_networks_too_where_the_array_tells_little():
-    """Without elevation, or in short rows; the preset's whole array needs no network for them."""
+def test_velocities_are_the_networks_too_where_the_array_tells_little(monkeypatch):
+    """Without elevation, or in short rows. With a whole array the network is asked where least squares are unsure, and
+    not missed where it does not fit."""
 
     def velocity(config):
-        return type(Workshop(Inputs(config)).odometry("fused", "threshold").velocity)
+        return Workshop(Inputs(config)).odometry("fused", "threshold").velocity
 
     aop = CONFIG.model_copy(update={"board": "iwr6843aop", "start_frequency": 60e9})
-    assert velocity(CONFIG) is DopplerVelocity
-    assert velocity(PRESETS["two-tx"]) is velocity(aop) is FusedVelocity
+    assert velocity(PRESETS["two-tx"]).always and velocity(aop).always
+    assert isinstance(velocity(CONFIG.model_copy(update={"loops": CONFIG.loops // 3})), DopplerVelocity)
+    whole, told = velocity(CONFIG), np.zeros((4, 2))
+    spread = np.array([0.01, 0.02, 0.2, 0.04])[:, None, None] ** 2 * np.eye(2)
+    sure, asked = Velocities(told, spread, np.full(4, 9), np.ones(4, bool)), []
+    monkeypatch.setattr(whole.doppler, "estimate", lambda batch: sure)
+    monkeypatch.setattr(
+        whole.learned, "estimate", lambda batch, which: asked.append(which) or replace(sure, seen=which)
+    )
+    found = whole.estimate(None)
+    assert isinstance(whole, FusedVelocity) and asked[0].tolist() == [False, False, True, True]
+    before, after = (np.diagonal(each, axis1=1, axis2=2) for each in (spread, found.covariance))
+    assert after[:2] == pytest.approx(before[:2], rel=1e-3) and (after[2:] < 0.6 * before[2:]).all()
 
 
 def test_without_weights_methods_are_classical(tmp_path, monkeypatch):

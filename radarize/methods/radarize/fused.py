@@ -18,17 +18,29 @@ class FusedVelocity:
     Where they contradict each other by more than both admit, at least one is wrong without knowing: then both are
     believed less.
 
+    Args:
+        learned, doppler, settings: both, and what may be set.
+        always: the network is asked of every frame, not of those alone of which least squares are unsure.
+
     Attributes:
         lever: m, see `VelocityEstimator`: that of least squares, which has most of the say.
     """
 
-    def __init__(self, learned: LearnedVelocity, doppler: DopplerVelocity, settings: FusionConfig | None = None):
+    def __init__(
+        self,
+        learned: LearnedVelocity,
+        doppler: DopplerVelocity,
+        settings: FusionConfig | None = None,
+        always: bool = True,
+    ):
         self.learned, self.doppler, self.settings = learned, doppler, settings or FusionConfig()
-        self.lever = doppler.lever
+        self.lever, self.always = doppler.lever, always
 
     def estimate(self, batch: Batch) -> Velocities:
         """Velocities of the next frames."""
-        one, other = self.learned.estimate(batch), self.doppler.estimate(batch)
+        other = self.doppler.estimate(batch)
+        unsure = np.linalg.eigvalsh(other.covariance)[:, -1] > self.settings.sure**2
+        one = self.learned.estimate(batch, unsure | self.always)
         # Faster than the network sees, its maps are empty.
         seen = one.seen & (np.hypot(*other.velocity.T) <= self.learned.limit)
         one = replace(one, seen=seen, covariance=np.where(seen[:, None, None], one.covariance, ANY_VELOCITY))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from radarize.batch import Batch
 from radarize.methods.radarize.motion import RotationNet, TranslationNet
@@ -38,10 +38,12 @@ class LearnedVelocity:
         self.limit = header.grid.reach / 2
 
     @torch.inference_mode()
-    def estimate(self, batch: Batch) -> Velocities:
-        """Velocities of the next frames; no echoes are counted."""
+    def estimate(self, batch: Batch, asked: Bool[np.ndarray, "frame"] | None = None) -> Velocities:
+        """Velocities of the next frames, or of those that are asked for; no echoes are counted."""
         shown = self._windows.push(batch.maps(self._windows.maps), batch.stamps)[0]
         told = shown.whole & ~batch.aliases.any(axis=1)  # it was taught speeds that do not alias
+        if asked is not None:
+            told &= asked
         velocity = np.zeros((len(batch), 2))
         covariance = np.tile(ANY_VELOCITY, (len(batch), 1, 1))
         if told.any():

@@ -1,5 +1,6 @@
 """The methods, put together."""
 
+from radarize.errors import InputError
 from radarize.mapping.scans import HeatmapScans
 from radarize.methods.method import Inputs
 from radarize.methods.radarize.fused import FusedVelocity
@@ -22,15 +23,21 @@ def fused(inputs: Inputs) -> Odometry:
 
     Least squares need the network where the array tells no elevation or has short rows. By an IWR6843AOP odometry is
     0.53 m off without it and 0.21 m with it, by two transmitters 0.10 and 0.08 m, on six walks of 20 s with five people
-    about; by whole arrays, there and on 20 walks of a minute, it gains nothing (`radarize.benchmark.choices.ARRAYS`).
+    about. By whole arrays, there and on 20 walks of a minute, it gains nothing on average
+    (`radarize.benchmark.choices.ARRAYS`), and is asked of those frames alone of which least squares are unsure.
     """
     settings, heatmaps = inputs.configuration, inputs.signal.heatmaps
     doppler = DopplerVelocity(heatmaps, settings.doppler)
     rotation = MapRotation(heatmaps, settings.rotation, _turns(inputs))
-    if is_whole(inputs.radar):
+    whole = is_whole(inputs.radar)
+    try:
+        alone = LearnedVelocity(inputs.radar, inputs.weights.of("translation"))
+    except InputError:
+        if not whole:
+            raise
         return Odometry(inputs.radar, doppler, rotation, settings.velocity)
-    alone = LearnedVelocity(inputs.radar, inputs.weights.of("translation"))
-    return Odometry(inputs.radar, FusedVelocity(alone, doppler, settings.fusion), rotation, settings.velocity)
+    velocity = FusedVelocity(alone, doppler, settings.fusion, always=not whole)
+    return Odometry(inputs.radar, velocity, rotation, settings.velocity)
 
 
 def _turns(inputs: Inputs) -> LearnedRotation:

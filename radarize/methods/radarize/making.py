@@ -1,11 +1,12 @@
 """The methods, put together."""
 
-from radarize.errors import InputError
 from radarize.mapping.scans import HeatmapScans
 from radarize.methods.method import Inputs
 from radarize.methods.radarize.fused import FusedVelocity
 from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
+from radarize.methods.radarize.motion import TranslationNet
 from radarize.methods.radarize.scans import Segmentation
+from radarize.nets.weights import header_of
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.odometry.integration import Odometry
 from radarize.odometry.rotation import MapRotation
@@ -29,13 +30,10 @@ def fused(inputs: Inputs) -> Odometry:
     settings, heatmaps = inputs.configuration, inputs.signal.heatmaps
     doppler = DopplerVelocity(heatmaps, settings.doppler)
     rotation = MapRotation(heatmaps, settings.rotation, _turns(inputs))
-    whole = is_whole(inputs.radar)
-    try:
-        alone = LearnedVelocity(inputs.radar, inputs.weights.of("translation"))
-    except InputError:
-        if not whole:
-            raise
+    whole, weights = is_whole(inputs.radar), inputs.weights.of("translation")
+    if whole and header_of(weights).difference(inputs.radar, TranslationNet.maker):
         return Odometry(inputs.radar, doppler, rotation, settings.velocity)
+    alone = LearnedVelocity(inputs.radar, weights)
     velocity = FusedVelocity(alone, doppler, settings.fusion, always=not whole)
     return Odometry(inputs.radar, velocity, rotation, settings.velocity)
 

@@ -18,7 +18,7 @@ from radarize.radar.dca1000 import MAX_PAYLOAD
 from radarize.radar.presets import load_config
 from radarize.recording import Losses, Recording, RecordingWriter
 from radarsim.emulator.disturbance import Disturbance
-from tests.virtual import BOARD, COMPUTER, emulator
+from tests.virtual import emulator
 
 LOOP = 64  # frames played again and again
 NOISE = 40  # counts, RMS: about an IWR1843's at 30 dB of gain in a room
@@ -75,8 +75,7 @@ def run(
     with emulator(folder / "played.h5", folder, "--loop", *options, "--seed", seed) as board:
         time.sleep(3)  # frames are made ahead
         capture = [
-            sys.executable, "-m", "radarize.cli", "capture", "--config", preset, "--port", board.port,
-            "--host", COMPUTER, "--dca", BOARD, "--command-port", board.command_port, "--data-port", board.data_port,
+            sys.executable, "-m", "radarize.cli", "capture", "--config", preset, *board.options,
             "--frames", frames, "-o", folder / "captured.h5",
         ]  # fmt: skip
         before, begun = used(board.process), os.times()

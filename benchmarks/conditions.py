@@ -1,7 +1,7 @@
 """Hard conditions (`benchmarks.hardships`): the same walks plain, and under each."""
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -10,19 +10,18 @@ import pandas as pd
 import yaml
 
 from benchmarks.hardships import CONDITIONS, Samples
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import Data, command_line, performed, publish
 from radarize.batch import Intake
 from radarize.benchmark.networks import Networks
+from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import NONE, with_error
-from radarize.console import progress
 from radarize.effort import BATCH
-from radarize.errors import InputError
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
 from radarize.evaluation.trajectory import trajectory
 from radarize.health import Health
-from radarize.jobs import Job, Report, perform
+from radarize.jobs import Report
 from radarize.methods.method import Inputs
-from radarize.methods.registry import BEST, ODOMETRY, SCANS, Workshop
+from radarize.methods.registry import BEST, Workshop
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarize.tum import planar_poses
@@ -106,23 +105,6 @@ def row(name: str, found: Sequence[Outcome], plain: Sequence[Outcome]) -> dict[s
     }
 
 
-def results(jobs: Mapping[str, Job], workers: int, title: str) -> list:
-    """Of all jobs, in their order.
-
-    Raises:
-        InputError: one of them fails.
-    """
-    found = {}
-    with progress(title) as report:
-        for news in perform(jobs, workers):
-            if news.error is not None:
-                raise InputError(news.error)
-            if news.ended:
-                found[news.name] = news.result
-                report(len(found), len(jobs))
-    return [found[name] for name in jobs]
-
-
 PARSER = command_line(
     __doc__,
     folder=(Path("conditions"), "of the recordings, which are made if they are not there"),
@@ -138,16 +120,16 @@ def main() -> None:
     trials = [Trial(walk, name, options.folder) for name in names for walk in walks]
     recordings = {str(trial.recording): trial.record for trial in trials}
     options.folder.mkdir(parents=True, exist_ok=True)
-    results(recordings, options.workers, "recordings")
+    performed(recordings, options.workers, "recordings")
     runs = {f"{trial.condition}, {trial.walk['seed']}": trial.outcome for trial in trials}
-    found = results(runs, options.workers, "runs")
+    found = performed(runs, options.workers, "runs")
     outcomes = {name: found[k * len(walks) : (k + 1) * len(walks)] for k, name in enumerate(names)}
     publish(
         "conditions",
         "Hard conditions",
         [row(name, each, outcomes["plain"]) for name, each in outcomes.items()],
         data=Data.of("walks of benchmarks/conditions.yaml and their hard versions", sorted(map(Path, recordings))),
-        networks=Networks().used((*ODOMETRY[BEST["odometry"]].networks, *SCANS[BEST["scans"]].networks)),
+        networks=Networks().used(Pair(**BEST).networks),
         notes=[
             f"Mean errors after alignment, of {len(walks)} walks, +- standard error; yaw: the largest error of "
             "odometry after alignment, and the standard deviation of the last yaw that it claims, given the first, "

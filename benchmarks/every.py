@@ -3,13 +3,13 @@ with all frames and with every second one, with networks and without."""
 
 import itertools
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
 
-from benchmarks.conditions import results
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import Data, command_line, performed, publish
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
@@ -35,8 +35,7 @@ class Trial(NamedTuple):
     def figures(self, _: Report) -> dict[str, float]:
         """Errors (m, rad), and F1 of the map."""
         with tempfile.TemporaryDirectory() as folder:
-            pair = {"odometry": self.pair.odometry, "scans": self.pair.scans}
-            found = evaluate(run(self.path, Path(folder) / "run", every=self.every, **pair))
+            found = evaluate(run(self.path, Path(folder) / "run", every=self.every, **asdict(self.pair)))
         errors = {name: found[name]["ate"] for name in ("odometry", "slam")}
         return {
             "odometry": errors["odometry"]["position"]["mean"],
@@ -70,11 +69,9 @@ def main() -> None:
     options = PARSER.parse_args()
     paths = [case.path for case in DataSet.load(options.data).cases]
     trials = [Trial(*each) for each in itertools.product(paths, PAIRS, EVERY)]
-    found = results({str(trial): trial.figures for trial in trials}, options.workers, "every")
-    of = {
-        (pair, every): pd.DataFrame(found[k :: len(PAIRS) * len(EVERY)])
-        for k, (pair, every) in enumerate(itertools.product(PAIRS, EVERY))
-    }
+    found = performed({str(trial): trial.figures for trial in trials}, options.workers, "every")
+    kinds = list(itertools.product(PAIRS, EVERY))
+    of = {kind: pd.DataFrame(found[k :: len(kinds)]) for k, kind in enumerate(kinds)}
     publish(
         "every",
         "Every frame, or every second one",

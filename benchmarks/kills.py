@@ -18,7 +18,7 @@ import yaml
 from benchmarks.results import Data, command_line, publish, same, surroundings, timed
 from radarize.radar.presets import load_config
 from radarize.recording import Recording, recover
-from tests.virtual import BOARD, COMPUTER, emulator, record
+from tests.virtual import emulator, record
 
 #: What a data set of seconds is made of.
 SPECIFICATION = {
@@ -110,8 +110,7 @@ def captures(kills: int, folder: Path, rng: np.random.Generator) -> dict[str, ob
         part = output.with_name(output.name + ".part")
         with emulator(folder / "played.h5", folder, "--loop") as board:
             words = [
-                "radarize.cli", "capture", "--config", "radarize", "--port", board.port, "--host", COMPUTER, "--dca",
-                BOARD, "--command-port", board.command_port, "--data-port", board.data_port, "-o", output,
+                "radarize.cli", "capture", "--config", "radarize", *board.options, "-o", output,
             ]  # fmt: skip
             process = Case(words, "").begin(output, again=False)
             while not part.exists() and process.poll() is None:

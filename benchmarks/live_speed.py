@@ -11,6 +11,7 @@ import tempfile
 import threading
 import time
 import urllib.request
+from dataclasses import asdict
 from pathlib import Path
 
 import psutil
@@ -26,7 +27,7 @@ from radarize.recording import Losses, Recording
 from radarize.stopwatch import Stopwatch
 from radarsim.simulate import simulate
 from tests.capture.browser import Browser
-from tests.virtual import BOARD, COMPUTER, emulator
+from tests.virtual import emulator
 
 
 def look_on(url: str) -> None:
@@ -40,12 +41,12 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     """One replay; a row of the table."""
     stream = Replay(path)
     every = pace(methods["odometry"], stream.config)
-    inputs, watch = prepare(Inputs(stream.config.every(every)), methods), Stopwatch()
+    inputs, watch = prepare(Inputs(stream.config, every=every), methods), Stopwatch()
     with Page("127.0.0.1:0") as page, stream:
         viewer = threading.Thread(target=look_on, args=(page.url,), daemon=True)
         viewer.start()
         (reader,) = [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
-        live, last, instants = Live(inputs, methods, page, every=every), [0.0], []
+        live, last, instants = Live(inputs, methods, page), [0.0], []
 
         def note(done: int, total: int) -> None:
             instants.append((time.monotonic(), done))
@@ -81,9 +82,8 @@ def together(path: Path, frames: int, folder: Path) -> dict[str, object]:
     with emulator(path, folder, "--loop") as board:
         time.sleep(3)  # frames are made ahead
         command = [
-            sys.executable, "-m", "radarize.cli", "live", "--config", "radarize", "--port", board.port, "--host",
-            COMPUTER, "--dca", BOARD, "--command-port", board.command_port, "--data-port", board.data_port, "--frames",
-            frames, "--address", "127.0.0.1:0", "-o", output,
+            sys.executable, "-m", "radarize.cli", "live", "--config", "radarize", *board.options, "--frames", frames,
+            "--address", "127.0.0.1:0", "-o", output,
         ]  # fmt: skip
         streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
         with subprocess.Popen([*map(str, command)], text=True, **streams) as session:
@@ -125,7 +125,7 @@ def main() -> None:
             "office", Path(folder) / "office.h5", duration=options.duration, seed=options.seed
         )
         chosen = dict.fromkeys((Pair(**CLASSICAL), Pair(**best_methods(Replay(path).config)[0])))
-        rows = [measure(path, {"odometry": pair.odometry, "scans": pair.scans}) for pair in chosen]
+        rows = [measure(path, asdict(pair)) for pair in chosen]
         data = Data.of(path.stem, [path], options.seed)
         if options.frames:
             rows.append(together(path, options.frames, Path(folder)))

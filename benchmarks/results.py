@@ -11,6 +11,9 @@ from typing import TypeVar
 
 from radarize.benchmark.results import Data, Network, Results, Walk, command, machine
 from radarize.benchmark.table import Beside, Table
+from radarize.console import progress
+from radarize.errors import InputError
+from radarize.jobs import Job, perform
 from radarsim.motion import Motion
 from radarsim.statistics import Statistics
 
@@ -68,6 +71,23 @@ def same(rows: Sequence[Mapping[str, object]]) -> list[dict[str, object]]:
     """Rows with the columns of all of them."""
     columns = dict.fromkeys(column for row in rows for column in row)
     return [{column: row.get(column) for column in columns} for row in rows]
+
+
+def performed(jobs: Mapping[str, Job], workers: int, title: str) -> list:
+    """Of all jobs, in their order.
+
+    Raises:
+        InputError: one of them fails.
+    """
+    found = {}
+    with progress(title) as report:
+        for news in perform(jobs, workers):
+            if news.error is not None:
+                raise InputError(news.error)
+            if news.ended:
+                found[news.name] = news.result
+                report(len(found), len(jobs))
+    return [found[name] for name in jobs]
 
 
 def walked(scene: str, seed: int, motion: Motion) -> Walk:

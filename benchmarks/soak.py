@@ -89,9 +89,8 @@ def _live(frames: int, folder: Path, output: Path, seed: int) -> tuple[dict[str,
     with emulator(folder / "walk.h5", folder, "--loop", *options, "--seed", seed) as board:
         time.sleep(3)  # frames are made ahead
         command = [
-            sys.executable, "-m", "radarize.cli", "live", "--config", "radarize", "--port", board.port, "--host",
-            COMPUTER, "--dca", BOARD, "--command-port", board.command_port, "--data-port", board.data_port, "--frames",
-            frames, "--odometry", "doppler", "--scans", "first-echo", "--address", "127.0.0.1:0", "-o", output,
+            sys.executable, "-m", "radarize.cli", "live", "--config", "radarize", *board.options, "--frames", frames,
+            "--odometry", "doppler", "--scans", "first-echo", "--address", "127.0.0.1:0", "-o", output,
         ]  # fmt: skip
         with subprocess.Popen([*map(str, command)], stdout=subprocess.PIPE, text=True) as session:
             url = re.match(r"page: (\S+)", session.stdout.readline())[1]

@@ -102,7 +102,7 @@ def run_each(
 
     def end(folder: Path) -> None:
         if intake.lost == intake.taken:
-            frames = f"all its {-(-len(source) // every)} frames are lost or silent"
+            frames = f"all its {intake.taken} frames are lost or silent"
             raise InputError(f"{source.path}: {frames}, expected one with samples")
         pipeline, writer = pipelines[folder], writers[folder]
         pipeline.finish()
@@ -123,7 +123,7 @@ def run_each(
     with Recording(recording) as source, ExitStack() as stack:
         if not len(source):
             raise InputError(f"{source.path}: has no whole frame, expected at least one")
-        inputs = Inputs(source.config.every(every), configuration or Configuration(), Weights(weights), source)
+        inputs = Inputs(source.config, configuration or Configuration(), Weights(weights), source, every)
         workshop, intake = Workshop(inputs), Intake(inputs.signal, every)
         each(make, pairs)
         for done, batch in _batches(source, intake):

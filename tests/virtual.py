@@ -102,6 +102,15 @@ class Running:
     data_port: int
     said: str = ""
 
+    @property
+    def options(self) -> list[str]:
+        """Of `radarize capture` and `live`, to find it."""
+        found = {
+            "--port": self.port, "--host": COMPUTER, "--dca": BOARD,
+            "--command-port": self.command_port, "--data-port": self.data_port,
+        }  # fmt: skip
+        return [str(word) for option in found.items() for word in option]
+
 
 @contextmanager
 def emulator(source: Path | str, folder: Path, *options: object) -> Iterator[Running]:

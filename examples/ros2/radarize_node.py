@@ -54,8 +54,7 @@ class RadarizeNode(Node):
             self.stream = Sensor(config, text, given["config"] or "radarize", given["port"])
         radar, best = self.stream.config, best_methods(self.stream.config)[0]
         methods = {kind: given[kind] or best[kind] for kind in ("odometry", "scans")}
-        self.every = pace(methods["odometry"], radar)
-        self.inputs = prepare(Inputs(radar.every(self.every)), methods)
+        self.inputs = prepare(Inputs(radar, every=pace(methods["odometry"], radar)), methods)
         self.pipeline = Workshop(self.inputs).pipeline(**methods, endless=True)
         self.scans = self.create_publisher(LaserScan, "scan", 10)
         self.odometry = self.create_publisher(Odometry, "odom", 10)
@@ -65,7 +64,7 @@ class RadarizeNode(Node):
 
     def run(self, stopping: threading.Event) -> None:
         """Follow the radar until it ends or ROS does."""
-        intake = Intake(self.inputs.signal, self.every)
+        intake = Intake(self.inputs.signal, self.inputs.every)
         with self.stream:
             for came in follow(self.stream, stopping, most=TOGETHER):
                 if batch := intake.take(came["adc"], came["time"], came["valid"], came["number"]):

@@ -37,7 +37,6 @@ class Live:
         methods: odometry and scans by name.
         page: shows it.
         foxglove: shows it, too.
-        every: the pipeline follows every so many-th frame; of a radar that delivers these alone `inputs` are made.
 
     Attributes:
         losses: of the frames that came.
@@ -45,11 +44,9 @@ class Live:
         busy: s spent on the frames so far, showing them included.
     """
 
-    def __init__(
-        self, inputs: Inputs, methods: dict[str, str], page: Page, foxglove: "Server | None" = None, every: int = 1
-    ):
+    def __init__(self, inputs: Inputs, methods: dict[str, str], page: Page, foxglove: "Server | None" = None):
         self.pipeline, self.page, self.foxglove = Workshop(inputs).pipeline(**methods, endless=True), page, foxglove
-        self.intake = Intake(inputs.signal, every)
+        self.intake = Intake(inputs.signal, inputs.every)
         self.view = View(self.pipeline, inputs.signal)
         self.losses, self.health = Losses(), Health(inputs.radar)
         self._keeper: Keeper | None = None

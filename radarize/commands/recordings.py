@@ -177,16 +177,16 @@ def live(
     stream = Replay(replay) if replay else _sensor(config, port, baud, host, dca, command_port, data_port)
     radar, methods = stream.config, best_methods(stream.config)[0]
     chosen = {"odometry": odometry or methods["odometry"], "scans": scans or methods["scans"]}
-    every, keeper = every or pace(chosen["odometry"], radar), None
+    keeper = None
     with until_interrupted() as stopping, ExitStack() as stack:
         with working("warming up"):
-            inputs = prepare(Inputs(radar.every(every)), chosen)
+            inputs = prepare(Inputs(radar, every=every or pace(chosen["odometry"], radar)), chosen)
         server = None
         if foxglove is not None:
             from radarize.foxglove import Server
 
             server = stack.enter_context(Server(foxglove))
-        live = Live(inputs, chosen, stack.enter_context(Page(address)), server, every)
+        live = Live(inputs, chosen, stack.enter_context(Page(address)), server)
         report = stack.enter_context(progress("live"))
         stack.enter_context(stream)
         print(f"page: {live.page.url}", flush=True)

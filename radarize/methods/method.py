@@ -39,17 +39,24 @@ class Inputs:
     """What methods are made from.
 
     Attributes:
-        radar: configuration of the radar.
+        delivered: configuration of the radar.
         configuration: of the pipeline.
         weights: of the networks.
         recording: where other sensors' streams are; None on a live radar.
+        every: every so many-th frame is used.
     """
 
-    radar: RadarConfig
+    delivered: RadarConfig
     configuration: Configuration = field(default_factory=Configuration)
     weights: Weights = field(default_factory=Weights)
     recording: Recording | None = None
+    every: int = 1
     _parts: dict[Callable, object] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def radar(self) -> RadarConfig:
+        """Of a radar that delivers no more frames than are used."""
+        return self.delivered.every(self.every)
 
     @cached_property
     def signal(self) -> Signal:

@@ -77,13 +77,17 @@ class Workshop:
         return Pipeline(self.odometry(odometry, scans), self.scanner(scans), slam, endless)
 
     def _method(self, what: str, name: str, known: dict[str, Method]) -> Method:
-        if name not in known:
-            raise InputError(f"{what} is {name!r}, expected one of {', '.join(known)}")
-        recording, method = self.inputs.recording, known[name]
+        recording, method = self.inputs.recording, _named(what, name, known)
         if recording is not None and not recording.has_samples and not (method.pictures or method.scans):
             wanted = f"{what} {PICTURED[what]}" if pictured(recording) else "a recording with /radar/adc"
             raise InputError(f"{recording.path}: has no raw samples, which {what} {name} needs, expected {wanted}")
         return method
+
+
+def _named(what: str, name: str, known: dict[str, Method]) -> Method:
+    if name not in known:
+        raise InputError(f"{what} is {name!r}, expected one of {', '.join(known)}")
+    return known[name]
 
 
 def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
@@ -106,9 +110,7 @@ def pace(odometry: str, radar: RadarConfig) -> int:
     Raises:
         InputError: unknown name.
     """
-    if odometry not in ODOMETRY:
-        raise InputError(f"odometry is {odometry!r}, expected one of {', '.join(ODOMETRY)}")
-    if "rotation" not in ODOMETRY[odometry].networks:
+    if "rotation" not in _named("odometry", odometry, ODOMETRY).networks:
         return 1
     taught = header_of(Weights().of("rotation")).grid
     return max(1, int(taught.frame_period / radar.frame_period * (1 + 1e-3))) if taught else 1

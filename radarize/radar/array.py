@@ -12,6 +12,9 @@ from jaxtyping import Float, Int
 
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 
+#: Antennas of a row that is not short; what velocities claim was fitted to rows of these.
+ROW = 8
+
 
 @dataclass(frozen=True)
 class Board:
@@ -92,10 +95,6 @@ def virtual_positions(config: RadarConfig) -> Float[np.ndarray, "tx rx 3"]:
 def _half(config: RadarConfig) -> float:
     """Half a wavelength at the board's design frequency, m."""
     return SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
-
-
-#: Antennas of a row that is not short.
-ROW = 8
 
 
 def _lattice(config: RadarConfig) -> Int[np.ndarray, "antenna 2"]:

@@ -70,12 +70,11 @@ def poses(results: list[Result]) -> np.ndarray:
 @pytest.mark.parametrize("every", [1, 2])
 def test_a_replay_gives_what_the_file_gives(walk, tmp_path, every):
     """Of every frame, or of every second; all are recorded."""
-    config = PRESETS["radarize"].every(every)
+    inputs = Inputs(PRESETS["radarize"], every=every)
     with Page("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
-        live = Kept(Inputs(config), CLASSICAL, page, None, every)
+        live = Kept(inputs, CLASSICAL, page)
         with RecordingWriter(tmp_path / "again.h5", stream.config) as writer:
             live.run(stream, threading.Event(), keeper=Keeper(writer))
-    inputs = Inputs(config)
     offline, intake = Workshop(inputs).pipeline(**CLASSICAL), Intake(inputs.signal, every)
     with Recording(walk) as one, Recording(tmp_path / "again.h5") as other:
         # In the live view's own batches: on some processors sums are ordered otherwise in batches of another size.
@@ -85,7 +84,7 @@ def test_a_replay_gives_what_the_file_gives(walk, tmp_path, every):
         assert np.array_equal(one.adc(0, FRAMES), other.adc(0, FRAMES))
         assert np.array_equal(one.valid(0, FRAMES), other.valid(0, FRAMES)) and np.array_equal(one.times, other.times)
     assert poses(live.results) == pytest.approx(poses(results), abs=1e-6)
-    frames = [np.concatenate([each.frames for each in every]) for every in (live.results, results)]
+    frames = [np.concatenate([each.frames for each in some]) for some in (live.results, results)]
     wanted = [k for k in range(0, FRAMES, every) if k != FRAMES - 2]
     assert frames[0].tolist() == frames[1].tolist() == wanted and live.intake.lost == intake.lost == 1
     assert live.losses.lost_frames == 1 and live.intake.taken == FRAMES // every and stream.counts.dropped == 0

@@ -46,9 +46,8 @@ def test_our_own_capture_loses_nothing(tmp_path):
     with emulator(tmp_path / "r.h5", tmp_path, "--loop") as running:
         captured = subprocess.run(
             [
-                sys.executable, "-m", "radarize.cli", "capture", "--config", "radarize", "--port", running.port,
-                "--host", COMPUTER, "--dca", BOARD, "--command-port", str(running.command_port),
-                "--data-port", str(running.data_port), "--frames", "120", "-o", tmp_path / "out.h5",
+                sys.executable, "-m", "radarize.cli", "capture", "--config", "radarize", *running.options,
+                "--frames", "120", "-o", tmp_path / "out.h5",
             ],
             capture_output=True, text=True, timeout=300,
         )  # fmt: skip

@@ -8,7 +8,7 @@ from radarize.methods.radarize.motion import TranslationNet
 from radarize.methods.radarize.scans import Segmentation
 from radarize.nets.weights import header_of
 from radarize.odometry.doppler import DopplerVelocity
-from radarize.odometry.integration import Odometry
+from radarize.odometry.integration import Odometry, VelocityEstimator
 from radarize.odometry.rotation import MapRotation
 from radarize.radar.array import is_whole
 
@@ -31,10 +31,9 @@ def fused(inputs: Inputs) -> Odometry:
     doppler = DopplerVelocity(heatmaps, settings.doppler)
     rotation = MapRotation(heatmaps, settings.rotation, _turns(inputs))
     whole, weights = is_whole(inputs.radar), inputs.weights.of("translation")
-    if whole and header_of(weights).difference(inputs.radar, TranslationNet.maker):
-        return Odometry(inputs.radar, doppler, rotation, settings.velocity)
-    alone = LearnedVelocity(inputs.radar, weights)
-    velocity = FusedVelocity(alone, doppler, settings.fusion, always=not whole)
+    velocity: VelocityEstimator = doppler
+    if not (whole and header_of(weights).difference(inputs.radar, TranslationNet.maker)):
+        velocity = FusedVelocity(LearnedVelocity(inputs.radar, weights), doppler, settings.fusion, always=not whole)
     return Odometry(inputs.radar, velocity, rotation, settings.velocity)
 
 

@@ -21,7 +21,7 @@ from radarize import __version__
 from radarize.benchmark.choices import Walk, helped
 from radarize.benchmark.table import Table
 from radarize.errors import explained
-from radarize.nets.weights import read
+from radarize.nets.weights import header_of, read
 from radarize.recording import Recording
 from radarize.replacing import write_whole
 
@@ -76,6 +76,7 @@ class Network:
         kind: of network.
         parameters: how many.
         data, split: that it was trained on; epochs: of the training.
+        width: channels of its first stage; hours: of walks that it learned from; 0 where a page is older than that.
     """
 
     kind: str
@@ -83,6 +84,8 @@ class Network:
     data: str
     split: str | None
     epochs: int
+    width: int = 0
+    hours: float = 0.0
 
     @classmethod
     def of(cls, path: Path) -> "Network":
@@ -91,17 +94,19 @@ class Network:
         Raises:
             InputError: unreadable.
         """
-        tensors, about = read(path)
+        tensors, _ = read(path)
         # What normalisation counts while it is trained is in the file, too.
         counted = [v.numel() for name, v in tensors.items() if "running_" not in name and "num_batches" not in name]
-        names = ("kind", "data", "split", "epochs")
-        kind, data, split, epochs = (about.get(name) for name in names)
-        return cls(str(kind), sum(counted), str(data or "-"), split, int(epochs or 0))
+        said = header_of(path)
+        return cls(said.kind, sum(counted), said.data or "-", said.split, said.epochs, said.width, said.hours)
 
     @property
     def sentence(self) -> str:
         split = "" if self.split is None else f" ({self.split})"
-        return f"{self.kind}, {self.parameters:,} parameters, trained on {self.data}{split}, {self.epochs} epochs"
+        width = f", width {self.width}" if self.width else ""
+        hours = f"{self.hours:.2g} h of " if self.hours else ""
+        size = f"{self.kind}{width}, {self.parameters:,} parameters"
+        return f"{size}, trained on {hours}{self.data}{split}, {self.epochs} epochs"
 
 
 @cache

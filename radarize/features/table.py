@@ -145,6 +145,11 @@ class Table:
             {reading.name: rows[reading.name] for reading in sensed},
         )
 
+    @property
+    def duration(self) -> float:
+        """Of all recordings, s."""
+        return sum(self.lengths) * self.frame_period
+
     def starts(self, reach: int) -> Int[Tensor, "window"]:
         """Frames that have `reach` - 1 more after them in their recording, with truth and readings that are known."""
         first = np.cumsum([0, *self.lengths[:-1]])

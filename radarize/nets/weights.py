@@ -35,6 +35,7 @@ class Header(Frozen):
         grid: of its maps; None if it sees none.
         spacings: frames from one of the window to the next, as trained.
         data: name of the data set; split: of it.
+        hours: of walks that it learned from, validation aside; 0 if nobody said.
         seed, epochs: of the training.
         metrics: on its validation data.
         version: of this package.
@@ -49,6 +50,7 @@ class Header(Frozen):
     spacings: tuple[Annotated[int, Field(ge=1, le=1 << 10)], ...] = Field((1,), min_length=1, max_length=1 << 6)
     data: str = ""
     split: str | None = None
+    hours: float = Field(0.0, ge=0, allow_inf_nan=False)
     seed: int = 0
     epochs: int = 0
     metrics: dict[str, float] = {}

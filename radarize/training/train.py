@@ -108,6 +108,7 @@ def train(
             header = task.header(
                 settings, trainer.training.grid, data=about["data"], split=options.split,
                 spacings=tuple(trainer.spacings), metrics=metrics,
+                hours=round(trainer.training.duration / 3600 + (before.hours if before else 0.0), 4),
                 epochs=len(trainer.history) + (before.epochs if before else 0),
             )  # fmt: skip
             save(trainer.net, header, output)

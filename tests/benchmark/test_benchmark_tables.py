@@ -173,8 +173,8 @@ def test_which_recordings_helped_to_choose_is_looked_up():
 def test_networks_tell_their_size_and_training():
     network = Network.of(Weights(None).of("rotation"))
     assert (
-        network.sentence.startswith("rotation, 70")
-        and "trained on training, then any-radar (random-0), 11 epochs" in network.sentence
+        network.sentence.startswith("rotation, width 16, 70")
+        and "trained on 2.1 h of training, then any-radar (random-0), 11 epochs" in network.sentence
     )
 
 

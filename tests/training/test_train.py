@@ -311,6 +311,9 @@ def test_a_training_begins_with_weights_and_sees_any_radar(small, tmp_path):
     before, header = header_of(first), header_of(again)
     assert (header.width, header.frames, header.grid) == (before.width, before.frames, before.grid)
     assert header.data == "small0, then mixed" and header.epochs == before.epochs + 1
+    # Two recordings of 60 frames each time, for of three one validates.
+    assert before.hours == pytest.approx(120 * CONFIG.frame_period / 3600, abs=1e-4)
+    assert header.hours == pytest.approx(2 * before.hours, abs=1e-4)
     held = write(tmp_path / "held.h5", "velocity", 60, seed=30)
     errors = [judged("translation", path, held)["rmse_m_s"] for path in (first, again)]
     assert errors[0] < 0.3 and abs(errors[1] - errors[0]) < 0.05  # of 0.8 m/s RMS

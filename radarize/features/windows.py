@@ -40,6 +40,9 @@ class Windows:
         period: s, from one of the radar's frames to the next.
         spacings: the radar's frames from one of a window to the next, ascending.
         resampling: of the radar's maps, to the network's grid; None if they lie on it.
+
+    Attributes:
+        reach: frames before the newest that a window can contain.
     """
 
     def __init__(
@@ -52,7 +55,7 @@ class Windows:
     ):
         self.maps, self.frames, self.spacings = tuple(maps), frames, tuple(spacings)
         self._period, self._resampling = period, resampling
-        self._reach = (frames - 1) * self.spacings[-1]
+        self.reach = (frames - 1) * self.spacings[-1]
         self._past: torch.Tensor | None = None
         self._stamps = np.zeros(0)  # of the past frames
 
@@ -71,7 +74,7 @@ class Windows:
         for spacing in self.spacings:
             rows, there = spaced(stamps, len(new), self.frames, spacing * self._period, self._period)
             found.append(Shown(frames[torch.from_numpy(rows)], there.all(axis=1), rows[:, -1] - rows[:, 0]))
-        kept = max(len(frames) - self._reach, 0)
+        kept = max(len(frames) - self.reach, 0)
         self._past, self._stamps = frames[kept:], stamps[kept:]
         return found
 

@@ -75,14 +75,15 @@ class Correlation(nn.Module):
             both = torch.full((columns + 1, 1), 2.0).index_fill(0, torch.tensor([0, columns]), 1.0)  # frequency's signs
             self.shift *= both / (2 * columns) / columns**0.5
 
-    def forward(self, maps: Maps) -> Float[Tensor, "twice channel band shift"]:
-        """Correlation by step in range (channel), range (row, of four bins) and shift in azimuth, of all windows, then
-        of all windows reversed."""
+    def forward(self, maps: Maps, reversed_too: bool = False) -> Float[Tensor, "seen channel band shift"]:
+        """Correlation by step in range (channel), range (row, of four bins) and shift in azimuth, of all windows; then,
+        if wanted, of all windows reversed."""
         found = self.features(maps.flatten(0, 1))
         # Only what differs from cell to cell says anything of shifts.
         found = normalize(found - found.mean(dim=3, keepdim=True), dim=1, eps=0.1)
         real, imaginary = ((found @ part.T).unflatten(0, maps.shape[:2]) for part in self.spectrum)
-        real, imaginary = (torch.cat([part, part.flip(1)]) for part in (real, imaginary))
+        if reversed_too:
+            real, imaginary = (torch.cat([part, part.flip(1)]) for part in (real, imaginary))
         rows, image = real.shape[3], []
         for step in range(-self.steps, self.steps + 1):
             here, there = slice(max(0, -step), rows - max(0, step)), slice(max(0, step), rows - max(0, -step))

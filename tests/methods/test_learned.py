@@ -1,5 +1,7 @@
 """Networks as estimators: which frames they are shown, and what becomes of their answers."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 import torch
@@ -102,6 +104,28 @@ def test_batches_do_not_matter(tmp_path):
         )
     for a, b in zip(*results, strict=True):
         assert np.allclose(a, b, atol=1e-4)
+
+
+def test_maps_are_made_where_the_network_is_asked(tmp_path):
+    """Of these frames and of those that their windows reach; the answers are the same as if it were asked always."""
+    everything, times = spectra(12), np.arange(12) * CONFIG.frame_period
+    asked = np.isin(np.arange(12), (0, 5, 6, 11))
+    always = LearnedVelocity(CONFIG, weights(tmp_path, "translation")).estimate(of_spectrum(SIGNAL, everything, times))
+    for cuts, expected in (([1] * 12, [0, 3, 4, 5, 6, 9, 10, 11]), ([4, 3, 2, 3], range(12)), ([1, 1, 10], range(12))):
+        rarely, made, found = LearnedVelocity(CONFIG, weights(tmp_path, "translation")), [], []
+        wanted = np.split(asked, np.cumsum(cuts)[:-1])
+        for batch, some in zip(parts(SIGNAL, everything, times, cuts), wanted, strict=True):
+            batch.maps = partial(noted, made, batch.maps, batch.stamps)
+            found.append(rarely.estimate(batch, some))
+        assert np.allclose(made, times[list(expected)])
+        seen, velocity = (np.concatenate([getattr(each, what) for each in found]) for what in ("seen", "velocity"))
+        assert (seen == asked & always.seen).all() and seen.sum() == 3  # before the first frame there is none
+        assert np.allclose(velocity[seen], always.velocity[seen], atol=1e-4) and np.ptp(velocity[seen, 0]) > 1e-3
+
+
+def noted(made: list, maps, stamps: np.ndarray, names: tuple[str, ...]) -> dict:
+    made.extend(stamps)
+    return maps(names)
 
 
 def numbered(numbers: np.ndarray, times: np.ndarray) -> Batch:

@@ -117,13 +117,15 @@ def test_gain_does_not_matter(kind):
         assert torch.allclose(a, b, atol=1e-4)
 
 
-def test_a_turn_back_is_the_turn_negated():
+def test_training_sees_turns_and_the_way_back():
     torch.manual_seed(0)
     net = RotationNet(2, ("range_azimuth",), 4).eval()
     maps = 10 * torch.randn(3, 2, 1, 96, 80)
     travel = torch.tensor([[0.2, 0.0], [0.1, -0.1], [0.0, 0.3]])
+    both = net(maps, travel)
     (there, one), (back, other) = net.estimate(maps, travel), net.estimate(maps.flip(1), -travel)
-    assert torch.allclose(there, -back, atol=1e-6) and torch.allclose(one, other)
+    assert torch.allclose(both.mean, torch.cat([there, back]), atol=1e-6) and not torch.allclose(there, back)
+    assert torch.allclose(both.covariance, torch.cat([one, other]), rtol=1e-4)
     assert there.shape == (3, 1) and one.shape == (3, 1, 1) and (one > 0).all()
 
 
@@ -164,8 +166,8 @@ def test_correlation_is_the_sum_of_products():
     layer = Correlation(1, 10, features=1, turns=3, steps=1)
     layer.features = torch.nn.Identity()
     maps = torch.randn(1, 2, 1, 5, 10)
-    found = layer(maps)
-    assert found.shape == (2, 3, 5, 7)
+    found = layer(maps, reversed_too=True)
+    assert found.shape == (2, 3, 5, 7) and torch.equal(layer(maps), found[:1])
     for half, (newest, other) in enumerate(((1, 0), (0, 1))):
         centred = maps - maps.mean(dim=4, keepdim=True)
         a, b = (torch.nn.functional.normalize(centred[0, k], dim=0, eps=0.1)[0] for k in (newest, other))

@@ -50,7 +50,7 @@ class PictureTurnNet(Network):
 
     def forward(self, maps: Maps) -> Gaussian:
         """Turns of all windows."""
-        image = self.correlation(maps / 255)[: len(maps)]
+        image = self.correlation(maps / 255)
         return Gaussian.of(self.resnet(torch.cat([image, coordinates(image)], dim=1)), 1)
 
     def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item 1"], Float[Tensor, "item 1 1"]]:

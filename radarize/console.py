@@ -51,6 +51,7 @@ def run(app: typer.Typer, name: str, arguments: list[str] | None = None) -> None
         if option in arguments:
             os.environ[variable] = "1"  # for jobs, too, wherever they are done
     arguments = [argument for argument in arguments if argument not in _EVERYWHERE]
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # a request to terminate ends it as Ctrl-C does
     try:
         code = typer.main.get_command(app).main(arguments, prog_name=name, standalone_mode=False)
     except (Exception, KeyboardInterrupt) as error:

@@ -1,6 +1,8 @@
 """Tables in a terminal of 80 columns."""
 
 import json
+import os
+import signal
 
 import pytest
 import trimesh
@@ -8,7 +10,7 @@ import typer
 
 import radarize.cli
 import radarsim.cli
-from radarize.console import print_table, run
+from radarize.console import new_app, print_table, run
 from radarize.contents import show
 from radarsim import doctor
 
@@ -50,6 +52,18 @@ def test_what_is_longer_than_a_line_is_broken(terminal, capsys):
 def test_an_empty_table_is_its_head(terminal, capsys):
     print_table(("attribute", "value"), [])
     assert capsys.readouterr().out.split()[:2] == ["attribute", "value"]
+
+
+def test_a_request_to_terminate_ends_as_ctrl_c_does(capsys, monkeypatch):
+    """What `kill`, a service manager and a queue of jobs send."""
+    app, before = new_app("Ends."), signal.getsignal(signal.SIGTERM)
+    app.command("wait")(lambda: os.kill(os.getpid(), signal.SIGTERM))
+    try:
+        with pytest.raises(SystemExit) as exit_:
+            run(app, "command", ["wait"])
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert exit_.value.code == 2 and "command: stopped; nothing was written" in capsys.readouterr().err
 
 
 @pytest.fixture

@@ -24,7 +24,8 @@ class Options:
     """What is compared, by default all that there is, and with what.
 
     Attributes:
-        methods: keys of `radarize.methods.ODOMETRY` and `SCANS`; all of a sort of which none is named.
+        methods: keys of `radarize.methods.ODOMETRY` and `SCANS`; of a sort of which none is named, all that read
+            samples.
         weights: folder of the networks' weights; the shipped ones if None.
         trained: train networks on each split instead.
         epochs: of these trainings, at most; their defaults if None.
@@ -90,8 +91,11 @@ class Chosen:
     def of(cls, options: Options, data: DataSet) -> "Chosen":
         """Methods of choice are those without networks where the shipped ones do not fit the radar."""
         partner = best_methods(data.cases[0].config)[0] if options.shipped else BEST
-        named = [tuple(name for name in options.methods if name in known) for known in (ODOMETRY, SCANS)]
-        return cls(named[0] or tuple(ODOMETRY), named[1] or tuple(SCANS), Pair(**partner))
+        compared = []
+        for known in (ODOMETRY, SCANS):
+            named = [name for name in options.methods if name in known]
+            compared.append(tuple(named or (name for name, method in known.items() if not method.pictures)))
+        return cls(*compared, Pair(**partner))
 
 
 @dataclass(frozen=True)

@@ -69,7 +69,8 @@ def benchmark(
     data: Annotated[Path | None, typer.Option(help="Folder of recordings, see `radarsim dataset`.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder to write; goes on where it was left.")] = None,
     methods: Annotated[
-        list[str] | None, typer.Option(help="Odometry and scans to compare, all by default: fused,doppler,threshold.")
+        list[str] | None,
+        typer.Option(help="Odometry and scans to compare; by default all that read samples: fused,doppler,threshold."),
     ] = None,
     weights: Annotated[
         Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")

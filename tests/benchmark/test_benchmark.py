@@ -20,7 +20,7 @@ from radarize.benchmark.protocol import PROTOCOLS
 from radarize.benchmark.registry import BENCHMARKS
 from radarize.benchmark.run import benchmark
 from radarize.benchmark.steps import kept, perform
-from radarize.benchmark.study import Options, Study
+from radarize.benchmark.study import Chosen, Options, Study
 from radarize.console import run as command_line
 from radarize.errors import InputError
 from radarize.methods.registry import ODOMETRY, SCANS
@@ -279,6 +279,12 @@ def test_radars_stand_beside_each_other(toys, tmp_path, monkeypatch):
     assert mean == pytest.approx(np.mean(off[:2]), abs=1e-3)
     assert error == pytest.approx(abs(off[0] - off[1]) / 2, abs=6e-4) and error > 1e-3
     assert table.rows[2]["odometry m"] == "-"
+
+
+def test_of_samples_are_compared_what_reads_samples(rooms):
+    chosen = Chosen.of(Options(["doppler"]), DataSet.load(rooms))
+    assert chosen.odometry == ("doppler",)
+    assert {"segmentation", "first-echo", "radarhd"} <= set(chosen.scans) and "pictures" not in chosen.scans
 
 
 def test_data_that_a_benchmark_cannot_use(rooms, tmp_path):

@@ -202,7 +202,7 @@ CHOICES = (
     Choice("how long errors of velocities are claimed to last", LASTING),
     Choice("how coarse maps of other radars may be, and what arrays that tell little claim of velocities", RADARS),
     Choice("that radars which see far turn with networks, too", FARTHER),
-    Choice("that odometry in real time follows every second frame, and networks see no window reversed", EVERY),
+    Choice("that odometry in real time follows every second frame", EVERY),
     Choice("with which arrays velocities are the network's, too", ARRAYS),
     Choice("that radars whose speeds or frames are too coarse for the network of velocities turn by the other", COARSE),
     Choice("what closures need in the back end's preset radar, and its cells", CLOSURES),

@@ -191,6 +191,48 @@ REAL = {Walk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 1
 #: What score closures need, each in three or six variants of the other settings, so that luck counts for less.
 CLOSURES = STRETCH | REAL
 
+#: The walks of `benchmarks.unseen`.
+UNSEEN = {
+    "A_0": (4685120208187634443, 6618024391697106542, 6521432179179074455),
+    "A_1": (8495296017601023444, 2262171279084691540, 3569678933891587897),
+    "B_0": (1545003881051843651, 5110916572368462979, 6007960445364185434),
+    "B_1": (6602382969039364027, 2240336790806240164, 6869386616435705106),
+    "C_0": (
+        724201778809387820,
+        1156441515850792847,
+        8115143333812616053,
+        4361038421524535839,
+        7627576961144511042,
+        6198504031940538356,
+    ),
+    "D_0": (4684167859578670421, 2749239589803305869, 1115606651295037585),
+    "D_1": (1148467783489981490, 7928969630935559806, 4530062985889809638),
+    "intel": (
+        1633036892368292623,
+        1657108691115868743,
+        8173393606404314469,
+        2813661912708123820,
+        2212447509621216820,
+        158786416379137526,
+    ),
+    "office": (
+        3395743981279285753,
+        8704203491720589756,
+        4797459636368754746,
+        3795987885027042868,
+        4780576947787991104,
+        6404277631608852749,
+    ),
+    "orebro": (
+        6573752708687205494,
+        3099603745149447827,
+        622674337176178190,
+        8060617745599297848,
+        4306770579666577916,
+        7682780017201744702,
+    ),
+}
+
 #: RadarHD's training walks, one by one and all together.
 PICTURES = {Walk.radarhd(number).scene: (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
 
@@ -211,6 +253,7 @@ CHOICES = (
     Choice("how many rays tell whether a mirrored path is partly clear", {"office": (3,), "buildings/b": (3,)}),
     Choice("what is known of a turn while frames are missing", GAPS),
     Choice("how bearings of strong echoes tell turns, and what turns claim", BEARINGS),
+    Choice("that turns are averaged with those of windows reversed", UNSEEN),
     Choice("what tells speeds beyond the limit", {"office": (9501, 9502)}),
     Choice("the probability from which `segmentation` returns a range", EVALUATION, looked_at=4),
     Choice("the noise of `fused`'s matcher beside the network", EVALUATION, looked_at=6),

@@ -5,7 +5,7 @@ radar whose frames come twice as often shows them every second one, its maps are
 where frames are lost, they see no window that spans the gap.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,9 @@ import torch
 from jaxtyping import Bool, Float, Float16, Int
 
 from radarize.features.grid import Resampling
+
+#: Maps of frames, by name.
+Made = Mapping[str, Float16[np.ndarray, "frame row azimuth"]]
 
 
 @dataclass(frozen=True)
@@ -40,9 +43,6 @@ class Windows:
         period: s, from one of the radar's frames to the next.
         spacings: the radar's frames from one of a window to the next, ascending.
         resampling: of the radar's maps, to the network's grid; None if they lie on it.
-
-    Attributes:
-        reach: frames before the newest that a window can contain.
     """
 
     def __init__(
@@ -55,15 +55,23 @@ class Windows:
     ):
         self.maps, self.frames, self.spacings = tuple(maps), frames, tuple(spacings)
         self._period, self._resampling = period, resampling
-        self.reach = (frames - 1) * self.spacings[-1]
+        self._reach = (frames - 1) * self.spacings[-1]
         self._past: torch.Tensor | None = None
         self._stamps = np.zeros(0)  # of the past frames
+        self._waiting: list[tuple[Callable[[], Made], np.ndarray]] = []  # frames after these, not yet made
 
-    def push(
-        self,
-        made: Mapping[str, Float16[np.ndarray, "frame row azimuth"]],
-        stamps: Float[np.ndarray, "frame"],
-    ) -> list[Shown]:
+    def announce(self, make: Callable[[], Made], stamps: Float[np.ndarray, "frame"]) -> None:
+        """The next frames: maps are made of them only if a window that is wanted reaches back to them."""
+        self._waiting.append((make, stamps))
+        while len(self._waiting) > 1 and sum(len(past) for _, past in self._waiting[1:-1]) >= self._reach:
+            del self._waiting[0]
+
+    def wanted(self) -> list[Shown]:
+        """Windows that end at the frames announced last, see `push`."""
+        waiting, self._waiting = self._waiting, []
+        return [self.push(make(), stamps) for make, stamps in waiting][-1]
+
+    def push(self, made: Made, stamps: Float[np.ndarray, "frame"]) -> list[Shown]:
         """Windows that end at the next frames, by their maps and stamps (s), for each spacing."""
         new = torch.stack([torch.from_numpy(made[name]) for name in self.maps], dim=1).float()
         if self._resampling is not None:
@@ -74,7 +82,7 @@ class Windows:
         for spacing in self.spacings:
             rows, there = spaced(stamps, len(new), self.frames, spacing * self._period, self._period)
             found.append(Shown(frames[torch.from_numpy(rows)], there.all(axis=1), rows[:, -1] - rows[:, 0]))
-        kept = max(len(frames) - self.reach, 0)
+        kept = max(len(frames) - self._reach, 0)
         self._past, self._stamps = frames[kept:], stamps[kept:]
         return found
 

@@ -1,5 +1,6 @@
 """Velocity and turns by the networks (paper, sections 4.2 and 4.3), as estimators like any others."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -36,7 +37,6 @@ class LearnedVelocity:
         self._net, header = compiled(weights, TranslationNet, radar)
         self._windows = header.windows(radar, TranslationNet.maker)
         self.limit = header.grid.reach / 2
-        self._waiting: list[Batch] = []  # whose maps nobody has needed yet
 
     @torch.inference_mode()
     def estimate(self, batch: Batch, asked: Bool[np.ndarray, "frame"] | None = None) -> Velocities:
@@ -44,16 +44,12 @@ class LearnedVelocity:
         told = ~batch.aliases.any(axis=1)  # it was taught speeds that do not alias
         if asked is not None:
             told &= asked
-        self._waiting.append(batch)
         velocity = np.zeros((len(batch), 2))
         covariance = np.tile(ANY_VELOCITY, (len(batch), 1, 1))
+        self._windows.announce(partial(batch.maps, self._windows.maps), batch.stamps)
         if told.any():
-            for late in self._waiting:
-                (shown,) = self._windows.push(late.maps(self._windows.maps), late.stamps)
-            self._waiting.clear()
+            (shown,) = self._windows.wanted()
             told &= shown.whole
-        while self._waiting and sum(map(len, self._waiting[1:])) >= self._windows.reach:
-            del self._waiting[0]
         if told.any():
             mean, spread = self._net.estimate(shown.maps[told])
             velocity[told], covariance[told] = mean.double().numpy(), spread.double().numpy()

@@ -1,4 +1,5 @@
-"""Shapes and kinds of arrays, as annotations have them, checked in every call while tests run.
+"""Shapes and kinds of arrays, as annotations have them, checked while tests run: in the first calls of each function,
+and in some of the many that loops make later.
 
 Whatever else is annotated is duck-typed: tests put simpler things in its place. Compiled kernels have no annotations of
 arrays, and numba takes them as they are.
@@ -6,7 +7,9 @@ arrays, and numba takes them as they are.
 
 import dataclasses
 from collections.abc import Callable
+from functools import wraps
 from inspect import isclass
+from itertools import count
 from types import UnionType
 from typing import Union, get_args, get_origin
 
@@ -14,13 +17,25 @@ import jaxtyping
 from beartype import beartype
 from jaxtyping import AbstractArray, install_import_hook
 
+#: Calls of a function in a process that are all checked, and of how many later ones one is: a check takes longer than
+#: most functions that are called more often.
+FIRST, ONE_OF = 100, 20
+
 
 def install() -> None:
     """From now on, in whatever is imported of both packages."""
     plain = jaxtyping.jaxtyped
 
     def only_arrays(typechecker):
-        return lambda thing: plain(thing, typechecker=typechecker) if _takes_arrays(thing) else thing
+        def decorate(thing: type | Callable) -> type | Callable:
+            if not _takes_arrays(thing):
+                return thing
+            if not isclass(thing):
+                return _sampled(plain(thing, typechecker=typechecker), thing)
+            thing.__init__ = _sampled(plain(thing.__init__, typechecker=typechecker), thing.__init__)
+            return thing
+
+        return decorate
 
     jaxtyping.jaxtyped = only_arrays  # which the hook puts on everything: half of the back end's time went into that
     install_import_hook(["radarize", "radarsim"], "tests.checked.arrays")
@@ -36,6 +51,18 @@ def arrays(function: Callable) -> Callable:
     found = beartype(function)
     found.__annotations__ = hints
     return found
+
+
+def _sampled(checked: Callable, function: Callable) -> Callable:
+    """The checked function in some of its calls, and the function itself in the others."""
+    calls = count()
+
+    @wraps(function)
+    def either(*args, **options):
+        call = next(calls)
+        return (checked if call < FIRST or call % ONE_OF == 0 else function)(*args, **options)
+
+    return either
 
 
 def _takes_arrays(thing: type | Callable) -> bool:

@@ -1,15 +1,15 @@
-"""Shapes and kinds of arrays, as annotations have them, checked while tests run: in the first calls of each function,
-and in some of the many that loops make later.
+"""Shapes and kinds of arrays, as annotations have them, checked while tests run: in the first calls that a test makes
+of each function, and in some of the many that loops make later.
 
 Whatever else is annotated is duck-typed: tests put simpler things in its place. Compiled kernels have no annotations of
 arrays, and numba takes them as they are.
 """
 
 import dataclasses
+from collections import Counter
 from collections.abc import Callable
 from functools import wraps
 from inspect import isclass
-from itertools import count
 from types import UnionType
 from typing import Union, get_args, get_origin
 
@@ -17,9 +17,10 @@ import jaxtyping
 from beartype import beartype
 from jaxtyping import AbstractArray, install_import_hook
 
-#: Calls of a function in a process that are all checked, and of how many later ones one is: a check takes longer than
-#: most functions that are called more often.
+#: Calls of a function in a test that are all checked, and of how many later ones one is: a check takes longer than most
+#: functions that are called more often.
 FIRST, ONE_OF = 100, 20
+_calls: Counter[Callable] = Counter()
 
 
 def install() -> None:
@@ -30,15 +31,20 @@ def install() -> None:
         def decorate(thing: type | Callable) -> type | Callable:
             if not _takes_arrays(thing):
                 return thing
-            if not isclass(thing):
-                return _sampled(plain(thing, typechecker=typechecker), thing)
-            thing.__init__ = _sampled(plain(thing.__init__, typechecker=typechecker), thing.__init__)
-            return thing
+            if isclass(thing):
+                thing.__init__ = decorate(thing.__init__)
+                return thing
+            return _sampled(plain(thing, typechecker=typechecker), thing)
 
         return decorate
 
     jaxtyping.jaxtyped = only_arrays  # which the hook puts on everything: half of the back end's time went into that
     install_import_hook(["radarize", "radarsim"], "tests.checked.arrays")
+
+
+def begin_test() -> None:
+    """Calls are first ones again: what is checked in a test does not depend on those before it."""
+    _calls.clear()
 
 
 def arrays(function: Callable) -> Callable:
@@ -55,11 +61,11 @@ def arrays(function: Callable) -> Callable:
 
 def _sampled(checked: Callable, function: Callable) -> Callable:
     """The checked function in some of its calls, and the function itself in the others."""
-    calls = count()
 
     @wraps(function)
     def either(*args, **options):
-        call = next(calls)
+        call = _calls[function]
+        _calls[function] = call + 1
         return (checked if call < FIRST or call % ONE_OF == 0 else function)(*args, **options)
 
     return either

@@ -16,6 +16,10 @@ checked.install()
 LONGEST = {"documents", "fuzzing", "training", "twin"}
 
 
+def pytest_runtest_setup():
+    checked.begin_test()
+
+
 def pytest_collection_modifyitems(items):
     """What takes longest begins first: nobody waits for it in the end."""
     items.sort(key=lambda item: LONGEST.isdisjoint(item.path.parts))

@@ -19,7 +19,7 @@ from jaxtyping import AbstractArray, install_import_hook
 
 #: Calls of a function in a test that are all checked, and of how many later ones one is: a check takes longer than most
 #: functions that are called more often.
-FIRST, ONE_OF = 100, 20
+FIRST, ONE_OF = 10, 20
 _calls: Counter[Callable] = Counter()
 
 

@@ -154,6 +154,18 @@ def test_bins_of_a_recording(tmp_path):
         assert bins(recording, slice(None))[0] == pytest.approx([1.1 / biased.range_resolution, -1])
 
 
+def test_ranges_of_another_radar_are_bins_of_the_networks_grid(tmp_path):
+    """What is in a bin of its picture is as far off as the map's row there, whatever the radar's own bins are."""
+    task, step, scan = TASKS["radarhd"], 1.7 * CONFIG.range_resolution, np.array([[0.5, 1.5, 2.9, np.inf]])
+    with RecordingWriter(tmp_path / "a.h5", CONFIG, streams={"truth/scan": Stream((4,), "f4", "m", "")}) as writer:
+        samples = np.random.default_rng(0).normal(0, 100, (1, *CONFIG.frame_shape)).astype(np.int16)
+        writer.append(samples, np.zeros(1), rows={"truth/scan": scan})
+    grid = Grid.of(CONFIG, "range_azimuth").model_copy(update={"step": step, "rows": int(2.5 / step)})
+    table = Table.read([tmp_path / "a.h5"], ["range_azimuth"], task.truth, grid=grid)
+    assert table.maps["range_azimuth"].shape[1] == grid.rows
+    assert table.truth["scan"].numpy() == pytest.approx(np.array([[0.5 / step, 1.5 / step, -1, -1]]))
+
+
 @pytest.mark.parametrize("kind", TASKS)
 def test_files_come_back_and_onnx_says_the_same(kind, tmp_path):
     task = TASKS[kind]

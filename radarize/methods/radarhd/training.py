@@ -9,6 +9,7 @@ from torch import Generator, Tensor, nn
 from torch.nn.functional import adaptive_max_pool2d, binary_cross_entropy_with_logits
 
 from radarize.features import augment
+from radarize.features.grid import Grid
 from radarize.features.maps import Maps
 from radarize.features.table import Reading
 from radarize.mapping.scans import BEARINGS
@@ -24,6 +25,12 @@ def bins(recording: Recording, frames: slice) -> Float[np.ndarray, "frame bearin
     return np.where(np.isinf(found), -1, found).astype(np.float32)
 
 
+def on_grid(bins: Float[np.ndarray, "frame bearing"], own: Grid, known: Grid) -> Float[np.ndarray, "frame bearing"]:
+    """Range bins of one radar as those of a grid, -1 beyond its last one."""
+    found = bins * np.float32(own.step / known.step)
+    return np.where((bins < 0) | (found > known.rows - 0.5), np.float32(-1), found)
+
+
 class RadarHd(Task):
     """Pictures of first surfaces, drawn from the true scan: the lidar of the original.
 
@@ -31,7 +38,7 @@ class RadarHd(Task):
     """
 
     network, maps = RadarHdNet, ("range_azimuth",)
-    truth = (Reading("scan", "truth/scan", bins),)
+    truth = (Reading("scan", "truth/scan", bins, on_grid),)
     defaults = Settings(frames=41, epochs=120, batch=6, rate=1e-4)
     share = 1 / 20
     #: Cells of range by which a first surface may be off to count as found: 9 cm.

@@ -1,5 +1,7 @@
 """Scans from occupancy: where the first surface is, and what the threshold does."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import torch
@@ -9,11 +11,12 @@ from radarize.features.grid import Grid
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.method import Inputs
 from radarize.methods.radarize.making import segmentation
-from radarize.methods.radarize.scans import NEAR, Segmentation, first_surface
+from radarize.methods.radarize.scans import NEAR, Segmentation, at_middles, first_surface
 from radarize.methods.radarize.segmentation import SegmentationNet
 from radarize.nets.weights import Header, build, example, save
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
+from radarsim.sensors.scan import Cell, Occupancy
 from tests.batches import of_spectrum
 from tests.importers.public import captures
 
@@ -45,6 +48,38 @@ def test_the_first_surface_is_where_it_is_likeliest():
             best = int(np.argmax(mass))
             expected = sum(i * first[i] for i in rows[best]) / mass[best] if mass[best] >= 0.4 else np.inf
             assert found[frame, bearing] == pytest.approx(expected)
+
+
+@pytest.mark.parametrize("degrees", [0, 30, 60, -60])
+def test_walls_at_an_angle_are_where_they_are(degrees):
+    """A network that says what the label says has ranges of a column's middle, not of its nearest ray: at 60 degrees
+    those are 2 cm less."""
+    normal, away = np.deg2rad(degrees), np.linspace(0.8, 1.4, 60)[:, None]
+    column = BEARINGS[1] - BEARINGS[0]
+    rays = BEARINGS[:, None] + column * ((np.arange(4) + 0.5) / 4 - 0.5)
+    label = Occupancy.label(
+        SimpleNamespace(scenario=SimpleNamespace(config=CONFIG)), wall(away[..., None], normal, rays)
+    )
+    told = first_surface(np.where(label == Cell.SURFACE, 0.99, 1e-4), 0.5)
+    ranges, true = told * CONFIG.range_resolution - CONFIG.range_bias, wall(away, normal, BEARINGS)
+    there = np.isfinite(ranges) & (true < 4)
+    off, before = at_middles(ranges)[there] - true[there], ranges[there] - true[there]
+    assert abs(off.mean()) < 0.001
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(CONFIG.range_resolution / 12**0.5, rel=0.05)  # of whole bins
+    assert abs(degrees) < 60 or before.mean() < -0.015
+
+
+def wall(away, normal, bearings):
+    """Ranges of a plane so far away, m, whose normal has a bearing."""
+    across = np.cos(bearings - normal)
+    return np.where(across > 0.05, away / np.maximum(across, 0.05), 100.0)
+
+
+def test_no_step_between_two_things_is_a_wall():
+    ranges = np.array([[1.0, 1.1, 1.2, 3.0, np.inf, 2.0, 2.0, np.inf]])
+    expected = [[1 + 0.0375, 1.1 + 0.0375, 1.2 + 0.0375, 3.0, np.inf, 2.0, 2.0, np.inf]]
+    assert at_middles(ranges) == pytest.approx(np.array(expected))
+    assert at_middles(ranges[:, ::-1]) == pytest.approx(np.array(expected)[:, ::-1])
 
 
 @pytest.fixture

@@ -18,6 +18,11 @@ from radarize.stopwatch import stage
 LEAST = 0.7
 #: Cells to either side that count as right: 9 cm of the preset's.
 NEAR = 2
+#: Of its width, how far a column's outermost rays lie from its middle, in the label that the network learned
+#: (`radarsim.sensors.scan`).
+OUTERMOST = 3 / 8
+#: m: what differs by less from bearing to bearing is one surface.
+_STEP = 0.3
 
 
 class Segmentation:
@@ -53,10 +58,9 @@ class Segmentation:
         with stage("scans"):
             occupancy = self.occupancy(batch)
             if self.first:
-                bins = first_surface(occupancy, LEAST)
+                near = at_middles(echoes.at(first_surface(occupancy, LEAST), self.ranges))
             else:
-                bins = echoes.strongest(occupancy >= LEAST, occupancy)
-        near = echoes.at(bins, self.ranges)
+                near = echoes.at(echoes.strongest(occupancy >= LEAST, occupancy), self.ranges)
         if self._beyond is None:
             return near
         far = self._beyond.scan(batch)
@@ -69,6 +73,21 @@ def first_surface(
     """Fractional range bin of every bearing's first surface, inf where none is likely enough."""
     bins, probability = likeliest(occupancy)
     return np.where(probability >= least, bins, np.inf)
+
+
+def at_middles(ranges: Float[np.ndarray, "frame bearing"]) -> Float[np.ndarray, "frame bearing"]:
+    """Ranges in the middle of each column, from those of its nearest ray, inf where there is none.
+
+    The network was taught all surfaces that a column's rays see, and the first of a wall at an angle is that of an
+    outermost ray: by `OUTERMOST` of what the range changes from column to column too near.
+    """
+    steps = np.diff(np.where(np.isinf(ranges), np.nan, ranges), axis=1)
+    same = np.abs(steps) <= _STEP
+    change, sides = np.zeros(ranges.shape), np.zeros(ranges.shape, int)
+    for side in (np.s_[:, 1:], np.s_[:, :-1]):
+        change[side] += np.where(same, steps, 0)
+        sides[side] += same
+    return ranges + OUTERMOST * np.abs(change) / np.maximum(sides, 1)
 
 
 def likeliest(

@@ -17,8 +17,8 @@ from radarsim.sensors.sensor import Sensor
 
 #: Bearings of the scan, rad: the radar's own 88 columns of one degree.
 AZIMUTHS = np.deg2rad(np.arange(-44, 44))
-#: Rays that share a column of the label.
-_RAYS = 4
+#: Bearings of the four rays that share a column of the label, rad, (column, ray).
+RAYS = AZIMUTHS[:, None] + (AZIMUTHS[1] - AZIMUTHS[0]) * ((np.arange(4) + 0.5) / 4 - 0.5)
 
 
 class Cell(IntEnum):
@@ -83,10 +83,8 @@ class Occupancy(Sensor):
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The label."""
         times = frames.middles
-        column = AZIMUTHS[1] - AZIMUTHS[0]
-        offsets = column * ((np.arange(_RAYS) + 0.5) / _RAYS - 0.5)
-        rays = level_rays(self.scenario.motion, times, (AZIMUTHS[:, None] + offsets).ravel())
-        distance = self.scenario.sight.distance(*rays, times).reshape(len(times), len(AZIMUTHS), _RAYS)
+        rays = level_rays(self.scenario.motion, times, RAYS.ravel())
+        distance = self.scenario.sight.distance(*rays, times).reshape(len(times), *RAYS.shape)
         return {"truth/occupancy": self.label(distance)}
 
     def label(self, distance: Float[np.ndarray, "frame column ray"]) -> UInt8[np.ndarray, "frame range column"]:

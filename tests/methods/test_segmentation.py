@@ -11,12 +11,12 @@ from radarize.features.grid import Grid
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.method import Inputs
 from radarize.methods.radarize.making import segmentation
-from radarize.methods.radarize.scans import NEAR, Segmentation, at_middles, first_surface
+from radarize.methods.radarize.scans import NEAR, OUTERMOST, Segmentation, at_middles, first_surface
 from radarize.methods.radarize.segmentation import SegmentationNet
 from radarize.nets.weights import Header, build, example, save
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
-from radarsim.sensors.scan import Cell, Occupancy
+from radarsim.sensors.scan import RAYS, Cell, Occupancy
 from tests.batches import of_spectrum
 from tests.importers.public import captures
 
@@ -55,10 +55,8 @@ def test_walls_at_an_angle_are_where_they_are(degrees):
     """A network that says what the label says has ranges of a column's middle, not of its nearest ray: at 60 degrees
     those are 2 cm less."""
     normal, away = np.deg2rad(degrees), np.linspace(0.8, 1.4, 60)[:, None]
-    column = BEARINGS[1] - BEARINGS[0]
-    rays = BEARINGS[:, None] + column * ((np.arange(4) + 0.5) / 4 - 0.5)
     label = Occupancy.label(
-        SimpleNamespace(scenario=SimpleNamespace(config=CONFIG)), wall(away[..., None], normal, rays)
+        SimpleNamespace(scenario=SimpleNamespace(config=CONFIG)), wall(away[..., None], normal, RAYS)
     )
     told = first_surface(np.where(label == Cell.SURFACE, 0.99, 1e-4), 0.5)
     ranges, true = told * CONFIG.range_resolution - CONFIG.range_bias, wall(away, normal, BEARINGS)
@@ -67,6 +65,10 @@ def test_walls_at_an_angle_are_where_they_are(degrees):
     assert abs(off.mean()) < 0.001
     assert np.sqrt(np.mean(off**2)) == pytest.approx(CONFIG.range_resolution / 12**0.5, rel=0.05)  # of whole bins
     assert abs(degrees) < 60 or before.mean() < -0.015
+
+
+def test_the_outermost_ray_is_the_labels():
+    assert RAYS.max(axis=1) - BEARINGS == pytest.approx(OUTERMOST * np.diff(BEARINGS)[0])
 
 
 def wall(away, normal, bearings):

@@ -25,10 +25,10 @@ def bins(recording: Recording, frames: slice) -> Float[np.ndarray, "frame bearin
     return np.where(np.isinf(found), -1, found).astype(np.float32)
 
 
-def on_grid(bins: Float[np.ndarray, "frame bearing"], own: Grid, known: Grid) -> Float[np.ndarray, "frame bearing"]:
+def on_grid(label: Float[np.ndarray, "frame bearing"], own: Grid, known: Grid) -> Float[np.ndarray, "frame bearing"]:
     """Range bins of one radar as those of a grid, -1 beyond its last one."""
-    found = bins * np.float32(own.step / known.step)
-    return np.where((bins < 0) | (found > known.rows - 0.5), np.float32(-1), found)
+    found = label * np.float32(own.step / known.step)
+    return np.where((label < 0) | (found > known.rows - 0.5), np.float32(-1), found)
 
 
 class RadarHd(Task):

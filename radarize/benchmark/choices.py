@@ -249,6 +249,7 @@ CHOICES = (
     Choice("that radars whose speeds or frames are too coarse for the network of velocities turn by the other", COARSE),
     Choice("what closures need in the back end's preset radar, and its cells", CLOSURES),
     Choice("what matches and closures count for in the back end's preset radar", BEARINGS | REAL),
+    Choice("what closures count for in the preset radar, and how right matches are at best", EVERY | REAL),
     Choice("by how much larger sines of azimuth are taken to match turns", STRETCH),
     Choice("how many rays tell whether a mirrored path is partly clear", {"office": (3,), "buildings/b": (3,)}),
     Choice("what is known of a turn while frames are missing", GAPS),

@@ -172,6 +172,10 @@ class Table:
 
         return part(slice(frame), self.lengths[:count]), part(slice(frame, None), self.lengths[count:])
 
+    def on(self, device: torch.device) -> "Table":
+        """With its maps in a device's memory, where windows are cut out many times faster than they are sent."""
+        return replace(self, maps={name: values.to(device) for name, values in self.maps.items()})
+
     def window(self, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item frame map row azimuth"]:
         """Maps of windows of frames."""
         return torch.stack([values[frames] for values in self.maps.values()], dim=2).float()

@@ -164,15 +164,16 @@ PRESETS: dict[str, SlamConfig] = {
         node=NodeConfig(distance=0.3, angle=0.2, duration=3.0, scans=10, min_points=25),
         # Cartographer's settings published with Radarize: ranges from 0.3 m. Cells, how many err alike, and what
         # closures need were chosen on `radarize.benchmark.choices.CLOSURES`, what matches and closures count for, since
-        # odometry's headings are better than theirs, on `BEARINGS` and the real walks of `CLOSURES`.
+        # odometry's headings are better than theirs, on `BEARINGS` and the real walks of `CLOSURES`; how right matches
+        # are at best, and what closures count for, since ranges are better, on `EVERY` and the same real walks.
         grid=GridConfig(hit=0.65, miss=0.45, min_range=0.3, free_range=0.0, nodes=16),
         matcher=MatcherConfig(
-            presearch_distance=0.0, presearch_angle=0.0, sigma=4.0, translation_floor=0.03, rotation_floor=0.015,
+            presearch_distance=0.0, presearch_angle=0.0, sigma=4.0, translation_floor=0.02, rotation_floor=0.01,
             alike=16,
         ),
         loop=LoopConfig(
             radius=8.0, distance=3.0, angle=1.0, candidates=5, every=4, nodes=8, front=0.25, min_score=0.55,
-            final_score=0.4, levels=4, sigma=2.0, translation_floor=0.02, rotation_floor=0.012,
+            final_score=0.4, levels=4, sigma=1.5, translation_floor=0.015, rotation_floor=0.009,
         ),
     ),
     # Published with Radarize: 0.08 m cells, 30 scans per submap (Cartographer finishes one after twice as many), ranges

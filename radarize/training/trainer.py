@@ -43,7 +43,7 @@ class Trainer:
 
     def __init__(self, task: Task, settings: Settings, training: Table, validation: Table, team: Team):
         self.task, self.settings, self.team = task, settings, team
-        self.training, self.validation = training, validation
+        self.training, self.validation = training.on(team.device), validation.on(team.device)
         self.spacings = task.spacings(training.frame_period)
         reach = (settings.frames - 1) * max(self.spacings) + 1
         self._starts = training.starts(reach)

@@ -210,6 +210,15 @@ def test_workers_read_the_same(small):
     assert Team(0, 1, torch.device("cpu")).share(torch.nn.Identity()) is not None
 
 
+def test_maps_lie_where_the_network_is_and_truth_here(small):
+    table = Table.read(sorted(small.glob("*.h5")), ("doppler_azimuth",), (VELOCITY, YAW))
+    there = table.on(torch.device("meta"))
+    frames = torch.tensor([[0, 1], [3, 4]])
+    assert there.window(frames).device.type == "meta"
+    assert there.window(frames).shape == table.window(frames).shape
+    assert there.truth is table.truth and there.starts(2).equal(table.starts(2))
+
+
 def test_the_command(tmp_path):
     data = data_set(tmp_path / "data", "velocity", frames=60)
     (data / "dataset.json").write_text('{"splits": {"random-0": {"train": ["0"], "validation": ["2"], "test": ["1"]}}}')

@@ -15,7 +15,8 @@ from radarize.extras import EXTRAS
 ROOT = Path(__file__).parents[1]
 #: Packages and modules of `radarize`, lowest first: each imports only what stands before it, or beside it.
 LAYERS = (
-    "errors plain files locks replacing hdf5 yamlfile jsonfile npyfile pixels pose tum extras console stopwatch jobs",
+    "errors plain files locks replacing hdf5 yamlfile jsonfile npyfile pixels pose rightangles tum extras console "
+    "stopwatch jobs",
     "radar",
     "recording",
     "heatmaps disturbance aliasing receivers points effort contents polar clouds walks",

@@ -138,6 +138,18 @@ EVERY = {
     "office": (6144515701617550422, 7622204269520151047, 7648158696642559674, 1746107501086170527),
 }
 
+#: Those, and 60 s by hand, by cart and by robot in the floor plan csail, whose walls stand in several directions.
+WALLS = EVERY | {
+    "csail": (
+        187465492810887943,
+        1665936419561694009,
+        3757019034055293954,
+        8184801985872683704,
+        4261751475892960821,
+        1789843974631215102,
+    )
+}
+
 #: 20 s by hand and by cart, five people about, in buildings of styles A to D with seeds 661 to 664 and in the office of
 #: seed 665, each as the presets radarize and two-tx and two boards at 60 GHz see it; and the walks above and the
 #: demo's, by radarize.
@@ -250,6 +262,7 @@ CHOICES = (
     Choice("what closures need in the back end's preset radar, and its cells", CLOSURES),
     Choice("what matches and closures count for in the back end's preset radar", BEARINGS | REAL),
     Choice("what closures count for in the preset radar, and how right matches are at best", EVERY | REAL),
+    Choice("that walls tell headings in the preset radar, and how well they are known", WALLS | REAL),
     Choice("by how much larger sines of azimuth are taken to match turns", STRETCH),
     Choice("how many rays tell whether a mirrored path is partly clear", {"office": (3,), "buildings/b": (3,)}),
     Choice("what is known of a turn while frames are missing", GAPS),

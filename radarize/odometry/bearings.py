@@ -9,9 +9,8 @@ that errors do not add up from frame to frame. Range and Doppler shift cannot te
 about a post look the same.
 
 Walls are remembered. Most of a building's stand at right angles, so one that is met says how far the heading has
-drifted since another one was seen. Which one that was is weighed as in a Chinese restaurant process (Aldous, 1985): a
-known direction by how many walls had it and how well it fits, a new one by a constant. Only what is hardly in doubt is
-used, so that in a building without right angles nothing is.
+drifted since another one was seen, where it is hardly in doubt which one that was: in a building without right angles
+nothing is told.
 """
 
 from collections.abc import Sequence
@@ -24,6 +23,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.odometry.echoes import Echo
 from radarize.odometry.gaussian import Gaussian, Row
 from radarize.pose import wrap
+from radarize.rightangles import past_right_angle, recognised
 
 #: Place of the heading in the filter.
 YAW = 0
@@ -41,8 +41,8 @@ _SHARES, _ROUGH, _EXACT, _OFF = np.array([0.0, 1.0]), np.array([0.02, 0.06]), np
 #: beyond which it is neither, such as a path over two walls or something that moves.
 _SURE, _KNOWN, _NEITHER = 10.0, 0.245, 3.5
 #: Frames in which a wall was seen before its normal counts; rad, by which normals of walls are not quite at right
-#: angles; walls that a new direction counts for; probability from which on one is met again; directions remembered.
-_LASTING, _SQUARE, _NEW, _CERTAIN, _DIRECTIONS = 5, np.radians(0.5), 0.5, 0.9, 6
+#: angles; directions remembered.
+_LASTING, _SQUARE, _DIRECTIONS = 5, np.radians(0.5), 6
 
 
 @dataclass
@@ -184,23 +184,18 @@ class Bearings:
         """Look the k-th's wall up among the directions that are remembered."""
         state, place = self._state, self._place(k)
         rows = [state.row({place: 1.0, self._first + wall: -1.0}) for wall in range(len(self._walls))]
-        off = np.array([-_past_right_angle(row @ state.mean) for row in rows])
+        off = -past_right_angle(np.array([row @ state.mean for row in rows]))
         variances = np.array([state.variance(row) + _SQUARE**2 for row in rows])
-        likely = self._walls * np.exp(-(off**2) / variances / 2) / np.sqrt(2 * np.pi * variances)
-        share = likely / (likely.sum() + _NEW / (np.pi / 2))
-        if share.max(initial=0.0) > _CERTAIN:
-            best = int(share.argmax())
-            state.update(rows[best], off[best], _SQUARE**2)
-            self._walls[best] += 1
-        elif share.sum() < 0.5:
+        met = recognised(off, variances, self._walls)
+        if met is None:
+            return
+        if met < len(rows):
+            state.update(rows[met], off[met], _SQUARE**2)
+            self._walls[met] += 1
+        else:
             if len(self._walls) == _DIRECTIONS:
                 rarest = int(np.argmin(self._walls))
                 state.keep([place for place in range(len(state.mean)) if place != self._first + rarest])
                 self._walls.pop(rarest)
             state.add(self._place(0), state.row({self._place(k): 1.0}), 0.0, 0.0)
             self._walls.append(1)
-
-
-def _past_right_angle(angle: float) -> float:
-    """An angle less the nearest multiple of a right one."""
-    return float(wrap(4 * angle)) / 4

@@ -23,6 +23,7 @@ from radarize.slam.posegraph import PoseGraph
 from radarize.slam.rows import Rows
 from radarize.slam.submap import Submap
 from radarize.slam.trimming import needless
+from radarize.slam.walls import Walls
 
 #: Nodes whose last loop searches may wait at a time.
 _AHEAD = 16
@@ -30,6 +31,8 @@ _AHEAD = 16
 _STILL = 1 / 3
 #: Scans that `Slam.trajectory` takes at a time.
 _BLOCK = 4096
+#: m: standard deviation of places of which walls tell nothing.
+_ANYWHERE = 100.0
 #: Submaps that an endless session forgets at a time: the graph is then solved anew.
 _TRIM = 8
 
@@ -74,6 +77,7 @@ class Slam:
         self._drift = Drift(self.config.odometry.scale)
         self._search = LoopSearch(self.config.loop)
         self._jury = Jury(self.graph, self._drift, self.config.loop)
+        self._walls = Walls(self.config.walls)
         self._building: list[Submap] = []
         self._centers: list[np.ndarray] = []  # of finished submaps, as seen from their anchors
 
@@ -134,6 +138,9 @@ class Slam:
         self._drain(final=True)
         if self._open:
             self._add_node()
+        for submap in self._building if self.config.walls.enabled else ():
+            if 2 * len(submap.nodes) >= self.config.grid.nodes:
+                self._align(submap)
         if self.config.loop.enabled:
             self._hear()
             self.graph.optimise()
@@ -280,9 +287,28 @@ class Slam:
         for submap in self._building:
             submap.insert(number, node, between(self._local[submap.anchor], self._local[number]))
         if self._building[0].finished:
-            self._centers.append(self._building.pop(0).center)
+            done = self._building.pop(0)
+            self._centers.append(done.center)
+            if self.config.walls.enabled:
+                self._align(done)
             if self.endless:
                 self._trim()
+
+    def _align(self, submap: Submap) -> None:
+        """Let the walls of a submap tell the heading of the node in its middle."""
+        middle, poses = submap.nodes[len(submap.nodes) // 2], self.graph.poses
+        points = np.concatenate(
+            [transform(between(self._local[middle], self._local[k]), self.nodes[k].points) for k in submap.nodes]
+        )
+        if len(points) < self.config.node.min_points:
+            return
+        told = self._walls.meet(middle, points, poses[:, 2], lambda *nodes: self._drift.between(*nodes)[2, 2])
+        if told is not None:
+            other, turn = told
+            x, y, _ = between(poses[other], poses[middle])
+            spread = np.diag([_ANYWHERE, _ANYWHERE, np.sqrt(2) * self.config.walls.sigma]) ** 2
+            self.graph.add_match(other, middle, np.array([x, y, turn]), spread)
+            self.graph.update()
 
     def _trim(self) -> None:
         """Forget submaps of places that were shown often enough since, and the nodes that are in no other one."""
@@ -299,6 +325,7 @@ class Slam:
         self._jury.forget()
         self.nodes, self._local = [self.nodes[k] for k in kept], [self._local[k] for k in kept]
         place = {number: k for k, number in enumerate(kept)}
+        self._walls.keep(place)
         for submap in self.submaps:
             submap.anchor, submap.nodes = place[submap.anchor], [place[number] for number in submap.nodes]
 

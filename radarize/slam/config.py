@@ -119,6 +119,14 @@ class LoopConfig(Frozen):
     )
 
 
+class WallsConfig(Frozen):
+    """Headings from the walls of submaps, see `radarize.slam.walls`."""
+
+    enabled: bool = setting(False, "walls tell headings at all")
+    sigma: float = setting(0.01, "standard deviation of the direction of a submap's walls, rad", gt=0)
+    contrast: float = setting(1.6, "so much better than along any other direction points must pile up along it", gt=1)
+
+
 class SlamConfig(Frozen):
     """All parameters of `radarize.slam.backend.Slam`."""
 
@@ -127,15 +135,16 @@ class SlamConfig(Frozen):
     grid: GridConfig = GridConfig()
     matcher: MatcherConfig = MatcherConfig()
     loop: LoopConfig = LoopConfig()
+    walls: WallsConfig = WallsConfig()
 
     @classmethod
     def preset(cls, name: str) -> "SlamConfig":
         """A named set of parameters.
 
         ``lidar``: wide, dense and exact scans. ``radar``: narrow, short and noisy scans at 30 Hz with odometry that is
-        good in translation and weak in heading; matches weigh little, so that they do no harm, and closures as much as
-        they are worth. ``cartographer``: what the paper published of its settings, and Cartographer's own defaults
-        beside them, where they apply.
+        good in translation and weak in heading; matches weigh little, so that they do no harm, closures as much as they
+        are worth, and walls tell headings. ``cartographer``: what the paper published of its settings, and
+        Cartographer's own defaults beside them, where they apply.
 
         Raises:
             InputError: there is no preset of that name.
@@ -165,7 +174,8 @@ PRESETS: dict[str, SlamConfig] = {
         # Cartographer's settings published with Radarize: ranges from 0.3 m. Cells, how many err alike, and what
         # closures need were chosen on `radarize.benchmark.choices.CLOSURES`, what matches and closures count for, since
         # odometry's headings are better than theirs, on `BEARINGS` and the real walks of `CLOSURES`; how right matches
-        # are at best, and what closures count for, since ranges are better, on `EVERY` and the same real walks.
+        # are at best, and what closures count for, since ranges are better, on `EVERY` and the same real walks; walls,
+        # since then, on `WALLS` and those.
         grid=GridConfig(hit=0.65, miss=0.45, min_range=0.3, free_range=0.0, nodes=16),
         matcher=MatcherConfig(
             presearch_distance=0.0, presearch_angle=0.0, sigma=4.0, translation_floor=0.02, rotation_floor=0.01,
@@ -175,6 +185,7 @@ PRESETS: dict[str, SlamConfig] = {
             radius=8.0, distance=3.0, angle=1.0, candidates=5, every=4, nodes=8, front=0.25, min_score=0.55,
             final_score=0.4, levels=4, sigma=1.5, translation_floor=0.015, rotation_floor=0.009,
         ),
+        walls=WallsConfig(enabled=True),
     ),
     # Published with Radarize: 0.08 m cells, 30 scans per submap (Cartographer finishes one after twice as many), ranges
     # of 0.3-4.284 m, no online correlative matcher, 100 iterations, optimisation every 90 nodes, stock loop closure

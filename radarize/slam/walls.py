@@ -1,0 +1,110 @@
+"""Headings from the walls of submaps: most of a building's stand at right angles, or in a few directions.
+
+The walls of a submap have the direction along which its points, seen along either axis, pile up most. Where it is one
+that was met before, the two submaps are parallel, or at right angles, however far apart they are and whatever odometry
+has lost in between. Which one it is must hardly be in doubt, so that where walls stand in all directions nothing is
+told.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize.rightangles import past_right_angle, recognised
+from radarize.slam.config import WallsConfig
+
+#: rad: directions that are tried, and those that count as the same.
+_TURNS, _SAME = np.radians(np.arange(0, 90, 0.25)), np.radians(8.0)
+#: Of both axes, by direction.
+_AXES = np.array([[np.cos(_TURNS), np.sin(_TURNS)], [-np.sin(_TURNS), np.cos(_TURNS)]])
+#: Points of a submap that are looked at, at most; m and number of the cells that they pile up in; what is farther
+#: apart than all cells begins at the first again.
+_POINTS, _CELL, _CELLS = 2000, 0.05, 1024
+
+
+class Direction(NamedTuple):
+    """Of walls.
+
+    Attributes:
+        angle: of their normals, rad, modulo a right angle.
+        contrast: how much better points pile up than along any other direction.
+    """
+
+    angle: float
+    contrast: float
+
+    @classmethod
+    def of(cls, points: Float[np.ndarray, "point 2"]) -> "Direction":
+        """Of the walls that some points (m) lie on."""
+        points = points[:: 1 + len(points) // _POINTS]
+        piled = sum(_piled(points @ axes) for axes in _AXES)
+        best = int(piled.argmax())
+        before, at, after = piled[best - 1], piled[best], piled[(best + 1) % len(piled)]
+        between = (before - after) / (2 * (before - 2 * at + after) or 1.0)
+        others = piled[np.abs(past_right_angle(_TURNS - _TURNS[best])) > _SAME]
+        return cls(float(_TURNS[best] + between * (_TURNS[1] - _TURNS[0])), float(at / others.max()))
+
+
+class Walls:
+    """Directions that are remembered, with the nodes in the middle of the submaps whose walls had them."""
+
+    def __init__(self, config: WallsConfig):
+        self.config = config
+        self._known: list[dict[int, float]] = []  # of each direction the angles by node, each as seen from it
+        self._last = 0  # the last node that was told its heading
+
+    def meet(
+        self,
+        node: int,
+        points: Float[np.ndarray, "point 2"],
+        headings: Float[np.ndarray, "node"],
+        drift: Callable[[int, int], float],
+    ) -> tuple[int, float] | None:
+        """Look up the direction of a submap's walls, and remember it.
+
+        Args:
+            node: in the middle of the submap.
+            points: of the submap, seen from the node, m.
+            headings: of all nodes, as they are known, rad.
+            drift: variance of the turn from one node to another by odometry, rad^2.
+
+        Returns:
+            The first node that had this direction, and the turn from its heading to that of this one, rad; None where
+            nothing is told.
+        """
+        found = Direction.of(points)
+        if found.contrast < self.config.contrast:
+            return None
+        firsts = [next(iter(known.items())) for known in self._known]
+        expected = np.array([headings[first] + angle for first, angle in firsts])
+        off = past_right_angle(expected - headings[node] - found.angle)
+        variance = drift(self._last, node) + 2 * self.config.sigma**2
+        number = recognised(off, variance, [len(known) for known in self._known])
+        if number is None:
+            return None
+        if number == len(self._known):
+            self._known.append({node: found.angle})
+            return None
+        self._known[number][node], self._last = found.angle, node
+        first = firsts[number][0]
+        return first, float(headings[node] + off[number] - headings[first])
+
+    def keep(self, place: Mapping[int, int]) -> None:
+        """Forget all nodes but these, which then have other numbers."""
+        kept = [{place[node]: angle for node, angle in known.items() if node in place} for known in self._known]
+        self._known = [known for known in kept if known]
+        self._last = place.get(self._last, 0)
+
+
+def _piled(places: Float[np.ndarray, "point turn"]) -> Float[np.ndarray, "turn"]:
+    """Sums over cells of the squared numbers of points in them, each point being shared by the two next to it."""
+    places = places / _CELL
+    cells = np.floor(places)
+    share, cells = places - cells, cells.astype(int) % _CELLS
+    count = np.zeros((len(_TURNS), _CELLS))
+    rows = np.broadcast_to(np.arange(len(_TURNS)), cells.shape)
+    for column, weight in ((cells, 1 - share), ((cells + 1) % _CELLS, share)):
+        count += np.bincount((rows * _CELLS + column).ravel(), weight.ravel(), count.size).reshape(count.shape)
+    return (count**2).sum(axis=1)

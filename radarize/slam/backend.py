@@ -1,4 +1,4 @@
-"""The SLAM back end: gather scans, match, build submaps, close loops, optimise.
+"""The SLAM back end: gather scans, match, build submaps, align their walls, close loops, optimise.
 
 After Google's Cartographer (Hess et al., Real-Time Loop Closure in 2D LIDAR SLAM, ICRA 2016), on gtsam: matching runs
 in a local frame that is smooth and drifts, the graph's poses are global and jump when loops close.

@@ -64,7 +64,7 @@ class PoseGraph:
         self._news.add(self._certain[-1])
 
     def add_match(self, of: int, to: int, relative: Float[np.ndarray, "3"], covariance: Float[np.ndarray, "3 3"]):
-        """A match to the submap being built: believed at once, seldom false."""
+        """A match to the submap being built, or walls that are parallel: believed at once, seldom false."""
         self._matches.append(_factor(of, to, relative, covariance))
         self._news.add(self._matches[-1])
 

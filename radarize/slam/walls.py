@@ -3,12 +3,13 @@
 The walls of a submap have the direction along which its points, seen along either axis, pile up most. Where it is one
 that was met before, the two submaps are parallel, or at right angles, however far apart they are and whatever odometry
 has lost in between. Which one it is must hardly be in doubt, so that where walls stand in all directions nothing is
-told.
+told; and after a turn that odometry did not see, directions are others than before.
 """
 
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+import numba
 import numpy as np
 from jaxtyping import Float
 
@@ -17,8 +18,8 @@ from radarize.slam.config import WallsConfig
 
 #: rad: directions that are tried, and those that count as the same.
 _TURNS, _SAME = np.radians(np.arange(0, 90, 0.25)), np.radians(8.0)
-#: Of both axes, by direction.
-_AXES = np.array([[np.cos(_TURNS), np.sin(_TURNS)], [-np.sin(_TURNS), np.cos(_TURNS)]])
+#: rad: a heading that is known worse since a direction was met last does not tell right angles apart.
+_LOST = np.radians(15.0)
 #: Points of a submap that are looked at, at most; m and number of the cells that they pile up in; what is farther
 #: apart than all cells begins at the first again.
 _POINTS, _CELL, _CELLS = 2000, 0.05, 1024
@@ -38,8 +39,7 @@ class Direction(NamedTuple):
     @classmethod
     def of(cls, points: Float[np.ndarray, "point 2"]) -> "Direction":
         """Of the walls that some points (m) lie on."""
-        points = points[:: 1 + len(points) // _POINTS]
-        piled = sum(_piled(points @ axes) for axes in _AXES)
+        piled = _piled(points[:: 1 + len(points) // _POINTS], _TURNS)
         best = int(piled.argmax())
         before, at, after = piled[best - 1], piled[best], piled[(best + 1) % len(piled)]
         between = (before - after) / (2 * (before - 2 * at + after) or 1.0)
@@ -53,7 +53,6 @@ class Walls:
     def __init__(self, config: WallsConfig):
         self.config = config
         self._known: list[dict[int, float]] = []  # of each direction the angles by node, each as seen from it
-        self._last = 0  # the last node that was told its heading
 
     def meet(
         self,
@@ -75,19 +74,20 @@ class Walls:
             nothing is told.
         """
         found = Direction.of(points)
-        if found.contrast < self.config.contrast:
+        if found.contrast < self.config.contrast or any(node in known for known in self._known):
             return None
-        firsts = [next(iter(known.items())) for known in self._known]
+        variances = [drift(next(reversed(known)), node) + 2 * self.config.sigma**2 for known in self._known]
+        near = [k for k, variance in enumerate(variances) if variance < _LOST**2]
+        firsts = [next(iter(self._known[k].items())) for k in near]
         expected = np.array([headings[first] + angle for first, angle in firsts])
         off = past_right_angle(expected - headings[node] - found.angle)
-        variance = drift(self._last, node) + 2 * self.config.sigma**2
-        number = recognised(off, variance, [len(known) for known in self._known])
+        number = recognised(off, np.array(variances)[near], [len(self._known[k]) for k in near])
         if number is None:
             return None
-        if number == len(self._known):
+        if number == len(near):
             self._known.append({node: found.angle})
             return None
-        self._known[number][node], self._last = found.angle, node
+        self._known[near[number]][node] = found.angle
         first = firsts[number][0]
         return first, float(headings[node] + off[number] - headings[first])
 
@@ -95,16 +95,21 @@ class Walls:
         """Forget all nodes but these, which then have other numbers."""
         kept = [{place[node]: angle for node, angle in known.items() if node in place} for known in self._known]
         self._known = [known for known in kept if known]
-        self._last = place.get(self._last, 0)
 
 
-def _piled(places: Float[np.ndarray, "point turn"]) -> Float[np.ndarray, "turn"]:
-    """Sums over cells of the squared numbers of points in them, each point being shared by the two next to it."""
-    places = places / _CELL
-    cells = np.floor(places)
-    share, cells = places - cells, cells.astype(int) % _CELLS
-    count = np.zeros((len(_TURNS), _CELLS))
-    rows = np.broadcast_to(np.arange(len(_TURNS)), cells.shape)
-    for column, weight in ((cells, 1 - share), ((cells + 1) % _CELLS, share)):
-        count += np.bincount((rows * _CELLS + column).ravel(), weight.ravel(), count.size).reshape(count.shape)
-    return (count**2).sum(axis=1)
+@numba.njit(cache=True, nogil=True)
+def _piled(points, turns):
+    """For each turn, by how much points pile up along both axes: sums of the squared numbers of points in cells, each
+    being shared by the two cells next to it."""
+    found, count = np.zeros(len(turns)), np.empty(_CELLS)
+    for k in range(len(turns)):
+        for x, y in ((np.cos(turns[k]), np.sin(turns[k])), (-np.sin(turns[k]), np.cos(turns[k]))):
+            count[:] = 0.0
+            for i in range(len(points)):
+                place = (points[i, 0] * x + points[i, 1] * y) / _CELL
+                low = np.floor(place)
+                cell = int(low) % _CELLS
+                count[cell] += 1 - (place - low)
+                count[(cell + 1) % _CELLS] += place - low
+            found[k] += (count**2).sum()
+    return found

@@ -76,6 +76,17 @@ def test_a_submap_is_parallel_to_the_first_of_its_direction_alone():
     assert told[0] == 0 and np.degrees(told[1]) == pytest.approx(-90.0, abs=0.2)
 
 
+def test_after_a_turn_that_nobody_saw_directions_are_new():
+    """With 30 deg RMS lost, 40 deg off is nearly as likely as 50 deg off the next right angle."""
+    walls, room = Walls(WallsConfig()), box(-2, -1.5, 2.5, 1.5)
+    known = np.radians([0.0, 0.0, 40.0, 41.0])
+    lost = lambda a, b: np.radians(30.0 if a < 2 <= b else 1.0) ** 2  # noqa: E731
+    told = [walls.meet(node, seen(room, seed=node), known, lost) for node in range(4)]
+    assert told[0] is None and told[2] is None
+    for node, first in ((1, 0), (3, 2)):
+        assert told[node][0] == first and np.degrees(told[node][1]) == pytest.approx(0, abs=0.2)
+
+
 def reckoned(walls, enabled, seed):
     """Final heading error of SLAM down the corridor and back, odometry's headings drifting by 1 deg a metre, rad."""
     poses, rng = walk([[1, 1], [38, 1]], 0.05, 0.1), np.random.default_rng(seed)

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 #: Walls that a new direction counts for; probability from which on a wall has one that is known.
 _NEW, _CERTAIN = 0.5, 0.9
@@ -17,11 +17,10 @@ def past_right_angle(angle: float | Float[np.ndarray, "*any"]) -> float | Float[
 def recognised(
     off: Float[np.ndarray, "direction"],
     variances: float | Float[np.ndarray, "direction"],
-    walls: Sequence[int] | Int[np.ndarray, "direction"],
+    walls: Sequence[int],
 ) -> int | None:
     """Which direction a wall has, weighed as in a Chinese restaurant process (Aldous, 1985): a known one by how many
-    walls had it and how well it fits, a new one by a constant. It is in doubt, too, where headings are known so badly
-    that the wall may as well be past another right angle.
+    walls had it and how well it fits, a new one by a constant.
 
     Args:
         off: by which the wall is past each known direction or a right angle to it, rad.
@@ -31,10 +30,8 @@ def recognised(
     Returns:
         The direction's number; as many as there are for a new one; None where it is in doubt.
     """
-    others = off + np.pi / 2 * np.arange(-2, 3)[:, None]
-    likely = np.exp(-(others**2) / variances / 2) / np.sqrt(2 * np.pi * variances) * np.array(walls)
-    new = _NEW / (np.pi / 2)
-    share = likely[2] / (likely.sum() + new)
+    likely = np.array(walls) * np.exp(-(off**2) / variances / 2) / np.sqrt(2 * np.pi * variances)
+    share = likely / (likely.sum() + _NEW / (np.pi / 2))
     if share.max(initial=0.0) > _CERTAIN:
         return int(share.argmax())
-    return len(walls) if new > likely.sum() else None
+    return len(walls) if share.sum() < 0.5 else None

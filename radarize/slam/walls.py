@@ -3,7 +3,7 @@
 The walls of a submap have the direction along which its points, seen along either axis, pile up most. Where it is one
 that was met before, the two submaps are parallel, or at right angles, however far apart they are and whatever odometry
 has lost in between. Which one it is must hardly be in doubt, so that where walls stand in all directions nothing is
-told; and after a turn that odometry saw too badly, directions are others than before.
+told; and after a turn that odometry did not see, directions are others than before.
 """
 
 from collections.abc import Callable, Mapping
@@ -18,7 +18,7 @@ from radarize.slam.config import WallsConfig
 
 #: rad: directions that are tried, and those that count as the same.
 _TURNS, _SAME = np.radians(np.arange(0, 90, 0.25)), np.radians(8.0)
-#: rad: a heading that is known worse since a direction was met last may not tell right angles apart.
+#: rad: a heading that is known worse since a direction was met last does not tell right angles apart.
 _LOST = np.radians(15.0)
 #: Points of a submap that are looked at, at most; m and number of the cells that they pile up in; what is farther
 #: apart than all cells begins at the first again.
@@ -76,34 +76,20 @@ class Walls:
         found = Direction.of(points)
         if found.contrast < self.config.contrast or any(node in known for known in self._known):
             return None
-        number = self._recognised(node, found.angle, headings, drift)
+        variances = [drift(next(reversed(known)), node) + 2 * self.config.sigma**2 for known in self._known]
+        near = [k for k, variance in enumerate(variances) if variance < _LOST**2]
+        firsts = [next(iter(self._known[k].items())) for k in near]
+        expected = np.array([headings[first] + angle for first, angle in firsts])
+        off = past_right_angle(expected - headings[node] - found.angle)
+        number = recognised(off, np.array(variances)[near], [len(self._known[k]) for k in near])
         if number is None:
             return None
-        if number == len(self._known):
+        if number == len(near):
             self._known.append({node: found.angle})
             return None
-        first, angle = next(iter(self._known[number].items()))
-        self._known[number][node] = found.angle
-        off = past_right_angle(headings[first] + angle - headings[node] - found.angle)
-        return first, float(headings[node] + off - headings[first])
-
-    def _recognised(
-        self, node: int, angle: float, headings: Float[np.ndarray, "node"], drift: Callable[[int, int], float]
-    ) -> int | None:
-        """Which direction an angle is, seen from a node; as many as there are for a new one, None where in doubt.
-
-        Only where no direction was met since headings were lost, those before are looked at; in doubt it is a new one.
-        """
-        firsts = [next(iter(known.items())) for known in self._known]
-        off = past_right_angle(np.array([headings[k] + each for k, each in firsts]) - headings[node] - angle)
-        variances = np.array([drift(next(reversed(known)), node) for known in self._known]) + 2 * self.config.sigma**2
-        walls = np.array([len(known) for known in self._known], int)
-        near = np.flatnonzero(variances < _LOST**2)
-        if not len(near):
-            found = recognised(off, variances, walls)
-            return len(walls) if found is None else found
-        found = recognised(off[near], variances[near], walls[near])
-        return found if found is None else int([*near, len(walls)][found])
+        self._known[near[number]][node] = found.angle
+        first = firsts[number][0]
+        return first, float(headings[node] + off[number] - headings[first])
 
     def keep(self, place: Mapping[int, int]) -> None:
         """Forget all nodes but these, which then have other numbers."""

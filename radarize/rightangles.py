@@ -5,13 +5,15 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
+from radarize.pose import wrap
+
 #: Walls that a new direction counts for; probability from which on a wall has one that is known.
 _NEW, _CERTAIN = 0.5, 0.9
 
 
 def past_right_angle(angle: float | Float[np.ndarray, "*any"]) -> float | Float[np.ndarray, "*any"]:
     """Angles (rad) less the nearest multiple of a right one: within pi/4 of 0."""
-    return np.arctan2(np.sin(4 * angle), np.cos(4 * angle)) / 4
+    return wrap(4 * angle) / 4
 
 
 def recognised(

@@ -192,10 +192,10 @@ class Bearings:
         if met < len(rows):
             state.update(rows[met], off[met], _SQUARE**2)
             self._walls[met] += 1
-        else:
-            if len(self._walls) == _DIRECTIONS:
-                rarest = int(np.argmin(self._walls))
-                state.keep([place for place in range(len(state.mean)) if place != self._first + rarest])
-                self._walls.pop(rarest)
-            state.add(self._place(0), state.row({self._place(k): 1.0}), 0.0, 0.0)
-            self._walls.append(1)
+            return
+        if len(self._walls) == _DIRECTIONS:
+            rarest = int(np.argmin(self._walls))
+            state.keep([place for place in range(len(state.mean)) if place != self._first + rarest])
+            self._walls.pop(rarest)
+        state.add(self._place(0), state.row({self._place(k): 1.0}), 0.0, 0.0)
+        self._walls.append(1)

@@ -5,13 +5,13 @@ in a local frame that is smooth and drifts, the graph's poses are global and jum
 """
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
-from radarize.pose import between, carried, compose, interpolate, transform
+from radarize.pose import Pose, between, carried, compose, interpolate, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.grid import OccupancyGrid
@@ -138,7 +138,7 @@ class Slam:
         self._drain(final=True)
         if self._open:
             self._add_node()
-        for submap in self._building if self.config.walls.enabled else ():
+        for submap in self._building:
             if 2 * len(submap.nodes) >= self.config.grid.nodes:
                 self._align(submap)
         if self.config.loop.enabled:
@@ -289,17 +289,16 @@ class Slam:
         if self._building[0].finished:
             done = self._building.pop(0)
             self._centers.append(done.center)
-            if self.config.walls.enabled:
-                self._align(done)
+            self._align(done)
             if self.endless:
                 self._trim()
 
     def _align(self, submap: Submap) -> None:
         """Let the walls of a submap tell the heading of the node in its middle."""
+        if not self.config.walls.enabled:
+            return
         middle, poses = submap.nodes[len(submap.nodes) // 2], self.graph.poses
-        points = np.concatenate(
-            [transform(between(self._local[middle], self._local[k]), self.nodes[k].points) for k in submap.nodes]
-        )
+        points = _seen(middle, self._local, {k: self.nodes[k].points for k in submap.nodes})
         if len(points) < self.config.node.min_points:
             return
         told = self._walls.meet(middle, points, poses[:, 2], lambda *nodes: self._drift.between(*nodes)[2, 2])
@@ -374,7 +373,7 @@ class Slam:
         anchors = np.array([submap.anchor for submap in self.submaps[:ready]])
         members = range(first, number + 1)
         points, fronts = (
-            thin(np.concatenate([transform(between(poses[number], poses[k]), part[k]) for k in members]), spacing)
+            thin(_seen(number, poses, part), spacing)
             for part in ({k: self.nodes[k].points for k in members}, {k: self.nodes[k].fronts for k in members})
         )
         centers = compose(poses[anchors], np.pad(np.array(self._centers), ((0, 0), (0, 1))))[:, :2]
@@ -392,3 +391,10 @@ class Slam:
             )
             for k in near[np.argsort(away[near], kind="stable")][:count]
         ]
+
+
+def _seen(
+    number: int, poses: Sequence[Pose] | Float[np.ndarray, "node 3"], points: Mapping[int, Float[np.ndarray, "_ 2"]]
+) -> Float[np.ndarray, "point 2"]:
+    """Points of several nodes as one node sees them."""
+    return np.concatenate([transform(between(poses[number], poses[k]), each) for k, each in points.items()])

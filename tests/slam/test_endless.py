@@ -6,23 +6,9 @@ import pytest
 from radarize.pose import between, compose
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
-from tests.slam.world import box, lap, ring, scan, walk
+from tests.slam.world import RATE, box, lap, play, ring, walk
 
-RATE = 30.0
-BEARINGS = np.radians(np.linspace(-44, 43, 88))
 ROOM = np.concatenate([box(0, 0, 6, 5), box(3, 2.2, 3.5, 2.7), box(5.2, 0, 6, 0.6)])
-
-
-def play(slam, walls, poses, rng, share=0.03):
-    """Scans of 4.3 m along poses, and odometry whose steps are off by a share; its last pose."""
-    odometry = poses[0]
-    for k, (before, pose) in enumerate(zip(poses[[0, *range(len(poses) - 1)]], poses, strict=True)):
-        step = between(before, pose)
-        sigma = share * np.abs(step) + 1e-5
-        odometry = compose(odometry, step + rng.normal(0, sigma))
-        slam.add_odometry(k / RATE, odometry, np.diag(sigma**2))
-        slam.add_scan(k / RATE, BEARINGS, scan(walls, pose, BEARINGS, 4.28) + rng.normal(0, 0.02, len(BEARINGS)))
-    return odometry
 
 
 def test_to_and_fro_in_one_room_ends_to_grow():

@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from radarize.pose import between, compose, transform
+from radarize.pose import transform
 from radarize.rightangles import past_right_angle, recognised
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig, WallsConfig
 from radarize.slam.walls import Direction, Walls
-from tests.slam.world import box, scan, walk
+from tests.slam.world import box, play, walk
 
-RATE = 30.0
 BEARINGS = np.radians(np.linspace(-60, 60, 61))
 #: A corridor of 40 m with doors.
 CORRIDOR = np.concatenate([box(0, 0, 40, 2), *(box(x, 0, x + 1, 0.15) for x in range(4, 40, 5))])
@@ -24,10 +23,10 @@ def seen(walls, turn=0.0, noise=0.02, seed=0):
     return transform(np.array([0, 0, -turn]), points + rng.normal(0, noise, points.shape))
 
 
-def ring(centre, radius):
-    """Walls of a round room."""
+def round_room(radius):
+    """Its walls."""
     angles = np.linspace(0, 2 * np.pi, 33)
-    corners = centre + radius * np.column_stack([np.cos(angles), np.sin(angles)])
+    corners = radius * np.column_stack([np.cos(angles), np.sin(angles)])
     return np.column_stack([corners[:-1], corners[1:]])
 
 
@@ -45,7 +44,7 @@ def test_a_wall_across_the_cells_end_is_one_wall():
 
 
 def test_a_round_room_has_no_direction():
-    assert Direction.of(seen(ring(np.zeros(2), 2.0))).contrast < 1.3
+    assert Direction.of(seen(round_room(2.0))).contrast < 1.3
 
 
 def test_a_known_direction_a_new_one_and_one_in_doubt():
@@ -80,33 +79,31 @@ def test_after_a_turn_that_nobody_saw_directions_are_new():
     """With 30 deg RMS lost, 40 deg off is nearly as likely as 50 deg off the next right angle."""
     walls, room = Walls(WallsConfig()), box(-2, -1.5, 2.5, 1.5)
     known = np.radians([0.0, 0.0, 40.0, 41.0])
-    lost = lambda a, b: np.radians(30.0 if a < 2 <= b else 1.0) ** 2  # noqa: E731
+
+    def lost(a, b):
+        return np.radians(30.0 if a < 2 <= b else 1.0) ** 2
+
     told = [walls.meet(node, seen(room, seed=node), known, lost) for node in range(4)]
     assert told[0] is None and told[2] is None
     for node, first in ((1, 0), (3, 2)):
         assert told[node][0] == first and np.degrees(told[node][1]) == pytest.approx(0, abs=0.2)
 
 
-def reckoned(walls, enabled, seed):
-    """Final heading error of SLAM down the corridor and back, odometry's headings drifting by 1 deg a metre, rad."""
-    poses, rng = walk([[1, 1], [38, 1]], 0.05, 0.1), np.random.default_rng(seed)
-    config = SlamConfig.preset("radar")
+def heading_errors(enabled, seed):
+    """Of SLAM down the corridor, rad, where odometry's headings drift by 1 deg a metre."""
+    poses, config = walk([[1, 1], [38, 1]], 0.05, 0.1), SlamConfig.preset("radar")
     slam = Slam(config.model_copy(update={"walls": config.walls.model_copy(update={"enabled": enabled})}))
-    odometry, sigma = poses[0], np.array([0.001, 0.001, np.radians(0.25)])
-    for k, (before, pose) in enumerate(zip(poses[[0, *range(len(poses) - 1)]], poses, strict=True)):
-        odometry = compose(odometry, between(before, pose) + rng.normal(0, sigma) * (k > 0))
-        slam.add_odometry(k / RATE, odometry, np.diag(sigma**2))
-        ranges = scan(walls, pose, BEARINGS, 4.28)
-        slam.add_scan(k / RATE, BEARINGS, ranges + rng.normal(0, 0.02, len(ranges)))
+    floor = np.array([0.001, 0.001, np.radians(0.25)])
+    play(slam, CORRIDOR, poses, np.random.default_rng(seed), share=0, floor=floor, bearings=BEARINGS)
     slam.finish()
     _, found = slam.trajectory()
-    return found[:, 2] - poses[: len(found), 2], slam
+    return found[:, 2] - poses[: len(found), 2]
 
 
 def test_a_corridor_stays_straight():
     """On five walks, where each of 740 steps is off by 0.25 deg RMS: by 1 deg and more within a submap already."""
     errors = {
-        enabled: np.degrees([np.abs(reckoned(CORRIDOR, enabled, seed)[0]).mean() for seed in range(5)])
+        enabled: np.degrees([np.abs(heading_errors(enabled, seed)).mean() for seed in range(5)])
         for enabled in (False, True)
     }
     assert errors[True].max() < 1.3 and errors[True].mean() < 0.6 * errors[False].mean()

@@ -5,6 +5,8 @@ import numpy as np
 from radarize.pose import between, compose
 from radarize.slam.posegraph import PoseGraph
 
+#: Hz, and rad: of a radar's scans.
+RATE, BEARINGS = 30.0, np.radians(np.linspace(-44, 43, 88))
 #: Of a step of a lap, m and rad.
 SIGMA = np.array([0.02, 0.02, 0.01])
 
@@ -60,6 +62,18 @@ def walk(corners, step, turn):
         count = int(np.ceil(np.hypot(*(b - a)) / step))
         poses += [[*(a + (b - a) * k / count), yaw] for k in range(count)]
     return np.array([*poses, [*corners[-1], yaw]])
+
+
+def play(slam, walls, poses, rng, share=0.03, floor=1e-5, bearings=BEARINGS):
+    """Scans of 4.3 m along poses, and odometry whose steps are off by a share and a floor (m, rad); its last pose."""
+    odometry = poses[0]
+    for k, (before, pose) in enumerate(zip(poses[[0, *range(len(poses) - 1)]], poses, strict=True)):
+        step = between(before, pose)
+        sigma = share * np.abs(step) + floor
+        odometry = compose(odometry, step + rng.normal(0, sigma))
+        slam.add_odometry(k / RATE, odometry, np.diag(sigma**2))
+        slam.add_scan(k / RATE, bearings, scan(walls, pose, bearings, 4.28) + rng.normal(0, 0.02, len(bearings)))
+    return odometry
 
 
 def align(truth, estimate):

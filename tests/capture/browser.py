@@ -9,6 +9,8 @@ import time
 from pathlib import Path
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+#: What an evaluation answers while the page is left for another.
+_LEAVING = ("Inspected target navigated or closed", "Execution context was destroyed", "Cannot find context")
 _FLAGS = "--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking --disable-sync"
 
 
@@ -60,9 +62,17 @@ class Browser:
     def wait(self, expression: str, patience: float = 60.0) -> None:
         """Wait until an expression is true in the page."""
         deadline = time.monotonic() + patience
-        while not self.evaluate(expression):
+        while not self._true(expression):
             assert time.monotonic() < deadline, f"{expression} did not become true; {self.errors}"
             time.sleep(0.1)
+
+    def _true(self, expression: str) -> bool:
+        try:
+            return bool(self.evaluate(expression))
+        except AssertionError as error:
+            if not any(said in str(error) for said in _LEAVING):
+                raise
+            return False
 
     def screenshot(self, path: Path) -> None:
         """Write what the page looks like (PNG)."""

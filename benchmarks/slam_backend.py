@@ -18,7 +18,7 @@ from radarize.log import Log
 from radarize.methods.registry import BEST
 from radarize.pose import between, compose, wrap
 from radarize.slam.backend import Slam
-from radarize.slam.config import SlamConfig
+from radarize.slam.config import SlamConfig, WallsConfig
 from radarize.tum import planar, read_tum
 from tests.slam.world import align, ate, lap
 
@@ -137,24 +137,29 @@ def graph_rows(seed: int) -> list[dict[str, object]]:
 
 
 def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
-    """Means over the runs of a benchmark's folder, each with its own odometry and scans, and the worst one, by preset;
-    and what they are of."""
+    """Means over the runs of a benchmark's folder, each with its own odometry and scans, and the worst one, by
+    settings; and what they are of."""
     paths = sorted(path.parent for path in folder.glob(f"*/{Pair(**BEST)}/reference.tum"))
     if not paths:
         raise SystemExit(f"{folder}: has no runs of {Pair(**BEST)}, expected such as `benchmarks.unseen` keeps")
-    cases = {"radar": "radar", "cartographer": f"radar, {CLASSIC}"}
-    found: dict[str, list[dict[str, object]]] = {preset: [] for preset in cases}
+    radar = SlamConfig.preset("radar")
+    cases = {
+        "radar": radar,
+        "radar, without walls": radar.model_copy(update={"walls": WallsConfig()}),
+        f"radar, {CLASSIC}": SlamConfig.preset("cartographer"),
+    }
+    found: dict[str, list[dict[str, object]]] = {case: [] for case in cases}
     walks = []
     for path in track(paths, "radar walks"):
         log, (times, poses) = Log.read(path), read_tum(path / "reference.tum")
         truth = planar(poses)[np.abs(times[None] - log.times[:, None]).argmin(axis=1)]
-        for preset, rows in found.items():
-            rows.append(row(path.parent.name, log, truth, SlamConfig.preset(preset)))
+        for case, config in cases.items():
+            found[case].append(row(path.parent.name, log, truth, config))
         about = read_json(path / "run.json")["recording_attributes"]
-        walks.append(Walk(about.get("scene", "-"), about.get("seed"), rows[-1]["path m"], "engine" in about))
+        walks.append(Walk(about.get("scene", "-"), about.get("seed"), found["radar"][-1]["path m"], "engine" in about))
     summary = []
-    for preset, rows in found.items():
-        worst, case = max(rows, key=itemgetter("ATE m")), cases[preset]
+    for case, rows in found.items():
+        worst = max(rows, key=itemgetter("ATE m"))
         summary.append({"case": f"{case}, mean of {len(rows)} walks", **pd.DataFrame(rows).mean(numeric_only=True)})
         summary.append(worst | {"case": f"{case}, the worst: {worst['case']}"})
     return summary, walks

@@ -4,6 +4,7 @@ The plans are made of lidar logs (`radarsim scene import`), which `benchmarks.sl
 preset `lidar` was chosen on their scans, but nothing of the radar's was.
 """
 
+import argparse
 import shutil
 from functools import cache
 from pathlib import Path
@@ -34,24 +35,27 @@ from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
 from radarsim.scene.importers import import_scene
 
-SPECIFICATION = Path(__file__).with_suffix(".yaml")
 #: Lidar logs by the name of the building that is made of them.
 PLANS = {name: SHARED / "radish" / f"{name}-corrected.log.gz" for name in ("intel", "orebro")}
 #: s: spans over which claims of poses are followed; the longest that a walk of a minute has a few of.
 SPANS = (1, 10, 50)
-WORST = "![The worst walk of each platform, its headings, and how many bearings see anything](unseen.png)"
+WORST = "![The worst walk of each platform, its headings, and how many bearings see anything]({})"
+GOALS = (
+    "To reach: odometry 0.20 m, 0.04 rad, by hand 0.30 m; SLAM 0.08 m, 0.02 rad, no walk over 0.3 m, none over 1.05 x "
+    "odometry; map F1 85 %; NEES 0.9 to 1.1 of velocities, 0.8 to 1.25 of poses."
+)
 #: m: no walk is to be off by more; and as a share of odometry's error, no SLAM.
 LOST, WORSE = 0.30, 1.05
 
 
-def recorded(folder: Path, workers: int | None) -> DataSet:
-    """The recordings, made as far as they are not there."""
+def recorded(walks: Path, folder: Path, workers: int | None) -> DataSet:
+    """The recordings that a specification lists, made as far as they are not there."""
     plans = folder / "plans"
     plans.mkdir(parents=True, exist_ok=True)
     for name, log in PLANS.items():
         if not (plans / f"{name}.yaml").is_file():
             import_scene(log, plans)
-    specification = Specification.load(shutil.copy(SPECIFICATION, plans))
+    specification = Specification.load(shutil.copy(walks, plans))
     with progress("recordings") as report:
         make(specification, folder, workers=workers, progress=report)
     return DataSet.load(folder)
@@ -139,10 +143,10 @@ def tables(study: Study) -> list[Table]:
         "Mean error after alignment, mean over walks +- its standard error. NEES: squared error over the claimed "
         "variance, per dimension, of all frames and windows, 1 if that is right; in brackets the median over its "
         "expectation. Of SLAM: of poses since the start, mean and median over walks.",
-        f"To reach: odometry 0.20 m, 0.04 rad, by hand 0.30 m; SLAM 0.08 m, 0.02 rad, no walk over {LOST:g} m, none "
-        f"over {WORSE:g} x odometry; map F1 85 %; NEES 0.9 to 1.1 of velocities, 0.8 to 1.25 of poses.",
+        study.benchmark.about,
     ]
-    return [Table("Walks never looked at, by platform and building", groups, notes), Table("Walk by walk", walks, [])]
+    first = Table(f"{study.benchmark.title}, by platform and building", groups, notes)
+    return [first, Table("Walk by walk", walks, [])]
 
 
 def draw(study: Study) -> Figure:
@@ -173,26 +177,35 @@ def draw(study: Study) -> Figure:
     return figure
 
 
-PARSER = command_line(
-    __doc__,
-    folder=(Path("unseen"), "of the recordings, which are made if they are not there"),
-    output=(Path("unseen-runs"), "folder of the runs"),
-    workers=(2, "processes"),
-)
-
-
-def main() -> None:
-    options = PARSER.parse_args()
-    data = recorded(options.folder, options.workers)
-    benchmark = Benchmark("Walks never looked at", "", Chosen.by_odometry, tables)
-    chosen = Options(tuple(BEST.values()), workers=options.workers, command=command("python -m benchmarks.unseen"))
+def judge(name: str, title: str, goals: str, options: argparse.Namespace) -> None:
+    """Make the recordings of the specification of a script's name, run the pipeline on them, and write the page."""
+    data = recorded(Path(__file__).with_name(f"{name}.yaml"), options.folder, options.workers)
+    benchmark = Benchmark(title, goals, Chosen.by_odometry, tables)
+    chosen = Options(tuple(BEST.values()), workers=options.workers, command=command(f"python -m benchmarks.{name}"))
     study = Study.plan(benchmark, data, options.output, chosen)
     with progress("runs") as report:
         carry_out([study], report)
-    draw(study).savefig(FOLDER / "unseen.png", dpi=70)
+    draw(study).savefig(FOLDER / f"{name}.png", dpi=70)
     results = study.publish()
-    results.notes.append(WORST)
-    print(results.write(FOLDER, "unseen").read_text())
+    results.notes.append(WORST.format(f"{name}.png"))
+    print(results.write(FOLDER, name).read_text())
+
+
+def parser(about: str | None, name: str) -> argparse.ArgumentParser:
+    """Options of a script of that name."""
+    return command_line(
+        about,
+        folder=(Path(name), "of the recordings, which are made if they are not there"),
+        output=(Path(f"{name}-runs"), "folder of the runs"),
+        workers=(2, "processes"),
+    )
+
+
+PARSER = parser(__doc__, "unseen")
+
+
+def main() -> None:
+    judge("unseen", "Walks never looked at", GOALS, PARSER.parse_args())
 
 
 if __name__ == "__main__":

@@ -1,6 +1,7 @@
 """Headless Chromium, driven over its debugging pipe (Chrome DevTools Protocol), which needs no library."""
 
 import base64
+import contextlib
 import json
 import os
 import shutil
@@ -9,9 +10,13 @@ import time
 from pathlib import Path
 
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-#: What an evaluation answers while the page is left for another.
+#: How answers begin while the page is left for another.
 _LEAVING = ("Inspected target navigated or closed", "Execution context was destroyed", "Cannot find context")
 _FLAGS = "--headless --no-sandbox --disable-gpu --no-first-run --disable-background-networking --disable-sync"
+
+
+class Leaving(Exception):
+    """The page is left for another, and answers nothing."""
 
 
 class Browser:
@@ -62,17 +67,12 @@ class Browser:
     def wait(self, expression: str, patience: float = 60.0) -> None:
         """Wait until an expression is true in the page."""
         deadline = time.monotonic() + patience
-        while not self._true(expression):
+        while True:
+            with contextlib.suppress(Leaving):
+                if self.evaluate(expression):
+                    return
             assert time.monotonic() < deadline, f"{expression} did not become true; {self.errors}"
             time.sleep(0.1)
-
-    def _true(self, expression: str) -> bool:
-        try:
-            return bool(self.evaluate(expression))
-        except AssertionError as error:
-            if not any(said in str(error) for said in _LEAVING):
-                raise
-            return False
 
     def screenshot(self, path: Path) -> None:
         """Write what the page looks like (PNG)."""
@@ -87,6 +87,8 @@ class Browser:
         while True:
             answer = self._message()
             if answer.get("id") == self._number:
+                if answer.get("error", {}).get("message", "").startswith(_LEAVING):
+                    raise Leaving(answer)
                 assert "error" not in answer, answer
                 return answer["result"]
             self._note(answer)

@@ -27,9 +27,9 @@ from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.evaluation.motion import velocity_errors
 from radarize.evaluation.trajectory import trajectory, yaws
 from radarize.methods.registry import BEST
+from radarize.odometry.claims import Claims
 from radarize.pose import Pose, between, wrap
 from radarize.runfolder import RunFolder
-from radarize.slam.odometry import Drift
 from radarize.tum import planar
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
@@ -62,23 +62,18 @@ def recorded(walks: Path, folder: Path, workers: int | None) -> DataSet:
     return DataSet.load(folder)
 
 
-def pose_nees(
-    poses: Pose, true: Pose, steps: Float[np.ndarray, "frame 3 3"], starts: range, length: int
-) -> Float[np.ndarray, "window"]:
+def pose_nees(poses: Pose, true: Pose, claims: Claims, starts: range, length: int) -> Float[np.ndarray, "window"]:
     """Squared error of a motion over windows of some frames over what it claims, per dimension.
 
     Args:
         poses, true: of each frame.
-        steps: claimed covariance of each step since the frame before, in the frame of the pose.
+        claims: of the steps between poses.
         starts: of the windows.
         length: of each, frames.
     """
-    first, drift = np.array(starts), Drift(0.0)
-    for pose, step in zip(poses, steps, strict=True):
-        drift.add(pose, step, 0.0)
-    claimed = np.stack([drift.between(start, start + length) for start in starts])
+    first = np.array(starts)
     moved, truly = (between(some[first], some[first + length]) for some in (poses, true))
-    return normalised(between(truly, moved), claimed)
+    return normalised(between(truly, moved), claims.motions(poses, first, length))
 
 
 def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:
@@ -113,7 +108,7 @@ def _nees(run: Path, span: float) -> np.ndarray:
     times, poses = folder.odometry
     rate = 1 / np.median(np.diff(times))
     starts = range(0, len(times) - round(span * rate), round(rate))
-    return pose_nees(planar(poses), true_poses(folder), folder.scans["step_covariance"], starts, round(span * rate))
+    return pose_nees(planar(poses), true_poses(folder), folder.claims, starts, round(span * rate))
 
 
 def _mean_and_median(runs: list[Path], span: float) -> tuple[float, float]:

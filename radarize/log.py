@@ -11,6 +11,7 @@ from jaxtyping import Float
 from radarize.errors import InputError
 from radarize.files import regular
 from radarize.npyfile import read_npz
+from radarize.odometry.claims import Claims
 from radarize.runfolder import RunFolder, RunWriter
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
@@ -30,6 +31,7 @@ class Log:
         ranges: m; inf: nothing seen; nan: not known.
         odometry_times, odometry: s; x, y (m) and yaw (rad).
         covariances: of each motion since the odometry entry before, in the later one's frame; None: not known.
+        claims: how far motions over several entries may be off; None: not known.
     """
 
     times: Float[np.ndarray, "scan"]
@@ -38,6 +40,7 @@ class Log:
     odometry_times: Float[np.ndarray, "pose"]
     odometry: Float[np.ndarray, "pose 3"]
     covariances: Float[np.ndarray, "pose 3 3"] | None = None
+    claims: Claims | None = None
 
     @classmethod
     def read(cls, scans: Path, odometry: Path | None = None) -> "Log":
@@ -52,22 +55,22 @@ class Log:
         Raises:
             InputError: a file or field is missing or is not as described.
         """
-        scans, moved, covariances = Path(scans), odometry and read_tum(odometry), None
+        scans, moved, covariances, claims = Path(scans), odometry and read_tum(odometry), None, None
         if scans.is_dir():
             run = RunFolder(scans)
             moved = moved or run.odometry
             if not run.scans:
                 raise InputError(f"{scans}: has no scans.h5, expected a run with scans")
             times, azimuths, ranges = (run.scans[name].astype(float) for name in ("time", "azimuths", "ranges"))
-            covariances = run.scans.get("step_covariance")
+            covariances, claims = run.scans.get("step_covariance"), run.claims
         else:
             times, azimuths, ranges = _npz_scans(scans)
         if moved is None:
             return cls(times, azimuths, ranges, np.zeros(0), np.zeros((0, 3)))
         stamps, poses = moved
         if covariances is not None and len(covariances) != len(stamps):
-            covariances = None  # the odometry is another one
-        return cls(times, azimuths, ranges, stamps, planar(poses), covariances)
+            covariances = claims = None  # the odometry is another one
+        return cls(times, azimuths, ranges, stamps, planar(poses), covariances, claims)
 
     def feed(self, slam: Slam, progress: Callable[[int, int], None] = lambda done, total: None) -> None:
         """Give everything to a new session, in order of time, and finish it; `progress` takes scans done and in all."""

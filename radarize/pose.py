@@ -43,10 +43,14 @@ def transform(pose: Pose, points: Float[np.ndarray, "*n 2"]) -> Float[np.ndarray
     return points @ np.array([[cos, sin], [-sin, cos]]) + pose[:2]
 
 
-def adjoint(a: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+def adjoint(a: Pose) -> Float[np.ndarray, "*#batch 3 3"]:
     """Matrix that carries a small motion (x, y, yaw) in the frame of a into the frame that a is given in."""
-    cos, sin = np.cos(a[2]), np.sin(a[2])
-    return np.array([[cos, -sin, a[1]], [sin, cos, -a[0]], [0, 0, 1]])
+    cos, sin = np.cos(a[..., 2]), np.sin(a[..., 2])
+    found = np.zeros((*a.shape, 3))
+    found[..., 0, 0], found[..., 0, 1], found[..., 0, 2] = cos, -sin, a[..., 1]
+    found[..., 1, 0], found[..., 1, 1], found[..., 1, 2] = sin, cos, -a[..., 0]
+    found[..., 2, 2] = 1.0
+    return found
 
 
 def carried(covariance: Float[np.ndarray, "3 3"], motion: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

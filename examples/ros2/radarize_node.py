@@ -28,7 +28,8 @@ from radarize.capture.sensor import Sensor
 from radarize.capture.stream import follow
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.registry import Inputs, Workshop, best_methods, pace
-from radarize.pose import adjoint, between, compose, inverse
+from radarize.odometry.claims import Unknown
+from radarize.pose import between, compose, inverse
 from radarize.radar.presets import load_config
 from radarize.runfolder import OccupancyMap
 
@@ -60,7 +61,7 @@ class RadarizeNode(Node):
         self.odometry = self.create_publisher(Odometry, "odom", 10)
         self.transforms = self.create_publisher(TFMessage, "/tf", 10)
         self.maps = self.create_publisher(OccupancyGrid, "map", latched())
-        self._map_due, self._spread = -math.inf, np.zeros((3, 3))
+        self._map_due, self._unknown = -math.inf, Unknown()
 
     def run(self, stopping: threading.Event) -> None:
         """Follow the radar until it ends or ROS does."""
@@ -79,11 +80,11 @@ class RadarizeNode(Node):
             self.scans.publish(scan_message(float(stamp), ranges, radar.max_range, radar.frame_period))
         if not len(track.pose):
             return
-        for step, covariance in zip(track.step, track.covariance, strict=True):
-            back = adjoint(inverse(step))
-            self._spread = back @ self._spread @ back.T + covariance
+        claims = track.claims
+        for step in zip(track.step, claims.noise, claims.kept, claims.held, strict=True):
+            self._unknown.step(*step)
         stamp, pose = float(track.time[-1]), track.pose[-1]
-        self.odometry.publish(odometry_message(stamp, pose, track.velocity[-1], self._spread))
+        self.odometry.publish(odometry_message(stamp, pose, track.velocity[-1], self._unknown.covariance))
         node = slam.nodes[-1] if slam.nodes else None
         on_map = compose(slam.graph.poses[-1], between(slam.odometry.pose(node.time), pose)) if node else pose
         links = [transform(stamp, MAP, ODOM, compose(on_map, inverse(pose))), transform(stamp, ODOM, BASE, pose)]

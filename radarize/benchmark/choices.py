@@ -200,6 +200,21 @@ BEARINGS = {
 #: Six of RadarHD's training walks.
 REAL = {Walk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
 
+#: 60 s by robot in those buildings.
+ROBOTS = {
+    "A_0": (2106597204298039597,),
+    "A_1": (4007340081320726866,),
+    "B_0": (1933094628439845999,),
+    "B_1": (2579120282144327846,),
+    "C_0": (1366028506092312976, 8873525895446425793),
+    "D_0": (8800564068725671787,),
+    "D_1": (6016225555685628876,),
+    "office": (2286702663252877423, 1344538034185109547),
+}
+
+#: What odometry claims of motions over any time; but for a walk by hand in csail that is lost anyway.
+CLAIMS = WALLS | {scene: (*WALLS[scene], *seeds) for scene, seeds in ROBOTS.items()}
+
 #: What score closures need, each in three or six variants of the other settings, so that luck counts for less.
 CLOSURES = STRETCH | REAL
 
@@ -263,6 +278,7 @@ CHOICES = (
     Choice("what matches and closures count for in the back end's preset radar", BEARINGS | REAL),
     Choice("what closures count for in the preset radar, and how right matches are at best", EVERY | REAL),
     Choice("that walls tell headings in the preset radar, and how well they are known", WALLS | REAL),
+    Choice("what odometry claims of motions over any time", CLAIMS),
     Choice("by how much larger sines of azimuth are taken to match turns", STRETCH),
     Choice("how many rays tell whether a mirrored path is partly clear", {"office": (3,), "buildings/b": (3,)}),
     Choice("what is known of a turn while frames are missing", GAPS),

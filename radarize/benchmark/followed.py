@@ -9,6 +9,7 @@ import pandas as pd
 from jaxtyping import Float
 
 from radarize.evaluation.motion import turn_errors
+from radarize.odometry.claims import Claims
 from radarize.pose import Pose, wrap
 from radarize.runfolder import RunFolder
 from radarize.tum import planar
@@ -20,17 +21,17 @@ class Followed:
 
     Attributes:
         velocity, true_velocity: m/s, sensor frame; covariance: claimed, m^2/s^2.
-        turns: from the frame before, rad; variance: claimed, rad^2.
-        true_yaw: rad.
+        poses: by odometry; true_yaw: rad.
+        claims: of their motions.
         period: s, from frame to frame.
     """
 
     velocity: Float[np.ndarray, "frame 2"]
     covariance: Float[np.ndarray, "frame 2 2"]
     true_velocity: Float[np.ndarray, "frame 2"]
-    turns: Float[np.ndarray, "frame"]
-    variance: Float[np.ndarray, "frame"]
+    poses: Pose
     true_yaw: Float[np.ndarray, "frame"]
+    claims: Claims
     period: float
 
     @classmethod
@@ -42,24 +43,22 @@ class Followed:
         """
         folder = RunFolder(run)
         scans, (times, poses) = folder.scans, folder.odometry
-        yaw = planar(poses)[:, 2]
         return cls(
             scans["velocity"],
             scans["velocity_covariance"],
             scans["truth/velocity"][:, :2],
-            wrap(np.diff(yaw, prepend=yaw[0])),
-            scans["step_covariance"][:, 2, 2],
+            planar(poses),
             true_poses(folder)[:, 2],
+            folder.claims,
             float(np.median(np.diff(times))),
         )
 
     def turned(self, seconds: float) -> tuple[Float[np.ndarray, "window"], Float[np.ndarray, "window"]]:
-        """Errors of the yaw over all windows of a span (one frame at least), rad, and the claims of their frames, added
-        up as if independent, rad^2.
-        """
+        """Errors of the yaw over all windows of a span (one frame at least), rad, and their claimed variance, rad^2."""
         window = max(round(seconds / self.period), 1)
-        claimed = np.concatenate([[0.0], np.cumsum(self.variance[1:])])
-        return turn_errors(self.turns, self.true_yaw, window), claimed[window:] - claimed[:-window]
+        claimed = self.claims.motions(self.poses, np.arange(len(self.poses) - window), window)
+        turns = wrap(np.diff(self.poses[:, 2], prepend=0.0))
+        return turn_errors(turns, self.true_yaw, window), claimed[:, 2, 2]
 
 
 def true_poses(run: RunFolder) -> Pose:
@@ -70,7 +69,7 @@ def true_poses(run: RunFolder) -> Pose:
 
 def joined(found: Sequence[Followed]) -> dict[str, np.ndarray]:
     """Frames of several recordings, one after the other, by attribute."""
-    names = [each.name for each in fields(Followed) if each.name != "period"]
+    names = [each.name for each in fields(Followed) if each.name not in ("claims", "period")]
     return {name: np.concatenate([getattr(one, name) for one in found]) for name in names}
 
 

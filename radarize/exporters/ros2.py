@@ -20,8 +20,9 @@ from radarize.errors import InputError
 from radarize.exporters.bagwriter import BagWriter, header, message, vector
 from radarize.heatmaps import Heatmaps
 from radarize.log import Log
+from radarize.odometry.claims import Unknown
 from radarize.points import COLUMNS
-from radarize.pose import between, carried
+from radarize.pose import between
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.tum import planar_poses
@@ -109,18 +110,19 @@ def _scans(log: Log, config: RadarConfig | None) -> Iterator[Event]:
 
 
 def _odometry(log: Log) -> Iterator[Event]:
-    """Odometry with the covariance that its steps add up to, and as a transform."""
-    poses, spread = planar_poses(log.odometry), np.zeros((3, 3))
+    """Odometry with the covariance of the way since the start, and as a transform."""
+    poses, claims, unknown = planar_poses(log.odometry), log.claims, Unknown()
     for k, (time, pose) in enumerate(zip(log.odometry_times, log.odometry, strict=True)):
         velocity = np.zeros(3)
         if k:
             step = between(log.odometry[k - 1], pose)
             velocity = step / (time - log.odometry_times[k - 1])
-            spread = carried(spread, step) + (0 if log.covariances is None else log.covariances[k])
+            if claims is not None:
+                unknown.step(step, claims.noise[k], claims.kept[k], claims.held[k])
         c, s = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])  # on the axes of the odometry's own frame
         twist = np.array([velocity[0], velocity[1], 0, 0, 0, velocity[2]])
-        yield time, "/odom", _odometry_message(time, ODOM, BASE, poses[k], twist, turn @ spread @ turn.T)
+        yield time, "/odom", _odometry_message(time, ODOM, BASE, poses[k], twist, turn @ unknown.covariance @ turn.T)
         yield time, "/tf", message("tf2_msgs/msg/TFMessage", transforms=[_transform(time, ODOM, BASE, poses[k])])
 
 

@@ -7,6 +7,7 @@ cloned states. Windows overlap, so that as many of them as fit into one are beli
 import numpy as np
 
 from radarize.features.windows import spaced
+from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track
 from radarize.odometry.ties import Ties
 from radarize.pose import between
@@ -76,4 +77,5 @@ class Displacements:
 def joined(times: np.ndarray, track: list[tuple[np.ndarray, ...]], turn_seen: bool = False) -> Track:
     """What `Displacements.next` said of every frame; turns are seen with displacements, or always."""
     *values, seen = (np.stack(each) for each in zip(*track, strict=True))
-    return Track(times, *values, seen, seen | turn_seen)
+    pose, step, spread, *velocity = values
+    return Track(times, pose, step, spread, *velocity, seen, seen | turn_seen, Claims.independent(spread))

@@ -8,10 +8,11 @@ from jaxtyping import Bool, Float
 
 from radarize.batch import Batch
 from radarize.errors import InputError
+from radarize.odometry.claims import Claims, half_turned
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
 from radarize.plain import Frozen, setting
-from radarize.pose import compose, exponential, inverse
+from radarize.pose import compose, exponential
 from radarize.radar.config import RadarConfig
 from radarize.stopwatch import stage
 
@@ -23,8 +24,9 @@ _BRIDGED, _SMOOTH = 0.32, 1.0
 _STEADY = 0.1
 #: s, for which errors of velocities last, as exp(-t / it), those in a row being of the same echoes: so claims of steps
 #: add up to those of a way (chosen on seven walks of 60 s, by hand in A to D of seeds 301 to 304 and by cart in A to C,
-#: where claims of independent errors had a NEES of 4 to 19 over a second).
-_LASTING = 0.25
+#: where claims of independent errors had a NEES of 4 to 19 over a second). Less where claims know of each other, and of
+#: what lasts longer (chosen on the walks of `radarize.benchmark.choices.CLAIMS`).
+_LASTING, _LASTING_BESIDE = 0.25, 0.06
 
 
 class VelocityEstimator(Protocol):
@@ -61,11 +63,12 @@ class Track:
         time: (frame,) burst centres, s.
         pose: (frame, 3) x, y (m) and yaw (rad, wrapped), the first frame of all being the origin.
         step: (frame, 3) motion since the frame before, in its sensor frame: x, y (m), yaw (rad).
-        covariance: (frame, 3, 3) of `step`, in the frame at its end.
+        covariance: (frame, 3, 3) of `step`, in the frame at its end, for those who take steps for independent.
         velocity: (frame, 2) filtered, m/s, sensor frame.
         velocity_covariance: (frame, 2, 2), m^2/s^2.
         velocity_seen, turn_seen: (frame,) False where odometry was blind: nothing determined the velocity at the frame,
             or the turn since the one before; what stands there is what went before.
+        claims: how far motions over any frames may be off.
     """
 
     time: Float[np.ndarray, "frame"]
@@ -76,6 +79,7 @@ class Track:
     velocity_covariance: Float[np.ndarray, "frame 2 2"]
     velocity_seen: Bool[np.ndarray, "frame"]
     turn_seen: Bool[np.ndarray, "frame"]
+    claims: Claims
 
 
 class VelocityConfig(Frozen):
@@ -155,23 +159,24 @@ class Odometry:
     def _integrate(self, times: np.ndarray, velocities: Velocities, rotations: Rotations) -> Track:
         frames = len(times)
         pose, step, covariance = np.empty((frames, 3)), np.zeros((frames, 3)), np.zeros((frames, 3, 3))
+        noise = np.zeros((frames, 3, 3))
         for i in range(frames):
             velocity, spread = velocities.velocity[i], velocities.covariance[i]
             if self._last is not None:
                 time, last_velocity, last_spread = self._last
                 dt = times[i] - time
                 step[i] = exponential(dt * (last_velocity + velocity) / 2, rotations.yaw[i])
-                # Who has turned by more than is thought has gone into another direction, too, by half as much.
-                x, y, _ = inverse(step[i])
-                turned = np.array([y / 2, -x / 2, 1.0])
-                unsure = min(rotations.variance[i] + (self.rotation.lag * rotations.yaw[i]) ** 2, np.pi**2)
-                covariance[i] = unsure * np.outer(turned, turned)
-                covariance[i, :2, :2] += dt**2 / np.tanh(dt / (2 * _LASTING)) * (last_spread + spread) / 2
-                covariance[i, :2, :2] += np.eye(2) * _BRIDGED**2 * dt**3 / 12 * dt**2 / (dt**2 + _SMOOTH**2)
+                half, lag = half_turned(step[i]), (self.rotation.lag * rotations.yaw[i]) ** 2
+                apart = (covariance, rotations.variance, _LASTING), (noise, rotations.noise, _LASTING_BESIDE)
+                for claimed, turned, lasting in apart:
+                    claimed[i] = min(turned[i] + lag, np.pi**2) * np.outer(half, half)
+                    claimed[i, :2, :2] += dt**2 / np.tanh(dt / (2 * lasting)) * (last_spread + spread) / 2
+                    claimed[i, :2, :2] += np.eye(2) * _BRIDGED**2 * dt**3 / 12 * dt**2 / (dt**2 + _SMOOTH**2)
             self._last = (times[i], velocity, spread)
             self._pose = pose[i] = compose(self._pose, step[i])
+        claims = Claims(noise, rotations.kept, rotations.held)
         seen = velocities.seen, rotations.seen
-        return Track(times, pose, step, covariance, velocities.velocity, velocities.covariance, *seen)
+        return Track(times, pose, step, covariance, velocities.velocity, velocities.covariance, *seen, claims)
 
 
 def intervals(times: Float[np.ndarray, "frame"], last: float | None) -> Float[np.ndarray, "frame"]:

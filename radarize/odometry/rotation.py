@@ -48,12 +48,15 @@ _SIGMAS = 3.0
 _INDEPENDENT = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
 _ASTRAY = np.radians(45.0)
-#: rad/s^0.5, what every step claims.
-_JITTER = np.radians(0.6)
+#: rad/s^0.5: what every step claims, taken for independent; and what a heading is off by that nothing takes back,
+#: chosen on the walks of `radarize.benchmark.choices.CLAIMS`.
+_JITTER, _DRIFT = np.radians(0.6), np.radians(0.3)
 #: m to either side of a wall's flash, where it hides the rest.
 _RING = 0.1
 #: See `radarize.odometry.integration.RotationEstimator`, of those that do not know by how much they lag.
 LAG = 0.2
+#: Of the first frame of all, what `Rotations` says.
+_FIRST = (0.0, 0.0, True, 0.0, 1.0, 0.0)
 #: Places in the filter of the turning rate, and of the angle at which the map lies.
 _RATE, _MAP = 1, 2
 
@@ -64,14 +67,25 @@ class Rotations:
 
     Attributes:
         yaw: (frame,) rad, positive to the left; zero for the very first frame.
-        variance: (frame,) rad^2.
+        variance: (frame,) rad^2, for those who take turns for independent.
         seen: (frame,) False where nothing was measured of it: the turn is what went before, or what a network makes of
             next to no echoes, which may be off by all that the sensor turned.
+        noise, kept, held: (frame,) how their errors go on, as in `radarize.odometry.claims.Claims`; noise: rad^2.
     """
 
     yaw: Float[np.ndarray, "frame"]
     variance: Float[np.ndarray, "frame"]
     seen: Bool[np.ndarray, "frame"]
+    noise: Float[np.ndarray, "frame"]
+    kept: Float[np.ndarray, "frame"]
+    held: Float[np.ndarray, "frame"]
+
+    @classmethod
+    def independent(
+        cls, yaw: Float[np.ndarray, "frame"], variance: Float[np.ndarray, "frame"], seen: Bool[np.ndarray, "frame"]
+    ) -> "Rotations":
+        """Turns whose errors know nothing of each other."""
+        return cls(yaw, variance, seen, variance, np.ones(len(yaw)), np.zeros(len(yaw)))
 
 
 class RotationConfig(Frozen):
@@ -167,18 +181,21 @@ class MapRotation:
     def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
         """Yaw increments of the next frames, given their velocities."""
         told = None if self._prior is None else self._doubted(self._prior.estimate(batch, velocities))
-        yaw, variance, seen = np.zeros(len(batch)), np.zeros(len(batch)), np.ones(len(batch), bool)
+        turns = []
         shown = zip(self.features(batch.spectrum), self.echoes(batch.spectrum), strict=True)
         for i, (feature, echoes) in enumerate(shown):
             view = View(feature, self._ranges, self._bearing_sines)
             time, velocity = float(batch.centers[i]), velocities.velocity[i]
             dt = self.settings.memory if self._time is None else time - self._time
-            if self._time is not None:
+            if self._time is None:
+                turns.append(_FIRST)
+            else:
                 turn = None if told is None else (told.yaw[i], told.variance[i])
-                yaw[i], variance[i], seen[i] = self._turn(view, time, dt, velocity, turn, echoes)
+                turns.append(self._turn(view, time, dt, velocity, turn, echoes))
             self._join(view, -np.expm1(-dt / self.settings.memory))
             self._time, self._velocity = time, velocity
-        return Rotations(yaw, variance, seen)
+        yaw, variance, seen, *lasting = np.array(turns, float).reshape(-1, len(_FIRST)).T
+        return Rotations(yaw, variance, seen.astype(bool), *lasting)
 
     def _doubted(self, told: Rotations) -> Rotations:
         """What a network says; where frames are missing none has spoken, but what is known of how turning rates
@@ -193,11 +210,12 @@ class MapRotation:
         velocity: Float[np.ndarray, "2"],
         told: tuple[float, float] | None,
         echoes: list[Echo],
-    ) -> tuple[float, float, bool]:
-        """Yaw increment to a frame `dt` s after the last one, its variance, and whether anything told it."""
+    ) -> tuple[float, float, bool, float, float, float]:
+        """What `Rotations` says of a frame `dt` s after the last one."""
         state, mean = self._state, (self._velocity + velocity) / 2
         start, laid, known = state.mean[YAW], self._laid, state.covariance[YAW, YAW]
         self._predict(dt, told)
+        expected = state.covariance[YAW, YAW]
         self._bearings.move(dt, mean)
         seen = self._bearings.see(time, echoes, velocity)
         self._start, self._way = np.array([*self._position, (laid + self._laid) / 2]), np.array([*(dt * mean), 0.0])
@@ -205,9 +223,11 @@ class MapRotation:
         seen = self._match(view) or seen
         # A heading that becomes surer is corrected, by as much as its variance falls, on average: by news of the steps
         # before, which is no turn of this one. Whoever has corrected those steps by himself has to know of it.
-        change = abs(state.covariance[YAW, YAW] - known)
-        wander = _JITTER if seen else self.settings.unseen
-        return state.mean[YAW] - start, change + wander**2 * dt, seen
+        held = state.covariance[YAW, YAW]
+        wander, drift = (_JITTER, _DRIFT) if seen else (self.settings.unseen, self.settings.unseen)
+        # A filter's gain leaves as much of an error as of its variance.
+        kept = min(held / expected, 1.0) if expected > 0 else 1.0
+        return state.mean[YAW] - start, abs(held - known) + wander**2 * dt, seen, drift**2 * dt, kept, held
 
     @property
     def _laid(self) -> float:

@@ -4,6 +4,7 @@ size for."""
 import json
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from radarize.hdf5 import dataset, open_hdf5
 from radarize.health import Condition
 from radarize.jsonfile import read_json
 from radarize.odometry.blindness import BlindSpans
+from radarize.odometry.claims import Claims
 from radarize.plain import complaint
 from radarize.replacing import write_whole
 from radarize.runfolder.occupancy import OccupancyMap
@@ -36,6 +38,9 @@ SHAPES = {
     "velocity_seen": "scan",
     "turn_seen": "scan",
     "step_covariance": "scan 3 3",
+    "claims/noise": "scan 3 3",
+    "claims/kept": "scan",
+    "claims/held": "scan",
     "trajectory_covariance": "pose 3 3",
     "truth/velocity": "scan 2+",
     "truth/scan": "scan true_beam",
@@ -164,6 +169,14 @@ class RunFolder:
     def scans(self) -> "Scans":
         """Data sets of ``scans.h5``; none without."""
         return Scans(self.path / "scans.h5") if self.has("scans.h5") else Scans()
+
+    @cached_property
+    def claims(self) -> Claims | None:
+        """Of odometry, of every scan; steps of old runs know nothing of each other. None where nothing is claimed."""
+        names = [f"claims/{each.name}" for each in fields(Claims)]
+        if self.scans.keys() >= {*names}:
+            return Claims(*(self.scans[name] for name in names))
+        return Claims.independent(self.scans["step_covariance"]) if "step_covariance" in self.scans else None
 
     @cached_property
     def map(self) -> OccupancyMap | None:

@@ -91,6 +91,9 @@ class RunWriter:
         self.extend("velocity", track.velocity, "m/s, sensor frame")
         self.extend("velocity_covariance", track.velocity_covariance, "m^2/s^2")
         self.extend("step_covariance", track.covariance, "m^2, m rad, rad^2: of odometry since before")
+        self.extend("claims/noise", track.claims.noise, "m^2, m rad, rad^2: of odometry since before")
+        self.extend("claims/kept", track.claims.kept, "share of the heading's error before")
+        self.extend("claims/held", track.claims.held, "rad^2: of the heading's error")
         self.write_poses("odometry", (track.time, planar_poses(track.pose)))
 
     def describe(self, recording: Recording, heatmaps: Heatmaps) -> None:

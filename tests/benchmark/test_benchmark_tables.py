@@ -18,6 +18,7 @@ from radarize.errors import InputError
 from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.evaluation.trajectory import trajectory
 from radarize.methods.registry import Weights
+from radarize.odometry.claims import Claims
 from radarize.tum import planar_poses
 from radarsim.dataset.specification import Specification
 from tests.benchmark.rooms import write_rooms
@@ -74,9 +75,9 @@ def followed(length: float, speed: float, turn: float, frames: int = 40) -> tupl
         velocity + [speed, 0],
         np.tile(np.eye(2) * 0.01, (frames, 1, 1)),
         velocity,
-        zero + turn,
-        zero + 1e-4,
+        np.column_stack([zero, zero, turn * np.arange(frames)]),
         zero,
+        Claims.independent(np.tile(np.eye(3) * 1e-4, (frames, 1, 1))),
         1 / 30,
     )
     return found, errors.summary()

@@ -5,6 +5,7 @@ import numpy as np
 from radarize.batch import Batch
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.registry import ODOMETRY, SCANS, Inputs, Method
+from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track
 from radarize.pose import between
 from radarize.tum import planar
@@ -23,7 +24,8 @@ class Scaled:
         rows = np.searchsorted(self.times, batch.stamps)
         velocity = self.steps[rows, :2] / self.period
         square, seen = np.tile(np.eye(3) * 1e-4, (len(batch), 1, 1)), np.ones((2, len(batch)), bool)
-        return Track(batch.centers, self.poses[rows], self.steps[rows], square, velocity, square[:, :2, :2], *seen)
+        known = square, velocity, square[:, :2, :2], *seen, Claims.independent(square)
+        return Track(batch.centers, self.poses[rows], self.steps[rows], *known)
 
 
 class Metre:

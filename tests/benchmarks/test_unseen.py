@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 
 from benchmarks.unseen import pose_nees
+from radarize.odometry.claims import Claims
 from radarize.pose import compose
 
 FRAMES, WALKS = 40, 800
 
 
-def test_claims_of_steps_add_up_to_those_of_poses():
+def test_claims_of_steps_add_up_to_those_of_poses(monkeypatch):
     """Steps of a walk in a curve whose errors are drawn as claimed: 1 over any span, and 4 if they claim half."""
+    monkeypatch.setattr("radarize.odometry.claims._SCALE", 0.0)
     rng = np.random.default_rng(0)
     half = np.array([[0.002, 0.0, 0.0], [0.0006, 0.001, 0.0], [0.0, 0.0004, 0.001]])
     step, steps = np.array([0.1, 0.02, 0.08]), np.broadcast_to(half @ half.T, (FRAMES, 3, 3))
@@ -20,7 +22,8 @@ def test_claims_of_steps_add_up_to_those_of_poses():
         poses[k] = compose(compose(poses[k - 1], step), rng.normal(size=(WALKS, 3)) @ half.T)
     for length in (5, FRAMES - 1):
         walks = range(WALKS)
-        found = [pose_nees(poses[:, walk], true[:, walk], steps, range(1), length) for walk in walks]
+        claims = Claims.independent(steps)
+        found = [pose_nees(poses[:, walk], true[:, walk], claims, range(1), length) for walk in walks]
         assert np.mean(found) == pytest.approx(1, abs=0.1)
-    quarter = pose_nees(poses[:, -1], true[:, -1], steps / 4, range(1), FRAMES - 1)
+    quarter = pose_nees(poses[:, -1], true[:, -1], Claims.independent(steps / 4), range(1), FRAMES - 1)
     assert quarter == pytest.approx(4 * found[-1])

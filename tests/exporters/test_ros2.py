@@ -15,6 +15,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.importers.companions import depth_picture
 from radarize.log import run as slam
 from radarize.mapping.scans import BEARINGS
+from radarize.odometry.claims import Claims
 from radarize.pose import compose, exponential
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
@@ -155,7 +156,8 @@ def test_covariance_adds_up_as_in_a_simulation():
     from radarize.log import Log
 
     rng, error = np.random.default_rng(1), np.diag([0.01, 0.02, 0.01]) ** 2
-    log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), np.tile(error, (COUNT, 1, 1)))
+    errors = np.tile(error, (COUNT, 1, 1))
+    log = Log(MIDDLE, BEARINGS, RANGES, MIDDLE, poses(), errors, Claims.independent(errors))
     claimed = [message for _, topic, message in _odometry(log) if topic == "/odom"][-1].pose.covariance.reshape(6, 6)
     walks = np.zeros((20_000, 3))
     for _ in range(COUNT - 1):

@@ -194,7 +194,7 @@ class Astray:
 
     def estimate(self, batch, velocities):
         count = len(batch)
-        return Rotations(self.turns, np.full(count, np.radians(0.1) ** 2), np.ones(count, bool))
+        return Rotations.independent(self.turns, np.full(count, np.radians(0.1) ** 2), np.ones(count, bool))
 
 
 def test_sliding_along_a_bare_wall_is_no_turn():

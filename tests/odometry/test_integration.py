@@ -174,7 +174,7 @@ def test_a_turn_that_nothing_is_seen_of_is_claimed():
 
     class Sure:
         def estimate(self, batch, velocities):
-            return Rotations(np.zeros(len(batch)), np.full(len(batch), 1e-8), np.ones(len(batch), bool))
+            return Rotations.independent(np.zeros(len(batch)), np.full(len(batch), 1e-8), np.ones(len(batch), bool))
 
     adc = record(CONFIG, nowhere, np.array([[2.0, 0.0, 0.0]]), np.zeros(1), stamps, rng, 20.0, block=16)
     result = classical(rotation=MapRotation(SIGNAL.heatmaps, prior=Sure())).follow(batch(SIGNAL, adc, stamps))
@@ -200,7 +200,7 @@ class Told:
         return self
 
     def rotation(self) -> "Told":
-        self.estimate = lambda batch, velocities: Rotations(
+        self.estimate = lambda batch, velocities: Rotations.independent(
             self.rate * np.diff(batch.stamps, prepend=batch.stamps[0]),
             np.full(len(batch), 1e-6),
             np.ones(len(batch), bool),
@@ -255,7 +255,7 @@ def test_an_unknown_turn_leaves_the_direction_unknown():
     sigma, told, draws = np.radians(6), np.radians(40), np.random.default_rng(7).normal(size=4000)
     found = []
     for spread in (0.0, sigma):
-        turns = Rotations(np.array([0, told]), np.array([0, spread**2]), np.ones(2, bool))
+        turns = Rotations.independent(np.array([0, told]), np.array([0, spread**2]), np.ones(2, bool))
         rotation = SimpleNamespace(lag=0.0, estimate=lambda *_, turns=turns: turns)
         times = np.array([0.0, 1.0])
         found.append(Odometry(CONFIG, Told().velocity(), rotation).follow(of_spectrum(SIGNAL, times, times)))

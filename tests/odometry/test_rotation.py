@@ -8,6 +8,7 @@ from scipy.ndimage import gaussian_filter, map_coordinates
 
 from radarize.batch import Signal
 from radarize.odometry.bearings import YAW
+from radarize.odometry.claims import Claims
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
@@ -113,7 +114,7 @@ class Unsure:
 
     def estimate(self, batch, velocities) -> Rotations:
         at = np.arange(len(batch)) == self.lost
-        return Rotations(self.turns, np.where(at, np.radians(20) ** 2, 1e-5), ~at)
+        return Rotations.independent(self.turns, np.where(at, np.radians(20) ** 2, 1e-5), ~at)
 
 
 def test_the_search_goes_as_far_as_the_prior_is_unsure():
@@ -134,7 +135,7 @@ def test_a_second_lost_in_a_bend(off):
     poses = np.stack([speed / rate * np.sin(yaw), speed / rate * (1 - np.cos(yaw)), yaw], axis=1)
     turn, claimed, seen = np.diff(yaw, prepend=0.0), np.full(60, 1e-5), np.ones(60, bool)
     turn[30], claimed[30], seen[30] = turn[30] + off, np.radians(41) ** 2, False
-    found = follow(times, poses, SimpleNamespace(estimate=lambda *_: Rotations(turn, claimed, seen)))
+    found = follow(times, poses, SimpleNamespace(estimate=lambda *_: Rotations.independent(turn, claimed, seen)))
     assert np.degrees(found.yaw[30:33].sum() - (yaw[32] - yaw[29])) == pytest.approx(0, abs=2)
     assert found.seen[30] and found.variance[30] < np.radians(5) ** 2
 
@@ -167,7 +168,7 @@ def test_a_correction_claims_what_it_takes_back():
     settings = RotationConfig(unseen=0)
     drift = np.radians(1.0) * rng.normal(size=frames)
     claimed = np.full(frames, np.radians(1.0) ** 2 / settings.doubt)
-    prior = SimpleNamespace(estimate=lambda *_: Rotations(drift, claimed, np.ones(frames, bool)))
+    prior = SimpleNamespace(estimate=lambda *_: Rotations.independent(drift, claimed, np.ones(frames, bool)))
     rotation = sightless(settings, prior)
     state, count = rotation._state, iter(range(1, frames))
 
@@ -181,6 +182,14 @@ def test_a_correction_claims_what_it_takes_back():
     told = found.seen & (np.arange(frames) > 0)  # and the radar never turned
     assert told.sum() == 149
     assert np.mean(found.yaw[told] ** 2 / found.variance[told]) == pytest.approx(1, abs=0.25)
+    # A turn over any time is off by the difference of the errors at its ends.
+    claims = Claims(found.noise[:, None, None] * np.diag([1.0, 1.0, 1.0]), found.kept, found.held)
+    heading = np.cumsum(found.yaw)
+    for length in (1, 5, 40):
+        starts = np.arange(100, frames - length)
+        claimed = claims.motions(np.zeros((frames, 3)), starts, length)[:, 2, 2]
+        assert np.mean((heading[starts + length] - heading[starts]) ** 2 / claimed) == pytest.approx(1, abs=0.2)
+    assert claimed.mean() < found.variance[200:240].sum() / 4
 
 
 def test_a_map_that_is_left_behind_is_empty():

@@ -10,6 +10,7 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.mapping.scans import BEARINGS
+from radarize.odometry.claims import Claims
 from radarize.pipeline import Result
 from radarize.radar.presets import PRESETS
 from radarize.runfolder import RunFolder, RunWriter
@@ -29,6 +30,7 @@ def result(first, count):
         covariance=np.tile(np.eye(3) * 1e-6, (count, 1, 1)), velocity=RNG.normal(size=(count, 2)),
         velocity_covariance=np.tile(np.eye(2) * 1e-4, (count, 1, 1)), velocity_seen=frames < 50,
         turn_seen=np.ones(count, bool),
+        claims=Claims(RNG.uniform(size=(count, 3, 3)), RNG.uniform(size=count), RNG.uniform(size=count)),
     )  # fmt: skip
     ranges = np.where(frames[:, None] % 2, 3 / np.cos(BEARINGS), np.inf)
     return Result(frames, track, ranges.astype(np.float32))
@@ -59,6 +61,9 @@ def test_what_is_written_is_read(tmp_path):
     run = RunFolder(tmp_path / "a" / "RUN")
     for name, of in {"time": "time", "velocity": "velocity", "step_covariance": "covariance"}.items():
         assert np.array_equal(run.scans[name], np.concatenate([getattr(each.track, of) for each in results]))
+    for name in ("noise", "kept", "held"):
+        claimed = np.concatenate([getattr(each.track.claims, name) for each in results])
+        assert np.array_equal(getattr(run.claims, name), claimed)
     assert np.array_equal(run.scans["frames"], [*range(21), *range(30, 70)])
     assert np.array_equal(run.scans["ranges"], np.concatenate([each.ranges for each in results]))
     times, poses = run.odometry

@@ -6,6 +6,7 @@ from jaxtyping import Float, Float16
 
 from radarize.batch import Batch
 from radarize.methods.published.maps import PublishedStream
+from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track
 from radarize.pose import between, wrap
 from radarize.stopwatch import stage
@@ -45,7 +46,7 @@ class PublishedOdometry:
         used, made = batch.made(self._stream.maps)
         if not len(used):
             none = np.zeros((0, 3))
-            return Track(np.zeros(0), none, none, np.zeros((0, 3, 3)), none[:, :2], np.zeros((0, 2, 2)), *_sure(0))
+            return _track(np.zeros(0), none, none, np.zeros((0, 3, 3)), none[:, :2], np.zeros((0, 2, 2)))
         with stage("translation"):
             velocity, velocity_noise = self._translation.estimate(window(self._translation, made)[:, None])
         with stage("rotation"):
@@ -72,7 +73,7 @@ class PublishedOdometry:
                 steps[i] = between(before, poses[i])
                 spreads[i, :2, :2] = dt**2 * velocity_noise[0].numpy()
             self._past = [*self._past[-CHAINS + 1 :], (time, poses[i].copy(), maps[i])]
-        return Track(times, poses, steps, spreads, velocity, velocity_noise.double().numpy(), *_sure(len(times)))
+        return _track(times, poses, steps, spreads, velocity, velocity_noise.double().numpy())
 
 
 def window(net: torch.nn.Module, made: dict[str, Float16[np.ndarray, "frame row azimuth"]]) -> torch.Tensor:
@@ -80,6 +81,7 @@ def window(net: torch.nn.Module, made: dict[str, Float16[np.ndarray, "frame row 
     return torch.stack([torch.from_numpy(made[name]).float() for name in net.maps], dim=1)
 
 
-def _sure(frames: int) -> np.ndarray:
-    """(2, frame): the artefact always takes velocity and turn for seen."""
-    return np.ones((2, frames), bool)
+def _track(times, poses, steps, spreads, velocity, velocity_spread) -> Track:
+    """The artefact always takes velocity and turn for seen, and steps for independent."""
+    seen = np.ones((2, len(times)), bool)
+    return Track(times, poses, steps, spreads, velocity, velocity_spread, *seen, Claims.independent(spreads))

@@ -100,7 +100,7 @@ class LearnedRotation:
             growth[i] = max(self._yaws.covariance[-2, -2] - known, 1e-8)
         told = (back > 0).any(axis=0)
         growth[told] *= self._alike
-        return Rotations(yaw, growth, told)
+        return Rotations.independent(yaw, growth, told)
 
     @torch.inference_mode()
     def turns(

@@ -9,6 +9,7 @@ from jaxtyping import Float
 from radarize.batch import Batch
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.method import Inputs
+from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track, intervals
 from radarize.odometry.ties import wandered
 from radarize.pipeline import Scanner
@@ -69,7 +70,8 @@ class ScanMatching:
                 poses[i], rates[i], spreads[i] = self._pose, self._rate, self._spread[3:, 3:]
                 moved[i] = between(before, self._pose)
         spread = spreads * steps[:, None, None] ** 2
-        return Track(centers, poses, moved, spread, rates[:, :2], spreads[:, :2, :2], seen, seen)
+        claims = Claims.independent(spread)
+        return Track(centers, poses, moved, spread, rates[:, :2], spreads[:, :2, :2], seen, seen, claims)
 
     def _step(self, scan: Scan, dt: float, turning: Float[np.ndarray, "2"]) -> bool:
         """Move on to the next scan, and to a rate of turning with its variance; whether there are points to match."""

@@ -56,9 +56,8 @@ class Followed:
     def turned(self, seconds: float) -> tuple[Float[np.ndarray, "window"], Float[np.ndarray, "window"]]:
         """Errors of the yaw over all windows of a span (one frame at least), rad, and their claimed variance, rad^2."""
         window = max(round(seconds / self.period), 1)
-        claimed = self.claims.motions(self.poses, np.arange(len(self.poses) - window), window)
         turns = wrap(np.diff(self.poses[:, 2], prepend=0.0))
-        return turn_errors(turns, self.true_yaw, window), claimed[:, 2, 2]
+        return turn_errors(turns, self.true_yaw, window), self.claims.turns(window)
 
 
 def true_poses(run: RunFolder) -> Pose:

@@ -43,6 +43,14 @@ class Claims:
         """One after the other."""
         return cls(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(cls)))
 
+    def turns(self, length: int) -> Float[np.ndarray, "window"]:
+        """Variance of the turn over so many steps after every frame that has as many after it, rad^2."""
+        first, last = slice(None, -length), slice(length, None)
+        noise = np.cumsum(self.noise[:, 2, 2])
+        kept = np.cumsum(np.log(np.maximum(self.kept, 1e-300)))
+        shared = self.held[first] * np.exp(kept[last] - kept[first])
+        return noise[last] - noise[first] + self.held[first] + self.held[last] - 2 * shared
+
     def motions(
         self, poses: Float[np.ndarray, "frame 3"], starts: Int[np.ndarray, "window"], length: int
     ) -> Float[np.ndarray, "window 3 3"]:

@@ -81,15 +81,28 @@ def test_a_way_is_unsure_by_a_share_of_itself_ahead_but_not_aside():
     assert np.sqrt(np.diag(unknown.covariance)) == pytest.approx([0, 10 * _SCALE, 0])
 
 
-def test_a_window_of_many_is_as_alone():
+@pytest.fixture
+def walk() -> tuple[np.ndarray, Claims]:
+    """Poses, and claims that change from step to step."""
     rng = np.random.default_rng(0)
     poses = np.cumsum(rng.normal(size=(FRAMES, 3)) * 0.05, axis=0)
-    held = rng.uniform(1e-4, 2e-4, FRAMES)
-    claims = Claims(np.tile(np.eye(3) * 1e-5, (FRAMES, 1, 1)), rng.uniform(0.5, 1, FRAMES), held)
+    noise = rng.uniform(1e-5, 2e-5, (FRAMES, 1, 1)) * np.eye(3)
+    return poses, Claims(noise, rng.uniform(0.5, 0.7, FRAMES), rng.uniform(1e-4, 2e-4, FRAMES))
+
+
+@pytest.mark.parametrize("length", [1, 7, FRAMES - 1])
+def test_turns_are_those_of_motions(walk, length):
+    poses, claims = walk
+    motions = claims.motions(poses, np.arange(FRAMES - length), length)
+    np.testing.assert_allclose(claims.turns(length), motions[:, 2, 2], rtol=1e-9)
+
+
+def test_a_window_of_many_is_as_alone(walk):
+    poses, claims = walk
     starts = np.array([0, 7, 30])
     together = claims.motions(poses, starts, 20)
     np.testing.assert_allclose(together, [claims.motions(poses, np.array([k]), 20)[0] for k in starts], rtol=1e-12)
-    unknown = Unknown(held[7])
+    unknown = Unknown(claims.held[7])
     for k in range(8, 28):
         unknown.step(between(poses[k - 1], poses[k]), claims.noise[k], claims.kept[k], claims.held[k])
     np.testing.assert_allclose(unknown.covariance, together[1], rtol=1e-9)

@@ -26,7 +26,7 @@ _STEADY = 0.1
 #: add up to those of a way (chosen on seven walks of 60 s, by hand in A to D of seeds 301 to 304 and by cart in A to C,
 #: where claims of independent errors had a NEES of 4 to 19 over a second). Less where claims know of each other, and of
 #: what lasts longer (chosen on the walks of `radarize.benchmark.choices.CLAIMS`).
-_LASTING, _LASTING_BESIDE = 0.25, 0.06
+_LASTING, _LASTING_BESIDE = 0.25, 0.08
 
 
 class VelocityEstimator(Protocol):

@@ -50,7 +50,7 @@ _INDEPENDENT = 50
 _ASTRAY = np.radians(45.0)
 #: rad/s^0.5: what every step claims, taken for independent; and what a heading is off by that nothing takes back,
 #: chosen on the walks of `radarize.benchmark.choices.CLAIMS`.
-_JITTER, _DRIFT = np.radians(0.6), np.radians(0.3)
+_JITTER, _DRIFT = np.radians(0.6), np.radians(0.35)
 #: m to either side of a wall's flash, where it hides the rest.
 _RING = 0.1
 #: See `radarize.odometry.integration.RotationEstimator`, of those that do not know by how much they lag.
@@ -214,8 +214,8 @@ class MapRotation:
         """What `Rotations` says of a frame `dt` s after the last one."""
         state, mean = self._state, (self._velocity + velocity) / 2
         start, laid, known = state.mean[YAW], self._laid, state.covariance[YAW, YAW]
+        state.remember(YAW)
         self._predict(dt, told)
-        expected = state.covariance[YAW, YAW]
         self._bearings.move(dt, mean)
         seen = self._bearings.see(time, echoes, velocity)
         self._start, self._way = np.array([*self._position, (laid + self._laid) / 2]), np.array([*(dt * mean), 0.0])
@@ -225,8 +225,7 @@ class MapRotation:
         # before, which is no turn of this one. Whoever has corrected those steps by himself has to know of it.
         held = state.covariance[YAW, YAW]
         wander, drift = (_JITTER, _DRIFT) if seen else (self.settings.unseen, self.settings.unseen)
-        # A filter's gain leaves as much of an error as of its variance.
-        kept = min(held / expected, 1.0) if expected > 0 else 1.0
+        kept = max(state.shared[YAW] / known, 0.0) if known > 0 else 1.0
         return state.mean[YAW] - start, abs(held - known) + wander**2 * dt, seen, drift**2 * dt, kept, held
 
     @property

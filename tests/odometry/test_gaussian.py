@@ -44,6 +44,37 @@ def test_against_least_squares():
     )
 
 
+def test_what_errors_share_with_one_as_it_was():
+    """Against many draws of the errors: of a number when it was remembered, and of all after what came since."""
+    rng, draws = np.random.default_rng(2), 200_000
+    half = np.array([[1.0, 0.0], [0.6, 0.8]])
+    filter_ = Gaussian(np.ones(2))
+    filter_.covariance = half @ half.T
+    errors = rng.normal(size=(draws, 2)) @ half.T  # estimates less what is true
+    was = errors[:, 0]
+    filter_.remember(0)
+
+    def update(row: np.ndarray, variance: float) -> None:
+        nonlocal errors
+        gain = filter_.covariance @ row / (row @ filter_.covariance @ row + variance)
+        off = np.sqrt(variance) * rng.normal(size=draws) - errors @ row
+        errors = errors + off[:, None] * gain
+        filter_.update(row, 0.0, variance)
+
+    update(np.array([1.0, -0.5]), 0.3)
+    row = np.array([0.4, 0.5])
+    filter_.add(1, row, 0.0, 0.2)
+    # What is added is truly the sum and noise, and estimated by the sum.
+    errors = np.column_stack([errors[:, 0], errors @ row - np.sqrt(0.2) * rng.normal(size=draws), errors[:, 1]])
+    update(np.array([0.0, 1.0, 1.0]), 0.1)
+    filter_.replace(2, np.array([0.5, 0.0, 0.5]))
+    errors[:, 2] = (errors[:, 0] + errors[:, 2]) / 2
+    filter_.keep([2, 0])
+    errors = errors[:, [2, 0]]
+    assert filter_.covariance == pytest.approx(np.cov(errors.T), abs=0.01)
+    assert filter_.shared == pytest.approx((errors * was[:, None]).mean(axis=0), abs=0.01)
+
+
 def test_what_is_far_off_moves_little():
     moved = []
     for innovation in (1.0, 3.0, 30.0):

@@ -225,6 +225,7 @@ class MapRotation:
         # before, which is no turn of this one. Whoever has corrected those steps by himself has to know of it.
         held = state.covariance[YAW, YAW]
         wander, drift = (_JITTER, _DRIFT) if seen else (self.settings.unseen, self.settings.unseen)
+        # The part of this error that the one before explains: regression of the filter's errors on each other.
         kept = max(state.shared[YAW] / known, 0.0) if known > 0 else 1.0
         return state.mean[YAW] - start, abs(held - known) + wander**2 * dt, seen, drift**2 * dt, kept, held
 

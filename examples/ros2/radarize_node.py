@@ -80,9 +80,8 @@ class RadarizeNode(Node):
             self.scans.publish(scan_message(float(stamp), ranges, radar.max_range, radar.frame_period))
         if not len(track.pose):
             return
-        claims = track.claims
-        for step in zip(track.step, claims.noise, claims.kept, claims.held, strict=True):
-            self._unknown.step(*step)
+        for k, step in enumerate(track.step):
+            self._unknown.step(step, track.claims, k)
         stamp, pose = float(track.time[-1]), track.pose[-1]
         self.odometry.publish(odometry_message(stamp, pose, track.velocity[-1], self._unknown.covariance))
         node = slam.nodes[-1] if slam.nodes else None

@@ -118,7 +118,7 @@ def _odometry(log: Log) -> Iterator[Event]:
             step = between(log.odometry[k - 1], pose)
             velocity = step / (time - log.odometry_times[k - 1])
             if claims is not None:
-                unknown.step(step, claims.noise[k], claims.kept[k], claims.held[k])
+                unknown.step(step, claims, k)
         c, s = np.cos(pose[2]), np.sin(pose[2])
         turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])  # on the axes of the odometry's own frame
         twist = np.array([velocity[0], velocity[1], 0, 0, 0, velocity[2]])

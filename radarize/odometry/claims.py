@@ -5,7 +5,7 @@ by the difference of the errors at its ends, and not by the sum of what each ste
 apart or a minute.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -38,11 +38,6 @@ class Claims:
         """Of steps that know nothing of each other."""
         return cls(covariance, np.ones(len(covariance)), np.zeros(len(covariance)))
 
-    @classmethod
-    def joined(cls, parts: list["Claims"]) -> "Claims":
-        """One after the other."""
-        return cls(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(cls)))
-
     def turns(self, length: int) -> Float[np.ndarray, "window"]:
         """Variance of the turn over so many steps after every frame that has as many after it, rad^2."""
         first, last = slice(None, -length), slice(length, None)
@@ -57,7 +52,7 @@ class Claims:
         """Covariance of the motions over so many steps after some frames, in the frame at their ends."""
         unknown = Unknown(self.held[starts])
         for k in (starts + i for i in range(1, length + 1)):
-            unknown.step(between(poses[k - 1], poses[k]), self.noise[k], self.kept[k], self.held[k])
+            unknown.step(between(poses[k - 1], poses[k]), self, k)
         return unknown.covariance
 
 
@@ -76,23 +71,20 @@ class Unknown:
         self._spread[..., 3, 3] = self._held
 
     def step(
-        self,
-        motion: Float[np.ndarray, "*#window 3"],
-        noise: Float[np.ndarray, "*#window 3 3"],
-        kept: Float[np.ndarray, "*#window"] | float,
-        held: Float[np.ndarray, "*#window"] | float,
+        self, motion: Float[np.ndarray, "*#window 3"], claims: Claims, frame: int | Int[np.ndarray, "window"]
     ) -> None:
-        """Go on by a step; its claims are a row of `Claims`."""
+        """Go on by the step to a frame of those that claims are of."""
+        noise, kept, held = claims.noise[frame], claims.kept[frame], claims.held[frame]
         half, move = half_turned(motion), np.zeros_like(self._spread)
         move[..., :3, :3] = adjoint(inverse(motion))
-        move[..., :3, 3] = half * (np.asarray(kept) - 1)[..., None]
+        move[..., :3, 3] = half * (kept - 1)[..., None]
         move[..., 3, 3] = kept
         news = np.maximum(held - np.square(kept) * self._held, 0.0)
         both = np.concatenate([half, np.ones_like(half[..., :1])], axis=-1)
         self._spread = move @ self._spread @ move.mT
         self._spread += news[..., None, None] * both[..., :, None] * both[..., None, :]
         self._spread[..., :3, :3] += noise
-        self._held, self._moved = np.asarray(held, float), compose(self._moved, motion)
+        self._held, self._moved = held, compose(self._moved, motion)
 
     @property
     def covariance(self) -> Float[np.ndarray, "*#window 3 3"]:

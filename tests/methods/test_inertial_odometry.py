@@ -46,7 +46,8 @@ def follow(name: str, recording: Recording, weights: Weights, cuts: list[int]) -
         parts.append(follower.follow(batch(inputs.signal, adc, times)))
         first += count
     *arrays, claims = zip(*(vars(part).values() for part in parts), strict=True)
-    return Track(*map(np.concatenate, arrays), Claims.joined(list(claims)))
+    joined = (np.concatenate(each) for each in zip(*(vars(part).values() for part in claims), strict=True))
+    return Track(*map(np.concatenate, arrays), Claims(*joined))
 
 
 class Truth:

@@ -75,9 +75,9 @@ def test_independent_steps_add_up():
 
 
 def test_a_way_is_unsure_by_a_share_of_itself_ahead_but_not_aside():
-    unknown = Unknown()
+    unknown, sure = Unknown(), Claims.independent(np.zeros((1, 3, 3)))
     for _ in range(50):
-        unknown.step(np.array([0.0, 0.2, 0.0]), np.zeros((3, 3)), 1.0, 0.0)
+        unknown.step(np.array([0.0, 0.2, 0.0]), sure, 0)
     assert np.sqrt(np.diag(unknown.covariance)) == pytest.approx([0, 10 * _SCALE, 0])
 
 
@@ -104,5 +104,5 @@ def test_a_window_of_many_is_as_alone(walk):
     np.testing.assert_allclose(together, [claims.motions(poses, np.array([k]), 20)[0] for k in starts], rtol=1e-12)
     unknown = Unknown(claims.held[7])
     for k in range(8, 28):
-        unknown.step(between(poses[k - 1], poses[k]), claims.noise[k], claims.kept[k], claims.held[k])
+        unknown.step(between(poses[k - 1], poses[k]), claims, k)
     np.testing.assert_allclose(unknown.covariance, together[1], rtol=1e-9)

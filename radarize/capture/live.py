@@ -14,9 +14,11 @@ from radarize.capture.record import Keeper
 from radarize.capture.stream import Stream, follow
 from radarize.capture.view import View
 from radarize.health import Health
+from radarize.mapping.scans import BEARINGS
 from radarize.methods.registry import Inputs, Workshop
 from radarize.recording import Losses
 from radarize.runfolder import OccupancyMap
+from radarize.slam.rehearsal import rehearse
 from radarize.stopwatch import stage
 
 if TYPE_CHECKING:
@@ -140,8 +142,8 @@ class Live:
 
 
 def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
-    """Make a pipeline fast from its first frame on: another one runs on noise before, so that whatever is compiled or
-    loaded at first use is there."""
+    """Make a pipeline fast from its first frame on: another one runs on noise before, and SLAM, which noise does not
+    move, through a room of its own, so that whatever is compiled or loaded at first use is there."""
     torch.set_num_threads(1)  # a frame is too little to share out: threads that wait for each other cost more
     pipeline, intake, radar = Workshop(inputs).pipeline(**methods), Intake(inputs.signal), inputs.radar
     view, rng = View(pipeline, inputs.signal), np.random.default_rng(0)
@@ -150,4 +152,5 @@ def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
         stamps = (intake.taken + np.arange(frames)) * radar.frame_period
         view.add(pipeline.push(intake.take(adc, stamps)))
     view.frame(view.pictures(adc[-1:], np.ones((1, *adc.shape[1:3]), bool)), 0.0)
+    rehearse(pipeline.slam.config, BEARINGS)
     return inputs

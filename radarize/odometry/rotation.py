@@ -48,9 +48,11 @@ _SIGMAS = 3.0
 _INDEPENDENT = 50
 #: rad; from this standard deviation on, the prediction says nothing of how the frame lies in the map.
 _ASTRAY = np.radians(45.0)
-#: rad/s^0.5: what every step claims, taken for independent; and what a heading is off by that nothing takes back,
-#: chosen on the walks of `radarize.benchmark.choices.CLAIMS`.
-_JITTER, _DRIFT = np.radians(0.6), np.radians(0.35)
+#: rad/s^0.5: what every step claims, taken for independent.
+_JITTER = np.radians(0.6)
+#: rad^0.5: what a heading is off by that nothing takes back, for what it has turned: 0.6 degrees a quarter turn. A
+#: sensor that stands or goes straight hardly drifts (chosen on the walks of `radarize.benchmark.choices.CLAIMS`).
+_DRIFT = 0.0086
 #: m to either side of a wall's flash, where it hides the rest.
 _RING = 0.1
 #: See `radarize.odometry.integration.RotationEstimator`, of those that do not know by how much they lag.
@@ -224,10 +226,11 @@ class MapRotation:
         # A heading that becomes surer is corrected, by as much as its variance falls, on average: by news of the steps
         # before, which is no turn of this one. Whoever has corrected those steps by himself has to know of it.
         held = state.covariance[YAW, YAW]
-        wander, drift = (_JITTER, _DRIFT) if seen else (self.settings.unseen, self.settings.unseen)
+        turned, unseen = state.mean[YAW] - start, self.settings.unseen**2 * dt
+        jitter, drift = (_JITTER**2 * dt, _DRIFT**2 * abs(turned)) if seen else (unseen, unseen)
         # The part of this error that the one before explains: regression of the filter's errors on each other.
         kept = max(state.shared[YAW] / known, 0.0) if known > 0 else 1.0
-        return state.mean[YAW] - start, abs(held - known) + wander**2 * dt, seen, drift**2 * dt, kept, held
+        return turned, abs(held - known) + jitter, seen, drift, kept, held
 
     @property
     def _laid(self) -> float:

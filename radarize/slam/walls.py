@@ -39,7 +39,7 @@ class Direction(NamedTuple):
     @classmethod
     def of(cls, points: Float[np.ndarray, "point 2"]) -> "Direction":
         """Of the walls that some points (m) lie on."""
-        piled = _piled(points[:: 1 + len(points) // _POINTS], _TURNS)
+        piled = _piled(np.ascontiguousarray(points[:: 1 + len(points) // _POINTS]), _TURNS)
         best = int(piled.argmax())
         before, at, after = piled[best - 1], piled[best], piled[(best + 1) % len(piled)]
         between = (before - after) / (2 * (before - 2 * at + after) or 1.0)

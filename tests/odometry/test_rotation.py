@@ -161,6 +161,18 @@ def test_what_a_network_makes_of_nothing_is_no_sight():
     assert np.sqrt(found.variance.sum()) > rotation.settings.unseen
 
 
+@pytest.mark.parametrize("rate", [10, 30])
+def test_who_turns_drifts_and_who_stands_hardly(rate):
+    """Nothing takes back 0.6 deg of a quarter turn, as often as frames come: 1.2 deg of a whole one."""
+    times = np.arange(0, 6, 1 / rate)
+    lasting = []
+    for turning in np.radians([0, 60]):
+        found = follow(times, np.stack([np.zeros(len(times)), np.zeros(len(times)), turning * times], axis=1))
+        assert found.seen.all()
+        lasting.append(np.degrees(np.sqrt(found.noise.sum())))
+    assert lasting[0] < 0.3 and lasting[1] == pytest.approx(1.23, rel=0.05)
+
+
 def test_a_correction_claims_what_it_takes_back():
     """A wall tells the heading every third of a second. The step there is off by all that had drifted before: who found
     that out by himself would take it for a turn."""

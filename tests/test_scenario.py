@@ -31,6 +31,8 @@ from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 16})
 COUNT = 12
+#: s: more frames than are kept in memory before they are on the disk, or than one process makes at a time.
+LONG = 1.3
 SCENE = Scene.of(
     {
         "objects": [
@@ -73,10 +75,10 @@ SCENE = Scene.of(
 )
 
 
-def room(*sensors: str, seed: int = 4) -> Scenario:
+def room(*sensors: str, seed: int = 4, seconds: float = 0.5) -> Scenario:
     """Somebody in a room, and everything that noise, boards and phases are drawn for; the radar swings on an arm."""
     places, mounting = np.array([[0.8, 1.5], [1.9, 2.0]]), Mounting.of((0.2, 0.05, 0.1), (2, 3, -1))
-    walk = Walk("cart", 1.3, waypoints=places, mounting=mounting)
+    walk = Walk("cart", seconds, waypoints=places, mounting=mounting)
     return Scenario(SCENE, walk.through(SCENE, seed), CONFIG, FrontEndConfig(), seed, sensors)
 
 
@@ -181,7 +183,7 @@ def until_killed(scenario: Scenario, path: Path, frames: int) -> Path:
 
 def test_a_killed_recording_goes_on_where_it_stopped(tmp_path, monkeypatch):
     """To the same bytes, without making anew what is there but for two frames that are compared."""
-    scenario = room("imu", "points", "tracking", "depth")
+    scenario = room("imu", "points", "tracking", "depth", seconds=LONG)
     expected = recorded(scenario, tmp_path / "whole.h5").read_bytes()
     part = until_killed(scenario, tmp_path / "a.h5", 33)
     with Recording(part) as left:
@@ -197,7 +199,7 @@ def test_a_killed_recording_goes_on_where_it_stopped(tmp_path, monkeypatch):
 
 def test_processes_beside_each_other_make_the_same_bytes(tmp_path, monkeypatch):
     """Of every stream; and none outlives the recording."""
-    scenario = room("all")
+    scenario = room("all", seconds=LONG)
     expected = recorded(scenario, tmp_path / "a.h5").read_bytes()
     monkeypatch.setattr(batches, "_WORTH", 1)
     monkeypatch.setattr(Batches, "made", None)  # this process makes none
@@ -216,11 +218,11 @@ def test_what_fails_in_another_process_is_said_here(tmp_path, monkeypatch):
 
 def test_what_another_run_has_left_is_not_gone_on_with(tmp_path):
     """Another seed, and another world of the same name, which only its frames tell."""
-    scenario = room()
+    scenario = room(seconds=LONG)
     expected = recorded(scenario, tmp_path / "whole.h5").read_bytes()
     emptier = Scene("room", [item for item in SCENE.objects if item.name != "pipe"], SCENE.movers)
     emptier = Scenario(emptier, scenario.motion, CONFIG, FrontEndConfig(), scenario.seed)
-    for other in (room(seed=5), emptier):
+    for other in (room(seed=5, seconds=LONG), emptier):
         until_killed(other, tmp_path / "a.h5", 33)
         recorded(scenario, tmp_path / "a.h5")
         assert (tmp_path / "a.h5").read_bytes() == expected

@@ -41,7 +41,7 @@ TYPED_INSTEAD = (
     (r"^(radarize benchmark ablation .*)$", r"\1 --methods doppler,first-echo"),  # which has no networks
     (r"^(radarize benchmark (?!real |.*--methods).* --data .*)$", r"\1 --methods learned,segmentation"),
     (r"^((?:radarsim dataset|radarize benchmark (?!list|real)).*)$", r"\1 --workers 1"),  # others take seconds to begin
-    (r"^(radarsim twin .*)$", r"\1 --every 15"),
+    (r"^(radarsim twin .*)$", r"\1 --every 60"),
     (r"^(radarize train radarhd-pictures .*)$", r"\1 --frames 3"),  # two seconds are more than the walks have
     (r"--nproc-per-node 4", "--nproc-per-node 1"),
     (r"^(radarize (?:capture|live) .*)$", r"\1 --duration 0.5"),

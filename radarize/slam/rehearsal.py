@@ -10,7 +10,7 @@ from radarize.slam.config import SlamConfig
 _LAPS, _STEPS, _HALF = 2, 40, 2.0
 
 
-def rehearse(config: SlamConfig, azimuths: Float[np.ndarray, "beam"]) -> Slam:
+def rehearse(config: SlamConfig, azimuths: Float[np.ndarray, "beam"]) -> None:
     """Go round until places are met again: matches, walls and loops of closed submaps are all needed on the way.
 
     Args:
@@ -25,4 +25,3 @@ def rehearse(config: SlamConfig, azimuths: Float[np.ndarray, "beam"]) -> Slam:
         slam.add_odometry(float(k), np.array([*place, yaw]))
         slam.add_scan(float(k), azimuths, to_walls.min(axis=0))
     slam.finish()
-    return slam

@@ -31,7 +31,7 @@ from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 16})
 COUNT = 12
-#: s: more frames than are kept in memory before they are on the disk, or than one process makes at a time.
+#: s: longer than frames are kept in memory before they are on the disk.
 LONG = 1.3
 SCENE = Scene.of(
     {
@@ -199,7 +199,7 @@ def test_a_killed_recording_goes_on_where_it_stopped(tmp_path, monkeypatch):
 
 def test_processes_beside_each_other_make_the_same_bytes(tmp_path, monkeypatch):
     """Of every stream; and none outlives the recording."""
-    scenario = room("all", seconds=LONG)
+    scenario = room("all", seconds=0.8)
     expected = recorded(scenario, tmp_path / "a.h5").read_bytes()
     monkeypatch.setattr(batches, "_WORTH", 1)
     monkeypatch.setattr(Batches, "made", None)  # this process makes none

@@ -1,6 +1,7 @@
 """Files that README and docs take as given: a capture, a map, a mesh, somebody's scans."""
 
 import gzip
+import os
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -30,7 +31,9 @@ DATASETS = {
     "ablation/loops": {"A701": ("handheld",)},
     "radars": {"A501": ("handheld",)},
 }
-SECONDS, PLACE = 1.5, "stress/corner"
+#: Whether all pages are typed, or README alone. RadarHD, of another page, wants 41 frames.
+ALL = "DOCUMENTS" in os.environ
+SECONDS, PLACE = 1.5 if ALL else 0.8, "stress/corner"
 
 
 def specification(name: str, path: Path) -> None:

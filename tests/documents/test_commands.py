@@ -19,14 +19,12 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from given import DATASETS, GIVEN, STUDIO, specification
+from given import ALL, DATASETS, GIVEN, SECONDS, STUDIO, specification
 from pages import FIRST, PAGES, ROOT, THEN, Command, commands
 
 from tests.virtual import free_ports
 
-#: Whether the other pages are typed.
-ALL = "DOCUMENTS" in os.environ
-WALK = "--duration 1.5" if ALL else "--duration 0.8"  # RadarHD, of another page, wants 41 frames
+WALK = f"--duration {SECONDS}"
 #: What is typed instead: pattern, replacement; in this order, each on what the one before left.
 TYPED_INSTEAD = (
     # Shorter.

@@ -27,7 +27,7 @@ from tests.batches import stream
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory):
-    return simulate("office", tmp_path_factory.mktemp("walk") / "walk.h5", duration=4.5, seed=1)
+    return simulate("office", tmp_path_factory.mktemp("walk") / "walk.h5", duration=6.0, seed=1)
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_writes_everything(finished):
         "trajectory.tum", "odometry.tum", "reference.tum", "map.pgm", "map.yaml", "scans.h5", "run.json",
     }  # fmt: skip
     facts = json.loads((finished / "run.json").read_text())
-    assert facts["recording_attributes"]["seed"] == 1 and facts["frames"] == 135
+    assert facts["recording_attributes"]["seed"] == 1 and facts["frames"] == 180
     assert set(facts["ms_per_frame"]) == {"spectra", "translation", "rotation", "maps", "scans", "slam"}
 
 

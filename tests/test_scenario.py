@@ -31,8 +31,6 @@ from radarsim.walk import Walk
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 16})
 COUNT = 12
-#: s: longer than frames are kept in memory before they are on the disk.
-LONG = 1.3
 SCENE = Scene.of(
     {
         "objects": [
@@ -75,7 +73,7 @@ SCENE = Scene.of(
 )
 
 
-def room(*sensors: str, seed: int = 4, seconds: float = 0.5) -> Scenario:
+def room(*sensors: str, seed: int = 4, seconds: float = 1.3) -> Scenario:
     """Somebody in a room, and everything that noise, boards and phases are drawn for; the radar swings on an arm."""
     places, mounting = np.array([[0.8, 1.5], [1.9, 2.0]]), Mounting.of((0.2, 0.05, 0.1), (2, 3, -1))
     walk = Walk("cart", seconds, waypoints=places, mounting=mounting)
@@ -183,7 +181,7 @@ def until_killed(scenario: Scenario, path: Path, frames: int) -> Path:
 
 def test_a_killed_recording_goes_on_where_it_stopped(tmp_path, monkeypatch):
     """To the same bytes, without making anew what is there but for two frames that are compared."""
-    scenario = room("imu", "points", "tracking", "depth", seconds=LONG)
+    scenario = room("imu", "points", "tracking", "depth")
     expected = recorded(scenario, tmp_path / "whole.h5").read_bytes()
     part = until_killed(scenario, tmp_path / "a.h5", 33)
     with Recording(part) as left:
@@ -218,11 +216,11 @@ def test_what_fails_in_another_process_is_said_here(tmp_path, monkeypatch):
 
 def test_what_another_run_has_left_is_not_gone_on_with(tmp_path):
     """Another seed, and another world of the same name, which only its frames tell."""
-    scenario = room(seconds=LONG)
+    scenario = room()
     expected = recorded(scenario, tmp_path / "whole.h5").read_bytes()
     emptier = Scene("room", [item for item in SCENE.objects if item.name != "pipe"], SCENE.movers)
     emptier = Scenario(emptier, scenario.motion, CONFIG, FrontEndConfig(), scenario.seed)
-    for other in (room(seed=5, seconds=LONG), emptier):
+    for other in (room(seed=5), emptier):
         until_killed(other, tmp_path / "a.h5", 33)
         recorded(scenario, tmp_path / "a.h5")
         assert (tmp_path / "a.h5").read_bytes() == expected
@@ -231,9 +229,9 @@ def test_what_another_run_has_left_is_not_gone_on_with(tmp_path):
 def test_sensors_added_later_are_those_made_at_once(scenario, tmp_path):
     """Even those that look at the radar's echoes and samples."""
     names = ("tracking", "imu", "points", "ghosts", "depth")
-    bare = room()
+    bare = room(seconds=0.5)
     later = accompany(recorded(bare, tmp_path / "later.h5"), bare, names)
-    with Recording(later) as one, Recording(recorded(room(*names), tmp_path / "once.h5")) as other:
+    with Recording(later) as one, Recording(recorded(room(*names, seconds=0.5), tmp_path / "once.h5")) as other:
         assert sorted(one.names()) == sorted(other.names())
         for name in other.names():
             assert np.array_equal(one.read(name), other.read(name), equal_nan=True), name

@@ -31,9 +31,9 @@ DATASETS = {
     "ablation/loops": {"A701": ("handheld",)},
     "radars": {"A501": ("handheld",)},
 }
-#: Whether all pages are typed, or README alone. RadarHD, of another page, wants 41 frames.
+#: Whether all pages are typed, or README alone.
 ALL = "DOCUMENTS" in os.environ
-SECONDS, PLACE = 1.5 if ALL else 0.8, "stress/corner"
+SECONDS, PLACE = 1.5 if ALL else 0.8, "stress/corner"  # RadarHD, of another page, wants 41 frames
 
 
 def specification(name: str, path: Path) -> None:

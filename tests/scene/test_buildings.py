@@ -11,7 +11,7 @@ from radarsim.scene.buildings import Building
 from radarsim.scene.clearance import RESOLUTION, Clearance
 from radarsim.scene.scene import Scene
 
-SEEDS = np.random.default_rng(4).integers(0, 10_000, 12).tolist()
+SEEDS = np.random.default_rng(4).integers(0, 10_000, 20).tolist()
 FLOORS = [Building(kind="ABCD"[k % 4], seed=seed, floor=k // 4) for k, seed in enumerate(SEEDS)]
 #: Names of what is no furniture.
 FIXED = ("wall", "facade", "reveals", "column", "pipe", "window", "door", "way", "lamp", "riser", "stairs", "floor")

@@ -29,7 +29,7 @@ test: setup
 
 bounds: setup
 	@NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=build/bounds $(PYTEST) \
-		$(or $(TESTS),tests/slam tests/odometry tests/physics tests/fuzzing)
+		$(or $(TESTS),tests/slam tests/odometry tests/propagation tests/receiver tests/fuzzing)
 
 documents: setup
 	@DOCUMENTS=1 .venv/bin/python -m pytest tests/documents
@@ -46,7 +46,7 @@ lowest:
 	@$(or $(PYTHON),python3) -m venv --clear build/lowest && build/lowest/bin/python -m pip install -qq uv
 	@build/lowest/bin/uv pip install -q --python build/lowest --resolution lowest-direct '.[test]'
 	@NUMBA_CACHE_DIR=build/kernels build/lowest/bin/python -m pytest $(or $(TESTS),tests/radar tests/importers tests/exporters \
-		tests/scene tests/slam tests/nets tests/evaluation tests/report tests/test_recording.py tests/test_hdf5.py tests/test_cli.py \
+		tests/world tests/slam tests/nets tests/evaluation tests/report tests/test_recording.py tests/test_hdf5.py tests/test_cli.py \
 		tests/test_foxglove.py tests/test_viewer.py tests/test_pipeline.py tests/test_simulate.py)
 
 lint: setup

@@ -25,11 +25,11 @@ from radarize.methods.registry import BEST, Workshop
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarize.tum import planar_poses
-from radarsim.batches import Batches
+from radarsim.motion.walk import Walk
+from radarsim.recording.batches import Batches
+from radarsim.recording.simulate import record
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
-from radarsim.simulate import record
-from radarsim.walk import Walk
+from radarsim.world.scene import Scene
 
 WALKS = Path(__file__).with_suffix(".yaml")
 

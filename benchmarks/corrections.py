@@ -20,11 +20,11 @@ from radarize.nets.losses import surfaces
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
-from radarsim.scene.scene import Scene
+from radarsim.motion.walk import Walk
+from radarsim.recording.simulate import simulate
 from radarsim.sensors.scan import AZIMUTHS, level_rays
-from radarsim.sight import Sight
-from radarsim.simulate import simulate
-from radarsim.walk import Walk
+from radarsim.world.raycast import RayCaster
+from radarsim.world.scene import Scene
 from tests.echoes import record
 
 CONFIG = PRESETS["radarize"]
@@ -238,7 +238,7 @@ def levelled(scene: Scene, duration: float, seed: int) -> dict:
     """First surfaces in the sensor's own plane against those in the horizontal one."""
     motion = Walk(PLATFORM, duration).through(scene, seed)
     times = np.arange(0, min(duration, motion.duration) - 0.1, 0.1)
-    sight, own = Sight(scene), np.stack([np.cos(AZIMUTHS), np.sin(AZIMUTHS), 0 * AZIMUTHS], axis=1)
+    sight, own = RayCaster(scene), np.stack([np.cos(AZIMUTHS), np.sin(AZIMUTHS), 0 * AZIMUTHS], axis=1)
     level = sight.distance(*level_rays(motion, times, AZIMUTHS), times)
     directions = np.stack([turn.apply(own) for turn in (motion.rotation(t) for t in times)])
     tilted = sight.distance(motion.position(times), directions, times)

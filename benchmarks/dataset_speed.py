@@ -16,14 +16,14 @@ from benchmarks.results import Data, command_line, publish, timed
 from radarize.jobs import perform
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
-from radarsim.batches import TOGETHER
 from radarsim.dataset.run import making
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task
+from radarsim.motion.walk import Walk
+from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
 from radarsim.sensors.suite import ALWAYS, Suite, chosen
-from radarsim.walk import Walk
+from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"]
 BIG = "radarize146"

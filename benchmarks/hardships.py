@@ -10,11 +10,11 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from radarize.radar.noise import noise_floor, noise_profile
-from radarsim.crowd import crowded
-from radarsim.motion import Motion
+from radarsim.motion.pedestrians import crowded
+from radarsim.motion.trajectory import Motion
+from radarsim.motion.walk import Walk
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
-from radarsim.walk import Walk
+from radarsim.world.scene import Scene
 
 #: Counts, of one chirp: as strong as furniture at 2 m.
 _INTERFERER = 1000.0

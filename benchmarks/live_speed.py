@@ -25,7 +25,7 @@ from radarize.capture.replay import Replay
 from radarize.methods.registry import CLASSICAL, Inputs, best_methods, pace
 from radarize.recording import Losses, Recording
 from radarize.stopwatch import Stopwatch
-from radarsim.simulate import simulate
+from radarsim.recording.simulate import simulate
 from tests.capture.browser import Browser
 from tests.virtual import emulator
 

@@ -8,10 +8,10 @@ from rich.progress import track
 
 from benchmarks.results import Data, command_line, publish, walked
 from radarize.benchmark.table import PAPER
-from radarsim.planner import plan_motion
-from radarsim.platforms import PLATFORMS
-from radarsim.scene.scene import Scene
-from radarsim.statistics import Statistics
+from radarsim.motion.planner import plan_motion
+from radarsim.motion.platforms import PLATFORMS
+from radarsim.motion.statistics import Statistics
+from radarsim.world.scene import Scene
 
 DURATION = 60.0
 #: What the paper says of its platforms and data set; the gaps it leaves are "-".

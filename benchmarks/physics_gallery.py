@@ -2,8 +2,8 @@
 
     python -m benchmarks.physics_gallery
 
-Laws stand in `benchmarks.gallery`; most of them measure by functions of `tests/physics`. To add one, write it there and
-enter it in `LAWS`.
+Laws stand in `benchmarks.gallery`; most of them measure by functions of `tests/propagation`. To add one, write it there
+and enter it in `LAWS`.
 """
 
 from pathlib import Path
@@ -75,8 +75,8 @@ def main() -> None:
         "# The physics, law by law\n\n"
         "Each plot compares the simulator with theory: a closed form, or a sum that was programmed independently. The "
         f"radar is the preset `radarize` (centre {CONFIG.center_frequency / 1e9:.2f} GHz). "
-        "`python -m benchmarks.physics_gallery` writes this page, its figures and its plots. Tests in `tests/physics` "
-        "check the same laws.\n"
+        "`python -m benchmarks.physics_gallery` writes this page, its figures and its plots. Tests in "
+        "`tests/propagation` check the same laws.\n"
         "\n## Words\n\n| here | is | source |\n|---|---|---|\n" + "".join(f"| {' | '.join(row)} |\n" for row in WORDS)
     )
     for title, (draw, x, y) in LAWS.items():

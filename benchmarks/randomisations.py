@@ -35,7 +35,7 @@ from radarize.training.dataset import recordings
 from radarize.walkclock import Clock
 from radarize.walks import FIRST, TRAINING, Walk
 from radarize.yamlfile import read_yaml
-from radarsim.scene.description import shipped
+from radarsim.world.description import shipped
 
 #: Frames of a window, as the shipped network has them.
 WINDOW = Pictures.defaults.frames

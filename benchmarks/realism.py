@@ -20,13 +20,13 @@ from radarize import polar
 from radarize.console import progress
 from radarize.radar.presets import PRESETS
 from radarize.yamlfile import read_yaml
-from radarsim.batches import TOGETHER
-from radarsim.motion import Motion
+from radarsim.motion.trajectory import Motion
+from radarsim.motion.walk import Walk as WayThrough
+from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
-from radarsim.scene.description import find
-from radarsim.scene.life import DRAWN, Life
-from radarsim.scene.scene import Scene
-from radarsim.walk import Walk as WayThrough
+from radarsim.world.description import find
+from radarsim.world.life import DRAWN, Life
+from radarsim.world.scene import Scene
 
 SCENES = "office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"
 #: dB, that a picture shows below its largest.

@@ -14,8 +14,8 @@ from radarize.benchmark.table import Beside, Table
 from radarize.console import progress
 from radarize.errors import InputError
 from radarize.jobs import Job, perform
-from radarsim.motion import Motion
-from radarsim.statistics import Statistics
+from radarsim.motion.statistics import Statistics
+from radarsim.motion.trajectory import Motion
 
 FOLDER = Path(__file__).parent / "results"
 #: Captures and logs that others made, beside the checkout.

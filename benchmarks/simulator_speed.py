@@ -12,12 +12,12 @@ import numpy as np
 
 from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, timed, walked
 from radarize.radar.presets import PRESETS
-from radarsim.batches import TOGETHER, Batches
-from radarsim.physics.pathsolver import DEPTH, RAYS
+from radarsim.machine.threads import default_workers
+from radarsim.propagation.pathsolver import DEPTH, RAYS
+from radarsim.recording.batches import TOGETHER, Batches
+from radarsim.recording.simulate import planned, record
 from radarsim.scenario import Scenario
-from radarsim.simulate import planned, record
-from radarsim.threads import default_workers
-from tests.physics.brute_force import direct_sum
+from tests.propagation.brute_force import direct_sum
 
 CONFIG = PRESETS["radarize"]
 

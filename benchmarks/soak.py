@@ -23,7 +23,7 @@ from radarize.recording import Recording
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarsim.emulator.disturbance import Disturbance
-from radarsim.simulate import simulate
+from radarsim.recording.simulate import simulate
 from tests.disk import disk, fill
 from tests.slam.world import box, scan, walk
 from tests.virtual import BOARD, COMPUTER, emulator

@@ -1,5 +1,5 @@
 """How steady echoes are from frame to frame on a walk, beside rays that stand ten times as dense in the way of mirrored
-paths (`radarsim.physics.fresnelzone`).
+paths (`radarsim.propagation.fresnelzone`).
 
 A frame's echoes have places in the world, so that their phases at the next frame's instant are known. What the next
 frame's field differs by is what motion does not explain: flashes that come into sight, and amplitudes that hang on few
@@ -16,13 +16,13 @@ from benchmarks.results import Data, command_line, publish, walked
 from radarize.console import progress
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.batches import TOGETHER
-from radarsim.physics import fresnelzone
-from radarsim.physics.echoes import Echoes
-from radarsim.physics.fresnelzone import Lattice
+from radarsim.motion.walk import Walk
+from radarsim.propagation import fresnelzone
+from radarsim.propagation.echoes import Echoes
+from radarsim.propagation.fresnelzone import Lattice
+from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
-from radarsim.walk import Walk
+from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"]
 #: Of the field's power, dB: changes above it are counted.

@@ -19,13 +19,13 @@ from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.run import run
 from radarize.training.dataset import recordings
-from radarsim.calibrate import calibrate
-from radarsim.motion import Motion
-from radarsim.physics.frontend_config import FrontEndConfig
-from radarsim.planner import plan_motion
+from radarsim.motion.planner import plan_motion
+from radarsim.motion.trajectory import Motion
+from radarsim.receiver.calibrate import calibrate
+from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
 from radarsim.twin.likeness import frechet_distance, patch_statistics
+from radarsim.world.scene import Scene
 from tests.importers.public import captures
 
 SCENES = ("office", "visitors", "buildings/b")

@@ -8,11 +8,11 @@ import numpy as np
 
 from benchmarks.results import Data, command_line, publish
 from radarize.console import progress
-from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene
-from radarsim.simulate import simulate
+from radarsim.recording.simulate import simulate
 from radarsim.twin.comparison import FIGURES, Comparison, compare
 from radarsim.twin.twin import Options, make_twin
+from radarsim.world.materials import MATERIALS
+from radarsim.world.scene import Scene
 from tests.twin.poses import Change, altered, shaken
 
 #: Of `radarsim.twin.comparison.FIGURES`.

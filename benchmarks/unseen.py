@@ -33,7 +33,7 @@ from radarize.runfolder import RunFolder
 from radarize.tum import planar
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
-from radarsim.scene.importers import import_scene
+from radarsim.world.importers import import_scene
 
 #: Lidar logs by the name of the building that is made of them.
 PLANS = {name: SHARED / "radish" / f"{name}-corrected.log.gz" for name in ("intel", "orebro")}

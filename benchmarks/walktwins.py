@@ -24,19 +24,19 @@ from radarize.walkclock import Clock
 from radarize.walkposes import BEARINGS, poses_of, scan, stamps
 from radarize.walks import PERIOD, Walk
 from radarize.yamlfile import read_yaml
-from radarsim.batches import TOGETHER
-from radarsim.motion import motion_from_tum
+from radarsim.motion.trajectory import motion_from_tum
+from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
-from radarsim.scene.importers import Options, import_scene
-from radarsim.scene.scene import Scene
 from radarsim.twin.likeness import DEPTH, correlation, similarity
+from radarsim.world.importers import Options, import_scene
+from radarsim.world.scene import Scene
 
 
 class Assumed(NamedTuple):
     """What the lidar does not tell.
 
     Attributes:
-        life: see `radarsim.scene.scene.Life`.
+        life: see `radarsim.world.scene.Life`.
         walls: their material.
         room: floor to ceiling, m.
         sensor: its height, m.

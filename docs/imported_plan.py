@@ -6,9 +6,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from radarsim.scene.importers import import_scene
-from radarsim.scene.preview import preview
-from radarsim.scene.scene import Scene
+from radarsim.world.importers import import_scene
+from radarsim.world.preview.figures import preview
+from radarsim.world.scene import Scene
 
 HERE = Path(__file__).parent / "pictures"
 HEIGHT = 620  # px

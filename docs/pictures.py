@@ -16,8 +16,8 @@ from radarize.heatmaps import Heatmaps
 from radarize.recording import Recording
 from radarize.report.drawings import draw_doppler, draw_fan, draw_scan
 from radarize.runfolder import RunFolder
-from radarsim.scene.preview import preview
-from radarsim.scene.scene import Scene
+from radarsim.world.preview.figures import preview
+from radarsim.world.scene import Scene
 
 HERE = Path(__file__).parent / "pictures"
 

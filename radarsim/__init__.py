@@ -1,6 +1,9 @@
 """Ray-traced simulation of the IWR1843 radar in indoor meshes, written as raw int16 I/Q."""
 
 import os
+from pathlib import Path
+
+from radarsim.machine.kernels import drop_stale
 
 # Compiled loops last a millisecond or less. OpenMP's threads would spin between them, for milliseconds, on the cores
 # that Mitsuba's threads and whatever else runs need: that doubled the time of a frame. Read when the library loads.
@@ -8,3 +11,5 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 # Open3D brings an old TBB along, of which Numba complains before it takes the next: it need not look there first.
 os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
+
+drop_stale(Path(__file__).parent)

@@ -56,10 +56,10 @@ def simulate(
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
     from radarize.recording import Recording, keeping
-    from radarsim.motion import Mounting
-    from radarsim.simulate import simulate
-    from radarsim.statistics import Statistics
-    from radarsim.threads import default_workers
+    from radarsim.machine.threads import default_workers
+    from radarsim.motion.statistics import Statistics
+    from radarsim.motion.trajectory import Mounting
+    from radarsim.recording.simulate import simulate
 
     with keeping(output), progress(f"simulate {Path(scene).stem}") as report:
         written = simulate(
@@ -106,7 +106,7 @@ def calibrate(
     frames: Annotated[int, typer.Option(min=1, help="Frames to look at.")] = 8,
 ):
     """Fit the simulated front end to a real radar: noise, band edge, leakage, channels."""
-    from radarsim.calibrate import calibrate
+    from radarsim.receiver.calibrate import calibrate
 
     with working(f"calibrating on {recording.name}"):
         found = calibrate(recording, output, frames)
@@ -139,7 +139,7 @@ def twin(
 ):
     """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
     from radarize.recording import Recording, keeping
-    from radarsim.motion import Mounting
+    from radarsim.motion.trajectory import Mounting
     from radarsim.twin.report import report_twin
     from radarsim.twin.twin import Options, make_twin
 
@@ -162,7 +162,7 @@ def twin(
 @scene_app.command()
 def info(scene: SceneName):
     """Say what SCENE is made of."""
-    from radarsim.scene.scene import Scene
+    from radarsim.world.scene import Scene
 
     with working("loading the scene"):
         loaded = Scene.load(scene)
@@ -187,7 +187,7 @@ def preview(
     seed: Annotated[int, typer.Option(min=0, help="Of the page's tour.")] = 0,
 ):
     """Draw SCENE as pictures: its floor plan and a rendering with the ceilings taken off."""
-    from radarsim.scene.scene import Scene
+    from radarsim.world.scene import Scene
 
     if web:
         from radarsim.webpreview import web_preview
@@ -196,7 +196,7 @@ def preview(
             loaded = Scene.load(scene)
             print(web_preview(loaded, output / f"{loaded.name}.html", time=time, seed=seed))
         return
-    from radarsim.scene.preview import preview
+    from radarsim.world.preview.figures import preview
 
     with working("drawing the scene"):
         pictures = preview(Scene.load(scene), output)
@@ -230,7 +230,7 @@ def import_(
     resolution: Annotated[float, typer.Option(help="Cells of a log, m.")] = 0.05,
 ):
     """Make a scene of a mesh, a Mitsuba scene, a ROS map or a lidar log."""
-    from radarsim.scene.importers import Options, import_scene
+    from radarsim.world.importers import Options, import_scene
 
     with progress(f"import {source.stem}") as report:
         done = import_scene(
@@ -302,7 +302,7 @@ def emulate(
         given = Playback(Path(source), loop)
     else:
         from radarsim.emulator.simulation import Simulation
-        from radarsim.walk import Walk
+        from radarsim.motion.walk import Walk
 
         given = Simulation(source, Walk(platform, duration), seed, radar, loop)
     disturbance = Disturbance(loss, duplicate, reorder, delay, np.random.default_rng(seed))

@@ -1,8 +1,9 @@
 """Examines the machine: what is there, what is missing, and the command that gets it.
 
-``python -m radarsim.doctor --missing-packages`` prints the system packages that are missing; `setup.sh` asks it before
-any Python package is installed, so everything here that is not the standard library's is imported late.
-``python -m radarsim.doctor --first-frame`` simulates a frame, which compiles the simulator: the last step of set-up.
+``python -m radarsim.doctor --missing-packages`` prints the system packages that are missing. `setup.sh` calls it
+before any Python package is installed, so everything beyond the standard library is imported late.
+``python -m radarsim.doctor --first-frame`` simulates a frame, which compiles the simulator: the last step of
+set-up.
 """
 
 import ctypes
@@ -19,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from radarize.errors import InputError
-from radarsim import llvm
+from radarsim.machine import llvm
 
 #: Shared libraries that Python packages load from the system (all of them open3d's), and their Debian packages.
 LIBRARIES = {
@@ -38,7 +39,7 @@ FREE_DISK = 2e9
 
 # In a process of its own, for what it guards against ends the process.
 _RAY_TEST = """
-from radarsim import llvm
+from radarsim.machine import llvm
 llvm.require()
 import mitsuba as mi
 mi.set_variant("llvm_ad_mono_polarized")
@@ -142,9 +143,9 @@ def first_frame() -> float:
     import numpy as np
 
     from radarize.radar.presets import PRESETS
+    from radarsim.motion.walk import Walk
     from radarsim.scenario import Scenario
-    from radarsim.scene.scene import Scene
-    from radarsim.walk import Walk
+    from radarsim.world.scene import Scene
 
     scene = Scene.load("visitors")
     assert len(Scenario(scene, Walk(duration=1.0).through(scene, 0), PRESETS["radarize"]).frames(np.zeros(1)).samples)

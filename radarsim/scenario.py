@@ -1,7 +1,7 @@
 """What is simulated, and the one way from there to frames.
 
 A frame is a function of the scenario and of the instant at which it starts: all random numbers are keyed by the seed,
-what they are for and that instant (`draws`). So frames can be made in any order and number, again, or elsewhere.
+what they are for and that instant (`keyed_rng`). So frames can be made in any order and number, again, or elsewhere.
 """
 
 from dataclasses import dataclass
@@ -12,24 +12,24 @@ from jaxtyping import Complex, Float, Int, Int16
 
 from radarize.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
-from radarsim.draws import draws
-from radarsim.motion import Motion
-from radarsim.physics.clutter import Clutter, Cluttered
-from radarsim.physics.echoes import Echoes
-from radarsim.physics.finder import EchoFinder
-from radarsim.physics.frontend import FrontEnd
-from radarsim.physics.frontend_config import FrontEndConfig
-from radarsim.physics.interference import Interference
-from radarsim.physics.movingtargets import MovingTargets
-from radarsim.physics.obstacles import Obstacles
-from radarsim.physics.pathsolver import PathSolverFinder
-from radarsim.physics.reflectors import Reflectors
-from radarsim.physics.surface import Surface
-from radarsim.physics.synthesis import Synthesizer
-from radarsim.physics.unevenness import Heights
-from radarsim.scene.scene import Scene
-from radarsim.sight import Sight
-from radarsim.threads import one_blas_thread
+from radarsim.machine.threads import one_blas_thread
+from radarsim.motion.trajectory import Motion
+from radarsim.propagation.clutter import Clutter, Cluttered
+from radarsim.propagation.echoes import Echoes
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.movingtargets import MovingTargets
+from radarsim.propagation.obstacles import Obstacles
+from radarsim.propagation.pathsolver import PathSolverFinder
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.surface import Surface
+from radarsim.propagation.unevenness import Heights
+from radarsim.receiver.frontend import FrontEnd
+from radarsim.receiver.frontend_config import FrontEndConfig
+from radarsim.receiver.interference import Interference
+from radarsim.receiver.synthesis import Synthesizer
+from radarsim.rng import keyed_rng
+from radarsim.world.raycast import RayCaster
+from radarsim.world.scene import Scene
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,31 +89,31 @@ class Scenario:
         """Numbers of all ticks that a clock of so many Hz makes while the motion lasts, and a frame's ends with it."""
         return Frames(self, np.zeros(1), self.motion.duration + self.config.frame_period).ticks(rate)
 
-    def draws(self, purpose: str, time: float | None = None) -> np.random.Generator:
+    def rng(self, purpose: str, time: float | None = None) -> np.random.Generator:
         """Random numbers for a purpose, at an instant (s) if need be."""
-        return draws(self.seed, purpose, time)
+        return keyed_rng(self.seed, purpose, time)
 
     # --- what frames are made with ------------------------------------------------------------------------------------
     @cached_property
     def board(self) -> FrontEnd:
         """The front end of this very board."""
-        return FrontEnd(self.config, self.front_end, self.draws("board"))
+        return FrontEnd(self.config, self.front_end, self.rng("board"))
 
     @cached_property
     def finder(self) -> EchoFinder | PathSolverFinder:
         """Finds the echoes of a pose."""
         weakest, antenna = self.board.weakest, self.front_end.pattern
         if self.engine == "sionna":
-            seed = int(self.draws("sionna").integers(2**31))
+            seed = int(self.rng("sionna").integers(2**31))
             return PathSolverFinder(self.scene, self.config, weakest, antenna, seed)
         reach = SPEED_OF_LIGHT * self.board.passband[1] / (2 * self.config.slope)
-        scatterers = Cluttered(Surface(self.scene, self.draws("surface")), Clutter(self.scene, self.draws("clutter")))
-        reflectors = Reflectors.of(self.scene, self.config, Heights.of(self.scene, self.draws("unevenness")))
+        scatterers = Cluttered(Surface(self.scene, self.rng("surface")), Clutter(self.scene, self.rng("clutter")))
+        reflectors = Reflectors.of(self.scene, self.config, Heights.of(self.scene, self.rng("unevenness")))
         return EchoFinder(self.scene, scatterers, reflectors, self.config, weakest, reach, antenna, self._moving)
 
     @cached_property
     def _moving(self) -> MovingTargets:
-        return MovingTargets(self.scene.movers, self.draws("movers"))
+        return MovingTargets(self.scene.movers, self.rng("movers"))
 
     @cached_property
     def interference(self) -> Interference:
@@ -127,9 +127,9 @@ class Scenario:
         return Synthesizer(self.config)
 
     @cached_property
-    def sight(self) -> Sight:
+    def rays(self) -> RayCaster:
         """What cameras and scanners see: first surfaces, things that move included."""
-        return Sight(self.scene)
+        return RayCaster(self.scene)
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,11 +187,11 @@ class Frames:
     @one_blas_thread
     def samples(self) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
         """I/Q as the converter gives it."""
-        board, draws = self.scenario.board, self.scenario.draws
+        board, rng = self.scenario.board, self.scenario.rng
         signals = map(self.scenario.synthesize, self.lengths, self.received)
         if self.scenario.scene.interferers:
             signals = map(np.add, signals, self.interference)
-        return np.stack([board.digitize(s, draws("noise", t)) for t, s in zip(self.times, signals, strict=True)])
+        return np.stack([board.digitize(s, rng("noise", t)) for t, s in zip(self.times, signals, strict=True)])
 
     def ticks(self, rate: float) -> Int[np.ndarray, "tick"]:
         """Numbers of the ticks that a clock of so many Hz, which starts at 0, makes from the first frame to the end."""

@@ -8,11 +8,11 @@ from jaxtyping import Float
 
 from radarize.radar.presets import PRESETS
 from radarize.report.page import COLORS, INK, Page
-from radarsim.physics.echoes import Echoes, Provenance
+from radarsim.motion.walk import Walk
+from radarsim.propagation.echoes import Echoes, Provenance
 from radarsim.scenario import Scenario
-from radarsim.scene.rendering import CAP, cut_open
-from radarsim.scene.scene import Scene
-from radarsim.walk import Walk
+from radarsim.world.preview.rendering import CAP, cut_open
+from radarsim.world.scene import Scene
 
 #: Rays of each cause that are drawn, the strongest.
 RAYS = 80

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radarsim.scene.scene import Scene
+from radarsim.world.scene import Scene
 
 
 def least_distance(points: np.ndarray, triangles: np.ndarray, reach: float = 0.5) -> np.ndarray:

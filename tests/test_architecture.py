@@ -37,18 +37,15 @@ LAYERS = (
 )
 #: The same of `radarsim`.
 SIMULATOR = (
-    "complaint llvm draws waypoints threads",
-    "scene",
-    "motion platforms band",
-    "tour drive statistics",
-    "planner walk crowd",
-    "physics",
-    "calibrate sight",
+    "rng machine",
+    "world",
+    "motion",
+    "propagation",
+    "receiver",
     "scenario",
     "sensors",
-    "batches",
-    "simulate",
-    "accompany dataset emulator twin webpreview doctor",
+    "recording",
+    "dataset emulator twin doctor webpreview",
     "cli",
 )
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are

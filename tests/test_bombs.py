@@ -21,7 +21,7 @@ from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarize.tum import read_tum
 from radarize.yamlfile import read_yaml
-from radarsim.scene.importers import carmen, gltf, rosmap
+from radarsim.world.importers import carmen, gltf, rosmap
 
 
 @pytest.fixture(autouse=True)

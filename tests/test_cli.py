@@ -138,7 +138,7 @@ def test_an_interrupt_says_what_was_kept(capsys, monkeypatch, tmp_path):
             writer.append(np.zeros((3, *config.frame_shape), np.int16), np.arange(3) / 30)
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("radarsim.simulate.simulate", interrupted)
+    monkeypatch.setattr("radarsim.recording.simulate.simulate", interrupted)
     path = tmp_path / "walk.h5"
     code, _, err = call(capsys, "radarsim simulate", "office", "-o", path)
     assert code == 2 and f"stopped; 3 whole frames are kept in {path}" in " ".join(err.split())
@@ -147,7 +147,7 @@ def test_an_interrupt_says_what_was_kept(capsys, monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     # The old recording is not what this call kept.
-    monkeypatch.setattr("radarsim.simulate.simulate", too_early)
+    monkeypatch.setattr("radarsim.recording.simulate.simulate", too_early)
     code, _, err = call(capsys, "radarsim simulate", "office", "-o", path)
     assert code == 2 and "stopped; nothing was written" in err
 

@@ -21,7 +21,7 @@ from radarize.report.run import methods
 from radarize.run import run
 from radarize.runfolder import RunFolder
 from radarize.tum import read_tum
-from radarsim.simulate import simulate
+from radarsim.recording.simulate import simulate
 from tests.batches import stream
 
 

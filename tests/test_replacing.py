@@ -6,8 +6,8 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.replacing import replacing
-from radarsim.scene.importers import import_scene
-from radarsim.scene.preview import preview
+from radarsim.world.importers import import_scene
+from radarsim.world.preview.figures import preview
 
 
 @pytest.mark.parametrize(
@@ -35,7 +35,7 @@ def full(*_, **__):
 def test_pictures_and_meshes_of_scenes(tmp_path, monkeypatch):
     from types import SimpleNamespace
 
-    monkeypatch.setattr("radarsim.scene.preview.blueprint", lambda scene: SimpleNamespace(savefig=full))
+    monkeypatch.setattr("radarsim.world.preview.figures.blueprint", lambda scene: SimpleNamespace(savefig=full))
     with pytest.raises(InputError, match="a.plan.png: cannot be written"):
         preview(SimpleNamespace(name="a"), tmp_path)
     monkeypatch.setattr("pathlib.Path.write_bytes", full)

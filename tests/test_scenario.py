@@ -14,20 +14,20 @@ import pytest
 from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
-from radarsim import batches
-from radarsim.accompany import accompany
-from radarsim.batches import Batches
-from radarsim.draws import draws
-from radarsim.motion import Motion, Mounting
-from radarsim.physics.frontend_config import Band, FrontEndConfig
+from radarsim.motion.trajectory import Motion, Mounting
+from radarsim.motion.walk import Walk
+from radarsim.receiver.frontend_config import Band, FrontEndConfig
+from radarsim.recording import batches
+from radarsim.recording.add_sensors import accompany
+from radarsim.recording.batches import Batches
+from radarsim.recording.simulate import record
+from radarsim.rng import keyed_rng
 from radarsim.scenario import Scenario
-from radarsim.scene import shapes
-from radarsim.scene.materials import MATERIALS
-from radarsim.scene.objects import SceneObject
-from radarsim.scene.scene import Scene
 from radarsim.sensors.suite import Suite
-from radarsim.simulate import record
-from radarsim.walk import Walk
+from radarsim.world import shapes
+from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 16})
 COUNT = 12
@@ -139,8 +139,8 @@ def test_without_a_filter_what_lies_beyond_the_range_folds():
 
 def test_draws_differ_by_seed_purpose_and_instant():
     keys = [(s, p, t) for s in (0, 1) for p in ("noise", "depth") for t in (None, 0.0, 1e-9, 1 / 30, 200.0)]
-    first = {draws(*key).random() for key in keys}
-    assert len(first) == len(keys) and first == {draws(*key).random() for key in keys}
+    first = {keyed_rng(*key).random() for key in keys}
+    assert len(first) == len(keys) and first == {keyed_rng(*key).random() for key in keys}
 
 
 LATER = """

@@ -17,7 +17,8 @@ from packaging.utils import canonicalize_name
 
 from radarize import __version__
 from radarize.extras import EXTRAS
-from radarsim import doctor, llvm
+from radarsim import doctor
+from radarsim.machine import llvm
 
 ROOT = Path(__file__).parents[1]
 LOCK = {
@@ -153,7 +154,9 @@ def test_without_python_setup_says_what_to_type(tmp_path):
 
 
 def test_an_llvm_is_found_and_handed_to_drjit():
-    done = python("from radarsim import llvm; llvm.require(); import os; print(os.environ['DRJIT_LIBLLVM_PATH'])")
+    done = python(
+        "from radarsim.machine import llvm; llvm.require(); import os; print(os.environ['DRJIT_LIBLLVM_PATH'])"
+    )
     assert done.returncode == 0, done.stderr
     assert llvm.version(done.stdout.strip()) >= llvm.OLDEST
 
@@ -162,7 +165,7 @@ def test_an_llvm_is_found_and_handed_to_drjit():
 def test_unusable_llvms_are_refused_with_the_package(tmp_path, names):
     for name in names:  # the last is called 19, but is no library
         (tmp_path / name).write_text("not a library")
-    code = f"from radarsim import llvm; llvm._PATTERNS = ({str(tmp_path)!r} + '/*',); llvm.require()"
+    code = f"from radarsim.machine import llvm; llvm._PATTERNS = ({str(tmp_path)!r} + '/*',); llvm.require()"
     done = python(code)
     assert done.returncode == 1  # an exception, not the abort of a library
     assert "InputError: found" in done.stderr and "apt-get install libllvm19" in done.stderr
@@ -175,7 +178,7 @@ OLD = [path for major, path in llvm.installed() if 0 < major < llvm.OLDEST]
 
 @pytest.mark.parametrize("path", [*OLD[:1], "/missing.so"])
 def test_an_old_llvm_by_name_never_reaches_drjit(path, tmp_path):
-    done = python("from radarsim import llvm; llvm.require()", DRJIT_LIBLLVM_PATH=path)
+    done = python("from radarsim.machine import llvm; llvm.require()", DRJIT_LIBLLVM_PATH=path)
     assert done.returncode == 1 and "InputError" in done.stderr and "libllvm19" in done.stderr and path in done.stderr
     code = "import sys; sys.argv = ['radarsim', *sys.argv[1:]]; from radarsim.cli import main; main()"
     done = subprocess.run(

@@ -8,12 +8,12 @@ import pytest
 
 from radarize.errors import InputError
 from radarize.recording import Recording
-from radarsim.physics.echoes import Provenance
-from radarsim.physics.frontend_config import FrontEndConfig
-from radarsim.planner import plan_motion
-from radarsim.scene.scene import Scene
+from radarsim.motion.planner import plan_motion
+from radarsim.propagation.echoes import Provenance
+from radarsim.receiver.frontend_config import FrontEndConfig
+from radarsim.recording.simulate import simulate
 from radarsim.sensors.causes import CAUSES
-from radarsim.simulate import simulate
+from radarsim.world.scene import Scene
 
 
 @pytest.fixture(scope="module")

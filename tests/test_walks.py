@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from radarsim.planner import plan_motion
-from radarsim.platforms import PLATFORMS
-from radarsim.scene.scene import Scene
+from radarsim.motion.planner import plan_motion
+from radarsim.motion.platforms import PLATFORMS
+from radarsim.world.scene import Scene
 from tests.distances import column, least_distance, obstacles
 
 DURATION = 30.0

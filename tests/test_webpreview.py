@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from radarize.radar.presets import PRESETS
+from radarsim.motion.walk import Walk
 from radarsim.scenario import Scenario
-from radarsim.scene.rendering import cut_open
-from radarsim.scene.scene import Scene
-from radarsim.walk import Walk
 from radarsim.webpreview import web_preview
+from radarsim.world.preview.rendering import cut_open
+from radarsim.world.scene import Scene
 from tests.capture.browser import CHROMIUM, Browser
 
 WALK = Walk(duration=2.0)

@@ -4,11 +4,11 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from radarize.radar.presets import PRESETS
-from radarsim.physics.antenna import ISOTROPIC
-from radarsim.physics.finder import EchoFinder
-from radarsim.physics.reflectors import Reflectors
-from radarsim.physics.scatterers import Scatterers
-from radarsim.scene.scene import Scene
+from radarsim.propagation.antenna import ISOTROPIC
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength

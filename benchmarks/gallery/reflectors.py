@@ -4,17 +4,17 @@ import numpy as np
 
 from benchmarks.gallery.drawing import AHEAD, CONFIG, HERE, LAMBDA, THEORY, compare, target, walls_of
 from radarize.radar.array import virtual_positions
-from radarsim.physics.antenna import ISOTROPIC
-from radarsim.physics.echoes import Provenance
-from radarsim.physics.finder import EchoFinder
-from radarsim.physics.reflectors import Reflectors
-from radarsim.physics.scatterers import Scatterers
-from radarsim.scene import shapes
-from radarsim.scene.materials import MATERIALS, material
-from radarsim.scene.objects import SceneObject
-from radarsim.scene.scene import Scene
-from tests.physics.brute_force import kirchhoff_mirror
-from tests.physics.corners import (
+from radarsim.propagation.antenna import ISOTROPIC
+from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.world import shapes
+from radarsim.world.materials import MATERIALS, material
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
+from tests.propagation.brute_force import kirchhoff_mirror
+from tests.propagation.corners import (
     both_ways,
     corner,
     cross_section,
@@ -24,14 +24,14 @@ from tests.physics.corners import (
     seen_by_all,
     seen_by_both,
 )
-from tests.physics.corners import out_of_square as wedge
-from tests.physics.rigs import Rig, burst, field, isotropic, locate, polar
-from tests.physics.test_frontend import db
-from tests.physics.test_patches import capsule, ellipsoid, half_cylinder, rounded, stretched, tube
-from tests.physics.test_patches import field as smooth_field
-from tests.physics.test_patches import physical_optics as surface_optics
-from tests.physics.test_patches import reflectors as smooth_reflectors
-from tests.physics.test_plates import physical_optics
+from tests.propagation.corners import out_of_square as wedge
+from tests.propagation.rigs import Rig, burst, field, isotropic, locate, polar
+from tests.propagation.test_patches import capsule, ellipsoid, half_cylinder, rounded, stretched, tube
+from tests.propagation.test_patches import field as smooth_field
+from tests.propagation.test_patches import physical_optics as surface_optics
+from tests.propagation.test_patches import reflectors as smooth_reflectors
+from tests.propagation.test_plates import physical_optics
+from tests.receiver.test_frontend import db
 
 
 def point_target(axis) -> str:

@@ -14,23 +14,23 @@ from benchmarks.gallery.drawing import (
     compare,
 )
 from radarize.heatmaps import Heatmaps
-from radarsim.physics.antenna import ISOTROPIC, gain_pattern
-from radarsim.physics.coefficients import TABLE, reflection, transmission
-from radarsim.physics.finder import EchoFinder
-from radarsim.physics.reflectors import Reflectors
-from radarsim.physics.scatterers import Scatterers
-from radarsim.physics.search import Search
-from radarsim.scene.materials import material
-from radarsim.scene.scene import Scene
-from tests.physics.brute_force import transfer_matrix
-from tests.physics.rigs import Rig, burst
-from tests.physics.test_doors import HALF, MIDDLE, foot_speed, lengths, swinging
-from tests.physics.test_doors import finder as finder_of
-from tests.physics.test_fresnelzone import wall_past_pole
-from tests.physics.test_frontend import db
-from tests.physics.test_hollow import NEAR, PANES, RANGES, pane, peak, stud_wall
-from tests.physics.test_imagemethod import images_of_a_room, lattice
-from tests.physics.test_multipath import DOOR
+from radarsim.propagation.antenna import ISOTROPIC, gain_pattern
+from radarsim.propagation.coefficients import TABLE, reflection, transmission
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.observation import Observation
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.world.materials import material
+from radarsim.world.scene import Scene
+from tests.propagation.brute_force import transfer_matrix
+from tests.propagation.rigs import Rig, burst
+from tests.propagation.test_doors import HALF, MIDDLE, foot_speed, lengths, swinging
+from tests.propagation.test_doors import finder as finder_of
+from tests.propagation.test_fresnelzone import wall_past_pole
+from tests.propagation.test_hollow import NEAR, PANES, RANGES, pane, peak, stud_wall
+from tests.propagation.test_imagemethod import images_of_a_room, lattice
+from tests.propagation.test_multipath import DOOR
+from tests.receiver.test_frontend import db
 
 
 def box_room(axis) -> str:
@@ -39,7 +39,7 @@ def box_room(axis) -> str:
     p = np.array([0.37, -0.21, 1.23])
     # A level of -1 keeps those too that leave ahead and come back from behind, between opposite walls: unheard.
     isometry, _, orders = images_of_a_room(
-        Search(p[None], AHEAD[None], np.zeros(1), 14.0, LAMBDA, -1.0, *gain_pattern(ISOTROPIC))
+        Observation(p[None], AHEAD[None], np.zeros(1), 14.0, LAMBDA, -1.0, *gain_pattern(ISOTROPIC))
     )
     places, counts = isometry[:, :, :3] @ p + isometry[:, :, 3], []
     for order in (1, 2, 3):

@@ -5,22 +5,22 @@ from scipy import stats
 from scipy.special import gamma
 
 from benchmarks.gallery.drawing import AHEAD, CONFIG, FOUND, HERE, LAMBDA, THEORY, compare
-from radarsim.physics.clutter import CROSS_SECTION, EXPONENT, ON_WALLS, Clutter
-from radarsim.physics.echoes import Provenance
-from radarsim.physics.finder import EchoFinder
-from radarsim.physics.reflectors import Reflectors
-from radarsim.physics.scatterers import Scatterers
-from radarsim.physics.surface import Surface
-from radarsim.physics.unevenness import SCALES, Heights
-from radarsim.scene import shapes
-from radarsim.scene.life import Life
-from radarsim.scene.materials import material
-from radarsim.scene.objects import SceneObject
-from radarsim.scene.scene import Scene
-from tests.physics.rigs import Rig, burst, field
-from tests.physics.test_echoes import speckle as speckles
-from tests.physics.test_frontend import db
-from tests.physics.test_multipath import there_and_back
+from radarsim.propagation.clutter import CROSS_SECTION, EXPONENT, ON_WALLS, Clutter
+from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.propagation.surface import Surface
+from radarsim.propagation.unevenness import SCALES, Heights
+from radarsim.world import shapes
+from radarsim.world.life import Life
+from radarsim.world.materials import material
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
+from tests.propagation.rigs import Rig, burst, field
+from tests.propagation.test_echoes import speckle as speckles
+from tests.propagation.test_multipath import there_and_back
+from tests.receiver.test_frontend import db
 
 
 def clutter(rng: np.random.Generator, count: int) -> Scatterers:

@@ -15,7 +15,7 @@ from radarize.locks import hold
 from radarize.replacing import replacing
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Stale, Task
-from radarsim.threads import default_workers
+from radarsim.machine.threads import default_workers
 
 #: The expanded specification beside the recordings: parameters of each, and the members of every split.
 INDEX = "dataset.json"

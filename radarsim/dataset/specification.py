@@ -43,11 +43,11 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
 from radarize.yamlfile import read_yaml
-from radarsim.complaint import complaint
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task, content
 from radarsim.dataset.variant import Attributes, Strict, Variant
-from radarsim.scene.description import Description, described, find, shipped, split_level
+from radarsim.world.description import Description, described, find, shipped, split_level
+from radarsim.world.validation import format_validation_error
 
 #: What a building here may say of itself that stands beside `building` in a scene file.
 LIFE = "clutter", "unevenness", "interferers"
@@ -149,7 +149,7 @@ class Specification(Strict):
             for late in ("tasks", "members"):  # so that their errors come now, with the file's name
                 getattr(found, late)
         except ValidationError as error:
-            raise InputError(f"{path}: {complaint(error, data)}") from error
+            raise InputError(f"{path}: {format_validation_error(error, data)}") from error
         except InputError as error:
             raise InputError(f"{path}: {error}") from error
         return found
@@ -254,7 +254,7 @@ class Specification(Strict):
             Description.model_validate(description)
         except ValidationError as error:
             raise InputError(
-                f"buildings.{building}: {complaint(error, description).removeprefix('building.')}"
+                f"buildings.{building}: {format_validation_error(error, description).removeprefix('building.')}"
             ) from error
         return description
 

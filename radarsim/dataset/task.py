@@ -13,7 +13,7 @@ from radarize.errors import InputError
 from radarize.radar.presets import load_config
 from radarize.recording import Recording
 from radarsim.dataset.variant import Attributes, Variant
-from radarsim.scene.description import meshes, split_level
+from radarsim.world.description import meshes, split_level
 
 #: Attribute of a recording that holds its task's parameters.
 ATTRIBUTE = "task"
@@ -128,11 +128,11 @@ class Task:
             InputError: with the task's name.
         """
         from radarize.features.keeping import keep_maps
-        from radarsim.accompany import accompany
-        from radarsim.batches import Batches
-        from radarsim.simulate import record
-        from radarsim.statistics import Statistics
-        from radarsim.threads import share_with_drjit
+        from radarsim.machine.threads import share_with_drjit
+        from radarsim.motion.statistics import Statistics
+        from radarsim.recording.add_sensors import accompany
+        from radarsim.recording.batches import Batches
+        from radarsim.recording.simulate import record
 
         share_with_drjit()
         final, late = self.path(folder), self._late(folder)
@@ -160,10 +160,10 @@ class Task:
 
     def _scenario(self):
         """The `Scenario` to record, and the radar's original configuration text."""
-        from radarsim.crowd import crowded
+        from radarsim.motion.pedestrians import crowded
+        from radarsim.motion.walk import Walk
         from radarsim.scenario import Scenario
-        from radarsim.scene.scene import Scene
-        from radarsim.walk import Walk
+        from radarsim.world.scene import Scene
 
         scene = Scene.load(self.scene) if isinstance(self.scene, str) else Scene.of(self.scene, self._place)
         mild = Scene.load(split_level(self.scene)[0]) if self.variant.level else scene

@@ -7,8 +7,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS, load_config
 from radarize.yamlfile import changed
-from radarsim.motion import Mounting
-from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.motion.trajectory import Mounting
+from radarsim.receiver.frontend_config import FrontEndConfig
 
 Attributes = dict[str, str | float | int | bool]
 
@@ -23,7 +23,7 @@ class Variant(Strict):
     """Changes against what the specification says.
 
     Attributes:
-        level: of a scene that has levels (`radarsim.scene.description`); the walk is planned in its level 0.
+        level: of a scene that has levels (`radarsim.world.description`); the walk is planned in its level 0.
         radar: fields of `RadarConfig` to change, or a preset in place of the radar.
         frontend: fields of `FrontEndConfig` to change; of its parts, those given.
         mounting: of the sensor on the platform: x y z in m, roll pitch yaw in degrees.

@@ -8,12 +8,12 @@ import numpy as np
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config
-from radarsim.batches import TOGETHER
 from radarsim.emulator.source import packed
+from radarsim.motion.walk import Walk
+from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
-from radarsim.scene.description import find
-from radarsim.scene.scene import Scene
-from radarsim.walk import Walk
+from radarsim.world.description import find
+from radarsim.world.scene import Scene
 
 
 @dataclass(frozen=True)

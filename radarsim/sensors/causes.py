@@ -4,10 +4,10 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from radarize.recording import Stream
-from radarsim.physics.echoes import Echoes, Provenance
+from radarsim.machine.threads import one_blas_thread
+from radarsim.propagation.echoes import Echoes, Provenance
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
-from radarsim.threads import one_blas_thread
 
 _NAMES = ", ".join(p.name.lower() for p in Provenance)
 #: Parts of /truth/adc_by_cause, in this order; where other radars send, interference comes before the leakage.

@@ -133,7 +133,7 @@ class DepthCamera(Sensor):
         """Exact depth at given times, m, inf where there is nothing."""
         rotation = self._motion.rotation(times).as_matrix()
         directions = self._rays @ rotation.transpose(0, 2, 1)
-        distance = self.scenario.sight.distance(self._motion.position(times), directions, times, through_glass=True)
+        distance = self.scenario.rays.distance(self._motion.position(times), directions, times, through_glass=True)
         return (distance / self._stretch).reshape(len(times), self._camera.height, self._camera.width)
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
@@ -142,7 +142,7 @@ class DepthCamera(Sensor):
         if self._stereo is None:
             return {"truth/depth": np.where(depth < 65.5, np.rint(1000 * depth), 0).astype(np.uint16)}
         measured = [
-            self._stereo.measure(picture, self._camera, self.scenario.draws("depth", time))
+            self._stereo.measure(picture, self._camera, self.scenario.rng("depth", time))
             for picture, time in zip(depth, frames.times, strict=True)
         ]
         return {"truth/depth": np.stack(measured)}

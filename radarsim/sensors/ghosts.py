@@ -18,8 +18,9 @@ from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.radar.windows import taylor
 from radarize.recording import Product, Stream
-from radarsim.physics.echoes import Provenance
-from radarsim.physics.synthesis import BurstClock, _sincos_cycles
+from radarsim.propagation.burst import BurstClock
+from radarsim.propagation.echoes import Provenance
+from radarsim.receiver.synthesis import _sincos_cycles
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import CAUSES
 from radarsim.sensors.scan import AZIMUTHS

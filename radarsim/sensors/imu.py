@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from radarize.recording import Product, Stream
-from radarsim.motion import turned
+from radarsim.motion.trajectory import turned
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.depth import MOUNT
 from radarsim.sensors.sensor import Sensor
@@ -117,8 +117,8 @@ class Imu(Sensor):
         super().__init__(scenario)
         self._motion = scenario.motion.mounted(MOUNT)
         count = len(scenario.ticks(RATE))
-        self._accelerometer = Triad(ACCELEROMETER, scenario.draws("accelerometer"), count)
-        self._gyroscope = Triad(GYROSCOPE, scenario.draws("gyroscope"), count)
+        self._accelerometer = Triad(ACCELEROMETER, scenario.rng("accelerometer"), count)
+        self._gyroscope = Triad(GYROSCOPE, scenario.rng("gyroscope"), count)
         clock = "imu/time"
         self.streams = {
             clock: Stream((), "f8", "s", "instants of the IMU's samples", clock),

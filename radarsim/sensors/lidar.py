@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize import polar
-from radarsim.motion import turned
+from radarsim.motion.trajectory import turned
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 
@@ -39,7 +39,7 @@ class Lidar(Sensor):
     def _picture(self, time: float, position: Float[np.ndarray, "3"], yaw: float) -> np.ndarray:
         cos, sin = np.cos(yaw), np.sin(yaw)
         ways = self._beams @ np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
-        distance = self.scenario.sight.distance(position[None], ways[None], np.array([time]), through_glass=True)[0]
+        distance = self.scenario.rays.distance(position[None], ways[None], np.array([time]), through_glass=True)[0]
         hit = distance <= self._reach
         picture = np.zeros((polar.ROWS, polar.BEAMS), bool)
         picture[tuple(polar.lidar_pixels(self._beams[hit] * distance[hit, None]).T)] = True

@@ -3,7 +3,7 @@
 import numpy as np
 
 from radarize.recording import Stream
-from radarsim.motion import turned
+from radarsim.motion.trajectory import turned
 from radarsim.scenario import Frames
 from radarsim.sensors.sensor import Sensor
 

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from radarize.recording import Product, Stream
-from radarsim.motion import Motion, turned
+from radarsim.motion.trajectory import Motion, turned
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 
@@ -58,7 +58,7 @@ class PlanarScan(Sensor):
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The scan."""
         times = frames.middles
-        distance = self.scenario.sight.distance(*level_rays(self.scenario.motion, times, AZIMUTHS), times)
+        distance = self.scenario.rays.distance(*level_rays(self.scenario.motion, times, AZIMUTHS), times)
         return {"truth/scan": np.where(distance <= self.scenario.config.max_range, distance, np.inf)}
 
 
@@ -84,7 +84,7 @@ class Occupancy(Sensor):
         """The label."""
         times = frames.middles
         rays = level_rays(self.scenario.motion, times, RAYS.ravel())
-        distance = self.scenario.sight.distance(*rays, times).reshape(len(times), *RAYS.shape)
+        distance = self.scenario.rays.distance(*rays, times).reshape(len(times), *RAYS.shape)
         return {"truth/occupancy": self.label(distance)}
 
     def label(self, distance: Float[np.ndarray, "frame column ray"]) -> UInt8[np.ndarray, "frame range column"]:

@@ -13,7 +13,7 @@ class Sensor(ABC):
     """A sensor beside the radar, or a truth that no sensor measures.
 
     What it gives for some frames depends on nothing else than their instants: errors that drift are laid down for the
-    whole motion, noise is drawn by instant (`Scenario.draws`).
+    whole motion, noise is drawn by instant (`Scenario.rng`).
 
     Args:
         scenario: that it is part of.

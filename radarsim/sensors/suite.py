@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from radarize.errors import InputError
+from radarsim.machine.threads import one_blas_thread
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import AdcByCause, CauseCounts
 from radarsim.sensors.depth import DepthCamera, DepthStrip
@@ -16,7 +17,6 @@ from radarsim.sensors.pose import TruePose
 from radarsim.sensors.scan import Occupancy, PlanarScan
 from radarsim.sensors.sensor import Sensor
 from radarsim.sensors.tracking import TrackingCamera
-from radarsim.threads import one_blas_thread
 
 #: Sensors that cost next to nothing and are always there.
 ALWAYS = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}

@@ -37,7 +37,7 @@ class TrackingCamera(Sensor):
     @cached_property
     def _poses(self) -> tuple[Float[np.ndarray, "tick 7"], Float[np.ndarray, "tick 7"]]:
         """Tracked and true poses of the whole motion, whose steps add up from its start."""
-        motion, rng = self.scenario.motion, self.scenario.draws("tracking")
+        motion, rng = self.scenario.motion, self.scenario.rng("tracking")
         times = self.scenario.ticks(RATE) / RATE
         position, rotation = motion.position(times), motion.rotation(times)
         scale, draw = 1 + SCALE_ERROR * rng.standard_normal(), rng.standard_normal((len(times), 7))

@@ -17,15 +17,15 @@ from radarize.errors import InputError
 from radarize.radar.array import BOARDS
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
-from radarsim.batches import Batches
-from radarsim.calibrate import calibrate
-from radarsim.motion import Motion, Mounting, motion_through
-from radarsim.physics.frontend_config import Channel, FrontEndConfig, Mismatch
+from radarsim.motion.statistics import crossings
+from radarsim.motion.trajectory import Motion, Mounting, motion_through
+from radarsim.receiver.calibrate import calibrate
+from radarsim.receiver.frontend_config import Channel, FrontEndConfig, Mismatch
+from radarsim.recording.batches import Batches
+from radarsim.recording.simulate import record
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
 from radarsim.sensors.suite import chosen
-from radarsim.simulate import record
-from radarsim.statistics import crossings
+from radarsim.world.scene import Scene
 
 #: s between two poses: over a longer gap nobody knows where the radar was, and frames there have no twin.
 GAP = 0.5

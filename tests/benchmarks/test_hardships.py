@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation, RotationSpline
 
 from benchmarks.hardships import CONDITIONS, Samples, corridor, mounted
 from radarize.radar.presets import PRESETS
-from radarsim.motion import Motion
+from radarsim.motion.trajectory import Motion
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
+from radarsim.world.scene import Scene
 
 FLOOR = {"name": "floor", "shape": "rectangle", "size": [9, 9], "facing": [0, 0, 1], "material": "concrete"}
 

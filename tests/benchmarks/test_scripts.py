@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import results
 from radarize.benchmark.results import Results
-from radarsim.simulate import simulate
+from radarsim.recording.simulate import simulate
 
 
 @pytest.fixture(scope="module")

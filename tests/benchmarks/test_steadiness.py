@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from benchmarks.steadiness import CONFIG, changes
-from radarsim.physics.echoes import Echoes
-from radarsim.physics.finder import EchoFinder
+from radarsim.motion.walk import Walk
+from radarsim.propagation.echoes import Echoes
+from radarsim.propagation.finder import EchoFinder
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
-from radarsim.walk import Walk
+from radarsim.world.scene import Scene
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ from radarize.benchmark.followed import Followed
 from radarize.benchmark.runs import figures
 from radarize.evaluation.motion import velocity_errors
 from radarize.run import run
-from radarsim.simulate import simulate
+from radarsim.recording.simulate import simulate
 
 
 @pytest.fixture(scope="module")

@@ -16,8 +16,8 @@ from radarize.features.maps import MAPS
 from radarize.recording import Recording
 from radarsim.dataset.run import INDEX, make
 from radarsim.dataset.specification import Specification
-from radarsim.scene.scene import Scene
-from radarsim.walk import Walk
+from radarsim.motion.walk import Walk
+from radarsim.world.scene import Scene
 
 PLAIN = {
     "name": "tiny",

@@ -15,9 +15,9 @@ from radarize.radar.presets import PRESETS, load_config
 from radarize.yamlfile import read_yaml
 from radarsim.dataset import specification
 from radarsim.dataset.specification import Specification
-from radarsim.physics.frontend_config import Channel, FrontEndConfig, Leakage
-from radarsim.scene import description
-from radarsim.scene.description import shipped
+from radarsim.receiver.frontend_config import Channel, FrontEndConfig, Leakage
+from radarsim.world import description
+from radarsim.world.description import shipped
 
 CONFIG = PRESETS["radarize"]
 

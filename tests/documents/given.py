@@ -14,7 +14,7 @@ from PIL import Image
 from radarize.exporters import export
 from radarize.methods.configuration import Configuration
 from radarize.recording import Recording
-from radarsim.scene.description import shipped
+from radarsim.world.description import shipped
 from tests.importers.ros import write_published
 from tests.importers.rover import write_sequence
 from tests.importers.test_import_pcap import pcap, stream

@@ -67,7 +67,7 @@ NOT_TYPED = {
     r"make (docs|setup)": "makes an environment",
     r"sudo .*": "changes the machine's network and groups",
     r"building: .*": "a line of a scene file, as scenes/buildings have it",
-    r"scene = Scene\.of.*": "Python; tests/scene/test_buildings.py has it",
+    r"scene = Scene\.of.*": "Python; tests/world/test_buildings.py has it",
     r"radarsim doctor.*": "compiles what the others compile, too; tests/test_setup.py runs it",
     r"python -m benchmarks\..*": "draws the page's own pictures, by the checkout's benchmarks",
 }

@@ -16,7 +16,7 @@ from radarsim.emulator.commandline import PROMPT
 from radarsim.emulator.disturbance import Disturbance
 from radarsim.emulator.simulation import Simulation
 from radarsim.emulator.source import Playback
-from radarsim.walk import Walk
+from radarsim.motion.walk import Walk
 from tests.emulator.client import SMALL, attached
 from tests.packets import packets
 from tests.virtual import CONFIG, record
@@ -159,7 +159,7 @@ class Slow(Playback):
 
 
 def test_a_scene_is_simulated_as_simulate_does_it(tmp_path):
-    from radarsim.simulate import simulate
+    from radarsim.recording.simulate import simulate
 
     (tmp_path / "small.cfg").write_text(write_cfg(SMALL))
     simulate("office", tmp_path / "office.h5", duration=0.2, seed=3, radar=str(tmp_path / "small.cfg"))

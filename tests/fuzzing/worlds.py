@@ -11,10 +11,10 @@ from PIL import Image
 from radarize.methods.configuration import Configuration
 from radarize.slam.config import SlamConfig
 from radarsim.dataset.specification import Specification
-from radarsim.physics.frontend_config import FrontEndConfig
-from radarsim.scene.description import described
-from radarsim.scene.importers import carmen, import_scene, meshes, mitsuba
-from radarsim.waypoints import read_waypoints
+from radarsim.motion.waypoints import read_waypoints
+from radarsim.receiver.frontend_config import FrontEndConfig
+from radarsim.world.description import described
+from radarsim.world.importers import carmen, import_scene, meshes, mitsuba
 from tests.fuzzing.damage import damaged, misspelled
 from tests.fuzzing.reader import Reader, clear
 

@@ -6,12 +6,12 @@ from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
 from radarize.radar.presets import PRESETS
-from radarsim.motion import Motion
+from radarsim.motion.trajectory import Motion
 from radarsim.scenario import Scenario
-from radarsim.scene.materials import MATERIALS
-from radarsim.scene.objects import SceneObject
-from radarsim.scene.scene import Scene
 from radarsim.sensors.sensor import Sensor
+from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"]
 

@@ -9,13 +9,13 @@ from mounting import beside, box
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
-from radarsim.motion import Motion
-from radarsim.planner import plan_motion
+from radarsim.motion.planner import plan_motion
+from radarsim.motion.trajectory import Motion
 from radarsim.scenario import Scenario
-from radarsim.scene.description import Custom
-from radarsim.scene.movers import Person
-from radarsim.scene.scene import Scene
 from radarsim.sensors.depth import MOUNT, QUARTER, STRIP, DepthCamera, Intrinsics, Stereo
+from radarsim.world.description import Custom
+from radarsim.world.movers import Person
+from radarsim.world.scene import Scene
 
 NOW = np.array([0.0])
 

@@ -5,14 +5,14 @@ import pytest
 
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
-from radarsim.physics.echoes import Provenance
-from radarsim.physics.frontend_config import FrontEndConfig
+from radarsim.motion.walk import Walk
+from radarsim.propagation.echoes import Provenance
+from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
 from radarsim.sensors.causes import CAUSES, AdcByCause
 from radarsim.sensors.ghosts import NOISE, Ghosts
 from radarsim.sensors.scan import AZIMUTHS
-from radarsim.walk import Walk
+from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"]
 

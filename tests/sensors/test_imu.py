@@ -5,7 +5,7 @@ import pytest
 from mounting import CONFIG, beside, rows, stream, tumble
 from scipy.spatial.transform import Rotation
 
-from radarsim.motion import Motion
+from radarsim.motion.trajectory import Motion
 from radarsim.sensors.depth import MOUNT
 from radarsim.sensors.imu import ACCELEROMETER, GYROSCOPE, RATE, STANDARD_GRAVITY, Imu, Triad
 

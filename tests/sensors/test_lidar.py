@@ -5,7 +5,7 @@ import pytest
 from mounting import beside, box, rows
 
 from radarize import polar
-from radarsim.motion import Motion
+from radarsim.motion.trajectory import Motion
 from radarsim.sensors.lidar import Lidar
 
 WALL = box("wall", [2.0, -20, 0], [2.2, 20, 3])

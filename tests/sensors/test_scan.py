@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from mounting import CONFIG, beside, box, rows
 
-from radarsim.motion import Motion
-from radarsim.planner import plan_motion
+from radarsim.motion.planner import plan_motion
+from radarsim.motion.trajectory import Motion
 from radarsim.scenario import Scenario
-from radarsim.scene.scene import Scene
 from radarsim.sensors.depth import MOUNT, QUARTER, DepthCamera
 from radarsim.sensors.scan import AZIMUTHS, Cell, Occupancy, PlanarScan
+from radarsim.world.scene import Scene
 
 WALL = box("wall", [2.0, -20, 0], [2.2, 20, 3])
 

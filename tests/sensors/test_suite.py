@@ -11,9 +11,9 @@ from radarize.contents import contents
 from radarize.errors import InputError
 from radarize.recording import Recording, RecordingWriter
 from radarize.report.recording import report_recording
-from radarsim.scene.scene import Scene
+from radarsim.recording.simulate import simulate
 from radarsim.sensors.suite import SENSORS, chosen
-from radarsim.simulate import simulate
+from radarsim.world.scene import Scene
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 from mounting import beside, rows, tumble
 from scipy.spatial.transform import Rotation
 
-from radarsim.motion import Motion
+from radarsim.motion.trajectory import Motion
 from radarsim.sensors.tracking import HEADING_WALK, JITTER, SCALE_ERROR, TrackingCamera
 
 

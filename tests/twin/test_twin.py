@@ -14,13 +14,13 @@ from scipy.spatial.transform import Rotation
 from radarize.errors import InputError
 from radarize.radar.presets import PRESETS, load_config
 from radarize.recording import Recording, RecordingWriter
-from radarsim.motion import Mounting
-from radarsim.scene.materials import MATERIALS
-from radarsim.scene.scene import Scene
-from radarsim.simulate import simulate
+from radarsim.motion.trajectory import Mounting
+from radarsim.recording.simulate import simulate
 from radarsim.twin.comparison import compare
 from radarsim.twin.report import report_twin
 from radarsim.twin.twin import Options, make_twin
+from radarsim.world.materials import MATERIALS
+from radarsim.world.scene import Scene
 from tests.importers.public import captures
 from tests.twin.poses import altered, shaken
 

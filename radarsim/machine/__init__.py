@@ -1,0 +1,1 @@
+"""The machine that simulations run on: LLVM, threads, compiled kernels."""

@@ -1,0 +1,1 @@
+"""How the sensor and people move: trajectories, planner, platforms."""

@@ -1,0 +1,1 @@
+"""From a scene to propagation paths: scatterers, reflectors, visibility, amplitudes."""

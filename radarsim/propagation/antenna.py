@@ -1,0 +1,107 @@
+"""The antenna element's gain pattern, the same for every transmitter and receiver."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from numba import njit
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+
+class Cut(BaseModel):
+    """Gain below the peak along one axis, linear between its points.
+
+    Attributes:
+        degrees: angle from boresight, either side, ascending from 0 to 90.
+        loss_db: there, dB below the peak.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    degrees: tuple[float, ...]
+    loss_db: tuple[float, ...]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Cut":
+        d = self.degrees
+        if len(d) < 2 or len(d) != len(self.loss_db):
+            raise ValueError(f"has {len(d)} degrees and {len(self.loss_db)} loss_db, expected as many, at least 2")
+        if d[0] != 0 or d[-1] != 90 or np.any(np.diff(d) <= 0):
+            raise ValueError(f"degrees is {list(d)}, expected ascending from 0 to 90")
+        return self
+
+
+class Antenna(BaseModel):
+    """An element's pattern: the product of an azimuth and an elevation cut.
+
+    The defaults are the IWR1843BOOST's (SPRUIM4, figures of the radiation pattern): 10.5 dBi, -3 dB at 28 deg azimuth
+    and 14 deg elevation, -6 dB at 50 and 20 deg. Beyond the published points the fall continues at the same pace: an
+    estimate.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    peak_dbi: float = Field(10.5, ge=-30, le=40)
+    azimuth: Cut = Cut(
+        degrees=(0, 10, 20, 28, 40, 50, 60, 75, 90), loss_db=(0, 0.4, 1.55, 3.0, 4.7, 6.0, 8.2, 13.0, 20.0)
+    )
+    elevation: Cut = Cut(
+        degrees=(0, 5, 10, 14, 20, 30, 45, 60, 90), loss_db=(0, 0.4, 1.55, 3.0, 6.0, 11.0, 17.0, 22.0, 27.0)
+    )
+
+
+#: Equal gain in all directions in front of the board.
+ISOTROPIC = Antenna(
+    peak_dbi=0, azimuth=Cut(degrees=(0, 90), loss_db=(0, 0)), elevation=Cut(degrees=(0, 90), loss_db=(0, 0))
+)
+
+
+class GainPattern(NamedTuple):
+    """Amplitude gain (square root of power gain) of an element, as compiled kernels take it.
+
+    Attributes:
+        azimuth_gain, elevation_gain: against the absolute angle in steps of half a degree; the element's gain is their
+            product.
+        peak_gain: the largest there is in any direction.
+    """
+
+    azimuth_gain: Float[np.ndarray, "181"]
+    elevation_gain: Float[np.ndarray, "181"]
+    peak_gain: float
+
+
+def gain_pattern(antenna: Antenna | None = None) -> GainPattern:
+    """Tables of an antenna's gain; default: the IWR1843BOOST's."""
+    antenna = antenna or Antenna()
+    degrees = np.linspace(0, 90, 181)
+    azimuth, elevation = (
+        10 ** ((level - np.interp(degrees, cut.degrees, cut.loss_db)) / 20)
+        for level, cut in ((antenna.peak_dbi, antenna.azimuth), (0.0, antenna.elevation))
+    )
+    return GainPattern(azimuth, elevation, float(azimuth.max() * elevation.max()))
+
+
+@njit
+def amplitude_gain(x, y, z, pattern):
+    """Amplitude gain towards the sensor-frame direction (x, y, z), not necessarily normalised; 0 behind the board.
+
+    `pattern` is a `GainPattern`, or a `Observation`, which holds its fields.
+    """
+    if x <= 0.0:
+        return 0.0
+    azimuth = _angle(abs(y), x) * (360.0 / np.pi)
+    elevation = _angle(abs(z), np.sqrt(x * x + y * y)) * (360.0 / np.pi)
+    i, j = min(int(azimuth), 179), min(int(elevation), 179)
+    a = pattern.azimuth_gain[i] + (azimuth - i) * (pattern.azimuth_gain[i + 1] - pattern.azimuth_gain[i])
+    b = pattern.elevation_gain[j] + (elevation - j) * (pattern.elevation_gain[j + 1] - pattern.elevation_gain[j])
+    return a * b
+
+
+@njit
+def _angle(y, x):
+    """arctan(y / x) for x > 0 and y >= 0 to 2e-8 rad, three times as fast (Abramowitz and Stegun 4.4.49)."""
+    t = min(x, y) / max(x, y)
+    s = t * t
+    angle = t * (1 + s * (-0.3333314528 + s * (0.1999355085 + s * (-0.1420889944 + s * (0.1065626393
+            + s * (-0.0752896400 + s * (0.0429096138 + s * (-0.0161657367 + s * 0.0028662257))))))))  # fmt: skip
+    return angle if y < x else 0.5 * np.pi - angle

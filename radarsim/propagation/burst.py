@@ -1,0 +1,44 @@
+"""The time axis of a burst, and path lengths as parabolas over it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from numba import njit
+
+from radarize.radar.config import RadarConfig
+
+#: Instants (in half bursts from the middle) at which path lengths are evaluated: Chebyshev nodes.
+NODES = np.array([-np.sqrt(3) / 2, 0.0, np.sqrt(3) / 2])
+
+
+@dataclass(frozen=True)
+class BurstClock:
+    """The burst's time axis: normalised time s = -1...1 over the chirps' ADC middles.
+
+    Attributes:
+        middle: after the frame's stamp, s.
+        half: half the span, s.
+    """
+
+    middle: float
+    half: float
+
+    @classmethod
+    def of(cls, config: RadarConfig) -> "BurstClock":
+        """The clock of a configuration's frame."""
+        times = config.chirp_times
+        half = max((times.max() - times.min()) / 2, config.chirp_time / 2)
+        return cls(config.burst_center, half)
+
+    @property
+    def nodes(self) -> Float[np.ndarray, "3"]:
+        """Instants of `NODES` after the frame's stamp, s."""
+        return self.middle + self.half * NODES
+
+
+@njit(inline="always")
+def parabola(low, mid, high):
+    """Coefficients (s^0, s^1, s^2) of the parabola through values at `NODES`."""
+    s = np.sqrt(3) / 2
+    return mid, (high - low) / (2 * s), (high - 2 * mid + low) / (2 * s * s)

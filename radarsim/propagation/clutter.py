@@ -1,0 +1,125 @@
+"""The small things that a room is full of, as points: on desks and shelves, on walls and under ceilings.
+
+Objects down to 2 cm are drawn (`radarsim.world.generators.things`). What is smaller, and the parts of larger ones
+(handles, edges, screws, plugs), is a Poisson process with a density per square metre of the surface that they stand or
+hang on, and their radar cross sections follow Weibull's law: so Ram, Singh and Ghatak (IEEE Open J. Signal Process. 2,
+2021) model the discrete clutter of rooms. The exponent of a cross section (1: Swerling's, the smaller the spikier)
+is that of strong indoor scatterers; log-normal laws that fit measured targets in halls (Azim et al., arXiv 2411.03206)
+have tails of that length. Densities and the mean were chosen beside the pictures of RadarHD's 25 training walks
+(`benchmarks.realism`), never its test walks: no measurement of rooms at 77 GHz is published.
+
+A point keeps its place, cross section and phase for good, so it is coherent under motion; it is hidden, mirrored and
+seen through panes as any other scatterer is.
+"""
+
+from dataclasses import dataclass, replace
+from math import gamma, log
+
+import numpy as np
+from jaxtyping import Float
+from scipy.special import gammaincc
+
+from radarize.errors import InputError
+from radarsim.propagation.hashgrid import Grid
+from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
+from radarsim.propagation.surface import Surface
+from radarsim.world.scene import Scene
+from radarsim.world.shapes import scattered
+
+#: Things a square metre at level 1: on walls (plugs, handles, screws, cables), on what stands at the height of desks
+#: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
+#: drawn it was 4, 16 and 3; of those there are some 0.2, 3 and 0.1.
+ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
+#: Mean radar cross section, m^2, and exponent of its distribution P(sigma > s) = exp(-(s / scale)^exponent).
+CROSS_SECTION, EXPONENT = 0.1, 0.7
+#: Points of a scene, some 200 bytes each: a floor of the largest buildings has ten thousand.
+MOST = 5_000_000
+#: Mean distance from the surface, m, over the least: half the depth of what hangs or stands there.
+STANDOFF, NEAREST = 0.03, 0.01
+#: Below the first height over the lowest floor an upward face is a floor, above the second none is within reach, m.
+LOW, HIGH = 0.15, 2.0
+
+
+class Clutter:
+    """All small things of a scene.
+
+    Args:
+        scene: the world; its `life.clutter` scales the densities.
+        rng: draws them.
+
+    Raises:
+        InputError: there were to be more than `MOST`.
+    """
+
+    def __init__(self, scene: Scene, rng: np.random.Generator):
+        corners, normals = scene.triangles, scene.normals
+        sides = corners[:, 1:] - corners[:, :1]
+        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
+        mean = scene.life.clutter * densities(scene) * area
+        if mean.sum() > MOST:
+            raise InputError(
+                f"scene {scene.name}: clutter is {scene.life.clutter:g}, which makes {mean.sum():.2g} points, expected "
+                f"at most {MOST:g}"
+            )
+        count = rng.poisson(mean)
+        on = np.repeat(np.arange(len(area)), count)
+        place = scattered(corners[on], rng)
+        place += (NEAREST + rng.exponential(STANDOFF, len(on)))[:, None] * normals[on]
+        size = rng.exponential(1.0, len(on))
+        self._points = replace(
+            Scatterers.points(place, cross_section(size), rng.uniform(0, 2 * np.pi, len(on))),
+            horizontal=scene.floors_and_ceilings[on],
+            bounces=_strongest(size, BOUNCE_STRIDE),
+            bounces_twice=_strongest(size, BOUNCE_STRIDE**2),
+        )
+        self._grid = Grid(place, place)
+
+    def __len__(self) -> int:
+        return len(self._points)
+
+    def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> Scatterers:
+        """Those within `reach` (m) of any of the positions."""
+        index, _ = self._grid.near(positions, reach)
+        return self._points[index]
+
+
+@dataclass(frozen=True)
+class Cluttered:
+    """A surface and the small things on it, as one set of scatterers."""
+
+    surface: Surface
+    clutter: Clutter
+
+    def __len__(self) -> int:
+        return len(self.surface) + len(self.clutter)
+
+    def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> Scatterers:
+        """Those within `reach` (m) of any of the positions, see `Surface.near`."""
+        return Scatterers.joined([part.near(positions, reach) for part in (self.surface, self.clutter)])
+
+
+def densities(scene: Scene) -> Float[np.ndarray, "triangle"]:
+    """Things a square metre of each triangle at level 1, told by where it faces and how high it is.
+
+    Undersides below a ceiling have none, and sheets have theirs on the side of their normal.
+    """
+    up, height = scene.normals[:, 2], scene.triangles[:, :, 2].mean(axis=1) - scene.bounds[0, 2]
+    kinds = {
+        "wall": np.abs(up) < 0.5,
+        "floor": (up >= 0.5) & (height < LOW),
+        "top": (up >= 0.5) & (height >= LOW) & (height < HIGH),
+        "ceiling": (up <= -0.5) & (height >= HIGH),
+    }
+    return np.select(list(kinds.values()), [ON_WALLS, ON_FLOORS, ON_TOPS, UNDER_CEILINGS], 0.0)
+
+
+def cross_section(size: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """Weibull's law from exponential numbers of mean 1, m^2."""
+    return CROSS_SECTION / gamma(1 + 1 / EXPONENT) * size ** (1 / EXPONENT)
+
+
+def _strongest(size: Float[np.ndarray, "n"], stride: int) -> Float[np.ndarray, "n"]:
+    """Weights of power where one point in `stride`, the strongest ones, stands for all; mean power stays."""
+    least = log(stride)
+    held = gammaincc(1 + 1 / EXPONENT, least)  # share of the mean cross section that they have
+    return (size > least) / held

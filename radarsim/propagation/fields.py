@@ -1,0 +1,140 @@
+"""What a ray meets on its way: the antenna's gain, mirrors with edges and polarisation, the surface that scatters it.
+
+Vectors are tuples of three numbers, which compiled code keeps in registers.
+"""
+
+import numpy as np
+from numba import njit
+
+from radarsim.propagation.antenna import amplitude_gain
+from radarsim.propagation.coefficients import TABLE
+
+
+@njit
+def vector(array):
+    """The three numbers of an array."""
+    return array[0], array[1], array[2]
+
+
+@njit
+def dot(a, b):
+    """Scalar product, without conjugation."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit
+def minus(a, b):
+    """a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit
+def along(a, t, b):
+    """a + t b."""
+    return a[0] + t * b[0], a[1] + t * b[1], a[2] + t * b[2]
+
+
+@njit
+def cross(a, b):
+    """Vector product."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit
+def length(a):
+    """Euclidean norm."""
+    return np.sqrt(dot(a, a))
+
+
+@njit
+def unit(a):
+    """The direction of a vector."""
+    size = length(a) + 1e-12
+    return a[0] / size, a[1] / size, a[2] / size
+
+
+@njit
+def mirrored(p, center, normal):
+    """A point mirrored in a plane."""
+    return along(p, -2 * dot(minus(p, center), normal), normal)
+
+
+@njit
+def write(a, out):
+    """Into the first three places of an array."""
+    out[0], out[1], out[2] = a
+
+
+@njit
+def gain_towards(direction, rotation, pattern):
+    """Amplitude gain of the antenna towards a direction in the world."""
+    return amplitude_gain(
+        rotation[0, 0] * direction[0] + rotation[1, 0] * direction[1] + rotation[2, 0] * direction[2],
+        rotation[0, 1] * direction[0] + rotation[1, 1] * direction[1] + rotation[2, 1] * direction[2],
+        rotation[0, 2] * direction[0] + rotation[1, 2] * direction[1] + rotation[2, 2] * direction[2],
+        pattern,
+    )
+
+
+@njit
+def facing(normal, towards, two_sided):
+    """Cosine between a normal and the unit vector away from the surface; 1 for an isotropic scatterer."""
+    if normal[0] == 0.0 and normal[1] == 0.0 and normal[2] == 0.0:
+        return 1.0
+    cosine = normal[0] * towards[0] + normal[1] * towards[1] + normal[2] * towards[2]
+    return abs(cosine) if two_sided else cosine
+
+
+@njit
+def ramp(inside, zone):
+    """0 ... 1 as a point moves from `zone` outside an edge to `zone` inside; two abutting mirrors add up to one."""
+    x = inside / zone
+    if x <= -1:
+        return 0.0
+    if x >= 1:
+        return 1.0
+    return 0.5 + 0.25 * x * (3 - x * x)
+
+
+@njit
+def upright(up, direction):
+    """The field that the board's patches send, or take, along a unit direction: upright and across it."""
+    return unit(along(up, -dot(up, direction), direction))
+
+
+@njit
+def upwards(rotation):
+    """Where the board's upper edge points, of a sensor that is turned so to the world."""
+    return rotation[0, 2], rotation[1, 2], rotation[2, 2]
+
+
+@njit
+def sent(up, direction):
+    """The field that sets out, as a complex vector."""
+    x, y, z = upright(up, direction)
+    return x + 0j, y + 0j, z + 0j
+
+
+@njit
+def reflected(field, arriving, leaving, normal, reflection):
+    """A transverse field after a mirror: TE and TM parts times their Fresnel coefficients.
+
+    Args:
+        field: complex vector.
+        arriving, leaving: unit directions of travel.
+        normal: of the mirror, on either side.
+        reflection: its table, (TE / TM, cosine).
+    """
+    cosine = min(abs(dot(arriving, normal)), 1.0)
+    at = cosine * (TABLE - 1)
+    j = min(int(at), TABLE - 2)
+    te = reflection[0, j] + (at - j) * (reflection[0, j + 1] - reflection[0, j])
+    tm = reflection[1, j] + (at - j) * (reflection[1, j + 1] - reflection[1, j])
+    across = cross(arriving, normal)
+    size = length(across)
+    if size < 1e-6:
+        return te * field[0], te * field[1], te * field[2]
+    across = (across[0] / size, across[1] / size, across[2] / size)
+    there, back = cross(across, arriving), cross(across, leaving)
+    a, b = te * dot(field, across), tm * dot(field, there)
+    return a * across[0] + b * back[0], a * across[1] + b * back[1], a * across[2] + b * back[2]

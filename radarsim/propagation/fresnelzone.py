@@ -1,0 +1,142 @@
+"""How much of a stretch of a mirrored path is clear: obstacles over its first Fresnel zones, not on one ray.
+
+What a screen with openings leaves of a wave is Fresnel's integral over them, (1 / 2j) int exp(j pi r^2 / 2) dA in units
+of sqrt(lambda d (L - d) / 2L). It is summed over the nodes of a Fibonacci lattice on a square of these units that ends
+smoothly; such a lattice shows a thin pole as many nodes whichever way it stands (Niederreiter, Random Number Generation
+and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes tell whether a stretch is partly clear, and only then more are
+looked at. Against strips it is good to half a dB (RMS); what they diffract from beyond the square is left out.
+
+The rays of a stretch are straight, from its begin to its end: half as far apart at the radar as at the first mirror.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+from numba import njit
+
+from radarsim.propagation.fields import cross, dot, minus
+from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.observation import Observation
+from radarsim.propagation.obstacles import Obstacles
+from radarsim.propagation.reflectors import Flat
+from radarsim.propagation.table import Table
+
+#: Slabs are looked for in the way of echoes that are at least this much stronger than the threshold.
+LEAST_LOSS = 4.0
+#: The same for zones: some 16 dB over noise.
+LEAST_SPLIT = 20.0
+#: At the radar rays are so far apart, as a share of what they are at a mirror.
+AT_RADAR = 0.5
+#: Fewer nodes than this within a mirror say less than the one ray through its middle.
+_FEWEST = 4
+#: No slit passes more than this of an amplitude.
+_MOST = 1.17
+
+
+class Lattice(NamedTuple):
+    """Nodes over the first Fresnel zones, Fresnel units, and their weights."""
+
+    nodes: Float[np.ndarray, "node 2"]
+    weight: Complex[np.ndarray, "node"]
+
+    @classmethod
+    def fibonacci(cls, count: int, before: int, half: float) -> "Lattice":
+        """So many nodes, a Fibonacci number, and the one before; half the side of the square, Fresnel units."""
+        k = np.arange(count)
+        nodes = half * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
+        weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.sqrt(
+            np.cos(np.pi * nodes / (2 * half)).prod(axis=1)
+        )
+        return cls(nodes, weight / weight.sum())
+
+
+_FEW, _MANY = Lattice.fibonacci(21, 13, 1.5), Lattice.fibonacci(55, 34, 1.5)
+
+
+@dataclass(frozen=True)
+class Stretches(Table):
+    """Straight stretches of mirrored paths.
+
+    Attributes:
+        frame: index.
+        begin, end: m.
+        before, after: how far a Fresnel unit along either transverse axis moves begin and end, m.
+        mirrors: in whose outlines begin and end lie; -1: none.
+    """
+
+    frame: Int[np.ndarray, "stretch"]
+    begin: Float[np.ndarray, "stretch 3"]
+    end: Float[np.ndarray, "stretch 3"]
+    before: Float[np.ndarray, "stretch 2 3"]
+    after: Float[np.ndarray, "stretch 2 3"]
+    mirrors: Int[np.ndarray, "stretch 2"]
+
+
+def passage(
+    observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, size: Float[np.ndarray, "stretch"]
+) -> tuple[Complex[np.ndarray, "stretch"], Float[np.ndarray, "stretch"]]:
+    """What is left of waves along stretches, as an amplitude, and their delay (m).
+
+    Args:
+        observation, flat, obstacles: the frames, the mirrors, and what is in the way.
+        stretches: of paths.
+        size: amplitude of each path if all of it were clear. Slabs are looked for, and more than one ray, where it is
+            so much above the threshold that it matters.
+    """
+    worth = size > LEAST_LOSS * observation.threshold
+    factor, delay = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
+    rows = np.flatnonzero(size > LEAST_SPLIT * observation.threshold)
+    few, begin, end, inside = _rays(flat, stretches[rows], _FEW)
+    clear = obstacles.clear(observation, stretches.frame[rows[few]], begin, end)
+    # Alike are all that are as the ray in the middle; then what that met is all there is.
+    unlike = np.zeros(len(rows), int)
+    np.add.at(unlike, few, clear != (factor[rows[few]] == 1))
+    rows = rows[(unlike > 0) & (inside.sum(axis=1) >= _FEWEST)]
+    many, begin, end, inside = _rays(flat, stretches[rows], _MANY)
+    passed, late = obstacles.passage(observation, stretches.frame[rows[many]], begin, end, np.ones(len(many), bool))
+    weight = np.where(inside, _MANY.weight, 0)
+    weight /= weight.sum(axis=1, keepdims=True)
+    wavenumber = 2j * np.pi / observation.wavelength
+    field, power, later = np.zeros(len(rows), complex), np.full(len(rows), 1e-30), np.zeros(len(rows))
+    np.add.at(field, many, weight[inside] * passed * np.exp(wavenumber * late))
+    np.add.at(power, many, np.abs(passed) ** 2)
+    np.add.at(later, many, np.abs(passed) ** 2 * late)
+    later /= power
+    field *= np.minimum(1, _MOST / np.maximum(np.abs(field), 1e-12)) * np.exp(-wavenumber * later)
+    factor[rows], delay[rows] = field, later
+    return factor, delay
+
+
+def _rays(flat: Flat, stretches: Stretches, lattice: Lattice):
+    """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which stretch these are."""
+    shape = len(stretches), len(lattice.nodes)
+    begin, end, inside = np.empty((*shape, 3)), np.empty((*shape, 3)), np.empty(shape, np.bool_)
+    _spread(flat.corners, flat.normal, stretches.columns, lattice.nodes, begin, end, inside)
+    return np.nonzero(inside)[0], begin[inside], end[inside], inside
+
+
+@njit(cache=True)
+def _spread(corners, normal, stretches, nodes, begin, end, inside):
+    for i in range(len(begin)):
+        one, two = stretches.mirrors[i]
+        for k in range(len(nodes)):
+            x, y = nodes[k]
+            for d in range(3):
+                begin[i, k, d] = stretches.begin[i, d] + x * stretches.before[i, 0, d] + y * stretches.before[i, 1, d]
+                end[i, k, d] = stretches.end[i, d] + x * stretches.after[i, 0, d] + y * stretches.after[i, 1, d]
+            inside[i, k] = (one < 0 or _within(begin[i, k], corners[one], normal[one])) and (
+                two < 0 or _within(end[i, k], corners[two], normal[two])
+            )
+
+
+@njit
+def _within(place, corners, normal):
+    """Whether a point over a convex outline is on the same side of all of its edges."""
+    left, right = True, True
+    for k in range(4):
+        one = vec(corners[k])
+        side = dot(cross(minus(vec(corners[(k + 1) % 4]), one), minus(vec(place), one)), vec(normal))
+        left, right = left and side > -1e-9, right and side < 1e-9
+    return left or right

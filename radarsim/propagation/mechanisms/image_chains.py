@@ -1,0 +1,308 @@
+"""Echoes by mirrors alone, two or three in a chain: images of the radar itself, corners included.
+
+A chain m_1 ... m_k takes the receiver to M rx, M = R_1 ... R_k the product of the reflections, and the echo's path is
+|tx - M rx|, straight through the mirrors unfolded along it. Two mirrors at right angles make M a half turn about their
+edge and three an inversion in their corner, whose path passes the edge or corner itself for every place of the radar;
+each order of the mirrors then holds its own share of the light.
+
+The mirrors are apertures on the unfolded path. One at distance d from an end of a path of length L diffracts as its
+offset x over sqrt(lambda d (L - d) / (2 L)) says (Fresnel), so in these units all apertures of a chain overlap to one
+polygon W, and the amplitude lambda / (4 pi L) of an endless mirror is taken F times,
+
+    F = (1 / 2j) int_W exp(j pi r^2 / 2) dA = (1 / 2 pi) closed int (1 - exp(j pi r^2 / 2)) dphi,
+
+the Kirchhoff integral, here along the edges (Stokes, as Maggi and Rubinowicz did): 1 in the middle of large apertures,
+1/2 on an edge, area over lambda times distance for small ones. So a dihedral of plates a x b has
+8 pi a^2 b^2 / lambda^2, and a trihedral of triangles 4 pi a^4 / (3 lambda^2).
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+from numba import njit
+
+from radarsim.propagation.apertures import CORNERS, FAR, depth, kirchhoff, outlines, overlap
+from radarsim.propagation.fields import (
+    along,
+    cross,
+    dot,
+    gain_towards,
+    length,
+    minus,
+    mirrored,
+    reflected,
+    sent,
+    unit,
+    upright,
+    upwards,
+    write,
+)
+from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.observation import Observation
+from radarsim.propagation.reflectors import Flat
+from radarsim.propagation.table import Table, filled
+
+#: No aperture passes more than this of an amplitude: two slits of Cornu's 1.17.
+_MOST = 1.4
+
+
+@dataclass(frozen=True)
+class Chains(Table):
+    """Ways over mirrors that lead from the sensor back to it, each in one of its two directions.
+
+    The other direction has the same amplitude and the inverse isometry (`isometry.inverse`); a chain with the same
+    mirror at either end is its own reverse.
+
+    Attributes:
+        mirrors: of two, the second one twice.
+        isometry: of the receiver.
+        amplitude: square root of received over transmitted power, with phase.
+        stops: places of reflection of a ray that takes this way (the last one repeated up to three), m.
+    """
+
+    mirrors: Int[np.ndarray, "chain 3"]
+    isometry: Float[np.ndarray, "chain 3 4"]
+    amplitude: Complex[np.ndarray, "chain"]
+    stops: Float[np.ndarray, "chain 3 3"]
+
+
+class _Orders(NamedTuple):
+    """What can follow what: firsts[start[b] : start[b + 1]] are the mirrors that can be before b, and after it."""
+
+    start: Int[np.ndarray, "mirror+1"]
+    firsts: Int[np.ndarray, "pair"]
+
+
+class _Room(NamedTuple):
+    """Scratch for polygons."""
+
+    planes: Float[np.ndarray, "12 3"]
+    polygon: Float[np.ndarray, "corner 2"]
+    spare: Float[np.ndarray, "corner 3"]
+
+
+def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observation, frame: int) -> Chains:
+    """Chains of two and three mirrors above the threshold.
+
+    Args:
+        flat: mirrors.
+        pairs: which can be first, and which second after it (see `visible_mirrors.Mirrors`).
+        observation, frame: from where.
+    """
+    pairs = pairs[np.lexsort(pairs.T)]
+    orders = _Orders(np.searchsorted(pairs[:, 1], np.arange(len(flat) + 1)), np.ascontiguousarray(pairs[:, 0]))
+    return filled(
+        lambda n: Chains(np.empty((n, 3), np.int64), np.empty((n, 3, 4)), np.empty(n, complex), np.empty((n, 3, 3))),
+        lambda found: _search(observation, frame, flat.columns, orders, found.columns),
+        1024,
+    )
+
+
+@njit(cache=True)
+def _search(observation, frame, flat, orders, found):
+    """Tries all chains whose mirrors can follow one another; returns how many lead back, of which as many as fit."""
+    p, rotation = vec(observation.position[frame]), observation.rotation[frame]
+    room = _Room(np.empty((12, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 3)))
+    edges = outlines(flat)
+    way = np.empty(3, np.int64)
+    count = 0
+    for b in range(len(flat.center)):
+        firsts = orders.firsts[orders.start[b] : orders.start[b + 1]]
+        for i in range(len(firsts)):
+            a = firsts[i]
+            image_a = mirrored(p, vec(flat.center[a]), vec(flat.normal[a]))
+            image_b = mirrored(image_a, vec(flat.center[b]), vec(flat.normal[b]))
+            for j in range(i - 1, len(firsts)):
+                order = 2 if j < i else 3
+                c = b if order == 2 else firsts[j]
+                if order == 2 and (b < a or not _after(orders, b, a)):  # the way back is not searched for
+                    continue
+                # The sensor's image in the last mirror: seen from there, the way leads straight to the sensor.
+                image = image_b if order == 2 else mirrored(image_b, vec(flat.center[c]), vec(flat.normal[c]))
+                back = minus(p, image)
+                path = length(back)
+                if path > 2 * observation.range or path < 0.05:
+                    continue
+                back = (back[0] / path, back[1] / path, back[2] / path)
+                # Backwards over the mirrors, each with the radar's image behind it.
+                ray = back
+                if order == 3:
+                    if not _meets(image, ray, path, observation.wavelength, flat, edges, c):
+                        continue
+                    ray = _turned(ray, flat, c)
+                if not _meets(image_b, ray, path, observation.wavelength, flat, edges, b):
+                    continue
+                ray = _turned(ray, flat, b)
+                if not _meets(image_a, ray, path, observation.wavelength, flat, edges, a):
+                    continue
+                ray = _turned(ray, flat, a)
+                taken = gain_towards((-back[0], -back[1], -back[2]), rotation, observation)
+                strength = (
+                    observation.wavelength / (4 * np.pi * path) * taken * gain_towards(ray, rotation, observation)
+                )
+                if _MOST * strength <= observation.threshold:
+                    continue
+                way[0], way[1], way[2] = a, b, c
+                value, e1, e2, off = _chain(way[:order], p, path, ray, observation, frame, flat, room)
+                value *= strength
+                if abs(value) <= observation.threshold:
+                    continue
+                if count < len(found.amplitude):
+                    for k in range(3):
+                        found.mirrors[count, k] = way[min(k, order - 1)]
+                    _isometry(way[:order], flat, found.isometry[count])
+                    found.amplitude[count] = value
+                    # A ray through the polygon, which misses the very edge of corners.
+                    zone = np.sqrt(observation.wavelength * path / 8)
+                    aim = along(along(along(p, path / 2, ray), zone * off[0], e1), zone * off[1], e2)
+                    _course(way[:order], p, aim, flat, found.stops[count])
+                count += 1
+    return count
+
+
+@njit
+def _after(orders, a, b):
+    """Whether b can be the mirror after a."""
+    some = orders.firsts[orders.start[b] : orders.start[b + 1]]
+    at = np.searchsorted(some, a)
+    return at < len(some) and some[at] == a
+
+
+@njit
+def _turned(ray, flat, m):
+    """A direction of travel, before a mirror or after it."""
+    n = vec(flat.normal[m])
+    return along(ray, -2 * dot(ray, n), n)
+
+
+@njit
+def _meets(image, ray, path, wavelength, flat, edges, m):
+    """Whether a straight path from the radar's image behind a mirror comes from near it: a quick test before `_chain`.
+
+    Args:
+        image: m.
+        ray: direction after the mirror.
+        path: the whole way, m.
+        edges: of all mirrors (`apertures.outlines`).
+        m: the mirror.
+    """
+    n = vec(flat.normal[m])
+    slope = dot(ray, n)
+    if slope < 0.02 and (slope > -0.02 or not flat.two_sided[m]):
+        return False
+    center = vec(flat.center[m])
+    t = dot(minus(center, image), n) / slope
+    if t <= 0.005 or t >= path - 0.005:
+        return False
+    low_u, high_u, low_v, high_v = edges[m]
+    offset = minus(along(image, t, ray), center)
+    x, y = dot(offset, vec(flat.u[m])), dot(offset, vec(flat.v[m]))
+    # The zone is widest half way: where an edge is nearer to that than the path is in the mirror's plane, it counts.
+    size = high_u - low_u + high_v - low_v
+    widest = min(max(path / 2, t - size), t + size)
+    margin = FAR * np.sqrt(wavelength * widest * (path - widest) / (2 * path)) / abs(slope)
+    return low_u - margin < x < high_u + margin and low_v - margin < y < high_v + margin
+
+
+@njit(cache=True)
+def _chain(way, p, path, ray, observation, frame, flat, room):
+    """F times the reflection coefficients of a chain that sets out along a ray; axes across it, and aim in them."""
+    none = 0j, ray, ray, (0.0, 0.0)
+    normal, corners, planes, wavelength = flat.normal, flat.corners, room.planes, observation.wavelength
+    rotation = observation.rotation[frame]
+    up = upwards(rotation)
+    aside = (0.0, 0.0, 1.0) if abs(ray[2]) < 0.7 else (1.0, 0.0, 0.0)
+    e1 = unit(cross(aside, ray))
+    e2 = cross(ray, e1)
+    field = sent(up, ray)
+    # Instead of unfolding the mirrors, the path and its axes are folded; the start moves to its images.
+    start, now, f1, f2 = p, ray, e1, e2
+    count, before = 0, 0.0
+    for m in way:
+        n, c = vec(normal[m]), vec(flat.center[m])
+        slope = dot(now, n)
+        if abs(slope) < 0.02 or (slope > 0 and not flat.two_sided[m]):
+            return none
+        t = dot(minus(c, start), n) / slope
+        if t <= 0.005 or t >= path - 0.005 or t < before - np.sqrt(wavelength * path):
+            return none
+        before = t
+        x, y = 0.0, 0.0  # the middle of the window
+        for k in range(4):
+            one = minus(vec(corners[m, k]), start)
+            x, y = x + dot(one, f1) / 4, y + dot(one, f2) / 4
+        middle = (x, y)
+        for k in range(4):
+            one, two = minus(vec(corners[m, k]), start), minus(vec(corners[m, (k + 1) % 4]), start)
+            x, y = dot(one, f1), dot(one, f2)
+            dx, dy = dot(two, f1) - x, dot(two, f2) - y
+            square = dx * dx + dy * dy
+            if square < 1e-8:
+                continue
+            side = dx * (middle[1] - y) - dy * (middle[0] - x)
+            sign = (1.0 if side < 0 else -1.0) / np.sqrt(square)
+            nx, ny = -dy * sign, dx * sign  # outward
+            offset = nx * x + ny * y
+            share = min(max(-(x * dx + y * dy) / square, 0.0), 1.0)
+            d = (dot(one, now) + share * (dot(two, now) - dot(one, now))) / path
+            if d < 0.02 or d > 0.98:  # an edge beside or behind the radar
+                if offset < 0:
+                    return none
+                continue
+            offset /= np.sqrt(wavelength * path * d * (1 - d) / 2)
+            if offset < -FAR:
+                return none
+            planes[count, 0], planes[count, 1], planes[count, 2] = nx, ny, offset
+            count += 1
+        after = along(now, -2 * slope, n)
+        field = reflected(field, now, after, n, flat.reflection[m])
+        start = mirrored(start, c, n)
+        f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
+        now = after
+    taken = upright(up, now)
+    value = dot(field, taken)
+    corner = overlap(planes, count, room.polygon, room.spare)
+    if corner < 3:
+        return none
+    share = kirchhoff(room.polygon, corner)
+    # The ray aims at the path itself, or where an edge is near, a little inside the polygon.
+    mx, my = 0.0, 0.0
+    for k in range(corner):
+        mx += room.polygon[k, 0] / corner
+        my += room.polygon[k, 1] / corner
+    toward = 0.0
+    for step in (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0):
+        toward = step
+        if depth(planes, count, step * mx, step * my) > 0.25:
+            break
+    return value * share, e1, e2, (toward * mx, toward * my)
+
+
+@njit(cache=True)
+def _isometry(way, flat, out):
+    """R_1 ... R_k as matrix | offset."""
+    for column in range(4):
+        if column < 3:
+            x = (1.0 * (column == 0), 1.0 * (column == 1), 1.0 * (column == 2))
+        else:
+            x = (0.0, 0.0, 0.0)
+        for k in range(len(way) - 1, -1, -1):
+            n = vec(flat.normal[way[k]])
+            height = dot(x, n) if column < 3 else dot(minus(x, vec(flat.center[way[k]])), n)
+            x = along(x, -2 * height, n)
+        out[0, column], out[1, column], out[2, column] = x
+
+
+@njit(cache=True)
+def _course(way, p, aim, flat, stops):
+    """Where a ray from p through a point meets the mirrors of a chain."""
+    start, now = p, unit(minus(aim, p))
+    for k in range(3):
+        if k < len(way):
+            n = vec(flat.normal[way[k]])
+            t = dot(minus(vec(flat.center[way[k]]), start), n) / dot(now, n)
+            start = along(start, t, now)
+            now = along(now, -2 * dot(now, n), n)
+        write(start, stops[k])

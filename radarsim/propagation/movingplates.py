@@ -1,0 +1,176 @@
+"""Plates that move, such as leaves of doors: they flash, mirror and let through as the same plates that stand.
+
+Each is a scene of its own, in whose frame it stands. Its faces join the flat reflectors of every frame where it is in
+the middle of the burst, and rays that it is in the way of are traced in its own frame. Over the burst it moves on by a
+rigid motion G, which takes what it mirrors along: an image of the receiver by a plate's part, M, becomes G M G^-1, and
+one by several mirrors the product of theirs.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float, Int
+
+from radarize.radar.config import RadarConfig
+from radarsim.propagation.burst import NODES, BurstClock
+from radarsim.propagation.isometry import after, inverse
+from radarsim.propagation.movingtargets import MovingTargets
+from radarsim.propagation.observation import Observation
+from radarsim.propagation.reflectors import Flat, Reflectors
+from radarsim.propagation.transmission import Transmission
+from radarsim.world.scene import Scene
+
+
+class MovingPlates:
+    """All of a scene's movers.
+
+    Args:
+        moving: the movers.
+        config: radar configuration.
+        margin: rays start and end this far from their ends, m.
+    """
+
+    def __init__(self, moving: MovingTargets, config: RadarConfig, margin: float):
+        self._moving, self._margin = moving, margin
+        self._offsets = BurstClock.of(config).half * np.append(NODES, 0.0)
+        self._part = np.array([k for k, part in enumerate(moving.parts) if part.material is not None], int)
+        scenes = [Scene("part", [moving.parts[k].object]) for k in self._part]
+        self._reflectors = [Reflectors.of(scene, config) for scene in scenes]
+        self._transmission = [Transmission(scene, config, margin) for scene in scenes]
+
+    def __len__(self) -> int:
+        return len(self._part)
+
+    def _places(self, times: Float[np.ndarray, "n"]):
+        """Rotations and centres of the plates at some times, s."""
+        # one instant at a time: sums over many at once are ordered otherwise, and a frame is to hang on no other
+        poses = [self._moving.poses(np.array([t])) for t in times]
+        turn, center = (np.concatenate(parts) for parts in zip(*poses, strict=True))
+        return turn[:, self._part], center[:, self._part]
+
+    def faces(self, observation: Observation) -> tuple[Flat, Flat]:
+        """Their faces in every frame, and the inner faces of hollow ones."""
+        outer, inner = [Flat.none()], [Flat.none()]
+        for frame, (turns, centers) in enumerate(zip(*self._places(observation.time), strict=True)):
+            for plate, (turn, center, own) in enumerate(zip(turns, centers, self._reflectors, strict=True)):
+                outer.append(_placed(own.flat, turn, center, plate, frame))
+                inner.append(_placed(own.inner, turn, center, plate, frame))
+        return Flat.joined(outer), Flat.joined(inner)
+
+    def moves(self, observation: Observation) -> Float[np.ndarray, "frame plate 4 3 4"]:
+        """How they move from the middle of each burst on: to where they are at its three nodes, and in the middle.
+
+        One more plate, the last, is what stands still.
+        """
+        out = np.tile(np.eye(3, 4), (observation.frames, len(self) + 1, 4, 1, 1))
+        for frame, time in enumerate(observation.time if len(self) else ()):
+            turn, center = self._places(time + self._offsets)
+            rotation = np.einsum("npij,pkj->pnik", turn, turn[3])
+            out[frame, :-1, :, :, :3] = rotation
+            out[frame, :-1, :, :, 3] = center.transpose(1, 0, 2) - np.einsum("pnij,pj->pni", rotation, center[3])
+        return out
+
+    def passage(
+        self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
+        end: Float[np.ndarray, "ray 3"], allowed: Bool[np.ndarray, "ray"],
+    ) -> tuple[Complex[np.ndarray, "ray"], Float[np.ndarray, "ray"]]:  # fmt: skip
+        """What they leave of waves between points, and by how much they delay it, as `Obstacles.passage` has it."""
+        factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
+        turns, centers = self._places(observation.time)
+        for plate, (part, own) in enumerate(zip(self._part, self._transmission, strict=True)):
+            met = self._met(observation, frame, begin, end, part)
+            factor[met[~allowed[met]]] = 0
+            met = met[allowed[met]]
+            if len(met):
+                turn, center = turns[frame[met], plate], centers[frame[met], plate]
+                ends = (np.einsum("nij,ni->nj", turn, x[met] - center) for x in (begin, end))
+                up = np.einsum("nij,ni->nj", turn, observation.rotation[frame[met], :, 2])
+                passed, late = own.passage(*ends, up)
+                factor[met] *= passed
+                delay[met] += late
+        return factor, delay
+
+    def _met(self, observation: Observation, frame, begin, end, part: int) -> Int[np.ndarray, "met"]:
+        """Rays that one of them stands in the way of."""
+        found = [np.zeros(0, int)]
+        for k in np.unique(frame):
+            now = np.flatnonzero(frame == k)
+            hidden = self._moving.occluded(begin[now], end[now], observation.time[k], self._margin, np.array([part]))
+            found.append(now[hidden])
+        return np.concatenate(found)
+
+
+def _placed(flat: Flat, turn, center, plate: int, frame: int) -> Flat:
+    """Faces of a plate as they stand in a frame."""
+    n = len(flat)
+    return replace(
+        flat, corners=flat.corners @ turn.T + center, center=flat.center @ turn.T + center,
+        normal=flat.normal @ turn.T, u=flat.u @ turn.T, v=flat.v @ turn.T, plate=np.full(n, plate),
+        frame=np.full(n, frame),
+    )  # fmt: skip
+
+
+def carried(flat: Flat, mirrors: Int[np.ndarray, "n mirror"]) -> Bool[np.ndarray, "n"]:
+    """Whether any of the mirrors (-1: none) of some paths moves."""
+    return (np.append(flat.plate, -1)[mirrors] >= 0).any(axis=1)
+
+
+def isometries(
+    flat: Flat, mirrors: Int[np.ndarray, "n mirror"], moves: Float[np.ndarray, "frame plate 4 3 4"]
+) -> Float[np.ndarray, "n 4 3 4"]:
+    """Products of the reflections in some mirrors (-1: none) at a burst's nodes and in its middle.
+
+    Args:
+        flat: all mirrors.
+        mirrors: in order from the sensor on.
+        moves: as `MovingPlates.moves` has them.
+    """
+    out = np.zeros((len(mirrors), 4, 3, 4))
+    out[..., :3] = np.eye(3)
+    for column in mirrors.T[::-1]:
+        rows = np.flatnonzero(column >= 0)
+        m = column[rows]
+        rigid = moves[flat.frame[m], flat.plate[m]]
+        normal = np.einsum("ntij,nj->nti", rigid[..., :3], flat.normal[m])
+        center = np.einsum("ntij,nj->nti", rigid[..., :3], flat.center[m]) + rigid[..., 3]
+        along = np.einsum("nti,ntij->ntj", normal, out[rows])
+        along[..., 3] -= np.einsum("nti,nti->nt", normal, center)
+        out[rows] -= 2 * normal[..., None] * along[..., None, :]
+    return out
+
+
+def moved(
+    flat: Flat, place: Float[np.ndarray, "n 3"], own: Float[np.ndarray, "n 3 3"], mirrors: Int[np.ndarray, "n mirror"],
+    moves: Float[np.ndarray, "frame plate 4 3 4"],
+) -> Float[np.ndarray, "n 3 3"]:  # fmt: skip
+    """How far virtual points have moved at a burst's nodes, m.
+
+    Args:
+        flat, mirrors, moves: as `isometries` has them.
+        place: of the points in the middle, m.
+        own: how far what is seen there has moved itself, by node, m.
+    """
+    chain = isometries(flat, mirrors, moves)
+    chain, middle = chain[:, :3], chain[:, 3:]
+    step = after(chain, inverse(middle))
+    steps = np.einsum("ntij,nj->nti", step[..., :3], place) + step[..., 3] - place[:, None]
+    return steps + np.einsum("ntij,ntj->nti", chain[..., :3], own)
+
+
+def turned(
+    flat: Flat, image: Float[np.ndarray, "n 3 4"], mirrors: Int[np.ndarray, "n mirror"],
+    moves: Float[np.ndarray, "frame plate 4 3 4"],
+) -> Float[np.ndarray, "n 3 3 4"]:  # fmt: skip
+    """Images of the receiver at a burst's nodes.
+
+    Args:
+        flat, moves: as `isometries` has them.
+        image: in the middle of the burst.
+        mirrors: one that it is a part of, its flash, an edge or a corner; or several that it is seen in.
+    """
+    first = mirrors[:, 0]
+    rigid = moves[flat.frame[first], flat.plate[first]][:, :3]
+    part = after(after(rigid, image[:, None]), inverse(rigid))
+    chain = isometries(flat, mirrors, moves)
+    chain = after(after(chain[:, :3], inverse(chain[:, 3:])), image[:, None])
+    return np.where((mirrors[:, 1] < 0)[:, None, None, None], part, chain)

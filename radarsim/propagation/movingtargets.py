@@ -1,0 +1,128 @@
+"""The movers of a scene as the radar meets them: scatterers that are carried along, and parts that stand in the way.
+
+Over a burst a scatterer's path is a parabola through three nodes. Limbs jerk: against every chirp's own place a
+walker's echoes are wrong by -40 to -60 dB for most of the step cycle and by -25 dB where shins turn (measured over
+one). Ghosts of movers go over one mirror or out and back over one each; legs over two are left out.
+
+Parts of a material scatter as its surfaces do, and are plates besides (`movingplates`).
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numba import njit, prange
+
+from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
+from radarsim.propagation.scatteringpattern import LAMBERT, weights
+from radarsim.world.crossing import crossing
+from radarsim.world.movers import MovingThing, poses
+
+
+class MovingTargets:
+    """All movers of a scene: their scatterers at any time, and what they hide.
+
+    Args:
+        movers: of the scene.
+        rng: draws places and phases of scatterers, once.
+        density: scatterers per square metre of surface.
+
+    Attributes:
+        parts: rigid parts of all movers.
+        opaque: indices of those that nothing passes.
+        part: (scatterer,) index of the part that carries it.
+        sigma, phase: (scatterer,) m^2, rad.
+    """
+
+    def __init__(self, movers: list[MovingThing], rng: np.random.Generator, density: float = 150.0):
+        self.movers = movers
+        own = [mover.parts() for mover in movers]
+        self.parts = [part for parts in own for part in parts]
+        self.opaque = np.array([k for k, part in enumerate(self.parts) if part.material is None], int)
+        place, normal, part, sigma = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, int)], [np.zeros(0)]
+        lobe = [np.zeros((0, 4))]
+        number = 0
+        for mover, parts in zip(movers, own, strict=True):
+            area = sum(each.area for each in parts)
+            for each in parts:
+                if each.material is None:
+                    # Half of an upright round body faces the radar, and there Lambert's squared cosine averages 1/2.
+                    per_area = 4 * mover.cross_section / area
+                else:
+                    per_area = each.material.sigma0
+                count = max(int(round(density * each.area)), 4)
+                points, normals = each.sample(count, rng)
+                place.append(points)
+                normal.append(normals)
+                part.append(np.full(count, number))
+                sigma.append(np.full(count, per_area * each.area / count))
+                lobe.append(np.tile(LAMBERT if each.material is None else weights(each.material), (count, 1)))
+                number += 1
+        self._place, self._normal = np.concatenate(place), np.concatenate(normal)
+        self.part, self.sigma = np.concatenate(part), np.concatenate(sigma)
+        self._lobe = np.concatenate(lobe)
+        self.phase = rng.uniform(0, 2 * np.pi, len(self.part))
+        self._half = np.array([p.half for p in self.parts]).reshape(-1, 3)
+        self._capsule = np.array([p.capsule for p in self.parts], bool)
+
+    def __len__(self) -> int:
+        return len(self.part)
+
+    def poses(self, t: Float[np.ndarray, "n"]) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
+        """Rotation and centre of every part of every mover."""
+        return poses(self.movers, t)
+
+    def positions(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n scatterer 3"]:
+        """Places of the scatterers at times t (s), m."""
+        turn, center = self.poses(t)
+        return np.einsum("nsij,sj->nsi", turn[:, self.part], self._place) + center[:, self.part]
+
+    def normals(self, t: float) -> Float[np.ndarray, "scatterer 3"]:
+        """Outward unit normals at a time, s."""
+        turn, _ = self.poses(np.array([t]))
+        return np.einsum("sij,sj->si", turn[0, self.part], self._normal)
+
+    def scatterers(self, t: float) -> Scatterers:
+        """The scatterers as they are at time t, s."""
+        n = len(self)
+        every = np.arange(n)
+        return Scatterers(
+            position=self.positions(np.array([t]))[0],
+            normal=self.normals(t),
+            sigma=self.sigma,
+            phase=self.phase,
+            two_sided=np.zeros(n, bool),
+            horizontal=np.zeros(n, bool),
+            bounces=np.where(every % BOUNCE_STRIDE == 0, float(BOUNCE_STRIDE), 0.0),
+            bounces_twice=np.where(every % BOUNCE_STRIDE**2 == 0, float(BOUNCE_STRIDE**2), 0.0),
+            lobe=self._lobe,
+            rank=np.full(n, -1.0),
+        )
+
+    def occluded(
+        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float, margin: float = 0.01,
+        parts: Int[np.ndarray, "some"] | None = None,
+    ) -> Bool[np.ndarray, "n"]:  # fmt: skip
+        """Whether a part, of some or of all, stands in a segment at time t, both ends shortened by `margin`, m."""
+        origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
+        hidden = np.zeros(len(origins), bool)
+        some = np.arange(len(self.parts)) if parts is None else parts
+        if len(some) and len(origins):
+            turn, center = self.poses(np.array([t]))
+            shape = self._half[some], self._capsule[some]
+            _hide(origins, targets, turn[0, some], center[0, some], *shape, margin, hidden)
+        return hidden
+
+
+@njit(parallel=True, cache=True)
+def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
+    """Whether segments, shortened at both ends, are anywhere inside a part."""
+    for i in prange(len(origins)):
+        way = targets[i] - origins[i]
+        length = np.sqrt(np.dot(way, way))
+        if length <= 2 * margin:
+            continue
+        way = way / length
+        for p in range(len(center)):
+            enters, leaves = crossing(origins[i], way, turn[p], center[p], half[p], capsule[p])
+            if enters <= length - margin and leaves >= margin:
+                hidden[i] = True
+                break

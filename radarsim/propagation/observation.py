@@ -1,0 +1,33 @@
+"""What is looked for, and from where: the poses of frames that are simulated together, and which echoes count."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+
+class Observation(NamedTuple):
+    """Poses in the middle of each burst, and limits.
+
+    Attributes:
+        position, rotation, time: m, sensor to world, s.
+        range: half the longest path, m.
+        wavelength: m.
+        threshold: echoes below this amplitude are left out.
+        azimuth_gain, elevation_gain, peak_gain: the antenna's (`antenna.GainPattern`).
+    """
+
+    position: Float[np.ndarray, "frame 3"]
+    rotation: Float[np.ndarray, "frame 3 3"]
+    time: Float[np.ndarray, "frame"]
+    range: float
+    wavelength: float
+    threshold: float
+    azimuth_gain: Float[np.ndarray, "181"]
+    elevation_gain: Float[np.ndarray, "181"]
+    peak_gain: float
+
+    @property
+    def frames(self) -> int:
+        """How many."""
+        return len(self.position)

@@ -1,0 +1,97 @@
+"""What stands in the way of rays: opaque objects and movers stop them, slabs and doors weaken and delay them."""
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float, Int
+
+from radarize.radar.config import RadarConfig
+from radarsim.propagation.movingplates import MovingPlates
+from radarsim.propagation.movingtargets import MovingTargets
+from radarsim.propagation.observation import Observation
+from radarsim.propagation.transmission import Transmission
+from radarsim.world.scene import Scene
+
+#: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
+CLEARANCE = 5e-3
+
+
+class Obstacles:
+    """The world as seen by a ray.
+
+    Args:
+        scene: None where nothing can stand in the way.
+        transmission: what passes through its thin objects.
+        moving: what moves by itself.
+        plates: those of its parts that waves may pass.
+    """
+
+    def __init__(
+        self, scene: Scene | None, transmission: Transmission | None, moving: MovingTargets, plates: MovingPlates
+    ):
+        self.scene, self.transmission, self.moving, self.plates = scene, transmission, moving, plates
+
+    @classmethod
+    def of(cls, scene: Scene | None, moving: MovingTargets, config: RadarConfig) -> "Obstacles":
+        """All that there is in a place for a radar."""
+        transmission = None if scene is None else Transmission(scene, config, CLEARANCE)
+        return cls(scene, transmission, moving, MovingPlates(moving, config, CLEARANCE))
+
+    def _shadowed(self, observation: Observation, frame, begin, end) -> Bool[np.ndarray, "ray"]:
+        """Whether an opaque part of a mover stands in the way."""
+        hidden = np.zeros(len(frame), bool)
+        for k in np.unique(frame) if len(self.moving.opaque) else ():
+            now = frame == k
+            hidden[now] = self.moving.occluded(begin[now], end[now], observation.time[k], parts=self.moving.opaque)
+        return hidden
+
+    def clear(
+        self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
+        end: Float[np.ndarray, "ray 3"],
+    ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
+        """Whether nothing is in the way, slabs included; frames and ends as `passage` has them."""
+        blocked = np.zeros(len(frame), bool) if self.scene is None else self.scene.occluded(begin, end, CLEARANCE)
+        blocked |= self._shadowed(observation, frame, begin, end)
+        if len(self.plates):
+            blocked |= self.plates.passage(observation, frame, begin, end, np.zeros(len(frame), bool))[0] == 0
+        return ~blocked
+
+    def passage(
+        self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
+        end: Float[np.ndarray, "ray 3"], allowed: Bool[np.ndarray, "ray"],
+    ) -> tuple[Complex[np.ndarray, "ray"], Float[np.ndarray, "ray"]]:  # fmt: skip
+        """What is left of waves between points, as an amplitude, and their delay (m).
+
+        Args:
+            observation, frame: which rays are for which frame.
+            begin, end: m.
+            allowed: slabs are looked for in the way of these, and are opaque to the others.
+        """
+        factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
+        if self.scene is not None and len(frame):
+            blocked = self.scene.occluded(begin, end, margin=CLEARANCE)
+            factor[blocked] = 0
+            through = np.flatnonzero(blocked & allowed)
+            if len(through):
+                up = observation.rotation[frame[through], :, 2]
+                factor[through], delay[through] = self.transmission.passage(begin[through], end[through], up)
+        factor[self._shadowed(observation, frame, begin, end)] = 0
+        if len(self.plates):
+            passed, late = self.plates.passage(observation, frame, begin, end, allowed & (factor != 0))
+            factor, delay = factor * passed, delay + late
+        return factor, delay
+
+    def way(
+        self, observation: Observation, frame: Int[np.ndarray, "way"], stops: Float[np.ndarray, "way stop 3"],
+        stretches: Int[np.ndarray, "way"], allowed: Bool[np.ndarray, "way"],
+    ) -> tuple[Complex[np.ndarray, "way"], Float[np.ndarray, "way"]]:  # fmt: skip
+        """The same for ways of several stretches from the sensor over stops.
+
+        Args:
+            stops: m; the last of a way may be followed by others that do not count.
+            stretches: how many of each way's stops count.
+        """
+        begins = np.concatenate([observation.position[frame, None], stops[:, :-1]], axis=1)
+        way, stop = np.nonzero(np.arange(stops.shape[1]) < stretches[:, None])
+        passed, extra = self.passage(observation, frame[way], begins[way, stop], stops[way, stop], allowed[way])
+        factor, delay = np.ones(begins.shape[:2], complex), np.zeros(begins.shape[:2])
+        factor[way, stop], delay[way, stop] = passed, extra
+        return factor.prod(axis=1), delay.sum(axis=1)

@@ -1,0 +1,349 @@
+"""The coherent echo of smooth curved surfaces: geometric optics at specular points, Fresnel's integral up to borders.
+
+Where the way from the radar over a surface and back is stationary, physical optics is the wall's echo times what the
+way's Hessians have in common (Deschamps, Proc. IEEE 60(9), 1972), with the principal radii a_1 and a_2 there
+
+    lambda / (8 pi h) / sqrt((1 + h / a_1) (1 + h / a_2)),
+
+far away sigma = pi a_1 a_2; beyond a caustic, where a factor is negative, its root turns by -90 deg. Borders cut the
+integral: with coordinates y in which the way's phase is pi |y|^2 / 2, it is (`apertures`)
+
+    F = (1 / 2j) int exp(j pi |y|^2 / 2) dA = inside - (1 / 2 pi) closed int exp(j pi |y|^2 / 2) dphi.
+
+Both hold where the specular point has left the piece: then it lies on the quadric that goes on beyond the border, and F
+fades. At a caustic the first factor grows as y shrinks, so an echo is never more than that of its piece if all of it
+were in phase: energy is kept without a bound of its own. Where the Hessian has both signs, F is taken with |y|^2 of
+both alike, which is right at its middle, at a straight border and for small pieces.
+
+Each piece has one specular point, which is what like curvatures make of it: its normals are all different.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float, Int
+from numba import njit
+
+from radarsim.propagation.apertures import FAR, diffracted, side
+from radarsim.propagation.coefficients import TABLE
+from radarsim.propagation.curved import QUADRIC, SHAPE, Arcs, stationary
+from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, unit, write
+from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.observation import Observation
+from radarsim.propagation.smooth import Piece
+from radarsim.propagation.table import filled
+
+#: About so many of a piece's corners are where the search for its specular point may begin, and so many triangles, at
+#: most, are from there to the one that holds it.
+STARTS, STEPS = 64, 512
+#: Square of an angle between normals, rad^2, that is nothing where no border is near.
+BESIDE = 1e-4
+
+
+class Patches(NamedTuple):
+    """Pieces of smooth surfaces, see `smooth.Piece`; corners and triangles are numbered through.
+
+    Attributes:
+        place, normal, curvature: by corner.
+        home: a triangle that a corner is of.
+        faces, across, border: by triangle and by side.
+        begin: first corner, triangle and side of each piece, and of none.
+        ball: centre and radius of a sphere around each, m.
+        two_sided: sheets show both sides.
+        reflection: at normal incidence, as of flat reflectors (`reflectors.Flat`).
+    """
+
+    place: Float[np.ndarray, "corner 3"]
+    normal: Float[np.ndarray, "corner 3"]
+    curvature: Float[np.ndarray, "corner 6"]
+    home: Int[np.ndarray, "corner"]
+    faces: Int[np.ndarray, "face 3"]
+    across: Int[np.ndarray, "face 3"]
+    border: Int[np.ndarray, "side 2"]
+    begin: Int[np.ndarray, "piece+1 3"]
+    ball: Float[np.ndarray, "piece 4"]
+    two_sided: Bool[np.ndarray, "piece"]
+    reflection: Complex[np.ndarray, "piece 2 cosine"]
+
+    @classmethod
+    def of(cls, rows: list[tuple[Piece, bool, Complex[np.ndarray, "2 cosine"]]]) -> "Patches":
+        """All of some pieces, each with whether it shows both sides and how it reflects."""
+        pieces = [row[0] for row in rows]
+        sizes = [(len(p.place), len(p.faces), len(p.border)) for p in pieces]
+        begin = np.cumsum([(0, 0, 0), *sizes], axis=0)
+        none = np.zeros((0, 3))
+        place, normal = (np.concatenate([none, *(getattr(p, k) for p in pieces)]) for k in ("place", "normal"))
+        curvature = np.concatenate([np.zeros((0, 6)), *(p.curvature for p in pieces)])
+        whole = np.zeros((0, 3), int)
+        faces = np.concatenate([whole, *(p.faces + b[0] for p, b in zip(pieces, begin, strict=False))])
+        across = np.concatenate([whole, *(np.where(p.across < 0, -1, p.across + b[1])
+                                          for p, b in zip(pieces, begin, strict=False))])  # fmt: skip
+        border = np.concatenate([whole[:, :2], *(p.border + b[0] for p, b in zip(pieces, begin, strict=False))])
+        middle = [(p.place.min(axis=0) + p.place.max(axis=0)) / 2 for p in pieces]
+        ball = [(*m, np.linalg.norm(p.place - m, axis=1).max()) for p, m in zip(pieces, middle, strict=True)]
+        home = np.zeros(len(place), int)
+        home[faces] = np.arange(len(faces))[:, None]
+        return cls(
+            place, normal, curvature, home, faces, across, border, begin, np.reshape(ball, (-1, 4)),
+            np.array([row[1] for row in rows], bool),
+            np.reshape([row[2] for row in rows], (-1, 2, TABLE)).astype(complex),
+        )  # fmt: skip
+
+
+def flashes(observation: Observation, frame: int, patches: Patches) -> Arcs:
+    """Those of all pieces above the threshold in one frame."""
+    return filled(
+        lambda n: Arcs(np.empty((n, 3)), np.zeros((n, 3, 4)), np.empty(n, complex), np.zeros((n, SHAPE))),
+        lambda found: _flashes(observation, frame, patches, found.columns),
+        2 * len(patches.ball) + 1,
+    )
+
+
+@njit(cache=True)
+def _flashes(observation, frame, patches, found):
+    """Returns how many there are, of which as many as fit are written."""
+    p, rotation, count = vec(observation.position[frame]), observation.rotation[frame], 0
+    for k in range(len(patches.ball)):
+        if length(minus(vec(patches.ball[k]), p)) - patches.ball[k, 3] > observation.range:
+            continue
+        for turn in range(2 if patches.two_sided[k] else 1):
+            aim, quadric, place, value = strength(observation, patches, (k, 1.0 - 2.0 * turn), p, p)
+            if abs(value) * observation.peak_gain**2 <= observation.threshold:
+                continue
+            value *= patches.reflection[k, 0, -1] * gain_towards(minus(place, p), rotation, observation) ** 2
+            if abs(value) <= observation.threshold:
+                continue
+            write(aim, found.aim[count])
+            for d in range(3):
+                found.isometry[count, d, d], found.isometry[count, d, 3] = -1.0, 2 * place[d]
+            found.amplitude[count] = value
+            point, axis, normal, bend1, bend2 = quadric
+            shape = found.shape[count]
+            shape[0], shape[11], shape[12] = QUADRIC, bend1, bend2
+            write(point, shape[1:4])
+            write(axis, shape[4:7])
+            write(normal, shape[8:11])
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def strength(observation, patches, of, one, two):
+    """The echo of one side of a piece between two places.
+
+    Args:
+        observation: range and wavelength.
+        patches, of: the pieces; which one, and 1.0 for the side of its normals, -1.0 for the other.
+        one, two: m.
+
+    Returns:
+        a point for rays to aim at, m; the surface there (`curved.stationary`); the specular point, m; and the amplitude
+        that an isotropic antenna gets from one place to the other.
+    """
+    k, turn = of
+    face, weights, inside = _foot(patches, k, turn, one, two)
+    aim, quadric = _surface(patches, face, turn, weights)
+    place, way, hessian, plane = stationary(quadric, one, two)
+    size = patches.ball[k, 3]
+    if way > 2 * observation.range or _grazes(quadric, place, one, two):
+        return aim, quadric, place, 0j
+    # Principal values of the Hessian; Fresnel zones are no larger than the piece
+    h11, h22, h12 = hessian
+    mean, apart = (h11 + h22) / 2, np.hypot((h11 - h22) / 2, h12)
+    angle, least = 0.5 * np.arctan2(h12, (h11 - h22) / 2), observation.wavelength / (2 * size * size)
+    high, low = _away(mean + apart, least), _away(mean - apart, least)
+    across, elliptic = cross(quadric[2], quadric[1]), high * low > 0
+    first = _mixed(np.cos(angle), quadric[1], np.sin(angle), across, np.sqrt(2 * abs(high) / observation.wavelength))
+    second = _mixed(-np.sin(angle), quadric[1], np.cos(angle), across, np.sqrt(2 * abs(low) / observation.wavelength))
+    value = _fresnel(patches, of, (place, first, second, elliptic, inside), (one, two, way, observation.wavelength))
+    if not elliptic:
+        value = -1j * abs(value)
+    elif high < 0:
+        value = -np.conj(value)
+    endless = plane[0] * plane[1] - plane[2] * plane[2]
+    return aim, quadric, place, value * observation.wavelength / (4 * np.pi * way) * np.sqrt(endless / abs(high * low))
+
+
+@njit
+def _away(value, least):
+    """A number that is not nearer to nought than so."""
+    return value if abs(value) > least else (least if value >= 0 else -least)
+
+
+@njit
+def _mixed(a, one, b, two, scale):
+    return along(along((0.0, 0.0, 0.0), a * scale, one), b * scale, two)
+
+
+@njit
+def _grazes(quadric, place, one, two):
+    there, back, normal = unit(minus(one, place)), unit(minus(two, place)), quadric[2]
+    return dot(there, normal) < 0.05 or dot(back, normal) < 0.05
+
+
+@njit
+def _off(patches, corner, turn, one, two):
+    """How the direction that halves the angle differs from the normal at a corner."""
+    place, normal = vec(patches.place[corner]), vec(patches.normal[corner])
+    return along(unit(along(unit(minus(one, place)), 1.0, unit(minus(two, place)))), -turn, normal)
+
+
+@njit(cache=True)
+def _foot(patches, k, turn, one, two):
+    """The triangle of a piece, and the weights of its corners, where the normal best halves the angle, and whether it
+    does: from the best of some corners on, across sides."""
+    nearest, best, begin, end = 9.0, 0, patches.begin[k, 0], patches.begin[k + 1, 0]
+    for corner in range(begin, end, (end - begin) // STARTS + 1):
+        off = _off(patches, corner, turn, one, two)
+        if dot(off, off) < nearest:
+            nearest, best = dot(off, off), corner
+    face = patches.home[best]
+    least, weights, shares = _nearest(patches, face, turn, one, two)
+    holds, came = face, -1
+    circles = False
+    for step in range(STEPS):
+        low, to, back = 0.0, -1, False
+        for corner in range(3):  # across the side beyond which it is, most of all
+            other = patches.across[face, corner]
+            if shares[corner] < low and other >= 0:
+                low, to, back = shares[corner], other, other == came
+        if to < 0:
+            break
+        circles = back or step == STEPS - 1
+        if circles:
+            break
+        came, face = face, to
+        off, others, shares = _nearest(patches, face, turn, one, two)
+        if off < least:
+            least, weights, holds = off, others, face
+    if circles and least > 0:
+        for face in range(patches.begin[k, 1], patches.begin[k + 1, 1]):
+            off, others, _ = _nearest(patches, face, turn, one, two)
+            if off < least:
+                least, weights, holds = off, others, face
+    return holds, weights, least < BESIDE
+
+
+@njit(cache=True)
+def _nearest(patches, face, turn, one, two):
+    """Where on a triangle the normal best halves the angle: the square of what it is off; weights of corners; and those
+    where it would halve it if the triangle went on for ever."""
+    a, b, c = patches.faces[face]
+    m = unit(along(along(vec(patches.normal[a]), 1.0, vec(patches.normal[b])), 1.0, vec(patches.normal[c])))
+    wa, wb, wc = (
+        _off(patches, a, turn, one, two), _off(patches, b, turn, one, two), _off(patches, c, turn, one, two)
+    )  # fmt: skip
+    seen = dot(wa, m) * turn > -1  # from behind, it is halved as well
+    wa, wb, wc = along(wa, -dot(wa, m), m), along(wb, -dot(wb, m), m), along(wc, -dot(wc, m), m)
+    ka, kb, kc = dot(cross(wb, wc), m), dot(cross(wc, wa), m), dot(cross(wa, wb), m)
+    total = ka + kb + kc
+    total = total if abs(total) > 1e-300 else 1e-300
+    shares = ka / total, kb / total, kc / total
+    if not seen:
+        return 4.0, (1 / 3, 1 / 3, 1 / 3), shares
+    if min(shares) >= 0:
+        return 0.0, shares, shares
+    ab, bc, ca = _on_side(wa, wb), _on_side(wb, wc), _on_side(wc, wa)
+    if ab[0] <= bc[0] and ab[0] <= ca[0]:
+        return ab[0], (1 - ab[1], ab[1], 0.0), shares
+    if bc[0] <= ca[0]:
+        return bc[0], (0.0, 1 - bc[1], bc[1]), shares
+    return ca[0], (ca[1], 0.0, 1 - ca[1]), shares
+
+
+@njit
+def _on_side(one, two):
+    """The square of the least vector between two, and its share of the way from one to the other."""
+    way = minus(two, one)
+    t = min(max(-dot(one, way) / (dot(way, way) + 1e-30), 0.0), 1.0)
+    off = along(one, t, way)
+    return dot(off, off), t
+
+
+@njit(cache=True)
+def _surface(patches, face, turn, weights):
+    """A point of a triangle for rays to aim at, m, and the surface there, as `curved.stationary` takes it.
+
+    The surface lies over the triangle as an arc lies over its chord: by (q - p_i) . n_i / (1 + n_i . n) from each
+    corner, which any quadric has to second order and a circle half way precisely.
+    """
+    q, n, middle = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    for i in range(3):
+        corner = patches.faces[face, i]
+        q = along(q, weights[i], vec(patches.place[corner]))
+        n = along(n, turn * weights[i], vec(patches.normal[corner]))
+        middle = along(middle, 1 / 3, vec(patches.place[corner]))
+    n = unit(n)
+    axis = unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.7 else (1.0, 0.0, 0.0)))
+    across = cross(n, axis)
+    height, c11, c22, c12 = 0.0, 0.0, 0.0, 0.0
+    for i in range(3):
+        corner = patches.faces[face, i]
+        normal, c = vec(patches.normal[corner]), patches.curvature[corner]
+        over = dot(minus(q, vec(patches.place[corner])), normal) * turn
+        height -= weights[i] * over / (1 + turn * dot(normal, n))
+        rows = (c[0], c[1], c[2]), (c[1], c[3], c[4]), (c[2], c[4], c[5])
+        on = dot(rows[0], axis), dot(rows[1], axis), dot(rows[2], axis)
+        beside = dot(rows[0], across), dot(rows[1], across), dot(rows[2], across)
+        c11 += turn * weights[i] * dot(on, axis)
+        c12 += turn * weights[i] * dot(on, across)
+        c22 += turn * weights[i] * dot(beside, across)
+    angle, apart = 0.5 * np.arctan2(c12, (c11 - c22) / 2), np.hypot((c11 - c22) / 2, c12)
+    axis = _mixed(np.cos(angle), axis, np.sin(angle), across, 1.0)
+    quadric = along(q, height, n), axis, n, (c11 + c22) / 2 + apart, (c11 + c22) / 2 - apart
+    return along(q, 0.02, minus(middle, q)), quadric
+
+
+@njit(cache=True)
+def _fresnel(patches, of, zones, way):
+    """What the borders of a piece leave of its echo.
+
+    Args:
+        patches, of: see `strength`.
+        zones: the specular point, m; axes in which places about it are Fresnel units, 1/m; whether the way is shortest
+            or longest there; and whether it is inside, where no border is near.
+        way: from where, to where, how long, and the wavelength, m.
+    """
+    k, turn = of
+    total, nearest, left = 0j, FAR * FAR, 1.0 if zones[4] else -1.0
+    for edge in range(patches.begin[k, 2], patches.begin[k + 1, 2]):
+        a, b = patches.border[edge]
+        if turn < 0:
+            a, b = b, a
+        if _hidden(patches, a, turn, way) and _hidden(patches, b, turn, way):
+            continue  # round the corner
+        x0, y0 = _units(vec(patches.place[a]), zones, way)
+        x1, y1 = _units(vec(patches.place[b]), zones, way)
+        size = np.hypot(x1 - x0, y1 - y0)
+        if size < 1e-12:
+            continue
+        s, begin, end = side(x0, y0, x1, y1, size)
+        s = s if abs(s) > 1e-6 else 1e-6
+        beyond = max(begin, -end, 0.0)
+        far = s * s + beyond * beyond
+        if far >= FAR * FAR:
+            continue
+        # of two sides that meet at the nearest corner, the one that is farther from being passed
+        if far < nearest - 1e-9 * nearest or (far < nearest + 1e-9 * nearest and abs(s) > abs(left)):
+            nearest, left = far, s
+        total -= diffracted(s, begin, end)
+    inside = 1.0 if left > 0 else 0.0
+    return inside + total / (2 * np.pi)
+
+
+@njit
+def _hidden(patches, corner, turn, way):
+    return turn * dot(minus(way[0], vec(patches.place[corner])), vec(patches.normal[corner])) < 0
+
+
+@njit
+def _units(place, zones, way):
+    """Fresnel units from the specular point: the direction as over its quadric, as far as the way is longer."""
+    middle, first, second, elliptic, _ = zones
+    one, two, least, wavelength = way
+    offset = minus(place, middle)
+    x, y = dot(offset, first), dot(offset, second)
+    square = x * x + y * y
+    longer = 4 * abs(length(minus(one, place)) + length(minus(two, place)) - least) / wavelength
+    scale = np.sqrt(max(longer / (square + 1e-18), 0.5 if elliptic else 1.0))
+    return x * scale, y * scale

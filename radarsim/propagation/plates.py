@@ -1,0 +1,194 @@
+"""The coherent echo of flat convex polygons: physical optics, from near field to far field, on and off the normal.
+
+The physical-optics integral of a plate under a point source at height h over its plane,
+
+    I = int cos exp(2jk rho) / rho^2 dA = h int dphi int exp(2jk rho) / rho^2 drho,
+
+polar about the foot of the perpendicular, has an end at the foot, the wall's flash, and one along the outline. Over the
+echo of the endless plane, lambda / (8 pi h), it is to the leading order in 1 / (k rho)
+
+    F = inside - h^2 / (2 pi) closed int exp(2jk (rho - h)) / rho^2 dphi,
+
+inside: whether the foot is. (The contour form of Kirchhoff's integral after Maggi and Rubinowicz; for far polygons it
+is Gordon's, IEEE TAP 23(4), 1975.) Along an edge whose line passes the foot at s and the radar at L = |(h, s)|, with
+X = sqrt(8 (rho - L) / lambda), it is exactly
+
+    h^2 s sqrt(lambda / 2) / (2 pi) int exp(j pi X^2 / 2) / (rho (rho^2 - h^2) sqrt(rho + L)) dX,
+
+which splits into the edge's own echo, from the point of its line nearest the radar, where that lies on the edge, and
+one from either end. Every part has its own exact path length |tx - M rx|: the mirror image in the plane, half turns
+about edges, inversions in corners. So Doppler, angle and range of edges and corners come out right, and parts of
+adjoining coplanar plates cancel along their seam.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Complex, Float, Int
+from numba import njit
+
+from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, write
+from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.observation import Observation
+from radarsim.propagation.reflectors import Flat
+from radarsim.propagation.table import Table, filled
+
+#: The foot moves this far inwards, m: on a seam it is inside both plates, which adds up.
+NUDGE = 1e-8
+#: Nodes and weights of the quadrature along an edge, on 0 ... 1: for most, and for where the pole is near.
+_FEW, _MANY = ((np.polynomial.legendre.leggauss(n) + np.array([[1.0], [0.0]])) / 2 for n in (8, 28))
+
+
+@dataclass(frozen=True)
+class Parts(Table):
+    """Flashes, edges and corners of facets as the radar sees them.
+
+    Attributes:
+        facet: index.
+        aim: a point for a ray to it to aim at, m.
+        isometry: of the receiver.
+        amplitude: square root of received over transmitted power, with phase.
+    """
+
+    facet: Int[np.ndarray, "part"]
+    aim: Float[np.ndarray, "part 3"]
+    isometry: Float[np.ndarray, "part 3 4"]
+    amplitude: Complex[np.ndarray, "part"]
+
+
+def parts(flat: Flat, observation: Observation, frame: int) -> Parts:
+    """Those of all facets above the threshold in one frame."""
+    return filled(
+        lambda n: Parts(np.empty(n, np.int64), np.empty((n, 3)), np.empty((n, 3, 4)), np.empty(n, complex)),
+        lambda found: _parts(flat.columns, observation, frame, found.columns),
+        1024,
+    )
+
+
+@njit(cache=True)
+def _parts(flat, observation, frame, found):
+    """Returns how many parts there are, of which as many as fit are written."""
+    corners, facet, amplitude, isometry, aim = flat.corners, found.facet, found.amplitude, found.isometry, found.aim
+    p, rotation, reach = vec(observation.position[frame]), observation.rotation[frame], observation.range
+    wavelength, weakest = observation.wavelength, observation.threshold
+    sides, count = corners.shape[1], 0
+    outward, value = np.empty((sides, 3)), np.empty(sides, np.complex128)
+    for f in range(len(corners)):
+        n = vec(flat.normal[f])
+        h = dot(minus(p, vec(corners[f, 0])), n)
+        if abs(h) < 0.01 or abs(h) > reach or (h < 0 and not flat.two_sided[f]):
+            continue
+        if h < 0:
+            n, h = (-n[0], -n[1], -n[2]), -h
+        middle = (0.0, 0.0, 0.0)
+        for k in range(sides):
+            middle = along(middle, 1 / sides, vec(corners[f, k]))
+        foot = along(p, -h, n)
+        inwards = minus(middle, foot)
+        foot = along(foot, NUDGE / (length(inwards) + NUDGE), inwards)
+        mirror = wavelength / (8 * np.pi * h) * abs(flat.reflection[f, 0, -1])
+        inside = True
+        value[:] = 0
+        for k in range(sides):
+            one, two = vec(corners[f, k]), vec(corners[f, (k + 1) % sides])
+            side = minus(two, one)
+            size = length(side)
+            if size < 1e-6:
+                outward[k] = 0.0
+                continue
+            side = (side[0] / size, side[1] / size, side[2] / size)
+            out = cross(side, n)
+            if dot(minus(middle, one), out) > 0:
+                out = (-out[0], -out[1], -out[2])
+            outward[k, 0], outward[k, 1], outward[k, 2] = out
+            s = dot(minus(one, foot), out)
+            inside = inside and s > 0
+            low = dot(minus(one, foot), side)
+            high = low + size
+            slant = np.hypot(h, s)
+            # Ends of the edge: worth a thought if the leading term, far from the flash, is.
+            for end, x, sign in ((k, low, 1.0), ((k + 1) % sides, high, -1.0)):
+                rho = np.hypot(slant, x)
+                if rho >= reach:
+                    continue
+                towards = minus(vec(corners[f, end]), p)
+                scale = mirror * gain_towards(towards, rotation, observation) ** 2
+                least = h * h * abs(s) / (rho * (s * s + x * x) * abs(x) + 1e-12) * wavelength / (8 * np.pi**2)
+                if min(least, 0.25) * scale > 0.1 * weakest:
+                    value[end] -= sign * np.sign(x) * _beyond(h, s, slant, abs(x), wavelength)
+            if low < 0 < high and slant < reach:
+                point = along(foot, s, out)
+                scale = mirror * gain_towards(minus(point, p), rotation, observation) ** 2
+                least = h * h * np.sqrt(wavelength * slant / 2) / (slant * slant * abs(s)) / (2 * np.pi)
+                if min(least, 0.5) * scale > weakest:
+                    own = -2 * _beyond(h, s, slant, 0.0, wavelength)
+                    if abs(own) * scale > weakest:
+                        if count < len(facet):
+                            facet[count], amplitude[count] = f, own * scale
+                            _turn(n, out, False, point, isometry[count])
+                            write(along(along(point, -0.01, out), 0.002, n), aim[count])
+                        count += 1
+        for k in range(sides):
+            if value[k] == 0:
+                continue
+            point = vec(corners[f, k])
+            scale = mirror * gain_towards(minus(point, p), rotation, observation) ** 2
+            if abs(value[k]) * scale > weakest:
+                if count < len(facet):
+                    facet[count], amplitude[count] = f, value[k] * scale
+                    _turn(n, n, True, point, isometry[count])
+                    before, after = vec(outward[(k - 1) % sides]), vec(outward[k])
+                    write(along(along(along(point, -0.01, before), -0.01, after), 0.002, n), aim[count])
+                count += 1
+        if inside:
+            scale = mirror * gain_towards(minus(foot, p), rotation, observation) ** 2
+            if scale > weakest:
+                if count < len(facet):
+                    facet[count], amplitude[count] = f, scale
+                    _turn(n, (0.0, 0.0, 0.0), False, foot, isometry[count])
+                    write(along(foot, 0.002, n), aim[count])
+                count += 1
+    for i in range(min(count, len(facet))):
+        head_on = flat.reflection[facet[i], 0, -1]
+        amplitude[i] *= head_on / abs(head_on)
+    return count
+
+
+@njit(cache=True)
+def _beyond(h, s, slant, x, wavelength):
+    """The integral along an edge's line from x >= 0 on, phase referred to the path by its begin.
+
+    From X the way turns by 45 deg into the complex plane, where exp(j pi X^2 / 2) decays; steps grow with the distance
+    from the pole X = +-j S at rho = h.
+    """
+    near = np.sqrt(slant * slant + x * x)
+    begin = x * np.sqrt(8 / (wavelength * (near + slant)))
+    pole = abs(s) * np.sqrt(8 / (wavelength * (slant + h)))
+    around = np.sqrt(begin * begin + pole * pole) + 1e-12
+    end = np.arcsinh(min(3.0, 5.5 / (begin + 1e-3)) / around)
+    turn = np.exp(0.25j * np.pi)
+    total = 0j
+    nodes, weights = _FEW if end < 1.5 else _MANY
+    for i in range(len(nodes)):
+        u = end * nodes[i]
+        y = around * np.sinh(u) * turn
+        rise = wavelength / 8 * (begin + y) ** 2  # rho - L
+        rho = slant + rise
+        below = s * s / (slant + h) + rise  # rho - h
+        phase = np.exp(0.5j * np.pi * y * (2 * begin + y))
+        total += weights[i] * np.cosh(u) * phase / (rho * below * (rho + h) * np.sqrt(rho + slant))
+    return total * turn * around * end * h * h * s * np.sqrt(wavelength / 2) / (2 * np.pi)
+
+
+@njit
+def _turn(n, out, all_axes, point, isometry):
+    """Reflection in a plane (out zero), half turn about an edge, or inversion in a corner."""
+    for i in range(3):
+        shift = point[i]
+        for j in range(3):
+            m = (1.0 if i == j else 0.0) - 2 * n[i] * n[j] - 2 * out[i] * out[j]
+            if all_axes:
+                m = -1.0 if i == j else 0.0
+            isometry[i, j] = m
+            shift -= m * point[j]
+        isometry[i, 3] = shift

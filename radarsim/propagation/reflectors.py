@@ -1,0 +1,130 @@
+"""What reflects like a mirror: the flat parts of a scene, each with its aperture, and its round bodies."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Complex, Float, Int
+
+from radarize.radar.config import RadarConfig
+from radarsim.propagation.bodies import recognise
+from radarsim.propagation.coefficients import TABLE, as_slab, lag, reflection
+from radarsim.propagation.curved import RoundBodies
+from radarsim.propagation.hashgrid import Grid
+from radarsim.propagation.patches import Patches
+from radarsim.propagation.smooth import pieces
+from radarsim.propagation.table import Table
+from radarsim.propagation.unevenness import FINISHES, Heights
+from radarsim.world.materials import Material
+from radarsim.world.planes import plates
+from radarsim.world.scene import Scene
+
+
+@dataclass(frozen=True)
+class Flat(Table):
+    """Flat convex quadrilaterals, and in each a rectangle that stands for it where it mirrors scatterers.
+
+    Attributes:
+        corners: in order around, m; of a triangle two fall together.
+        center, normal, u, v: m and unit vectors; u, v lie along the rectangle's sides.
+        half: half the rectangle's side lengths along u and v, m.
+        two_sided: sheets without a volume show both sides.
+        horizontal: part of a floor or ceiling.
+        reflection: complex reflection coefficient by (facet, polarisation TE / TM, cosine of incidence), roughness
+            included, as it appears in the beat signal (conjugate of the field's).
+        lag: how much later than its face the head-on echo comes, m (`coefficients.lag`).
+        finish: how uneven they are over plaster, see `unevenness.FINISHES`.
+        plate, frame: the moving plate that they belong to (`movingplates`), and the frame in which they stand so;
+            -1: they stand still, in all frames.
+    """
+
+    corners: Float[np.ndarray, "facet 4 3"]
+    center: Float[np.ndarray, "facet 3"]
+    normal: Float[np.ndarray, "facet 3"]
+    u: Float[np.ndarray, "facet 3"]
+    v: Float[np.ndarray, "facet 3"]
+    half: Float[np.ndarray, "facet 2"]
+    two_sided: Bool[np.ndarray, "facet"]
+    horizontal: Bool[np.ndarray, "facet"]
+    reflection: Complex[np.ndarray, "facet 2 cosine"]
+    lag: Float[np.ndarray, "facet"]
+    finish: Float[np.ndarray, "facet"]
+    plate: Int[np.ndarray, "facet"]
+    frame: Int[np.ndarray, "facet"]
+
+    def present(self, frame: int) -> Bool[np.ndarray, "facet"]:
+        """Which are there in a frame."""
+        return (self.frame < 0) | (self.frame == frame)
+
+    @classmethod
+    def none(cls) -> "Flat":
+        """No facet."""
+        no, empty, still = np.zeros(0, bool), np.zeros((0, 3)), np.zeros(0, int)
+        table = np.zeros((0, 2, TABLE), complex)
+        shape = np.zeros((0, 4, 3)), empty, empty, empty, empty, np.zeros((0, 2))
+        return cls(*shape, no, no, table, np.zeros(0), np.zeros(0), still, still)
+
+
+@dataclass(frozen=True)
+class Reflectors:
+    """All of a scene.
+
+    Attributes:
+        flat: quadrilaterals that cover its flat regions.
+        round: its spheres and cylinders.
+        smooth: pieces of its other curved surfaces.
+        inner: the inner faces of hollow bodies, which are seen through outer ones: they flash, but mirror nothing else.
+        heights: how uneven the flat ones are; None: not at all.
+    """
+
+    flat: Flat
+    round: RoundBodies
+    inner: Flat = Flat.none()
+    smooth: Patches = Patches.of([])
+    heights: Heights | None = None
+
+    @cached_property
+    def _grids(self) -> tuple[Grid, Grid]:
+        outer, inner = (Grid(some.corners.min(axis=1), some.corners.max(axis=1)) for some in (self.flat, self.inner))
+        return outer, inner
+
+    def near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> Flat:
+        """Flat ones within a distance (m) of any of the positions, in the same order."""
+        return self.flat[self._grids[0].near(positions, distance)[0]]
+
+    def inner_near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> Flat:
+        """The same of inner faces."""
+        return self.inner[self._grids[1].near(positions, distance)[0]] if len(self.inner) else self.inner
+
+    @classmethod
+    def of(cls, scene: Scene, config: RadarConfig, heights: Heights | None = None) -> "Reflectors":
+        """The reflectors of a scene."""
+        flat, inner, bodies, smooth = [], [], [], []
+        tables: dict[Material, tuple[np.ndarray, float]] = {}
+        for item in scene.objects:
+            slab, whole = as_slab(item)
+            if slab not in tables:
+                tables[slab] = reflection(slab, config), lag(slab, config)
+            gamma, late = tables[slab]
+            round_, is_round = recognise(item.mesh)
+            finish = FINISHES.get(item.material.name, 0.0)
+            bodies += [(b.center, b.axis, b.radius, b.half, gamma) for b in round_]
+            # physical optics holds down to about a wavelength
+            curved, is_curved = pieces(item.mesh, ~is_round, config.wavelength**2)
+            smooth += [(piece, item.two_sided, gamma) for piece in curved]
+            found = plates(item.mesh, ~(is_round | is_curved), config.wavelength**2)
+            hollow = slab.thickness is not None and not (whole or item.two_sided)
+            middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
+            lying = item.floors_and_ceilings(middles, np.reshape([p.normal for p in found], (-1, 3)))
+            for p, horizontal in zip(found, lying, strict=True):
+                rest = (item.two_sided, horizontal, gamma, late, finish, -1, -1)
+                flat.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *rest))
+                if hollow:
+                    inwards = -slab.thickness * p.normal
+                    place = p.corners[::-1] + inwards, p.center + inwards
+                    inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
+        return cls(_table(flat), RoundBodies.of(bodies), _table(inner), Patches.of(smooth), heights)
+
+
+def _table(rows: list[tuple]) -> Flat:
+    return Flat(*(np.array(column) for column in zip(*rows, strict=True))) if rows else Flat.none()

@@ -1,0 +1,75 @@
+"""World-anchored point scatterers: what stands for the diffuse echo of every surface.
+
+Each has its place, normal, cross section and random phase in the world. So speckle is a property of the world: it stays
+coherent while the sensor moves over it, as on a real wall. `Surface` draws those of a scene.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
+
+from radarsim.propagation.scatteringpattern import LAMBERT
+from radarsim.propagation.table import Table
+
+#: Of a sampled surface every n-th scatterer is seen over mirrors, and of those every n-th over two of them.
+BOUNCE_STRIDE = 4
+
+
+@dataclass(frozen=True)
+class Scatterers(Table):
+    """Point scatterers in the world.
+
+    Attributes:
+        position: m.
+        normal: unit outward normal, or zero for an isotropic scatterer.
+        sigma: sigma0 times the area it stands for, m^2; an isotropic scatterer's radar cross section.
+        phase: rad, uniformly random.
+        two_sided: whether it scatters from behind as well (sheets without a volume).
+        horizontal: whether it belongs to a floor or ceiling.
+        bounces: weight of its power in paths over one mirror. Ghosts are many and weak, so of a sampled surface only
+            every fourth scatterer has them, with four times the power.
+        bounces_twice: the same for paths over two mirrors or more: every sixteenth, with sixteen times the power.
+        lobe: its scattering pattern, see `scatteringpattern.weights`.
+        rank: 0...1, which decides from how far it is used, see `detail`; negative: from everywhere.
+    """
+
+    position: Float[np.ndarray, "scatterer 3"]
+    normal: Float[np.ndarray, "scatterer 3"]
+    sigma: Float[np.ndarray, "scatterer"]
+    phase: Float[np.ndarray, "scatterer"]
+    two_sided: Bool[np.ndarray, "scatterer"]
+    horizontal: Bool[np.ndarray, "scatterer"]
+    bounces: Float[np.ndarray, "scatterer"]
+    bounces_twice: Float[np.ndarray, "scatterer"]
+    lobe: Float[np.ndarray, "scatterer 4"]
+    rank: Float[np.ndarray, "scatterer"]
+
+    @classmethod
+    def points(
+        cls,
+        position: ArrayLike,
+        sigma: ArrayLike,
+        phase: Float[np.ndarray, "n"] | None = None,
+    ) -> "Scatterers":
+        """Isotropic scatterers at (n, 3) or (3,) places, m, of given cross sections, m^2."""
+        position = np.atleast_2d(np.asarray(position, float))
+        n = len(position)
+        zeros = np.zeros(n, bool)
+        return cls(
+            position,
+            np.zeros((n, 3)),
+            np.broadcast_to(np.asarray(sigma, float), n).copy(),
+            np.zeros(n) if phase is None else phase,
+            zeros,
+            zeros,
+            np.ones(n),
+            np.ones(n),
+            np.tile(LAMBERT, (n, 1)),
+            np.full(n, -1.0),
+        )
+
+    def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> "Scatterers":
+        """All of them: a given set is taken as it is, a `Surface` draws what is needed."""
+        return self

@@ -1,0 +1,55 @@
+"""Rows in parallel arrays: what a batch has many of, for numpy and for compiled kernels."""
+
+from collections import namedtuple
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, Self, TypeVar
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Table:
+    """Arrays of the same length; `rows[index]` takes some of them, `columns` is what compiled kernels take."""
+
+    Columns: ClassVar[type]
+
+    def __init_subclass__(cls):
+        # numba tells named tuples by their names alone
+        cls.Columns = namedtuple(f"{cls.__name__}Columns", cls.__annotations__)
+        cls.Columns.__module__, cls.Columns.__qualname__ = cls.__module__, f"{cls.__qualname__}.Columns"
+
+    @property
+    def columns(self) -> tuple:
+        """The arrays by name, as a named tuple."""
+        return self.Columns(*(getattr(self, name) for name in self.Columns._fields))
+
+    def __len__(self) -> int:
+        return len(self.columns[0])
+
+    def __getitem__(self, index) -> Self:
+        return type(self)(*(column[index] for column in self.columns))
+
+    @classmethod
+    def joined(cls, parts: list[Self]) -> Self:
+        """All rows of several tables."""
+        return cls(*(np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True)))
+
+
+Rows = TypeVar("Rows", bound=Table)
+
+
+def filled(room: Callable[[int], Rows], fill: Callable[[Rows], int], size: int) -> Rows:
+    """A table of as many rows as there turn out to be.
+
+    Args:
+        room: makes a table of so many rows.
+        fill: writes as many rows as fit; returns how many there are.
+        size: rows to begin with.
+    """
+    while True:
+        found = room(size)
+        count = fill(found)
+        if count <= size:
+            return found[:count]
+        size = count

@@ -1,0 +1,1 @@
+"""From propagation paths to samples: synthesis, front end, phase noise, interference, calibration."""

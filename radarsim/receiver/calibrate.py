@@ -1,0 +1,255 @@
+"""Fits the simulated front end to a real radar, from a few frames of one of its recordings.
+
+What can be told from a recording and what cannot: counts have no absolute scale, so noise figure and receive gain are
+taken from the data sheet and the configuration, and the noise floor gives the converter's full scale. The band's upper
+edge shows in the noise, the leakage in the lowest range bins, and the channels' errors wherever one echo outshines all
+others of its range and Doppler: there the array must see a plane wave.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Complex, Float
+from scipy.optimize import minimize
+
+from radarize.errors import InputError
+from radarize.radar.array import BOARDS, virtual_positions
+from radarize.radar.config import RadarConfig
+from radarize.radar.noise import noise_floor, noise_profile
+from radarize.radar.windows import periodic
+from radarize.recording import Recording
+from radarsim.receiver.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
+from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, PhaseNoise
+from radarsim.receiver.phasenoise import density
+
+#: Chirps of one transmitter that the noise is told from, at least.
+FEWEST_LOOPS = 8
+#: Delays (s) that count as leakage; beyond, it is an echo of something.
+LEAKAGE_DELAYS = (0.1e-9, 1.2e-9)
+#: Share of a snapshot's power that one plane wave must explain for the channels to be told from it.
+DOMINANCE = 0.95
+_SNAPSHOTS = 60
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """What was found.
+
+    Attributes:
+        settings: the front end.
+        remarks: what was measured and how, a sentence each.
+    """
+
+    settings: FrontEndConfig
+    remarks: list[str]
+
+
+def calibrate(recording: Path, output: Path, frames: int = 8) -> Calibration:
+    """Fit a front end to a recording and write it as a file for `radarsim simulate --frontend`.
+
+    Args:
+        recording: of a real radar; a few frames at rest, with one strong echo, are best.
+        output: front-end file to write.
+        frames: how many to look at, spread over the recording.
+
+    Raises:
+        InputError: no usable recording, too few chirps, or silence.
+    """
+    with Recording(recording) as opened:
+        config = opened.config
+        if not len(opened):
+            raise InputError(f"{recording}: has no whole frame, expected at least one")
+        if config.loops < FEWEST_LOOPS:
+            raise InputError(f"{recording}: has {config.loops} loops a frame, expected at least {FEWEST_LOOPS}")
+        chosen = np.unique(np.linspace(0, len(opened) - 1, min(frames, len(opened))).astype(int))
+        whole = [k for k in chosen if opened.valid(k, k + 1).all()]
+        if not whole:
+            raise InputError(f"{recording}: lost samples in all {len(chosen)} frames looked at, expected a whole one")
+        adc = np.concatenate([opened.adc(k, k + 1) for k in whole]).astype(np.float32)
+    signal = adc.view(np.complex64)[..., 0]
+    found = fit(signal, config, str(recording))
+    found.settings.save(output, [f"fitted to {Path(recording).name}", *found.remarks])
+    return found
+
+
+def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarConfig, source: str) -> Calibration:
+    """Fit a front end to samples; `source` is what errors name as their origin."""
+    profile = noise_profile(signal)
+    n = config.samples
+    flat = slice(n // 10, 8 * n // 10)
+    floor = noise_floor(profile)
+    if floor <= 2 / 12:
+        raise InputError(f"{source}: a noise power of {floor:.3g} counts^2, expected more than the rounding to counts")
+    band, fall = band_edge(profile / floor)
+    front_end = FrontEnd(config, FrontEndConfig(band=band))
+    leak = find_leakage(signal, front_end, floor)
+    # Thermal noise is what rounding of I and Q and the leakage's phase noise leave of it.
+    thermal = floor - 2 / 12 - (np.median(leak.skirt(config)[flat]) if leak else 0.0)
+    thermal = max(thermal, 0.1 * floor)  # a board with less phase noise than the mask's
+    gain, factor = config.rx_gain_db, front_end.settings.noise_factor(config.rx_gain_db)
+    dbm = 10 * np.log10(BOLTZMANN * ROOM_TEMPERATURE * config.sample_rate * factor / 1e-3) + gain
+    full_scale = round(dbm + 20 * np.log10(32767) - 10 * np.log10(thermal), 2)
+    remarks = [
+        f"noise {np.sqrt(floor):.2f} counts: full scale {full_scale:.2f} dBm after {gain:g} dB gain, if the noise "
+        f"figure is the data sheet's {10 * np.log10(factor):.1f} dB",
+        f"band flat to {band.flat:.3f} of the sample rate, noise {fall:.1f} dB down in its last sixteenth",
+    ]
+    settings = FrontEndConfig(full_scale_dbm=full_scale, band=band, leakage=None)
+    leakage = None
+    if leak:
+        leakage = leak.relative(FrontEnd(config, settings).scale, config)
+        remarks.append(
+            f"leakage {leakage.level_db:.1f} dB at {1e9 * leak.delay:.2f} ns before the high-pass filter, "
+            f"{leak.heard:.1f} counts behind it"
+        )
+    else:
+        remarks.append("no leakage above the noise")
+    mismatch, remark = fit_channels(signal, config, floor)
+    return Calibration(settings.model_copy(update={"leakage": leakage, "mismatch": mismatch}), [*remarks, remark])
+
+
+def band_edge(profile: Float[np.ndarray, "sample"]) -> tuple[Band, float]:
+    """The decimation filter that explains how noise falls towards the sample rate, and the fall (dB)."""
+    n = len(profile)
+    x = np.arange(n) / n
+    last = slice(n - n // 16, n - 2)  # the two topmost bins see the leakage around zero
+    fall = -10 * np.log10(np.mean(profile[last]))
+    upper = (x > 0.7) & (np.arange(n) < n - 2)
+    measured = 10 * np.log10(profile[upper])
+    best, least = Band(), np.inf
+    for flat in np.arange(0.8, 1.0, 0.005):
+        for high in np.arange(max(flat, 0.98) + 0.02, 1.5, 0.02):
+            model = 20 * np.log10(np.interp(x[upper], [flat, high], [1.0, 0.0]))
+            misfit = np.mean(np.abs(model - measured))
+            if misfit < least:
+                best, least = Band(flat=round(float(flat), 3), high=round(float(high), 3)), misfit
+    return best, fall
+
+
+@dataclass(frozen=True)
+class _Leak:
+    """Leakage in counts.
+
+    Attributes:
+        delay: s.
+        counts: amplitude of each channel before the high-pass filter.
+        heard: mean amplitude behind it.
+    """
+
+    delay: float
+    counts: Complex[np.ndarray, "tx rx"]
+    heard: float
+
+    def skirt(self, config: RadarConfig) -> Float[np.ndarray, "sample"]:
+        """Power per sample that its phase noise looks like in each range bin, counts^2."""
+        f = np.arange(config.samples) * config.sample_rate / config.samples
+        noise = density(PhaseNoise(), config.center_frequency, f) * 4 * np.sin(np.pi * f * self.delay) ** 2
+        return np.mean(np.abs(self.counts) ** 2) * noise * config.sample_rate
+
+    def relative(self, scale: float, config: RadarConfig) -> Leakage:
+        """As a setting; `scale` is counts per unit of amplitude."""
+        mean = np.sqrt(np.mean(np.abs(self.counts) ** 2)) / scale
+        whole = np.full((3, 4), mean, complex)
+        whole[np.ix_(config.tx, config.rx)] = self.counts / scale
+        channels = [Channel.of(c) for c in whole.ravel()]
+        return Leakage(level_db=round(20 * np.log10(mean), 2), delay=round(self.delay, 12), channels=channels)
+
+
+def find_leakage(
+    signal: Complex[np.ndarray, "frame loop tx rx sample"], front_end: FrontEnd, floor: float
+) -> _Leak | None:
+    """Delay and amplitude of what stands still in the lowest range bins, besides a constant offset."""
+    config = front_end.config
+    static = signal.mean(axis=(0, 1), dtype=complex)
+    n = config.samples
+    window = periodic(np.hanning, n)
+    t = (np.arange(n) - (n - 1) / 2) / config.sample_rate
+    low = np.exp(-2j * np.pi * np.outer(np.arange(5), np.arange(n)) / n) * window  # the five lowest bins
+    seen = static.reshape(-1, n) @ low.T
+
+    def explained(delay: float):
+        columns = low @ np.stack([np.exp(2j * np.pi * config.slope * delay * t), np.ones(n)], axis=1)
+        parts, *_ = np.linalg.lstsq(columns, seen.T, rcond=None)
+        return np.sum(np.abs(seen.T - columns @ parts) ** 2), parts[0]
+
+    delays = np.linspace(*LEAKAGE_DELAYS, 111)
+    delay = float(delays[np.argmin([explained(d)[0] for d in delays])])
+    heard = explained(delay)[1].reshape(len(config.tx), len(config.rx))
+    power = np.mean(np.abs(heard) ** 2)
+    if power < 10 * floor / (n * signal.shape[0] * signal.shape[1]):
+        return None
+    return _Leak(delay, heard / front_end.beat_response(np.array(config.slope * delay)), float(np.sqrt(power)))
+
+
+def fit_channels(
+    signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarConfig, floor: float
+) -> tuple[Mismatch, str]:
+    """Errors of the channels from snapshots that one plane wave dominates. A slope of the phase over the array cannot
+    be told from a direction, so there is none in the result."""
+    antennas = virtual_positions(config).reshape(-1, 3)
+    if len(antennas) < 3:
+        return Mismatch(), f"{len(antennas)} channels: mismatch left to the data sheet's bounds"
+    snapshots = _snapshots(signal, config, floor)
+    channel = np.ones(len(antennas), complex)
+    dominant = np.zeros(0, int)
+    for _ in range(5):
+        directions = [_direction(x / channel, antennas, config.wavelength) for x in snapshots]
+        share = np.array([d[1] for d in directions])
+        dominant = np.flatnonzero(share > DOMINANCE)
+        if not len(dominant):
+            break
+        total = np.zeros(len(antennas), complex)
+        for k in dominant:
+            steering = _steering(directions[k][0], antennas, config.wavelength)
+            wave = np.vdot(steering, snapshots[k] / channel) / len(antennas)
+            total += snapshots[k] * np.conj(steering * wave)
+        channel = total / np.mean(np.abs(total)) * np.exp(-1j * np.angle(total.sum()))
+    if not len(dominant):
+        best = f"{100 * share.max():.0f} %" if len(snapshots) else "no echo"
+        return Mismatch(), (
+            f"no echo outshines all others of its range (best: {best} of the power, needed {100 * DOMINANCE:.0f} %): "
+            "mismatch left to the data sheet's bounds"
+        )
+    whole = np.ones((3, 4), complex)
+    whole[np.ix_(config.tx, config.rx)] = channel.reshape(len(config.tx), len(config.rx))
+    gain, phase = 20 * np.log10(np.abs(channel)), np.rad2deg(np.angle(channel))
+    return Mismatch(channels=[Channel.of(c) for c in whole.ravel()]), (
+        f"channels from {len(dominant)} snapshots of single echoes: gain within {np.abs(gain).max():.2f} dB, phase "
+        f"within {np.abs(phase).max():.1f} deg of their mean, phase slopes over the array left out"
+    )
+
+
+def _snapshots(signal, config: RadarConfig, floor: float) -> list[Complex[np.ndarray, "virtual"]]:
+    """The strongest cells of all frames' range-Doppler maps, as if all channels had been sampled at once."""
+    loops, n = signal.shape[1], config.samples
+    slow, fast = periodic(np.hanning, loops), periodic(np.hanning, n)
+    cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
+    cycles = np.fft.fftfreq(loops)[:, None] * np.array(config.slot) / len(config.slot)  # a slot's share of a loop
+    cube = cube * np.exp(-2j * np.pi * cycles)[:, :, None, None]
+    cube = cube * np.asarray(BOARDS[config.board].rx_sign)[list(config.rx)][:, None]
+    power = np.sum(np.abs(cube) ** 2, axis=(2, 3))
+    far = config.ranges > 0.3  # nearer is leakage, or no plane wave
+    noise = floor * cube.shape[2] * cube.shape[3] * np.sum(slow**2) * np.sum(fast**2)
+    power = power * far * (power > 100 * noise)
+    frame, doppler, bin_ = np.unravel_index(np.argsort(power, axis=None)[::-1][:_SNAPSHOTS], power.shape)
+    keep = power[frame, doppler, bin_] > 0
+    return [cube[f, d, :, :, b].ravel() for f, d, b in zip(frame[keep], doppler[keep], bin_[keep], strict=True)]
+
+
+def _steering(sines: Float[np.ndarray, "2"], antennas, wavelength: float) -> Complex[np.ndarray, "virtual"]:
+    return np.exp(-2j * np.pi / wavelength * (antennas[:, 1:] @ sines))
+
+
+def _direction(snapshot, antennas, wavelength: float) -> tuple[Float[np.ndarray, "2"], float]:
+    """Direction (sines to the left and up) of the plane wave that explains most of a snapshot, and how much."""
+
+    def unexplained(sines):
+        response = np.vdot(_steering(np.asarray(sines), antennas, wavelength), snapshot)
+        return 1 - np.abs(response) ** 2 / (len(antennas) * np.sum(np.abs(snapshot) ** 2))
+
+    grid = [(a, b) for a in np.linspace(-0.9, 0.9, 61) for b in np.linspace(-0.5, 0.5, 11)]
+    steering = np.exp(2j * np.pi / wavelength * (np.array(grid) @ antennas[:, 1:].T))
+    start = grid[int(np.argmax(np.abs(steering @ snapshot)))]
+    found = minimize(unexplained, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-9})
+    return found.x, 1 - float(found.fun)

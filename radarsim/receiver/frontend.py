@@ -1,0 +1,221 @@
+"""From the field at the antennas to ADC counts, in the order in which a receiver does it:
+
+    amplify     transmit power, receive gain, gain and phase of each channel
+    couple      leakage from TX to RX
+    disturb     phase noise on every echo (range-correlated), thermal noise coloured by the decimation filter
+    mix         the image of an imperfect I/Q mixer
+    convert     saturation and rounding
+
+The IF filters act on echoes, by path length, before the synthesis (`if_response`). What each step is made of is in
+`FrontEndConfig`; noise and filters live in frequency bins, where they are products.
+"""
+
+from functools import cached_property
+
+import numpy as np
+import scipy.fft
+from jaxtyping import Complex, Float, Int16
+
+from radarize.radar.array import BOARDS
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+from radarsim.receiver.frontend_config import FrontEndConfig
+from radarsim.receiver.phasenoise import Skirts
+
+BOLTZMANN = 1.380649e-23
+ROOM_TEMPERATURE = 290.0
+#: Hz, of the IF amplifier (SWRS228): as far as the receiver hears where no decimation filter closes before.
+_IF_BANDWIDTH = 10e6
+
+
+class FrontEnd:
+    """The analogue and digital front end of one board.
+
+    Args:
+        config: radar configuration; gives receive gain, transmit back-off, filter corners, sample rate.
+        settings: what the front end is made of; default: an IWR1843BOOST's.
+        rng: draws what stays the same for a board: mismatch, phases of the leakage. Default: board number 0.
+
+    Attributes:
+        channel: complex gain of each channel.
+        leakage: amplitude of the leakage (square root of received over transmitted power) before the high-pass filter.
+    """
+
+    channel: Complex[np.ndarray, "tx rx"]
+    leakage: Complex[np.ndarray, "tx rx"]
+
+    def __init__(
+        self,
+        config: RadarConfig,
+        settings: FrontEndConfig | None = None,
+        rng: np.random.Generator | None = None,
+    ):
+        self.config, self.settings = config, settings or FrontEndConfig()
+        rng = np.random.default_rng(0) if rng is None else rng
+        enabled = np.ix_(config.tx, config.rx)
+        # Some boards feed receivers from the far side of the patch.
+        self.channel = (self._draw_channel(rng) * BOARDS[config.board].rx_sign)[enabled]
+        self.leakage = self._draw_leakage(rng)[enabled]
+        self._bins = np.arange(config.samples) * config.sample_rate / config.samples
+        self._skirts = None
+        if self.settings.phase_noise:
+            response = np.abs(self.beat_response(self._bins))
+            self._skirts = Skirts(config, self.settings.phase_noise, response)
+
+    def _draw_channel(self, rng: np.random.Generator) -> Complex[np.ndarray, "3 4"]:
+        mismatch = self.settings.mismatch
+        errors = rng.uniform(-0.5, 0.5, (2, 7))  # drawn in any case: the same seed gives the same board
+        if mismatch is None:
+            return np.ones((3, 4), complex)
+        if mismatch.channels:
+            return np.array([c.factor for c in mismatch.channels]).reshape(3, 4)
+        factor = 10 ** (mismatch.gain_db * errors[0] / 20) * np.exp(1j * np.deg2rad(mismatch.phase_deg) * errors[1])
+        return factor[:3, None] * factor[None, 3:]
+
+    def _draw_leakage(self, rng: np.random.Generator) -> Complex[np.ndarray, "3 4"]:
+        leakage = self.settings.leakage
+        phase = rng.uniform(0, 2 * np.pi, (3, 4))
+        if leakage is None:
+            return np.zeros((3, 4), complex)
+        if leakage.channels:
+            return np.array([c.factor for c in leakage.channels]).reshape(3, 4)
+        return 10 ** (leakage.level_db / 20) * np.exp(1j * phase)
+
+    # --- levels ------------------------------------------------------------------------------------------------------
+    @property
+    def tx_power(self) -> float:
+        """Transmitted power, W."""
+        return 1e-3 * 10 ** ((self.settings.tx_power_dbm - self.config.tx_backoff_db) / 10)
+
+    @cached_property
+    def noise_power(self) -> float:
+        """Noise power of a complex sample at the receiver's input, k T B F, W, whether switched on or not."""
+        factor = self.settings.noise_factor(self.config.rx_gain_db)
+        return BOLTZMANN * ROOM_TEMPERATURE * self.config.sample_rate * factor
+
+    @property
+    def counts(self) -> float:
+        """ADC counts per square root of a watt at the receiver's input."""
+        return 32767 * 10 ** ((self.config.rx_gain_db - self.settings.full_scale_dbm) / 20) / np.sqrt(1e-3)
+
+    @property
+    def scale(self) -> float:
+        """ADC counts per unit of echo amplitude."""
+        return self.counts * np.sqrt(self.tx_power)
+
+    @property
+    def weakest(self) -> float:
+        """Echo amplitude (square root of received over transmitted power) 10 dB below the noise of a whole burst."""
+        loops, tx, rx, samples, _ = self.config.frame_shape
+        return float(np.sqrt(0.1 * self.noise_power / (loops * tx * rx * samples) / self.tx_power))
+
+    # --- filters -----------------------------------------------------------------------------------------------------
+    @property
+    def passband(self) -> tuple[float, float]:
+        """Beat frequencies between which anything passes, Hz."""
+        band, rate = self.settings.band, self.config.sample_rate
+        return (-_IF_BANDWIDTH, _IF_BANDWIDTH) if band is None else (band.low * rate, band.high * rate)
+
+    def if_response(self, path_length: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"] | complex:
+        """Response of the IF chain to an echo of a path length (out and back, m)."""
+        return self.beat_response(self.config.slope * np.asarray(path_length) / SPEED_OF_LIGHT)
+
+    def beat_response(self, beat: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"] | complex:
+        """Response at beat frequencies, Hz: two first-order high-pass stages, then the decimation filter."""
+        response = np.asarray(self._decimation(beat), complex)
+        if self.settings.high_pass:
+            for corner in self.config.high_pass:
+                response = response * (1j * beat / (1j * beat + corner))
+        return response
+
+    def _decimation(self, beat: np.ndarray) -> np.ndarray:
+        band = self.settings.band
+        if band is None:
+            return np.ones(np.shape(beat))
+        return np.interp(beat / self.config.sample_rate, [band.low, 0.0, band.flat, band.high], [0.0, 1.0, 1.0, 0.0])
+
+    # --- the chain ---------------------------------------------------------------------------------------------------
+    def digitize(
+        self, signal: Complex[np.ndarray, "loop tx rx sample"], rng: np.random.Generator
+    ) -> Int16[np.ndarray, "loop tx rx sample 2"]:
+        """Counts of a received signal.
+
+        Args:
+            signal: square root of received over transmitted power, IF response included.
+            rng: for the noise.
+
+        Returns:
+            I and Q, rounded and saturated.
+        """
+        return self.convert(self.receive(signal, rng))
+
+    def receive(
+        self, signal: Complex[np.ndarray, "loop tx rx sample"], rng: np.random.Generator
+    ) -> Complex[np.ndarray, "loop tx rx sample"]:
+        """What arrives at the converter, in counts; arguments as for `digitize`."""
+        echoes = self._amplify(signal)
+        extra = self._thermal(echoes.shape, rng)
+        if self._skirts or self.settings.image_rejection_db is not None:
+            bins = scipy.fft.fft(echoes, axis=-1, norm="forward")
+        if self._skirts:
+            noise = self._bin_noise if self.settings.noise else 0.0
+            delay = self.settings.leakage.delay if self.settings.leakage else 0.0
+            extra += self._skirts(bins, (self.scale * self.leakage).astype(np.complex64), delay, noise, rng)
+        leakage = self._couple()
+        if self.settings.image_rejection_db is not None:
+            extra += self._image(bins + scipy.fft.fft(leakage, axis=-1, norm="forward") + extra)
+        return echoes + leakage + scipy.fft.ifft(extra, axis=-1, norm="forward")
+
+    def convert(self, counts: Complex[np.ndarray, "loop tx rx sample"]) -> Int16[np.ndarray, "loop tx rx sample 2"]:
+        """Saturated at full scale and rounded to the converter's steps."""
+        step = 2 ** (16 - self.settings.adc_bits)
+        iq = np.ascontiguousarray(counts, np.complex64).view(np.float32)
+        steps = np.clip(np.rint(iq / np.float32(step)), -32768 // step, 32767 // step)
+        return (steps * step).astype(np.int16).reshape(*counts.shape, 2)
+
+    def by_cause(
+        self, signals: list[Complex[np.ndarray, "loop tx rx sample"]]
+    ) -> list[Complex[np.ndarray, "loop tx rx sample"]]:
+        """Counts that each of several signals makes without noise and converter, and last those of the leakage.
+
+        Their sum is what `receive` returns for the sum of the signals with thermal and phase noise off.
+        """
+        shape = self.config.frame_shape[:-1]
+        parts = [self._amplify(s) for s in signals] + [np.broadcast_to(self._couple(), shape)]
+        if self.settings.image_rejection_db is None:
+            return parts
+        images = (self._image(scipy.fft.fft(p, axis=-1, norm="forward")) for p in parts)
+        return [p + scipy.fft.ifft(i, axis=-1, norm="forward") for p, i in zip(parts, images, strict=True)]
+
+    @property
+    def _bin_noise(self) -> float:
+        """Thermal noise power of a Fourier coefficient, counts^2."""
+        return self.counts**2 * self.noise_power / self.config.samples
+
+    def _amplify(self, signal: Complex[np.ndarray, "loop tx rx sample"]) -> Complex[np.ndarray, "loop tx rx sample"]:
+        return np.asarray(signal, np.complex64) * (self.scale * self.channel).astype(np.complex64)[:, :, None]
+
+    def _couple(self) -> Complex[np.ndarray, "tx rx sample"]:
+        """The leakage: an echo of its delay, the same in every chirp."""
+        delay = self.settings.leakage.delay if self.settings.leakage else 0.0
+        n = self.config.samples
+        beat = self.config.slope * delay
+        tone = np.exp(2j * np.pi * beat * (np.arange(n) - (n - 1) / 2) / self.config.sample_rate)
+        amplitude = self.scale * self.leakage * self.beat_response(np.array(beat))
+        return (amplitude[:, :, None] * tone).astype(np.complex64)
+
+    def _thermal(self, shape: tuple[int, ...], rng: np.random.Generator) -> Complex[np.ndarray, "loop tx rx sample"]:
+        """Thermal noise by bin, coloured by the decimation filter."""
+        if not self.settings.noise:
+            return np.zeros(shape, np.complex64)
+        level = np.sqrt(self._bin_noise / 2) * self._decimation(self._bins)
+        draw = rng.standard_normal((*shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
+        return draw * level.astype(np.float32)
+
+    def _image(self, bins: Complex[np.ndarray, "*trace sample"]) -> Complex[np.ndarray, "*trace sample"]:
+        """Image of bin b at -b, as far as the decimation filter lets it through; bin -b is bin N - b."""
+        passed = 10 ** (-self.settings.image_rejection_db / 20) * self._decimation(-self._bins)
+        # conj(x(t)) has the conjugate coefficients in mirrored order
+        image = np.zeros_like(bins)
+        some = np.flatnonzero(passed)
+        image[..., -some % self.config.samples] = passed[some].astype(np.float32) * bins[..., some].conj()
+        return image

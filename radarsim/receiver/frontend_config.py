@@ -1,0 +1,206 @@
+"""Settings of the front end, with the IWR1843BOOST's as defaults; a YAML file may hold any of them.
+
+Every effect can be switched off by itself (`null`, `false`), and `FrontEndConfig.ideal()` has none.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from radarize.errors import InputError
+from radarize.replacing import replacing
+from radarize.yamlfile import read_yaml
+from radarsim.propagation.antenna import ISOTROPIC, Antenna
+from radarsim.world.validation import format_validation_error
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Channel(_Strict):
+    """A complex value of one (tx, rx) channel."""
+
+    gain_db: float
+    phase_deg: float
+
+    @property
+    def factor(self) -> complex:
+        """As a complex amplitude."""
+        return 10 ** (self.gain_db / 20) * np.exp(1j * np.deg2rad(self.phase_deg))
+
+    @classmethod
+    def of(cls, factor: complex) -> "Channel":
+        """From a complex amplitude, rounded to what a reader wants to see."""
+        return cls(
+            gain_db=round(20 * np.log10(max(abs(factor), 1e-20)), 3), phase_deg=round(np.rad2deg(np.angle(factor)), 2)
+        )
+
+
+class _PerChannel(_Strict):
+    channels: tuple[Channel, ...] | None = None
+
+    @model_validator(mode="after")
+    def _twelve(self):
+        if self.channels is not None and len(self.channels) != 12:
+            raise ValueError(f"channels has {len(self.channels)} entries, expected 12: TX1 x RX1..4, then TX2, TX3")
+        return self
+
+
+class Mismatch(_PerChannel):
+    """Gain and phase errors of the channels.
+
+    A channel's factor is its transmitter's times its receiver's, each drawn from the seed within half the bounds, as
+    the errors of a real board are: all echoes of a TX share its error.
+
+    Attributes:
+        gain_db, phase_deg: bounds of a channel's error (data sheet SWRS228: 0.5 dB and 3 deg over temperature).
+        channels: measured factors in physical order (TX1 x RX1..4, TX2, TX3), instead of drawn ones.
+    """
+
+    gain_db: float = Field(0.5, ge=0, le=20)
+    phase_deg: float = Field(3.0, ge=0, le=180)
+
+
+class Leakage(_PerChannel):
+    """What goes from TX to RX on the board: one static echo from almost no range.
+
+    The default is the middle of what `radarsim calibrate` finds in three public captures of two boards: -38, -42 and
+    -47 dB at 0.23, 0.42 and 0.66 ns.
+
+    Attributes:
+        level_db: received over transmitted power, before the high-pass filter; each channel has a random phase.
+        delay: s.
+        channels: measured amplitudes in physical order, instead of `level_db` and random phases.
+    """
+
+    level_db: float = Field(-42.0, ge=-150, le=0)
+    delay: float = Field(0.4e-9, ge=0, le=20e-9)
+
+
+class PhaseNoise(_Strict):
+    """Single-sideband phase noise of the transmitted signal.
+
+    Attributes:
+        offset_hz, dbc_hz: mask for sweeps in 77-81 GHz, straight lines over the logarithm of the offset. The data
+            sheet gives one point (SWRS228: -93 dBc/Hz at 1 MHz); the fall of 20 dB a decade around it and the floor
+            towards the carrier are what a phase-locked loop does. Range correlation takes away what lies nearer.
+        lower_band_db: added where the sweep is in 76-77 GHz (SWRS228: -95 dBc/Hz).
+    """
+
+    offset_hz: tuple[float, ...] = (1e5, 316e3, 1e6, 1e7)
+    dbc_hz: tuple[float, ...] = (-83.0, -83.0, -93.0, -113.0)
+    lower_band_db: float = -2.0
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "PhaseNoise":
+        f = self.offset_hz
+        if not f or len(f) != len(self.dbc_hz) or f[0] <= 0 or np.any(np.diff(f) <= 0):
+            raise ValueError(f"offset_hz is {list(f)}, expected positive, ascending, and one per dbc_hz")
+        return self
+
+
+class Band(_Strict):
+    """The decimation filter's amplitude response over the beat frequency, as fractions of the sample rate.
+
+    0 at `low`, 1 from 0 to `flat`, 0 from `high` on, straight in between. Noise of real captures falls by 2 to 9 dB in
+    the last sixteenth of the band, and images of echoes beyond 5 % of the sample rate are 50 to 70 dB down. Where it
+    closes is as far as the simulator looks for echoes: they fade out there, and none pops.
+    """
+
+    low: float = Field(-0.06, lt=0)
+    flat: float = Field(0.9, gt=0)
+    high: float = Field(1.05, gt=0)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "Band":
+        if self.high <= self.flat:
+            raise ValueError(f"high is {self.high}, expected above flat = {self.flat}")
+        return self
+
+
+class FrontEndConfig(_Strict):
+    """Everything between the field at the antennas and the samples in the file.
+
+    Attributes:
+        antenna: pattern of each element; null: isotropic.
+        tx_power_dbm: per transmitter at no back-off (SWRS228: 12 dBm).
+        noise: thermal noise.
+        noise_figure_db: by receive gain in dB (SWRS228: 15 dB at the highest gain in 77-81 GHz, 15.6 dB at 30 dB).
+            Between two points and beyond them by Friis's formula: the noise factor is linear in 1 / gain.
+        full_scale_dbm: power of a complex tone of 32767 counts after the receive gain. Not in the data sheet; 5 dBm
+            puts the noise floor at 10.6 counts in the `radarize` preset, as against 14 counts (4 to 5 Msps) in real
+            captures, and clips 1 dB below the in-band compression point (-24 dBm at 30 dB).
+        adc_bits: resolution. 16: all bits of the file carry signal, as in real captures, where the decimation filter
+            has averaged a faster converter. 12: steps of 16 counts.
+        leakage, mismatch, phase_noise: null: none.
+        high_pass: the two first-order stages of the radar configuration.
+        band: null: flat up to the 10 MHz of the IF amplifier (echoes beyond the maximum range fold).
+        image_rejection_db: of the I/Q mixer (data sheet: 30 dB); null: perfect. The image of beat frequency f is at
+            -f, outside the band of complex-1x sampling, so only images of near echoes pass `band`.
+    """
+
+    antenna: Antenna | None = Antenna()
+    tx_power_dbm: float = Field(12.0, ge=-60, le=60)
+    noise: bool = True
+    noise_figure_db: dict[float, float] = Field({30.0: 15.6, 48.0: 15.0}, min_length=1)
+    full_scale_dbm: float = Field(5.0, ge=-100, le=100)
+    adc_bits: int = Field(16, ge=2, le=16)
+    leakage: Leakage | None = Leakage()
+    mismatch: Mismatch | None = Mismatch()
+    phase_noise: PhaseNoise | None = PhaseNoise()
+    high_pass: bool = True
+    band: Band | None = Band()
+    image_rejection_db: float | None = Field(30.0, ge=0, le=120)
+
+    @classmethod
+    def ideal(cls, **changes: object) -> "FrontEndConfig":
+        """Nothing but power and a 16-bit converter, with `changes`."""
+        off = {"noise": False, "leakage": None, "mismatch": None, "phase_noise": None, "high_pass": False}
+        return cls(**{"antenna": None, "band": None, "image_rejection_db": None, **off, **changes})
+
+    @property
+    def pattern(self) -> Antenna:
+        """The antenna pattern, isotropic where it is switched off."""
+        return self.antenna or ISOTROPIC
+
+    def noise_factor(self, gain_db: float) -> float:
+        """Noise factor (linear) at a receive gain, dB; never below 1."""
+        gains = np.array(list(self.noise_figure_db))
+        factors = 10 ** (np.array(list(self.noise_figure_db.values())) / 10)
+        line = np.polyfit(10 ** (-gains / 10), factors, min(1, len(gains) - 1))
+        return max(float(np.polyval(line, 10 ** (-gain_db / 10))), 1.0)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "FrontEndConfig":
+        """Read a front-end file; what it does not name keeps its default.
+
+        Raises:
+            InputError: unreadable, malformed YAML, unknown or impossible value; with file and field.
+        """
+        data = read_yaml(path)
+        if not isinstance(data, dict | None):
+            raise InputError(f"{path}: holds {type(data).__name__}, expected keys such as tx_power_dbm and leakage")
+        return cls.build(str(path), data or {})
+
+    @classmethod
+    def build(cls, source: str, fields: dict[str, object]) -> "FrontEndConfig":
+        """Settings from their fields; `source` is what errors name as their origin.
+
+        Raises:
+            InputError: unknown or impossible value; with the field.
+        """
+        try:
+            return cls.model_validate(fields)
+        except ValidationError as error:
+            raise InputError(f"{source}: {format_validation_error(error, fields)}") from error
+
+    def save(self, path: Path, remarks: list[str] = ()) -> None:
+        """Write as a front-end file, with remarks as comments on top."""
+        text = "".join(f"# {remark}\n" for remark in remarks) + yaml.safe_dump(
+            self.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=120
+        )
+        with replacing(path) as part:
+            part.write_text(text, encoding="utf-8")

@@ -1,0 +1,1 @@
+"""Recordings made of scenarios: batches of frames by processes, resume, sensors added later."""

@@ -1,0 +1,122 @@
+"""Frames of a recording with what sensors see beside the radar, some at a time: made here, or by several processes."""
+
+import pickle
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache, partial
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int16
+
+from radarize.errors import InputError
+from radarize.jobs import Report, perform
+from radarsim.machine.threads import share_with_drjit
+from radarsim.scenario import Frames, Scenario
+from radarsim.sensors.suite import Suite
+
+#: Frames that are made together, which is quicker: ray tests and loops over scatterers go well in large numbers.
+TOGETHER = 16
+#: Batches that a process has to make for its start, some seconds, to pay.
+_WORTH = 8
+
+
+class Batch(NamedTuple):
+    """I/Q of some frames, zero where chirps are lost, and rows of all sensors' streams."""
+
+    samples: Int16[np.ndarray, "frame loop tx rx sample 2"]
+    rows: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True, eq=False)
+class Batches:
+    """The frames of a recording.
+
+    Attributes:
+        scenario: that is recorded.
+        times: of the frames' starts on the clock of the motion, s.
+        start: stamp of that clock's zero, s.
+        valid: False where a chirp is lost; None: none is.
+    """
+
+    scenario: Scenario
+    times: Float[np.ndarray, "frame"]
+    start: float = 0.0
+    valid: Bool[np.ndarray, "frame loop tx"] | None = None
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "Batches":
+        """All frames of a scenario.
+
+        Raises:
+            InputError: its motion is shorter than one.
+        """
+        return cls(scenario, scenario.times)
+
+    @cached_property
+    def suite(self) -> Suite:
+        """The sensors."""
+        return Suite(self.scenario)
+
+    def frames(self, first: int, last: int) -> Frames:
+        """Frames first to last - 1, nothing of them computed yet."""
+        return self.scenario.frames(self.times[first:last], self.times[last] if last < len(self.times) else None)
+
+    def made(self, first: int, last: int) -> Batch:
+        """Samples and rows of frames first to last - 1.
+
+        Raises:
+            InputError: the recording is to begin with them, and none of its frames has an echo.
+        """
+        frames = self.frames(first, last)
+        if first == 0 and not any(map(len, frames.echoes)):
+            self._require_echoes()
+        arrived = np.True_ if self.valid is None else self.valid[first:last, ..., None, None, None]
+        return Batch(frames.samples * arrived, self.suite.observe(frames, first, self.start))
+
+    def spans(self) -> list[tuple[int, int]]:
+        """The first frame of each batch, and the one after its last."""
+        frames = len(self.times)
+        return [(first, min(first + TOGETHER, frames)) for first in range(0, frames, TOGETHER)]
+
+    def each(self, spans: list[tuple[int, int]], workers: int = 1) -> Iterator[Batch]:
+        """Batches in the order of their spans, made by so many processes if there is enough for each to do.
+
+        Raises:
+            InputError: as `made`, or a process died.
+        """
+        workers = min(workers, len(spans) // _WORTH)
+        if workers < 2:
+            yield from (self.made(*span) for span in spans)
+            return
+        order = pickle.dumps(replace(self))  # without what was computed here
+        jobs = {f"frames {first} to {last - 1}": partial(_make, order, first, last) for first, last in spans}
+        made, awaited = {}, deque(jobs)
+        for news in perform(jobs, workers):
+            if news.error is not None:
+                raise InputError(news.error)
+            if news.ended:
+                made[news.name] = news.result
+            while awaited and awaited[0] in made:
+                yield made.pop(awaited.popleft())
+
+    def _require_echoes(self) -> None:
+        """Refuse a recording of nothing, as a look at some frames all over it tells."""
+        some = np.unique(np.linspace(0, len(self.times) - 1, TOGETHER).astype(int))
+        if not any(map(len, self.scenario.frames(self.times[some]).echoes)):
+            raise InputError(
+                f"scene {self.scenario.scene.name}: no frame has an echo, expected surfaces that face the radar within "
+                f"{self.scenario.config.max_range:.1f} m of it"
+            )
+
+
+def _make(order: bytes, first: int, last: int, report: Report) -> Batch:
+    return _begun(order).made(first, last)
+
+
+@lru_cache(1)
+def _begun(order: bytes) -> Batches:
+    """What this process makes batches of, as its parent has sent it."""
+    share_with_drjit()
+    return pickle.loads(order)

@@ -1,0 +1,198 @@
+"""Recordings of scenarios: frame after frame to a file, and on from where a killed run stopped."""
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+from llvmlite.binding import get_host_cpu_name
+
+from radarize import __version__
+from radarize.errors import InputError
+from radarize.radar.config import RadarConfig
+from radarize.radar.limits import check_limits
+from radarize.radar.presets import load_config
+from radarize.recording import Recording, RecordingWriter, spare
+from radarsim.motion.pedestrians import crowded
+from radarsim.motion.statistics import Statistics, crossings
+from radarsim.motion.walk import Walk
+from radarsim.receiver.frontend_config import FrontEndConfig
+from radarsim.recording.batches import Batch, Batches
+from radarsim.scenario import Scenario
+from radarsim.sensors.suite import chosen
+from radarsim.world.scene import Scene
+
+
+def simulate(
+    scene: str | Path | Scene,
+    output: Path,
+    *,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+    **plan: object,
+) -> Path:
+    """Simulate a recording.
+
+    Args:
+        scene: a scene, its YAML file, or the name of one that comes with the project.
+        output: recording to write.
+        workers: processes beside this one that make frames; 1: this one does. A script that asks for more needs an
+            ``if __name__ == "__main__"``, as whatever starts processes does.
+        progress: called with (frames done, frames in all).
+        plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, engine, sensors, platform,
+            duration, trajectory, waypoints, mounting, people.
+
+    Returns:
+        the path written.
+
+    Raises:
+        InputError: unusable scene, configuration, trajectory, way-points, sensor or output.
+    """
+    scenario, cfg_text, about = planned(scene, **plan)
+    return record(Batches.of(scenario), output, cfg_text=cfg_text, attributes=about, workers=workers, progress=progress)
+
+
+def planned(
+    scene: str | Path | Scene,
+    *,
+    seed: int = 0,
+    radar: str | RadarConfig = "radarize",
+    frontend: Path | FrontEndConfig | None = None,
+    engine: str = "radarsim",
+    sensors: Sequence[str] = (),
+    people: int = 0,
+    **walk: object,
+) -> tuple[Scenario, str, dict[str, object]]:
+    """What `simulate` simulates.
+
+    Args:
+        scene: as there.
+        seed: of the tour, the scatterers and the noise.
+        radar: preset, configuration file or configuration.
+        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
+        engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver, for comparison. Its known defects
+            stand at the head of `physics.pathsolver`: corners, small facets and half of the ghosts are wrong, and
+            speckle is drawn anew for every frame.
+        sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
+            are the same whatever is chosen.
+        people: who walk about near the radar's way (see `crowd`).
+        walk: how the radar goes, by the fields of `Walk`: platform, duration, trajectory, waypoints, mounting.
+
+    Returns:
+        the scenario, the radar's original configuration text, and attributes of the recording beside `facts`.
+
+    Raises:
+        InputError: unusable scene, configuration, trajectory, way-points or sensor.
+    """
+    config, cfg_text = load_config(radar)
+    check_limits(config)
+    way, names = Walk(**walk), tuple(chosen(sensors))
+    settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
+    world = scene if isinstance(scene, Scene) else Scene.load(scene)
+    motion = way.through(world, seed)
+    world = crowded(world, motion, people, seed)
+    scenario = Scenario(world, motion, config, settings, seed, names, engine)
+    about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
+    return scenario, cfg_text, about | ({"people": people} if people else {})
+
+
+def record(
+    batches: Batches,
+    output: Path,
+    *,
+    cfg_text: str = "",
+    attributes: Mapping[str, object] | None = None,
+    workers: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> Path:
+    """Write a recording of a scenario; what a killed run has left of the very same one is taken over.
+
+    Args:
+        batches: to record.
+        output: recording to write.
+        cfg_text: original configuration text.
+        attributes: of the file, beside those that say what the scenario is, or instead.
+        workers: as `simulate` has them; the bytes are the same.
+        progress: called with (frames done, frames in all).
+
+    Returns:
+        the path written.
+
+    Raises:
+        InputError: the motion is shorter than a frame, none of its frames has an echo, the recording cannot be
+            written, or a process died.
+    """
+    spare(Path(output))
+    scenario, times, suite = batches.scenario, batches.times, batches.suite
+    about = facts(scenario) | dict(attributes or {})
+    with (
+        _left_over(Path(output)) as found,
+        RecordingWriter(
+            output, scenario.config, cfg_text=cfg_text, attributes=about, products=suite.products, streams=suite.streams
+        ) as writer,
+    ):
+        alike = found is not None and found.config == scenario.config
+        begun = found if alike and _fits(found, batches, about) else None
+        spans = batches.spans()
+        kept = [span for span in spans if begun is not None and span[1] <= len(begun)]
+        taken = (Batch(begun.adc(*span), {name: begun.rows(name, *span) for name in suite.streams}) for span in kept)
+        made = batches.each(spans[len(kept) :], workers)
+        for (first, last), batch in zip(spans, chain(taken, made), strict=True):
+            arrived = None if batches.valid is None else batches.valid[first:last]
+            writer.append(batch.samples, times[first:last] + batches.start, arrived, rows=batch.rows)
+            if progress:
+                progress(last, len(times))
+    return Path(output)
+
+
+def facts(scenario: Scenario) -> dict[str, object]:
+    """What a recording says of its scenario. The same on the same kind of processor is the same to the bit; on another,
+    compiled loops add up in another order."""
+    others = [each.model_dump(mode="json") for each in scenario.scene.interferers]
+    return {
+        "source": "radarsim simulate",
+        "scene": scenario.scene.name,
+        "seed": scenario.seed,
+        "radarsim_version": __version__,
+        "engine": scenario.engine,
+        "front_end": scenario.front_end.model_dump_json(),
+        "motion": Statistics.of(scenario.motion, scenario.scene).json(),
+        "warnings": crossings(scenario.motion, scenario.scene),
+        "processor": get_host_cpu_name(),
+    } | ({"interferers": json.dumps(others)} if others else {})
+
+
+@contextmanager
+def _left_over(output: Path) -> Iterator[Recording | None]:
+    """What killed runs have left of a recording, which is kept beside it until it is whole; None if that is nothing."""
+    part, kept = (output.with_name(output.name + suffix) for suffix in (".part", ".begun"))
+    if _length(part) > _length(kept):
+        part.replace(kept)
+    if not _length(kept):
+        yield None
+    else:
+        with Recording(kept) as recording:
+            yield recording
+    kept.unlink(missing_ok=True)
+
+
+def _length(path: Path) -> int:
+    """Whole frames in a recording; 0 where there is none."""
+    try:
+        with Recording(path) as recording:
+            return len(recording)
+    except InputError:
+        return 0
+
+
+def _fits(begun: Recording, batches: Batches, about: Mapping) -> bool:
+    """Whether the frames of a recording are the first of one that is to be made; two of them are made to see."""
+    count = len(begun)
+    return (
+        about.items() <= begun.attributes.items()
+        and np.array_equal(begun.times, (batches.times + batches.start)[:count])
+        and all(map(begun.has, batches.suite.streams))
+        and all(np.array_equal(begun.adc(k, k + 1), batches.made(k, k + 1).samples) for k in (0, count - 1))
+    )

@@ -1,0 +1,1 @@
+"""The scene: materials, objects, movers, ray tests, generators of buildings, importers."""

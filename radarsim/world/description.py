@@ -1,0 +1,321 @@
+"""Scene files: YAML with primitive objects and procedural buildings.
+
+    name: corner
+    objects:
+      - {name: wall, shape: rectangle, size: [4, 3], position: [3, 0, 1.5], facing: [-1, 0, 0], material: concrete}
+      - {name: crate, shape: box, size: [1, 1, 1], position: [2, 1, 0.5], rotation: [0, 0, 30], material: wood}
+      - {name: pipe, shape: cylinder, radius: 0.05, height: 2, position: [2, -1, 1], material: metal}
+      - {name: scan, shape: mesh, file: hall.ply, material: {custom: {permittivity: 4, conductivity: 0.2}}}
+    building: {kind: office, seed: 7}
+    moving:
+      - {kind: person, name: visitor, path: [[1, 0], [4, 0]], speed: 1.1}
+
+Lengths in m, angles in degrees (this is what people type), mesh files relative to the scene file. An open mesh that is
+the outside of a body says ``solid: true``; otherwise it is a sheet with two sides. `importers` writes such files.
+
+A scene can have levels, from mild to severe. The file without them is level 0; each level is laid upon the one before:
+an entry whose name is there already (``*`` and ``?`` stand for others) changes the fields it gives, another is added.
+
+    levels:
+      - objects: [{name: wall, material: glass}]                                         # level 1
+      - objects: [{name: "*", material: metal}, {name: pillar, shape: cylinder, ...}]    # level 2
+
+Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
+
+``clutter`` and ``unevenness`` say how far the place is from its drawing (see `life.Life`): 1 as in rooms that are
+lived in; left out, 0: not at all. With clutter the scene has more objects (see `things`). ``interferers`` are other
+radars that send there (see `interferers`); levels change and add them, too.
+"""
+
+import re
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+import trimesh
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from radarize.errors import InputError
+from radarize.files import within
+from radarize.yamlfile import read_yaml
+from radarsim.world import shapes
+from radarsim.world.generators.buildings import Building
+from radarsim.world.generators.office import Office
+from radarsim.world.generators.things import things
+from radarsim.world.interferers import Interferer
+from radarsim.world.life import Life
+from radarsim.world.materials import Material, constant, decibel, material
+from radarsim.world.movers import Mover
+from radarsim.world.objects import SceneObject
+from radarsim.world.squareness import out_of_square
+from radarsim.world.validation import format_validation_error
+
+Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Share = Annotated[float, Field(ge=0, le=10)]
+Vector = tuple[Number, Number, Number]
+Parts = tuple[str, list[SceneObject], list[Mover], Life, list[Interferer]]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Custom(_Strict):
+    """A material of constant permittivity, or a conductor."""
+
+    permittivity: Annotated[float, Field(ge=1)] = 1.0
+    conductivity: Annotated[float, Field(ge=0)] = 0.0  # S/m
+    conductor: bool = False
+    roughness: Annotated[float, Field(ge=0)] = 0.0  # RMS height, m
+    sigma0_db: float = -60.0  # four times the share of power scattered diffusely, dB
+    directive: Annotated[float, Field(ge=0, le=0.5)] = 0.0  # shares of it in lobes, see Material
+    backscatter: Annotated[float, Field(ge=0, le=0.5)] = 0.0
+    thickness: Length | None = None
+    clear: bool = False  # light passes, too
+
+    def material(self, name: str) -> Material:
+        law = None if self.conductor else constant(self.permittivity, self.conductivity)
+        sigma0 = decibel(self.sigma0_db)
+        told = {"directive": self.directive, "backscatter": self.backscatter, "clear": self.clear}
+        return Material(name, law, self.roughness, sigma0, self.thickness, source="scene file", **told)
+
+
+class CustomMaterial(_Strict):
+    custom: Custom
+
+
+class _Item(_Strict):
+    name: Annotated[str, Field(min_length=1)]
+    material: str | CustomMaterial
+    position: Vector = (0.0, 0.0, 0.0)
+    solid: bool = False  # part of the surface of a body, though open: seen from its outside only
+
+
+class _Turned(_Item):
+    rotation: Vector = (0.0, 0.0, 0.0)  # roll, pitch, yaw in degrees
+
+    def _placed(self, shape: trimesh.Trimesh) -> trimesh.Trimesh:
+        return shapes.placed(shape, self.position, np.deg2rad(self.rotation))
+
+
+class Box(_Turned):
+    shape: Literal["box"]
+    size: tuple[Length, Length, Length]
+
+    def mesh(self, folder: Path) -> trimesh.Trimesh:
+        return self._placed(shapes.box((0, 0, 0), self.size))
+
+
+class Rectangle(_Item):
+    shape: Literal["rectangle"]
+    size: tuple[Length, Length]  # width, height
+    facing: Vector
+
+    def mesh(self, folder: Path) -> trimesh.Trimesh:
+        if not np.any(self.facing):
+            raise InputError(f"object {self.name!r}: facing is [0, 0, 0], expected the direction of the normal")
+        return shapes.rectangle(self.position, self.size, self.facing)
+
+
+class Cylinder(_Turned):
+    shape: Literal["cylinder"]
+    radius: Length
+    height: Length
+    sides: Annotated[int, Field(ge=3, le=720)] = 24
+
+    def mesh(self, folder: Path) -> trimesh.Trimesh:
+        return self._placed(shapes.cylinder((0, 0, 0), self.radius, self.height, self.sides))
+
+
+class Sphere(_Item):
+    shape: Literal["sphere"]
+    radius: Length
+    subdivisions: Annotated[int, Field(ge=0, le=6)] = 3
+
+    def mesh(self, folder: Path) -> trimesh.Trimesh:
+        return shapes.sphere(self.position, self.radius, self.subdivisions)
+
+
+class Mesh(_Turned):
+    shape: Literal["mesh"]
+    file: str
+    scale: Length = 1.0
+
+    def mesh(self, folder: Path) -> trimesh.Trimesh:
+        path = within(folder / self.file, f"object {self.name!r}", folder)
+        if not path.is_file():
+            raise InputError(f"object {self.name!r}: file {path} does not exist, expected a mesh (.ply, .obj, .stl)")
+        try:
+            loaded = trimesh.load(path, force="mesh", process=False)
+            vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces)
+        except Exception as error:  # trimesh's readers raise whatever their parsers do
+            raise InputError(f"object {self.name!r}: file {path} is not a readable mesh ({error})") from error
+        if not len(faces):
+            raise InputError(f"object {self.name!r}: file {path} holds no triangles")
+        return self._placed(shapes.mesh(self.scale * vertices, faces))
+
+
+class _Change(BaseModel):
+    model_config = ConfigDict(extra="allow", frozen=True)
+
+    name: Annotated[str, Field(min_length=1)]
+
+
+class Level(_Strict):
+    """What one level changes and adds."""
+
+    objects: list[_Change] = []
+    moving: list[_Change] = []
+    interferers: list[_Change] = []
+
+
+class Description(_Strict):
+    """A scene file. Needs objects, a building, or both."""
+
+    name: str = ""
+    objects: list[Annotated[Box | Rectangle | Cylinder | Sphere | Mesh, Field(discriminator="shape")]] = []
+    building: Annotated[Office | Building, Field(discriminator="kind")] | None = None
+    moving: list[Mover] = []
+    levels: list[Level] = []
+    clutter: Share = 0.0
+    unevenness: Share = 0.0
+    interferers: list[Interferer] = []
+
+    @property
+    def life(self) -> Life:
+        """What tells the place from its drawing."""
+        return Life(self.clutter, self.unevenness)
+
+
+def split_level(name: str | Path) -> tuple[str, int]:
+    """A scene's file or bare name, and the level that it ends in (``corner@2``), 0 if in none."""
+    plain, _, level = str(name).rpartition("@")
+    return (plain, int(level)) if plain and re.fullmatch(r"\d+", level) else (str(name), 0)
+
+
+def find(path: str | Path) -> Path:
+    """The scene file meant by a path or a bare name, whatever its level.
+
+    Raises:
+        InputError: there is none, with the names that would work.
+    """
+    path = split_level(path)[0]
+    given = Path(path)
+    if given.suffix in (".yaml", ".yml") or given.is_file():
+        if given.is_file():
+            return given
+        raise InputError(f"scene file {given} does not exist")
+    folders = [Path("scenes"), shipped()]
+    for folder in folders:
+        if (candidate := folder / f"{given}.yaml").is_file():
+            return candidate
+    known = sorted(
+        {
+            str(f.relative_to(d).with_suffix(""))
+            for d in folders
+            for f in d.glob("**/*.yaml")
+            if f.relative_to(d).parts[0] != "datasets"
+        }
+    )
+    raise InputError(f"no scene {str(path)!r}, expected a .yaml file or one of: {', '.join(known) or 'none found'}")
+
+
+def shipped() -> Path:
+    """Folder of the scenes that come with the project: in the repository, or beside the installed package."""
+    here = Path(__file__).resolve()
+    packaged = here.parents[1] / "scenes"
+    return packaged if packaged.is_dir() else here.parents[2] / "scenes"
+
+
+def meshes(path: Path) -> list[Path]:
+    """The mesh files that a scene file names, at any of its levels.
+
+    Raises:
+        InputError: unreadable, malformed YAML, unknown key or value.
+    """
+    data, found = read_yaml(path), set()
+    for level in range(len(described(data, str(path)).levels) + 1):
+        found |= {item.file for item in described(data, str(path), level).objects if isinstance(item, Mesh)}
+    return [path.parent / name for name in sorted(found)]
+
+
+def read(path: Path, level: int = 0) -> Parts:
+    """Name, objects, movers, life and interferers of a scene file at one of its levels.
+
+    Raises:
+        InputError: unreadable, malformed YAML, unknown key, value, material, mesh file or level.
+    """
+    name, *parts = built(read_yaml(path), str(path), path.parent, level)
+    name = name or path.stem
+    return (f"{name}@{level}" if level else name), *parts
+
+
+def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
+    """Name ("" where it has none), objects, movers, life and interferers of a description as read from YAML.
+
+    Args:
+        data: the description.
+        source: what to call it in errors.
+        folder: mesh files are relative to it.
+        level: of severity, where there are some.
+
+    Raises:
+        InputError: unknown key, value, material, mesh file or level.
+    """
+    description = described(data, source, level)
+    try:
+        objects = [SceneObject(o.name, o.mesh(folder), _material(o), o.solid) for o in description.objects]
+        if description.building:
+            objects += description.building.build()
+        objects += things(objects, description.clutter)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+    if not objects:
+        raise InputError(f"{source}: has neither objects nor a building, expected at least one")
+    if description.building:
+        objects = out_of_square(objects, description.unevenness, description.building.seed)
+    return description.name, objects, description.moving, description.life, description.interferers
+
+
+def described(data: object, source: str, level: int = 0) -> Description:
+    """A description as read from YAML, checked, at one of its levels.
+
+    Raises:
+        InputError: unknown key, value or level.
+    """
+    if not isinstance(data, dict):
+        raise InputError(f"{source}: holds {type(data).__name__}, expected keys such as objects and building")
+    try:
+        plain = Description.model_validate(data)
+        if not 0 <= level <= len(plain.levels):
+            raise InputError(f"{source}: level is {level}, expected 0 to {len(plain.levels)}")
+        for changes in plain.levels[:level]:
+            data = _laid_upon(data, changes)
+        return Description.model_validate(data)
+    except ValidationError as error:
+        raise InputError(f"{source}: {format_validation_error(error, data)}") from error
+
+
+def _laid_upon(data: dict, changes: Level) -> dict:
+    """A description with the changes of a level."""
+    parts = {}
+    for part in ("objects", "moving", "interferers"):
+        parts[part] = entries = [dict(entry) for entry in data.get(part, [])]
+        for change in (item.model_dump() for item in getattr(changes, part)):
+            known = [entry for entry in entries if fnmatchcase(entry["name"], change["name"])]
+            for entry in known:
+                entry.update(change | {"name": entry["name"]})
+            if not known:
+                entries.append(change)
+    return data | parts
+
+
+def _material(item: _Item) -> Material:
+    if isinstance(item.material, CustomMaterial):
+        return item.material.custom.material(f"custom {item.name}")
+    try:
+        return material(item.material)
+    except InputError as error:
+        raise InputError(f"object {item.name!r}: {error}") from error

@@ -1,0 +1,103 @@
+"""Procedural buildings of four styles: any floor from a style, a seed and a floor's number.
+
+    building: {kind: A, seed: 3, floor: 2}
+
+The seed gives what the floors of a building share (`skeleton`): outline, corridors, stairs. The floor's number varies
+rooms, doors (`floorplan`) and what stands in them (`furnishing`). World origin at the south-west corner of the
+building's rooms, floor at z = 0. What stands on a plan is made by the same functions for the `office`.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from radarsim.world import shapes
+from radarsim.world.generators import furniture, joinery, walls
+from radarsim.world.generators.furnishing import furnish
+from radarsim.world.generators.layout import FloorPlan
+from radarsim.world.generators.openings import Opening
+from radarsim.world.generators.rooms import Room, Site
+from radarsim.world.generators.skeleton import Skeleton, skeleton
+from radarsim.world.generators.styles import STYLES, Style
+from radarsim.world.objects import SceneObject
+
+
+class Building(BaseModel):
+    """One floor of a building; `build` gives its objects. Same parameters, same objects to the last bit."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    kind: Literal["A", "B", "C", "D"]
+    seed: Annotated[int, Field(ge=0)] = 0
+    floor: Annotated[int, Field(ge=0)] = 0
+    furnished: bool = True
+
+    @property
+    def style(self) -> Style:
+        """Materials, sizes and densities."""
+        return STYLES[self.kind]
+
+    def skeleton(self) -> Skeleton:
+        """What all floors share."""
+        return skeleton(self.style, np.random.default_rng([self.seed, ord(self.kind)]))
+
+    def plan(self) -> FloorPlan:
+        """The floor's rooms and openings."""
+        return FloorPlan(self.skeleton(), self.style, self._rng(1))
+
+    def build(self) -> list[SceneObject]:
+        """All objects of the floor: walls, floors, ceilings, doors, windows, fittings, furniture."""
+        plan, site = self.plan(), Site(self._rng(2), self.style.height)
+        surfaces(site, plan)
+        for opening in plan.openings:
+            fit(site, plan, opening)
+        equip(site, plan, furnish if self.furnished else None)
+        return site.objects
+
+    def _rng(self, purpose: int) -> np.random.Generator:
+        return np.random.default_rng([self.seed, ord(self.kind), self.floor, purpose])
+
+
+def surfaces(site: Site, plan: FloorPlan) -> None:
+    """Walls: the ground less the rooms and openings, their faces by label. Floors and ceilings by room."""
+    style, height = plan.style, plan.style.height
+    boxes = plan.skeleton.ground(style.outer), plan.spaces(), plan.columns
+    solids, rooms, pillars = ([(x0, y0, 0.0, x1, y1, height) for x0, y0, x1, y1 in part] for part in boxes)
+    spans = [o.span for o in plan.openings]
+    found = walls.faces(solids, [*rooms, *spans], pillars)
+    planes: dict[tuple[str, str], list[walls.Face]] = {}
+    for face, label in zip(found, plan.labels(found), strict=True):
+        planes.setdefault(label, []).append(face)
+    for (name, what), parts in planes.items():
+        site.add(name, walls.surface(parts), what)
+    for room in plan.rooms:
+        for name, z, facing, what in (
+            ("floor", 0.0, 1, style.floor(room.kind)),
+            ("ceiling", height, -1, style.ceiling),
+        ):
+            site.add(f"{room.name} {name}", shapes.rectangle((*room.center, z), room.size, (0, 0, facing)), what)
+    sills = [
+        shapes.rectangle(((x0 + x1) / 2, (y0 + y1) / 2, 0.0), (x1 - x0, y1 - y0), (0, 0, 1))
+        for x0, y0, z0, x1, y1, _ in spans
+        if z0 == 0
+    ]
+    site.add("thresholds", shapes.joined(*sills), style.floor(""))
+
+
+def fit(site: Site, plan: FloorPlan, opening: Opening) -> None:
+    """Put into an opening what it is filled with."""
+    for name, mesh, what in joinery.fill(opening, plan.style):
+        site.add(f"{opening.name} {name}".rstrip(), mesh, what)
+
+
+def equip(site: Site, plan: FloorPlan, furnish: Callable[[Site, Room, FloorPlan], None] | None) -> None:
+    """Lamps in all rooms, and furniture where there is some."""
+    style = plan.style
+    lamp = furniture.lamp(style.height, *style.lamp[:2])
+    for room in plan.rooms:
+        along_x = style.plain or room.size[0] > room.size[1]
+        site.lamps(room, lamp, style.lamp[2], np.pi / 2 if along_x else 0.0)
+        if furnish:
+            furnish(site, room, plan)

@@ -1,0 +1,76 @@
+"""Openings in the walls of a floor: doors, ways, windows, glass walls."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from shapely.geometry import LineString, Polygon
+
+from radarsim.world.generators.rooms import Room
+from radarsim.world.generators.walls import Span
+
+DOOR, DOOR_HEIGHT = 1.0, 2.1  # m
+
+OPPOSITE = {"n": "s", "s": "n", "e": "w", "w": "e"}
+
+
+@dataclass(frozen=True)
+class Opening:
+    """A hole in a wall.
+
+    Attributes:
+        name: unique.
+        room: into which a leaf opens.
+        side: of the room.
+        low, high: along the wall, m.
+        bottom, top: heights, m.
+        thickness: of the wall, m.
+        kind: ``door``, ``way`` (no leaf), ``window`` or ``glass wall``.
+        other: room behind; None: outside.
+        leaf: material of the door; "": none.
+        angle: of the leaf, rad; 0: shut.
+        hinge: at the low (-1) or high (+1) end.
+        bay: of a glass wall: low and high end of its door.
+    """
+
+    name: str
+    room: Room
+    side: str
+    low: float
+    high: float
+    bottom: float
+    top: float
+    thickness: float
+    kind: str
+    other: Room | None = None
+    leaf: str = ""
+    angle: float = 0.0
+    hinge: int = -1
+    bay: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def span(self) -> Span:
+        """As a box."""
+        x0, y0, x1, y1 = strip(self.room, self.side, self.low, self.high, 0.0, self.thickness)
+        return x0, y0, self.bottom, x1, y1, self.top
+
+    @property
+    def passage(self) -> tuple[float, float] | None:
+        """Where one can walk through, along the wall, if no leaf shuts it."""
+        if self.kind == "window":
+            return None
+        return self.bay if self.kind == "glass wall" else (self.low, self.high)
+
+    def leaf_area(self, off: float = 0.0, around: float = 0.1) -> Polygon:
+        """Floor under an open leaf that hangs `off` the wall (m), and a little `around` it (m)."""
+        low, high = self.passage
+        hinge = (low if self.hinge < 0 else high) - self.hinge * off
+        tip = hinge - self.hinge * np.cos(self.angle) * (high - low), off + np.sin(self.angle) * (high - low)
+        ends = [self.room.wall_place(self.side, *end)[:2] for end in ((hinge, 0.0), tip)]
+        return LineString(ends).buffer(around)
+
+
+def strip(room: Room, side: str, low: float, high: float, near: float, far: float) -> tuple[float, ...]:
+    """Box along a wall of a room, from `near` to `far` (m) outward of its face."""
+    face, out = {"n": (room.y1, 1), "s": (room.y0, -1), "e": (room.x1, 1), "w": (room.x0, -1)}[side]
+    a, b = sorted((face + out * near, face + out * far))
+    return (low, a, high, b) if side in "ns" else (a, low, b, high)

@@ -1,0 +1,145 @@
+"""Rooms, and the site where things are put into them: no two on the same floor, none in a way."""
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+import shapely
+import trimesh
+from shapely.geometry import Polygon
+from shapely.geometry import box as area
+
+from radarsim.world import shapes
+from radarsim.world.generators import furniture
+from radarsim.world.generators.furniture import Piece
+from radarsim.world.materials import material
+from radarsim.world.objects import SceneObject
+
+
+@dataclass
+class Room:
+    """A room between its walls' faces.
+
+    Attributes:
+        name: unique.
+        x0, y0, x1, y1: extent, m.
+        kind: office, meeting, ... or corridor.
+        taken: floor area that is in use.
+        kept: floor area to be left free: in front of doors, ways between them.
+    """
+
+    name: str
+    x0: float
+    y0: float
+    x1: float
+    y1: float
+    kind: str
+    taken: list[Polygon] = field(default_factory=list)
+    kept: list[Polygon] = field(default_factory=list)
+
+    @property
+    def center(self) -> tuple[float, float]:
+        """m."""
+        return (self.x0 + self.x1) / 2, (self.y0 + self.y1) / 2
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Along x and y, m."""
+        return self.x1 - self.x0, self.y1 - self.y0
+
+    @cached_property
+    def floor(self) -> Polygon:
+        """All of its floor."""
+        return area(self.x0, self.y0, self.x1, self.y1)
+
+    def is_free(self, spot: Polygon, ignore_kept: bool = False) -> bool:
+        """Whether a piece of floor lies in the room and nothing stands there."""
+        blocked = self.taken if ignore_kept else self.taken + self.kept
+        return self.floor.contains(spot) and not any(spot.intersects(other) for other in blocked)
+
+    def wall(self, side: str) -> tuple[float, float]:
+        """Ends of the wall at a `side` ("n", "s", "e", "w"), m."""
+        return (self.x0, self.x1) if side in "ns" else (self.y0, self.y1)
+
+    def wall_place(self, side: str, along: float, off: float) -> tuple[float, float, float]:
+        """Place and yaw of a piece with its back to the wall at a `side`, `off` (m) its face."""
+        return {
+            "s": (along, self.y0 + off, np.pi / 2),
+            "n": (along, self.y1 - off, -np.pi / 2),
+            "w": (self.x0 + off, along, 0.0),
+            "e": (self.x1 - off, along, np.pi),
+        }[side]
+
+
+class Site:
+    """A floor being built.
+
+    Attributes:
+        rng: draws everything.
+        height: of the ceilings, m.
+        objects: so far.
+    """
+
+    def __init__(self, rng: np.random.Generator, height: float):
+        self.rng, self.height = rng, height
+        self.objects: list[SceneObject] = []
+        self._count: dict[str, int] = {}
+
+    def add(self, name: str, mesh: trimesh.Trimesh, what: str) -> None:
+        """Add an object of a material. Panes are sheets, all else is the surface of a body."""
+        self.objects.append(SceneObject(name, mesh, material(what), solid=what != "glass"))
+
+    def put(self, room: Room, piece: Piece, x: float, y: float, yaw: float) -> None:
+        """Stand a piece in a room and take its floor area."""
+        number = self._count[room.name + piece.kind] = self._count.get(room.name + piece.kind, 0) + 1
+        for what, part in piece.parts.items():
+            self.add(f"{room.name} {piece.kind} {number} {what}", shapes.placed(part, (x, y, 0), (0, 0, yaw)), what)
+        room.taken.append(footprint(piece, x, y, yaw))
+
+    def put_if_free(self, room: Room, piece: Piece, x: float, y: float, yaw: float, margin: float = 0.01) -> bool:
+        """Put a piece where nothing stands within a margin (m), or not at all; whether it was put."""
+        free = room.is_free(footprint(piece, x, y, yaw).buffer(margin))
+        if free:
+            self.put(room, piece, x, y, yaw)
+        return free
+
+    def against_wall(self, room: Room, piece: Piece, gap: float = 0.03) -> float | None:
+        """Put a piece with its back to a wall where there is room, and return its yaw, or None."""
+        for _ in range(24):
+            side = "nsew"[self.rng.integers(4)]
+            half = piece.width / 2 + 0.02
+            low, high = room.wall(side)[0] + half, room.wall(side)[1] - half
+            if low >= high:
+                continue
+            x, y, yaw = room.wall_place(side, self.rng.uniform(low, high), gap + piece.depth / 2)
+            if self.put_if_free(room, piece, x, y, yaw):
+                return yaw
+        return None
+
+    def seat(
+        self, room: Room, x: float, y: float, yaw: float, away: float = 0.82, sway: float = 0.5,
+        ignore_kept: bool = False,
+    ) -> None:  # fmt: skip
+        """A chair in front of what stands at a place, turned to it up to a `sway` (rad)."""
+        turn = yaw + np.pi + self.rng.uniform(-sway, sway)
+        piece = furniture.chair(self.rng)
+        x, y = x + away * np.cos(yaw), y + away * np.sin(yaw)
+        if room.is_free(footprint(piece, x, y, turn), ignore_kept):
+            self.put(room, piece, x, y, turn)
+
+    def lamps(self, room: Room, piece: Piece, spacing: float, yaw: float = np.pi / 2) -> None:
+        """Ceiling lamps on a regular grid; they take no floor."""
+        nx, ny = (max(1, round(side / spacing)) for side in room.size)
+        for i in range(nx):
+            for j in range(ny):
+                x = room.x0 + (i + 0.5) / nx * (room.x1 - room.x0)
+                y = room.y0 + (j + 0.5) / ny * (room.y1 - room.y0)
+                mesh = shapes.placed(piece.parts["metal"], (x, y, 0), (0, 0, yaw))
+                self.add(f"{room.name} lamp {i * ny + j + 1}", mesh, "metal")
+
+
+def footprint(piece: Piece, x: float, y: float, yaw: float) -> Polygon:
+    """Floor area under a piece."""
+    flat = area(-piece.depth / 2, -piece.width / 2, piece.depth / 2, piece.width / 2)
+    c, s = np.cos(yaw), np.sin(yaw)
+    return shapely.affinity.affine_transform(flat, [c, -s, s, c, x, y])

@@ -1,0 +1,276 @@
+"""Where something can be put: places on tops, walls and ceilings, and ray tests on what stands around them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
+from itertools import product
+
+import numpy as np
+import shapely
+from jaxtyping import Bool, Float, Int
+
+from radarsim.world.objects import SceneObject
+from radarsim.world.shapes import scattered
+
+#: Heights over the floor, m: of tops that people put things on, of ceilings, and of what is still there: only a wall.
+TOPS, CEILINGS, WALLS = (0.6, 2.0), 2.0, 2.25
+#: m: narrower walls are posts and the sides of openings; and gaps in walls that are none.
+NARROW, SEAM = 0.5, 0.02
+#: Cosines of what is level and of what is upright.
+LEVEL, UPRIGHT = 0.98, 0.05
+#: What buildings are made of. Where it is as high as tops it is steps and landings, which people walk on, or the sill
+#: of an opening: nothing is put there.
+BUILT = {"concrete", "brick", "plasterboard", "ceiling board", "asphalt", "carpet", "floorboard"}
+#: m: from where a ray looks back at a surface, and how far from that surface it may end.
+LIFT, OFF = 0.01, 0.002
+#: m: as far from a wall or ceiling a ray looks for the floor.
+ASIDE = 0.08
+DOWN = np.array([0.0, 0.0, -1.0])
+#: m: as high as no ceiling is.
+_SKY = 1e3
+#: Where rays look at a back, as shares of its half sides.
+_GRID = np.array(list(product(np.linspace(-1, 1, 5), repeat=2)))
+#: m: what is larger is looked through by more rays.
+_SMALL = 0.12
+_THREE, _OUT = (-1.0, 0.0, 1.0), (0.15, 0.55, 1.0)
+
+
+def _through(side: int) -> Float[np.ndarray, "ray 2 3"]:
+    """Ends of rays through the space that a thing takes, so many beside one another: shares of half its sides, and of
+    how far it stands off."""
+    rows = np.linspace(-1, 1, side)
+    return np.array(
+        [[(x, y, 0.0), (x, y, 1.0)] for x, y in product(_THREE, repeat=2)]
+        + [[(-1.0, y, z), (1.0, y, z)] for y, z in product(rows, _OUT)]
+        + [[(x, -1.0, z), (x, 1.0, z)] for x, z in product(rows, _OUT)]
+    )
+
+
+_FEW, _MANY = _through(5), _through(25)
+#: From where on a back rays look out of a body that all is inside of; one alone may graze a face.
+_EYES = np.array([(0.0, 0.0, 0.0), (0.31, 0.17, 0.0), (-0.23, 0.41, 0.0)])
+#: How far around a lamp's place there is no other, m.
+UNLIT = np.arange(0.2, 1.6, 0.2)
+
+
+@dataclass(frozen=True)
+class Spots:
+    """Boxes with their backs on a surface.
+
+    Attributes:
+        place: middle of the back, m.
+        along: unit vector along the surface, horizontal.
+        normal: unit vector off the surface.
+        size: along, across (normal x along), and off the surface, m.
+    """
+
+    place: Float[np.ndarray, "spot 3"]
+    along: Float[np.ndarray, "spot 3"]
+    normal: Float[np.ndarray, "spot 3"]
+    size: Float[np.ndarray, "spot 3"]
+
+    def __len__(self) -> int:
+        return len(self.place)
+
+    def __getitem__(self, some: Bool[np.ndarray, "spot"] | Int[np.ndarray, "n"]) -> "Spots":
+        return Spots(self.place[some], self.along[some], self.normal[some], self.size[some])
+
+    @classmethod
+    def joined(cls, parts: Sequence["Spots"]) -> "Spots":
+        """All of several."""
+        columns = ("place", "along", "normal", "size")
+        return cls(*(np.concatenate([np.zeros((0, 3)), *(getattr(p, name) for p in parts)]) for name in columns))
+
+    @cached_property
+    def axes(self) -> Float[np.ndarray, "spot 3 3"]:
+        """Along, across and normal in rows: a frame of the right hand."""
+        return np.stack([self.along, np.cross(self.normal, self.along), self.normal], axis=1)
+
+    def points(
+        self, shares: Float[np.ndarray, "point 3"], margin: tuple[float, float] = (0.0, 0.0)
+    ) -> Float[np.ndarray, "spot point 3"]:
+        """Points in the boxes, made larger by margins to all sides and in front, m.
+
+        Args:
+            shares: of half the sides, -1 ... 1, and of the distance from the surface, 0 ... 1.
+            margin: m.
+        """
+        half = (self.size + np.array([2 * margin[0], 2 * margin[0], margin[1]])) * [0.5, 0.5, 1.0]
+        return self.place[:, None] + np.einsum("pd,sd,sdx->spx", shares, half, self.axes)
+
+    def apart(self) -> Bool[np.ndarray, "spot"]:
+        """Which of them overlap none that comes earlier and is kept."""
+        corners = self.points(np.array(list(product((-1, 1), (-1, 1), (0, 1))), float))
+        low, high = corners[..., 2].min(axis=1), corners[..., 2].max(axis=1)
+        outline = shapely.convex_hull(shapely.multipoints(corners[..., :2]))
+        one, two = shapely.STRtree(outline).query(outline, predicate="intersects")
+        meet = (two < one) & (low[one] < high[two]) & (low[two] < high[one])
+        kept = np.ones(len(self), bool)
+        for first, later in sorted(zip(two[meet], one[meet], strict=True), key=lambda pair: (pair[1], pair[0])):
+            kept[later] &= not kept[first]
+        return kept
+
+
+class Surroundings:
+    """The surfaces of a place, and rays between them.
+
+    Args:
+        objects: what stands there.
+
+    Attributes:
+        floor: height of the floor, m.
+    """
+
+    def __init__(self, objects: Sequence[SceneObject]):
+        import open3d
+
+        counts = [len(o.mesh.faces) for o in objects]
+        self._corners = np.concatenate([np.asarray(o.mesh.vertices)[o.mesh.faces] for o in objects])
+        cross = np.cross(self._corners[:, 1] - self._corners[:, 0], self._corners[:, 2] - self._corners[:, 0])
+        double = np.linalg.norm(cross, axis=1)
+        self._normals, self._areas = cross / np.maximum(double, 1e-300)[:, None], double / 2
+        self._clear = np.repeat([o.material.clear for o in objects], counts)
+        self._built = np.repeat([o.material.name in BUILT for o in objects], counts)
+        self._body = np.repeat([not o.two_sided for o in objects], counts)
+        self._world = open3d.t.geometry.RaycastingScene()
+        flat = self._corners.reshape(-1, 3).astype(np.float32)
+        self._world.add_triangles(flat, np.arange(len(flat), dtype=np.uint32).reshape(-1, 3))
+        up, height = self._normals[:, 2], self._corners[:, :, 2].mean(axis=1)
+        rising = np.flatnonzero(up > LEVEL)
+        # floors are among the lowest that faces up, but for what lies astray in scans
+        order = rising[np.argsort(height[rising], kind="stable")]
+        total = np.cumsum(self._areas[order])
+        self.floor = float(height[order[np.searchsorted(total, 0.05 * total[-1])]] if len(order) else flat[:, 2].min())
+
+    @property
+    def seed(self) -> int:
+        """A number that is the same for the same surfaces: their corners, cut to 0.1 mm where no drawing has one."""
+        return int.from_bytes(sha256(np.floor(self._corners * 1e4 + 0.37).astype(np.int64).tobytes()).digest()[:8])
+
+    @cached_property
+    def tops(self) -> Int[np.ndarray, "triangle"]:
+        """Triangles of tops."""
+        height = self._corners[:, :, 2].mean(axis=1) - self.floor
+        able = ~(self._clear | self._built) & (height > TOPS[0]) & (height < TOPS[1])
+        return np.flatnonzero(able & (self._normals[:, 2] > LEVEL))
+
+    @cached_property
+    def ceilings(self) -> Int[np.ndarray, "triangle"]:
+        """Triangles of ceilings."""
+        above = self._corners[:, :, 2].mean(axis=1) - self.floor > CEILINGS
+        return np.flatnonzero(~self._clear & above & (self._normals[:, 2] < -LEVEL))
+
+    @cached_property
+    def walls(self) -> tuple[Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall"]]:
+        """Walls: where each begins on the floor on its left, seen from before it, m; its normal; its length, m."""
+        begin, normal, length = _straight(*self._lines)
+        wide = length > NARROW
+        return begin[wide], normal[wide], length[wide]
+
+    @property
+    def _lines(self) -> tuple[Float[np.ndarray, "line 2 3"], Float[np.ndarray, "line 3"]]:
+        """What is still there so high up: lines on the floor, left to right, one of a triangle, m; and normals."""
+        level = self.floor + WALLS
+        up, z = np.abs(self._normals[:, 2]), self._corners[:, :, 2]
+        rows = np.flatnonzero((up < UPRIGHT) & ~self._clear & (z.min(axis=1) < level) & (z.max(axis=1) > level))
+        corners, above = self._corners[rows], z[rows] > level
+        # the corner that is alone on its side, and the two others
+        alone = np.argmax(above == (above.sum(axis=1) == 1)[:, None], axis=1)
+        one, *others = (corners[np.arange(len(rows)), (alone + k) % 3] for k in range(3))
+        ends = []
+        for other in others:
+            share = (level - one[:, 2]) / (other[:, 2] - one[:, 2])
+            ends.append(one + share[:, None] * (other - one))
+        lines, normals = np.stack(ends, axis=1), self._normals[rows] * [1, 1, 0]
+        lines[:, :, 2] = self.floor
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        along = np.cross([0.0, 0.0, 1.0], normals)
+        turned = np.einsum("wd,wd->w", lines[:, 1] - lines[:, 0], along) < 0
+        lines[turned] = lines[turned, ::-1]
+        return lines, normals
+
+    def area(self, some: Int[np.ndarray, "triangle"]) -> float:
+        """Of some triangles, m^2."""
+        return float(self._areas[some].sum())
+
+    def drawn(
+        self, rng: np.random.Generator, some: Int[np.ndarray, "triangle"], count: int
+    ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
+        """Random places on some triangles, and the normals there."""
+        total = np.cumsum(self._areas[some])
+        which = rng.random(count)
+        on = some[np.minimum(np.searchsorted(total, which * total[-1]), len(some) - 1)] if count else some[:0]
+        return scattered(self._corners[on], rng), self._normals[on]
+
+    def fits(self, spots: Spots, rim: float, front: float, sides: float = 0.005) -> Bool[np.ndarray, "spot"]:
+        """Whether whole backs lie on surfaces, and nothing is in the way.
+
+        Args:
+            rim: so far around a back its surface goes on, m.
+            front, sides: so far in front and to the sides all is free, m.
+        """
+        back = spots.points(np.column_stack([_GRID, np.zeros(len(_GRID))]), (rim, 0.0))
+        lifted = back + LIFT * spots.normal[:, None]
+        away, on = self._hit(lifted, -spots.normal[:, None])
+        lying = ((np.abs(away - LIFT) < OFF) & ~self._clear[on]).all(axis=1)
+        small, clear = spots.size[:, :2].max(axis=1) < _SMALL, np.ones(len(spots), bool)
+        for some, rays in ((small, _FEW), (~small, _MANY)):
+            box = spots[some]
+            ends = box.points(rays.reshape(-1, 3), (sides, front)).reshape(len(box), len(rays), 2, 3)
+            ends += 0.003 * box.normal[:, None, None]
+            way = ends[:, :, 1] - ends[:, :, 0]
+            length = np.linalg.norm(way, axis=2)
+            clear[some] = (self._hit(ends[:, :, 0], way / length[..., None])[0] > length).all(axis=1)
+        away, on = self._hit(spots.points(_EYES) + LIFT * spots.normal[:, None], spots.normal[:, None])
+        behind = np.isfinite(away) & self._body[on] & (np.einsum("npd,nd->np", self._normals[on], spots.normal) > 0)
+        return lying & clear & ~behind.all(axis=1)
+
+    def above_floor(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
+        """Whether there is anything below: outside of a building there is not."""
+        return np.isfinite(self._hit(spots.place + ASIDE * spots.normal, DOWN)[0])
+
+    def on_floor(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
+        """Whether the lower ends of what is on a wall stand on a floor."""
+        foot = spots.points(np.array([(x, -1.0, 1.0) for x in _THREE])) + [0, 0, LIFT]
+        return (np.abs(self._hit(foot, DOWN)[0] - LIFT) < OFF).all(axis=1)
+
+    def headroom(self, spots: Spots) -> Float[np.ndarray, "spot"]:
+        """How high something is over what is on a wall, m; very high: nothing."""
+        return np.minimum(self._hit(spots.place + ASIDE * spots.normal, -DOWN)[0], _SKY)
+
+    def unlit(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
+        """Whether nothing hangs from the ceiling near by: no lamp."""
+        turn = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+        around = np.stack(np.broadcast_arrays(np.cos(turn)[:, None], np.sin(turn)[:, None], 0.0), axis=2)
+        eye = spots.place - [0, 0, 0.3]
+        seen = self._hit(eye[:, None], around[:, 0])[0][..., None] > UNLIT
+        above, _ = self._hit(eye[:, None, None] + UNLIT[:, None] * around, -DOWN)
+        return ~(seen & (above < 0.27)).any(axis=(1, 2))
+
+    def _hit(
+        self, origins: Float[np.ndarray, "*#n 3"], directions: Float[np.ndarray, "*#n 3"]
+    ) -> tuple[Float[np.ndarray, "*#n"], Int[np.ndarray, "*#n"]]:
+        """Distance to the first triangle (inf: none) and which it is (0 if none)."""
+        rays = np.concatenate(np.broadcast_arrays(origins, directions), axis=-1).astype(np.float32)
+        found = self._world.cast_rays(rays)
+        triangle = found["primitive_ids"].numpy().astype(np.int64)
+        return found["t_hit"].numpy().astype(float), np.where(triangle < len(self._corners), triangle, 0)
+
+
+def _straight(lines: Float[np.ndarray, "line 2 3"], normals: Float[np.ndarray, "line 3"]):
+    """Lines in line as one: where each begins on the left, its normal, its length."""
+    along = np.cross([0.0, 0.0, 1.0], normals)
+    offset, low, high = (
+        np.einsum("ld,ld->l", *pair) for pair in ((lines[:, 0], normals), (lines[:, 0], along), (lines[:, 1], along))
+    )
+    key = (np.column_stack([normals[:, :2], offset]) / 1e-3).round()
+    order = np.lexsort((low, *key.T))
+    found: list[list] = []
+    for k in order:
+        if found and np.array_equal(found[-1][0], key[k]) and low[k] < found[-1][2] + SEAM:
+            found[-1][2] = max(found[-1][2], high[k])
+        else:
+            found.append([key[k], k, high[k]])
+    first = np.array([k for _, k, _ in found], int)
+    return lines[first, 0], normals[first], np.array([end for *_, end in found]) - low[first]

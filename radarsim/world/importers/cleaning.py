@@ -1,0 +1,105 @@
+"""Meshes as files have them, made fit for tracing: merged, without waste, small enough."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import trimesh
+from jaxtyping import Float
+
+from radarize.errors import InputError
+from radarsim.world.importers.part import Part
+
+#: Corners closer than this are one, decimals of a metre.
+_DIGITS = 5
+#: Decimation may move 99 % of the surface by no more, m: a wall stays flat to a few wavelengths and where it was.
+DEVIATION = 0.02
+_SAMPLES = 200_000
+
+
+def clean(part: Part, source: str) -> Part | None:
+    """A part with corners merged, and without degenerate and repeated triangles; None if nothing is left.
+
+    Raises:
+        InputError: corners that are no numbers, or triangles of corners that do not exist.
+    """
+    vertices, faces = np.asarray(part.mesh.vertices, float), np.asarray(part.mesh.faces)
+    used = np.zeros(len(vertices), bool)
+    if len(faces) and (faces.min() < 0 or faces.max() >= len(vertices)):
+        raise InputError(
+            f"{source}: part {part.name!r} has a triangle of corner {faces.max()}, but only {len(vertices)} corners"
+        )
+    used[faces.ravel()] = True
+    if bad := int(np.sum(~np.isfinite(vertices[used]).all(axis=1))):
+        raise InputError(f"{source}: part {part.name!r} has {bad} corners that are no finite numbers")
+    mesh = trimesh.Trimesh(np.where(used[:, None], vertices, 0.0), faces, process=False)
+    mesh.merge_vertices(digits_vertex=_DIGITS)
+    faces = mesh.faces[mesh.area_faces > 1e-12]
+    # The same three corners, whichever way round, are one sheet.
+    faces = faces[np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])] if len(faces) else faces
+    if not len(faces):
+        return None
+    mesh = trimesh.Trimesh(mesh.vertices, faces, process=False)
+    mesh.remove_unreferenced_vertices()
+    return replace(part, mesh=mesh)
+
+
+def edges_of_many(mesh: trimesh.Trimesh) -> int:
+    """Number of edges with more than two triangles: there the mesh is no surface."""
+    _, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+    return int(np.sum(count > 2))
+
+
+def decimate(
+    parts: list[Part], budget: int, source: str, progress: Callable[..., None] | None = None
+) -> tuple[list[Part], float]:
+    """Parts with no more than about `budget` triangles together, and the deviation of 99 % of the surface, m.
+
+    Quadric error metrics (Garland and Heckbert 1997) collapse flat ground first, and so keep walls flat.
+
+    Raises:
+        InputError: that would move the surface too far.
+    """
+    import open3d as o3d
+
+    total = sum(len(part.mesh.faces) for part in parts)
+    if total <= budget:
+        return parts, 0.0
+    made, deviations = [], []
+    for number, part in enumerate(parts):
+        if progress:
+            progress("decimating", number, len(parts))
+        target = max(12, int(budget * len(part.mesh.faces) / total))
+        if len(part.mesh.faces) <= target:
+            made.append(part)
+            continue
+        dense = o3d.geometry.TriangleMesh(
+            o3d.utility.Vector3dVector(part.mesh.vertices), o3d.utility.Vector3iVector(part.mesh.faces)
+        )
+        coarse = dense.simplify_quadric_decimation(target)
+        mesh = trimesh.Trimesh(np.asarray(coarse.vertices), np.asarray(coarse.triangles), process=False)
+        share = int(np.ceil(_SAMPLES * len(part.mesh.faces) / total))
+        deviations.append(distances(part.mesh, mesh, share))
+        thin = clean(replace(part, mesh=mesh), source)
+        if thin is not None:
+            made.append(thin)
+    if progress:
+        progress("decimating", len(parts), len(parts))
+    left = sum(len(part.mesh.faces) for part in made)
+    moved = float(np.quantile(np.concatenate(deviations), 0.99))
+    if moved > DEVIATION or left > 1.2 * budget:
+        raise InputError(
+            f"{source}: has {total} triangles, and {left} would move 1 % of its surface by more than {moved:.3f} m, "
+            f"expected at most {budget} triangles within {DEVIATION} m: raise --budget or simplify the mesh first"
+        )
+    return made, moved
+
+
+def distances(mesh: trimesh.Trimesh, other: trimesh.Trimesh, count: int) -> Float[np.ndarray, "n"]:
+    """Distance of about `count` corners of a mesh from the surface of another, m."""
+    import open3d as o3d
+
+    scene = o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(np.asarray(other.vertices, np.float32), np.asarray(other.faces, np.uint32))
+    points = mesh.vertices[:: max(1, len(mesh.vertices) // max(count, 1))]
+    return scene.compute_distance(np.ascontiguousarray(points, np.float32)).numpy()

@@ -1,0 +1,109 @@
+"""Planes of noisy scans: walls that a scanner saw a few millimetres rough are made flat again.
+
+A radar at 77 GHz sees a wall as a mirror; the same wall with 5 mm of scanner noise would sparkle like gravel (the
+residual is the scanner's, true roughness is the material's: `scene.planes`). That module finds planes up to half a
+millimetre of noise. Here they are found on a smoothed copy, and the corners of the scan near a plane are put onto it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from jaxtyping import Float
+from scipy import sparse
+
+from radarsim.world.planes import regions
+
+#: Only meshes as fine as scans are looked at: median edge, m, and number of triangles.
+FINE, MANY = 0.12, 2000
+#: The copy is smoothed over about this length, m: wider than noise, narrower than furniture.
+_LENGTH = 0.10
+_STEPS = (8, 60)
+#: Smaller planes are left as they are, m^2.
+SMALLEST = 0.25
+#: Corners within four times the noise of a plane are put onto it, but none further away, m.
+FARTHEST = 0.04
+
+
+@dataclass(frozen=True)
+class Flattened:
+    """A mesh with its planes flat, how many there are, their share of the area, and the noise taken away (RMS, m)."""
+
+    mesh: trimesh.Trimesh
+    planes: int
+    share: float
+    noise: float
+
+
+def flatten(mesh: trimesh.Trimesh) -> Flattened | None:
+    """The mesh with its planes flat; None if it is no scan, or has no planes, or none that are noisy."""
+    edge = float(np.median(mesh.edges_unique_length))
+    if len(mesh.faces) < MANY or edge > FINE:
+        return None
+    vertices = np.asarray(mesh.vertices)
+    links = _links(mesh)
+    steps = int(np.clip(2 * (_LENGTH / edge) ** 2, *_STEPS))
+    smooth = _smoothed(vertices, links, steps)
+    copy = trimesh.Trimesh(smooth, mesh.faces, process=False)
+    found = [faces for faces in regions(copy) if mesh.area_faces[faces].sum() >= SMALLEST]
+    if not found:
+        return None
+    inner = [np.unique(mesh.faces[faces]) for faces in found]
+    planes = [_fit(vertices[corners]) for corners in inner]
+    residual = np.concatenate(
+        [(vertices[c] - at) @ normal for c, (at, normal) in zip(inner, planes, strict=True)]
+    )  # fmt: skip
+    # Robust: a region's rim may bend away from its plane.
+    noise = float(1.4826 * np.median(np.abs(residual)))
+    if noise < 1e-4:
+        return None
+    reach = min(4 * noise, FARTHEST)
+    # Smoothing rounds the rims off, so a plane goes on beyond its region as long as the scan stays near it.
+    members = [
+        _spread(corners, np.abs((vertices - at) @ normal) < reach, links, 2 + int(np.sqrt(4 * steps)))
+        for corners, (at, normal) in zip(inner, planes, strict=True)
+    ]
+    flat = vertices.copy()
+    for _ in range(8):  # corners on two or three planes end where these meet
+        for corners, (at, normal) in zip(members, planes, strict=True):
+            flat[corners] -= ((flat[corners] - at) @ normal)[:, None] * normal
+    moved = np.linalg.norm(flat - vertices, axis=1) < 3 * FARTHEST  # where two planes meet at a sharp angle
+    share = sum(mesh.area_faces[faces].sum() for faces in found) / mesh.area
+    result = trimesh.Trimesh(np.where(moved[:, None], flat, vertices), mesh.faces, process=False)
+    return Flattened(result, len(found), float(share), noise)
+
+
+def _links(mesh: trimesh.Trimesh) -> sparse.csr_array:
+    """Which corners share an edge."""
+    a, b = mesh.edges_unique.T
+    ones = np.ones(2 * len(a))
+    count = len(mesh.vertices)
+    return sparse.coo_array((ones, (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(count, count)).tocsr()
+
+
+def _smoothed(vertices: Float[np.ndarray, "v 3"], links: sparse.csr_array, steps: int) -> Float[np.ndarray, "v 3"]:
+    """Each corner half way to the mean of its neighbours, `steps` times."""
+    share = 0.5 / np.maximum(links.sum(axis=1), 1)[:, None]
+    for _ in range(steps):
+        vertices = 0.5 * vertices + share * (links @ vertices)
+    return vertices
+
+
+def _fit(points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """A point on the plane through points, and its unit normal."""
+    at = points.mean(axis=0)
+    return at, np.linalg.eigh((points - at).T @ (points - at))[1][:, 0]
+
+
+def _spread(corners: np.ndarray, near: np.ndarray, links: sparse.csr_array, steps: int) -> np.ndarray:
+    """The corners near a plane that can be reached from some of its own in so many steps."""
+    reached = np.zeros(len(near), bool)
+    reached[corners] = near[corners]
+    edge = np.flatnonzero(reached)
+    for _ in range(steps):
+        following = np.unique(links[edge].indices)
+        edge = following[near[following] & ~reached[following]]
+        if not len(edge):
+            break
+        reached[edge] = True
+    return np.flatnonzero(reached)

@@ -1,0 +1,100 @@
+"""Which material an imported part gets: by the user's patterns, by what the source says, by the words of its name."""
+
+import re
+from fnmatch import fnmatchcase
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+
+from radarize.errors import InputError
+from radarize.yamlfile import read_yaml
+from radarsim.world.description import CustomMaterial
+from radarsim.world.importers.part import Part
+from radarsim.world.materials import MATERIALS, material
+from radarsim.world.validation import format_validation_error
+
+Choice = str | dict
+
+_WORDS = {
+    "ceiling board": "ceiling",
+    "floorboard": "floor parquet laminate",
+    "carpet": "rug carpet mat",
+    "plasterboard": "wall plaster drywall gypsum paint column pillar beam",
+    "glass": "window glazing pane vase",
+    "wood": "door wooden table desk cabinet shelf shelving bookcase wardrobe drawer chest stool bench counter",
+    "fabric": "sofa couch chair armchair bed cushion pillow curtain blind blanket bedding towel cloth clothes seating",
+    "metal": "steel aluminium aluminum iron fridge refrigerator radiator sink lamp pipe rail railing mirror",
+    "marble": "stone granite",
+    "brick": "bricks masonry",
+    "vinyl": "tile tiles linoleum",
+    "acrylic": "tv monitor screen plastic",
+}
+_MEANING = {word: name for name, words in _WORDS.items() for word in words.split()} | {
+    name: name for name in MATERIALS if " " not in name
+}
+
+
+class MaterialMap:
+    """Patterns and their materials, the first that fits decides.
+
+    The file is YAML, ``pattern: material``, a material being a name or ``{custom: {...}}`` as in scene files; patterns
+    (``*``, ``?``, ``[...]``, case ignored) are tried on a part's name, material, group and category.
+    """
+
+    def __init__(self, patterns: dict[str, Choice], default: Choice | None):
+        self.patterns, self.default = patterns, default
+
+    @classmethod
+    def read(cls, path: Path | None, default: str | None) -> "MaterialMap":
+        """The map of a file.
+
+        Args:
+            path: none: no patterns.
+            default: material of parts whose names say nothing; none: plasterboard, and concrete of whole rooms.
+
+        Raises:
+            InputError: unreadable, malformed, or an unknown material, with the pattern.
+        """
+        if default is not None:
+            material(default)
+        if path is None:
+            return cls({}, default)
+        data = read_yaml(path)
+        if not isinstance(data, dict):
+            raise InputError(f"{path}: holds {type(data).__name__}, expected lines 'pattern: material'")
+        for pattern, choice in data.items():
+            try:
+                if isinstance(choice, str):
+                    material(choice)
+                else:
+                    TypeAdapter(CustomMaterial).validate_python(choice)
+            except ValidationError as error:
+                raise InputError(f"{path}: {pattern}: {format_validation_error(error, choice)}") from error
+            except InputError as error:
+                raise InputError(f"{path}: {pattern}: {error}") from error
+        return cls({str(pattern): choice for pattern, choice in data.items()}, default)
+
+    def choose(self, part: Part) -> tuple[Choice, str]:
+        """The material of a part, and by what it was chosen."""
+        names = [name.lower() for name in (part.name, *part.labels)]
+        for pattern, choice in self.patterns.items():
+            if any(fnmatchcase(name, pattern.lower()) for name in names):
+                return choice, f"pattern {pattern}"
+        if part.material is not None:
+            return part.material, "source"
+        # A material's name tells more than an object's.
+        for name in (*part.labels, part.name):
+            if guess := meaning(name):
+                return guess, "name" if name == part.name else f"label {name}"
+        return self.default or ("concrete" if part.room else "plasterboard"), "default"
+
+
+def meaning(name: str) -> str | None:
+    """The material that the words of a name stand for: one of the registry's (``mat-itu_glass``), or a thing's."""
+    words = re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name).lower())
+    plain = " ".join(word for word in words if word not in ("itu", "mat", "material"))
+    for known in sorted(MATERIALS, key=len, reverse=True):
+        if f" {known} " in f" {plain} ":
+            return known
+    # The last word is the thing itself: a "wall cabinet" is a cabinet.
+    return next((_MEANING[word] for word in reversed(words) if word in _MEANING), None)

@@ -1,0 +1,66 @@
+"""Other radars that send in a place, as another robot's or a neighbour's does.
+
+A scene file lists them:
+
+    interferers:
+      - {name: neighbour, radar: long-range, position: [6, 2, 1], yaw: 180}
+      - {name: robot, radar: {slope: 70e12, idle_time: 90e-6}, position: [9, 1, 0.5], velocity: [-0.5, 0, 0]}
+
+What of them is heard is the business of `radarsim.receiver.interference`.
+"""
+
+from typing import Annotated
+
+import numpy as np
+from jaxtyping import Float
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+from scipy.spatial.transform import Rotation
+
+from radarize.radar.config import RadarConfig
+from radarize.radar.presets import PRESETS
+from radarize.yamlfile import changed
+
+Number = Annotated[float, Field(ge=-1e4, le=1e4)]
+Vector = tuple[Number, Number, Number]
+
+
+class Interferer(BaseModel):
+    """A radar that sends by itself: antennas and power of the board are those of the radar that it disturbs.
+
+    Attributes:
+        name: of its own.
+        radar: a preset's name, or the fields of `RadarConfig` in which it differs from the preset `radarize`.
+        position: at time 0 of the motion, m.
+        velocity: m/s.
+        yaw: of its boresight, degrees.
+        start: when its first frame begins, s; it is silent before, and sends frame after frame from then on.
+        clock_ppm: by how much its clock is faster than that of the radar that it disturbs.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    name: Annotated[str, Field(min_length=1)]
+    radar: RadarConfig = PRESETS["radarize"]
+    position: Vector
+    velocity: Vector = (0.0, 0.0, 0.0)
+    yaw: Number = 0.0
+    start: Number = 0.0
+    clock_ppm: Annotated[float, Field(ge=-1000, le=1000)] = 0.0
+
+    @field_validator("radar", mode="before")
+    @classmethod
+    def _named(cls, radar: object) -> object:
+        if isinstance(radar, dict):
+            return changed(PRESETS["radarize"], radar)
+        if isinstance(radar, str) and radar not in PRESETS:
+            raise ValueError(f"expected one of the presets {', '.join(PRESETS)}, or fields of a configuration")
+        return PRESETS[radar] if isinstance(radar, str) else radar
+
+    def places(self, times: Float[np.ndarray, "*n"] | float) -> Float[np.ndarray, "*n 3"]:
+        """Where the board is at times, s; m."""
+        return np.asarray(self.position) + np.multiply.outer(times, self.velocity)
+
+    @property
+    def rotation(self) -> Float[np.ndarray, "3 3"]:
+        """Board to world."""
+        return Rotation.from_euler("z", self.yaw, degrees=True).as_matrix()

@@ -1,0 +1,246 @@
+"""What surfaces are made of: permittivity, roughness and backscatter at millimetre waves.
+
+Permittivity follows e^{+jwt}: eps = eps' - j sigma / (w eps0), losses have a negative imaginary part. ITU-R P.2040-4
+gives eps' = a f^b and sigma = c f^d (f in GHz) with bands of validity, read from Sionna RT's own table; where 77 GHz
+lies outside every band (brick, plywood, marble, vinyl, carpet, asphalt, acrylic) see `itu_permittivity`.
+
+Reflection and the diffuse floor share one energy budget. Roughness takes the factor
+rho = exp(-8 (pi sigma_h cos(theta) / lambda)^2) from the coherent amplitude, and what it takes comes back as diffuse
+scattering, sigma0 = 4 (1 - rho^2) |Gamma|^2: the backscatter coefficient at normal incidence were it all Lambertian
+(effective roughness, Degli-Esposti et al., IEEE TAP 55(1), 2007). The table's `sigma0` are these values rounded, and a
+few dB less for coarse or porous surfaces (carpet, fabric, mineral fibre, asphalt), which absorb part of what they take.
+RMS heights are estimates for common finishes; expect sigma0 within some 5 dB of a given real wall.
+
+Lobes share out the same power (`radarsim.propagation.scatteringpattern`). Plain surfaces, whose roughness is gentle,
+scatter about the specular direction; the paper's measured walls ask for such a lobe, of exponent 4. Masonry and
+aggregate have joints and pits that face the source and throw more back; cloth, fibre and foam are volumes and follow
+Lambert. The shares (`_LOBES`) are estimates; against Lambert they raise backscatter by 1.5 dB at normal incidence and
+lower it by as much at grazing.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from radarize.errors import InputError
+from radarize.radar.config import SPEED_OF_LIGHT
+
+EPS0 = 8.8541878128e-12
+
+
+@dataclass(frozen=True)
+class Material:
+    """A homogeneous surface material.
+
+    Attributes:
+        name: as used in scene files.
+        permittivity: relative permittivity: a name in ITU-R P.2040, a function of the frequency in Hz that returns it
+            (e^{+jwt}: negative imaginary part), or None for a perfect conductor.
+        roughness: RMS height sigma_h of the surface, m.
+        sigma0: four times the share of power scattered diffusely, linear m^2/m^2: without lobes the backscatter cross
+            section per area at normal incidence, falling off as cos^2 of the incidence angle (Lambert).
+        thickness: of a thin slab that waves pass (a pane, one board of a drywall), m; None: opaque half space.
+        color: RGB in 0...1 for pictures.
+        source: where the numbers come from.
+        directive, backscatter: shares of the diffuse power in the lobes about the specular direction and back to the
+            source; the rest is Lambertian.
+        lobe_exponent: alpha of both lobes.
+        clear: light passes, too: cameras and lidars see what is behind.
+    """
+
+    name: str
+    permittivity: str | Callable[[float], complex] | None
+    roughness: float
+    sigma0: float
+    thickness: float | None = None
+    color: tuple[float, float, float] = (0.6, 0.6, 0.6)
+    source: str = ""
+    directive: float = 0.0
+    backscatter: float = 0.0
+    lobe_exponent: float = 4.0
+    clear: bool = False
+
+    @property
+    def conductor(self) -> bool:
+        """Whether this is a perfect electric conductor."""
+        return self.permittivity is None
+
+    def permittivity_at(self, frequency: float) -> complex:
+        """Complex relative permittivity at `frequency` (Hz), negative imaginary part; -inf j for a conductor."""
+        if self.permittivity is None:
+            return complex(1.0, -np.inf)
+        if isinstance(self.permittivity, str):
+            return itu_permittivity(self.permittivity, frequency)
+        return complex(self.permittivity(frequency))
+
+    def fresnel(
+        self, cos_theta: Float[np.ndarray, "*n"], frequency: float
+    ) -> tuple[Complex[np.ndarray, "*n"], Complex[np.ndarray, "*n"]]:
+        """Reflection coefficients of the half space for incidence from air (ITU-R P.2040-4, eqs. 31a, 31b).
+
+        Args:
+            cos_theta: cosine of the angle between ray and normal, 0...1.
+            frequency: Hz.
+
+        Returns:
+            (gamma_te, gamma_tm). Electric-field convention: at normal incidence TE = -TM; a conductor has TE = -1,
+            TM = +1.
+        """
+        cos = np.abs(np.asarray(cos_theta, float))
+        if self.conductor:
+            return np.full(cos.shape, -1.0 + 0j), np.full(cos.shape, 1.0 + 0j)
+        eps = self.permittivity_at(frequency)
+        root = np.sqrt(eps - (1.0 - cos**2))  # principal branch: decays into the medium under e^{+jwt}
+        return np.asarray((cos - root) / (cos + root)), np.asarray((eps * cos - root) / (eps * cos + root))
+
+    def slab(
+        self, cos_theta: Float[np.ndarray, "*n"], frequency: float
+    ) -> tuple[Complex[np.ndarray, "2 *n"], Complex[np.ndarray, "2 *n"]]:
+        """Reflection and transmission of a slab of this material's thickness in air (ITU-R P.2040-4, eqs. 42, 43).
+
+        Args:
+            cos_theta: cosine of the angle between ray and normal, 0...1.
+            frequency: Hz.
+
+        Returns:
+            (gamma, tau), each with TE and TM in rows; the phase of tau counts from entry to exit face. For an opaque
+            material gamma is `fresnel` and tau zero.
+        """
+        cos = np.abs(np.asarray(cos_theta, float))
+        gamma = np.stack(self.fresnel(cos, frequency))
+        if self.thickness is None or self.conductor:
+            return gamma, np.zeros_like(gamma)
+        wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT
+        root = np.sqrt(self.permittivity_at(frequency) - (1.0 - cos**2))
+        through = np.exp(-1j * wavenumber * self.thickness * root)
+        loops = 1 - gamma**2 * through**2
+        return gamma * (1 - through**2) / loops, (1 - gamma**2) * through / loops
+
+    def coherent_factor(self, cos_theta: Float[np.ndarray, "*n"], frequency: float) -> Float[np.ndarray, "*n"]:
+        """Amplitude factor exp(-8 (pi sigma_h cos / lambda)^2) that roughness leaves to specular reflection."""
+        wavelength = SPEED_OF_LIGHT / frequency
+        return np.asarray(np.exp(-8 * (np.pi * self.roughness * np.asarray(cos_theta) / wavelength) ** 2))
+
+
+def itu_permittivity(name: str, frequency: float) -> complex:
+    """Relative permittivity of an ITU-R P.2040-4 material, between and beyond its bands too.
+
+    Inside a band: the recommendation. Between two bands: eps' and log(sigma) linear in log(f) between the facing edges.
+    Beyond the last band: the nearest band's power law carried on (eps' is constant in all of these). That is
+    an assumption; it is smooth, and for acrylic it meets the eps' = 2.6 measured at 90 GHz (Lamb 1996).
+
+    Args:
+        name: ITU name, e.g. ``concrete``.
+        frequency: Hz.
+
+    Raises:
+        KeyError: the table has no such material.
+    """
+    ghz = frequency / 1e9
+    bands = _itu_table()[name]
+    law = next((law for (low, high), law in bands.items() if low <= ghz <= high), None)
+    if law is None:
+        below = max((b for b in bands if b[1] < ghz), key=lambda b: b[1], default=None)
+        above = min((b for b in bands if b[0] > ghz), key=lambda b: b[0], default=None)
+        if below and above:
+            (e0, s0), (e1, s1) = _power_law(bands[below], below[1]), _power_law(bands[above], above[0])
+            weight = np.log(ghz / below[1]) / np.log(above[0] / below[1])
+            real, sigma = e0 + weight * (e1 - e0), s0 ** (1 - weight) * s1**weight
+            return complex(real, -sigma / (2 * np.pi * frequency * EPS0))
+        law = bands[below or above]
+    real, sigma = _power_law(law, ghz)
+    return complex(real, -sigma / (2 * np.pi * frequency * EPS0))
+
+
+def _power_law(law: tuple[float, float, float, float], ghz: float) -> tuple[float, float]:
+    a, b, c, d = law
+    return a * ghz**b, c * ghz**d
+
+
+@cache
+def _itu_table() -> dict:
+    from radarsim.machine import llvm
+
+    llvm.require()
+    from sionna.rt.radio_materials.itu import ITU_MATERIALS_PROPERTIES
+
+    return ITU_MATERIALS_PROPERTIES
+
+
+def skin(frequency: float) -> complex:
+    """Dry human skin: four-term Cole-Cole model reduced to its two non-zero terms (Gabriel et al., PMB 41, 1996)."""
+    w = 2 * np.pi * frequency
+    fast = 32.0 / (1 + 1j * w * 7.234e-12)
+    slow = 1100.0 / (1 + (1j * w * 32.481e-9) ** 0.8)
+    return complex(4.0 + fast + slow + 0.0002 / (1j * w * EPS0))
+
+
+def constant(permittivity: float, conductivity: float) -> Callable[[float], complex]:
+    """Permittivity function of a material with constant eps' and conductivity (S/m)."""
+    return partial(_constant, permittivity, conductivity)
+
+
+def _constant(permittivity: float, conductivity: float, frequency: float) -> complex:
+    return complex(permittivity, -conductivity / (2 * np.pi * frequency * EPS0))
+
+
+def decibel(value: float) -> float:
+    """Power ratio of `value` dB."""
+    return 10.0 ** (value / 10.0)
+
+
+_ITU = "ITU-R P.2040-4"
+_ITU_GAP = "ITU-R P.2040-4, interpolated between or carried beyond its bands"
+# name: permittivity, RMS height m, sigma0 dB, thickness m, colour, source
+_TABLE = {
+    "concrete": ("concrete", 0.10e-3, -12, None, (0.62, 0.62, 0.60), _ITU),
+    "brick": ("brick", 0.20e-3, -8, None, (0.64, 0.33, 0.25), _ITU_GAP),
+    "plasterboard": ("plasterboard", 0.05e-3, -22, 12.5e-3, (0.90, 0.89, 0.85), _ITU),
+    "wood": ("wood", 0.05e-3, -24, None, (0.60, 0.42, 0.24), _ITU),
+    "plywood": ("plywood", 0.06e-3, -22, 18e-3, (0.74, 0.58, 0.38), _ITU_GAP),
+    "chipboard": ("chipboard", 0.04e-3, -24, 25e-3, (0.82, 0.72, 0.55), _ITU),
+    "floorboard": ("floorboard", 0.05e-3, -20, None, (0.68, 0.50, 0.30), _ITU),
+    "glass": ("glass", 0.001e-3, -40, 6e-3, (0.55, 0.76, 0.88), _ITU),
+    "ceiling board": ("ceiling_board", 0.40e-3, -17, 15e-3, (0.95, 0.95, 0.93), _ITU + "; porous: volume scattering"),
+    "marble": ("marble", 0.01e-3, -32, None, (0.80, 0.78, 0.74), _ITU_GAP),
+    "vinyl": ("vinyl_tile", 0.03e-3, -25, None, (0.70, 0.72, 0.70), _ITU_GAP),
+    "carpet": ("carpet_tile", 0.80e-3, -14, None, (0.36, 0.42, 0.52), _ITU_GAP + "; fibres: volume scattering"),
+    "asphalt": ("asphalt_concrete", 0.60e-3, -7, None, (0.25, 0.25, 0.25), _ITU_GAP + "; aggregate of several mm"),
+    "acrylic": ("clear_acrylic", 0.005e-3, -38, 3e-3, (0.18, 0.19, 0.21), _ITU_GAP + "; Lamb 1996 at 90 GHz"),
+    # Cotton and foam at 60-100 GHz: eps' 1.3 to 1.7 by packing, loss tangent about 0.03; an estimate.
+    "fabric": (constant(1.5, 0.19), 0.50e-3, -17, None, (0.22, 0.30, 0.45), "estimate for woven cloth on foam"),
+    "skin": (skin, 0.10e-3, -9, None, (0.85, 0.65, 0.55), "Gabriel et al. 1996"),
+    # Painted sheet steel: reflects as a conductor; the diffuse part stands for seams, screws and paint.
+    "metal": (None, 0.02e-3, -22, None, (0.45, 0.48, 0.53), "perfect conductor; roughness of painted sheet"),
+}
+
+#: Directive and backscatter shares of the diffuse power; none: Lambert.
+_LOBES = dict.fromkeys(
+    ["concrete", "plasterboard", "wood", "plywood", "chipboard", "floorboard", "glass", "marble", "vinyl", "acrylic",
+     "metal"], (0.4, 0.1),
+) | dict.fromkeys(["brick", "asphalt"], (0.2, 0.3))  # fmt: skip
+
+#: Acrylic stands for black fronts of screens and machines.
+_CLEAR = {"glass"}
+
+MATERIALS: dict[str, Material] = {
+    name: Material(
+        name, eps, rms, decibel(db), thickness, color, source, *_LOBES.get(name, (0.0, 0.0)), clear=name in _CLEAR
+    )
+    for name, (eps, rms, db, thickness, color, source) in _TABLE.items()
+}
+
+
+def material(name: str) -> Material:
+    """A material of the registry; ``_`` and a leading ``itu`` are accepted (``itu_ceiling_board``).
+
+    Raises:
+        InputError: unknown name, with the known ones.
+    """
+    plain = name.strip().lower().replace("_", " ").replace("-", " ").removeprefix("itu ")
+    if plain not in MATERIALS:
+        raise InputError(f"unknown material {name!r}, expected one of: {', '.join(sorted(MATERIALS))}")
+    return MATERIALS[plain]

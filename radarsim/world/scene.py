@@ -1,0 +1,281 @@
+"""A world of triangles with materials, and the ray tests on it.
+
+Rays run on the Mitsuba geometry of a Sionna RT scene (Embree on a CPU, one shape per object). It computes in float32:
+within a kilometre of the origin, which is checked, positions are good to 0.06 mm, well under the margin of `occluded`.
+"""
+
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import shapely
+import trimesh
+from jaxtyping import Bool, Float, Float32, Int
+from numba import njit
+
+from radarize.errors import InputError
+from radarsim.machine import llvm
+from radarsim.world.description import built, find, read, split_level
+from radarsim.world.life import DRAWN, Life
+from radarsim.world.materials import EPS0, Material
+from radarsim.world.objects import SceneObject
+
+FREQUENCY = 77e9  # at which Sionna RT's own solvers start out
+_REACH = 1000.0
+#: Entries of four bytes that a processor's widest instruction takes at a time.
+_PACKET = 16
+
+
+class Scene:
+    """Objects, their triangles in one list, and ray tests.
+
+    Args:
+        name: for titles and recordings.
+        objects: with unique names.
+        movers: things that move by themselves (`movers`); ray tests know the objects only.
+        life: how lived-in the place is.
+        interferers: other radars that send (`interferers`).
+
+    Attributes:
+        triangles: (T, 3, 3) corners of all triangles, in the order of the objects, m.
+        normals: (T, 3) unit normals.
+        triangle_object: (T,) index into `objects`.
+
+    Raises:
+        InputError: no object, a name twice, a mesh without triangles or too far away.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        objects: list[SceneObject],
+        movers: Sequence = (),
+        life: Life = DRAWN,
+        interferers: Sequence = (),
+    ):
+        self.name, self.objects, self.movers, self.life = name, list(objects), list(movers), life
+        self.interferers = list(interferers)
+        if not self.objects:
+            raise InputError(f"scene {name}: has no objects, expected at least one")
+        seen: set[str] = set()
+        for item in self.objects:
+            if item.name in seen:
+                raise InputError(f"scene {name}: two objects are named {item.name!r}, expected unique names")
+            seen.add(item.name)
+            if not len(item.mesh.faces):
+                raise InputError(f"scene {name}: object {item.name!r} has no triangles")
+            if not np.all(np.abs(item.mesh.vertices) < _REACH):
+                raise InputError(
+                    f"scene {name}: object {item.name!r} reaches {np.abs(item.mesh.vertices).max():g} m from the "
+                    f"origin, expected finite coordinates within {_REACH:g} m"
+                )
+        self.triangles = np.concatenate([np.asarray(o.mesh.vertices)[o.mesh.faces] for o in self.objects])
+        self.triangle_object = np.repeat(np.arange(len(self.objects)), [len(o.mesh.faces) for o in self.objects])
+        cross = np.cross(self.triangles[:, 1] - self.triangles[:, 0], self.triangles[:, 2] - self.triangles[:, 0])
+        self.normals = cross / np.maximum(np.linalg.norm(cross, axis=1, keepdims=True), 1e-300)
+
+    def __reduce__(self):
+        """Pickled without the geometry for ray tests, which every process makes for itself."""
+        return Scene, (self.name, self.objects, self.movers, self.life, self.interferers)
+
+    @classmethod
+    def load(cls, path: str | Path) -> "Scene":
+        """Read a scene file.
+
+        Args:
+            path: a YAML file; a bare name such as ``office`` is looked for as a file here, then in ``scenes/`` here,
+                then among the scenes that come with the project. ``NAME@2`` is level 2 of a scene that has levels.
+
+        Raises:
+            InputError: missing file, malformed YAML, unknown key, material or level, missing mesh; with file and field.
+        """
+        return cls(*read(find(path), split_level(path)[1]))
+
+    @classmethod
+    def of(cls, description: dict, name: str) -> "Scene":
+        """The scene of a description without a file: ``Scene.of({"building": {"kind": "A", "seed": 3}}, "a3")``.
+
+        Args:
+            description: as in a scene file; mesh files are relative to the working directory.
+            name: of the scene.
+
+        Raises:
+            InputError: unknown key, value, material or mesh file; with the field.
+        """
+        _, *parts = built(description, f"scene {name}", Path())
+        return cls(name, *parts)
+
+    @property
+    def bounds(self) -> Float[np.ndarray, "2 3"]:
+        """Lowest and highest corner, m."""
+        corners = self.triangles.reshape(-1, 3)
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    @cached_property
+    def sionna(self):
+        """The same world as a `sionna.rt.Scene` with radio materials; its `mi_scene` answers the ray tests.
+
+        Raises:
+            InputError: no usable LLVM.
+        """
+        return self._geometry[0]
+
+    @cached_property
+    def _geometry(self):
+        """The Sionna scene, and the first triangle of the shape that has each Mitsuba registry number."""
+        llvm.require()
+        import drjit as dr
+        import mitsuba as mi
+        import sionna.rt as rt
+
+        scene = rt.Scene()
+        scene.frequency = FREQUENCY
+        radio = {o.material.name: _radio_material(o.material) for o in self.objects}
+        items = []
+        for number, item in enumerate(self.objects):
+            label = f"{number} {item.name}".replace(".", "_")  # Mitsuba keeps dots for paths
+            shape = mi.Mesh(label, len(item.mesh.vertices), len(item.mesh.faces))
+            data = mi.traverse(shape)
+            data["vertex_positions"] = _lent(np.ravel(item.mesh.vertices), np.float32)
+            data["faces"] = _lent(np.ravel(item.mesh.faces), np.uint32)
+            data.update()
+            items.append(rt.SceneObject(mi_mesh=shape, name=label, radio_material=radio[item.material.name]))
+        scene.edit(add=items)
+        numbers = [dr.reinterpret_array(mi.UInt32, mi.ShapePtr(o.mi_mesh)).numpy()[0] for o in items]
+        counts = [len(o.mesh.faces) for o in self.objects]
+        first = np.zeros(max(numbers) + 1, np.int64)
+        first[numbers] = np.cumsum([0, *counts[:-1]])
+        return scene, first
+
+    def occluded(
+        self, origins: Float[np.ndarray, "*#n 3"], targets: Float[np.ndarray, "*#n 3"], margin: float = 1e-3
+    ) -> Bool[np.ndarray, "*#n"]:
+        """Whether anything lies on the segment from origin to target, both ends shortened by `margin` (m)."""
+        geometry = self.sionna.mi_scene  # before Dr.Jit is loaded: it looks at the machine's LLVM
+        import mitsuba as mi
+
+        origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
+        if not len(origins):
+            return np.zeros(0, bool)
+        rays = _lent_rays(origins, targets - origins, margin)
+        ray = mi.Ray3f(mi.Point3f(rays[:3]), mi.Vector3f(rays[3:6]))
+        ray.maxt = mi.Float(rays[6])
+        return geometry.ray_test(ray).numpy().astype(bool)
+
+    def hit(
+        self, origins: Float[np.ndarray, "*#n 3"], directions: Float[np.ndarray, "*#n 3"], coherent: bool = False
+    ) -> tuple[Float[np.ndarray, "*#n"], Int[np.ndarray, "*#n"]]:
+        """Distance along each ray to the first triangle (inf: none) and that triangle's index (-1: none).
+
+        `coherent` says that neighbours in the list are neighbours in space, as a picture's rays are: twice as fast.
+        """
+        scene, first = self._geometry  # before Dr.Jit is loaded: it looks at the machine's LLVM
+        import drjit as dr
+        import mitsuba as mi
+
+        origins, directions = np.broadcast_arrays(np.asarray(origins, float), np.asarray(directions, float))
+        if not len(origins):
+            return np.zeros(0), np.zeros(0, int)
+        rays = _lent_rays(origins, directions, 0.0)
+        ray = mi.Ray3f(mi.Point3f(rays[:3]), mi.Vector3f(rays[3:6]))
+        found = scene.mi_scene.ray_intersect_preliminary(ray, coherent)
+        shape = dr.reinterpret_array(mi.UInt32, found.shape)
+        dr.eval(found.t, shape, found.prim_index)
+        distance = found.t.numpy().astype(float)
+        number = shape.numpy()
+        missed = (number == 0) | ~np.isfinite(distance)
+        triangle = first[np.where(missed, 0, number)] + found.prim_index.numpy()
+        return np.where(missed, np.inf, distance), np.where(missed, -1, triangle)
+
+    @cached_property
+    def floors_and_ceilings(self) -> Bool[np.ndarray, "triangle"]:
+        """Which of its triangles are floor or ceiling."""
+        edges = np.cumsum([0, *(len(item.mesh.faces) for item in self.objects)])
+        parts = zip(self.objects, edges, edges[1:], strict=False)
+        middle = self.triangles.mean(axis=1)
+        return np.concatenate([o.floors_and_ceilings(middle[a:b], self.normals[a:b]) for o, a, b in parts])
+
+    def cut(self, height: float) -> tuple[Float[np.ndarray, "n 2 2"], Int[np.ndarray, "n"]]:
+        """What the plane z = `height` cuts: ends of segments, m, and the triangle that each is of."""
+        flat = np.arange(3 * len(self.triangles)).reshape(-1, 3)
+        mesh = trimesh.Trimesh(self.triangles.reshape(-1, 3), flat, process=False)
+        # A cut through an edge or a horizontal face is ill defined; a nanometre up it is not.
+        lines, faces = trimesh.intersections.mesh_plane(mesh, [0, 0, 1], [0, 0, height + 1e-9], return_faces=True)
+        lines = np.round(np.asarray(lines, float)[..., :2].reshape(-1, 2, 2), 6)
+        some = np.any(lines[:, 0] != lines[:, 1], axis=1)
+        return lines[some], np.asarray(faces, int)[some]
+
+    def floor_plan(self, height: float) -> Float[np.ndarray, "n 4"]:
+        """Everything cut by the plane z = `height`, as segments x0 y0 x1 y1 in m; collinear pieces are joined."""
+        lines, _ = self.cut(height)
+        if not len(lines):
+            return np.zeros((0, 4))
+        merged = shapely.simplify(shapely.line_merge(shapely.union_all(shapely.linestrings(lines))), 1e-6)
+        pieces = []
+        for line in shapely.get_parts(merged):
+            points = shapely.get_coordinates(line)
+            pieces.append(np.hstack([points[:-1], points[1:]]))
+        return np.concatenate(pieces)
+
+
+def _lent_rays(
+    origins: Float[np.ndarray, "n 3"], ways: Float[np.ndarray, "n 3"], margin: float
+) -> Float32[np.ndarray, "7 n"]:
+    """Origins, unit directions and lengths of rays along ways, both ends shortened by `margin`, m; see `_room`."""
+    rays = _room((7, len(ways)), np.float32)
+    _aim(np.ascontiguousarray(origins), np.ascontiguousarray(ways), margin, rays)
+    return rays
+
+
+@njit(cache=True)
+def _aim(origins, ways, margin, rays):
+    for i in range(len(ways)):
+        x, y, z = ways[i]
+        length = np.sqrt(x * x + y * y + z * z)
+        some = max(length, 1e-12)
+        for d in range(3):
+            rays[3 + d, i] = ways[i, d] / some
+            rays[d, i] = origins[i, d] + margin * (ways[i, d] / some)
+        rays[6, i] = max(length - 2 * margin, 0.0)
+
+
+def _lent(values: np.ndarray, dtype: type) -> np.ndarray:
+    """An array as Dr.Jit may have it, see `_room`."""
+    found = _room(values.shape, dtype)
+    found[...] = values
+    return found
+
+
+def _room(shape: tuple[int, ...], dtype: type) -> np.ndarray:
+    """An array with room after its end: Dr.Jit reads NumPy's memory where it lies, in whole packets, and where the end
+    of an array is the end of what the process may read, that would be its end, too."""
+    size = int(np.prod(shape))
+    room = np.empty(size + _PACKET, dtype)
+    room[size:] = 0
+    return room[:size].reshape(shape)
+
+
+def _radio_material(material: Material):
+    """Sionna's counterpart: permittivity as here, roughness as a Lambertian share of the reflected amplitude."""
+    import drjit as dr
+    import mitsuba as mi
+    import sionna.rt as rt
+
+    def law(frequency) -> tuple:
+        hertz = float(np.ravel(np.array(frequency))[0])
+        if material.conductor:
+            return mi.Float(1.0), mi.Float(1e7)
+        eps = material.permittivity_at(hertz)
+        return mi.Float(eps.real), mi.Float(-eps.imag * 2 * dr.pi * hertz * EPS0)
+
+    gamma = abs(complex(material.fresnel(np.array(1.0), FREQUENCY)[0]))
+    return rt.RadioMaterial(
+        name=material.name.replace(".", "_"),
+        thickness=material.thickness or 0.5,
+        # sigma0 = 4 S^2 |Gamma|^2 at normal incidence for Sionna's Lambertian pattern
+        scattering_coefficient=float(np.clip(np.sqrt(material.sigma0) / (2 * gamma), 0.0, 1.0)),
+        scattering_pattern="lambertian",
+        frequency_update_callback=law,
+        color=material.color,
+    )

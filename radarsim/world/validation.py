@@ -1,0 +1,34 @@
+"""What pydantic finds wrong with something that a user wrote, as one sentence."""
+
+from pydantic import ValidationError
+
+
+def format_validation_error(error: ValidationError, data: object) -> str:
+    """The first thing that is wrong, with its place in `data`, the value found there and what was expected."""
+    problem = error.errors()[0]
+    kind, loc = problem["type"], problem["loc"]
+    field, owner, here = "", "", data
+    for part in loc:
+        # Parts that are not there tell which branch of a union was tried, unless it is they that miss or that are odd.
+        missing = isinstance(here, dict) and kind == "missing" and part == loc[-1]
+        within = isinstance(here, list | tuple) and isinstance(part, int) and part < len(here)
+        there = part in here if isinstance(here, dict) else within
+        if there or missing:
+            field += f"[{part}]" if isinstance(part, int) else f".{part}"
+            here = here[part] if there else None
+            if isinstance(part, int) and isinstance(here, dict) and "name" in here:
+                owner = f" (object {here['name']!r})"
+    field = field.lstrip(".")
+    if kind == "extra_forbidden":
+        return f"{field}{owner}: unknown key"
+    if kind == "missing":
+        return f"has no {field}{owner}"
+    if kind == "union_tag_invalid":
+        context = problem["ctx"]
+        which, expected = context["discriminator"].strip("'"), context["expected_tags"].replace("'", "")
+        return f"{field}.{which}{owner} is {context['tag']!r}, expected one of: {expected}".lstrip(".")
+    message = problem["msg"].removeprefix("Value error, ")
+    if not field:
+        return message
+    value = "" if isinstance(problem["input"], dict) else f" is {problem['input']!r}"
+    return f"{field}{owner}{value}: {message[0].lower()}{message[1:]}"

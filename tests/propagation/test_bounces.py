@@ -1,0 +1,86 @@
+"""Echoes by mirrors alone, against rays shot into the office: which corners are there, and how strong."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from radarize.radar.presets import PRESETS
+from radarsim.propagation import visible_mirrors
+from radarsim.propagation.mechanisms import images
+from radarsim.propagation.movingplates import MovingPlates
+from radarsim.propagation.movingtargets import MovingTargets
+from radarsim.propagation.obstacles import CLEARANCE, Obstacles
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.transmission import Transmission
+from radarsim.world.materials import MATERIALS
+from radarsim.world.scene import Scene
+from tests.propagation.brute_force import bounced, fan
+from tests.propagation.corners import looking
+from tests.propagation.rigs import isotropic
+
+CONFIG = PRESETS["radarize"]
+LAMBDA = CONFIG.wavelength
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.fixture(scope="module")
+def office():
+    """The office, all of metal, and what reflects in it."""
+    scene = Scene.load("office")
+    scene = Scene("metal", [replace(item, material=MATERIALS["metal"]) for item in scene.objects])
+    return scene, Reflectors.of(scene, CONFIG)
+
+
+def by_chains(office, position, axis, spread, bounces):
+    """Amplitude of all chains of so many mirrors that leave within a fan, weighted as its rays are."""
+    scene, reflectors = office
+    level = axis * [1, 1, 0] / np.hypot(axis[0], axis[1])
+    observation = isotropic(position, LAMBDA, looking(level), 7.0)
+    flat = reflectors.near(observation.position, observation.range)
+    nobody = MovingTargets([], np.random.default_rng(0))
+    plates = MovingPlates(nobody, CONFIG, CLEARANCE)
+    obstacles = Obstacles(scene, Transmission(scene, CONFIG, CLEARANCE), nobody, plates)
+    found = images.by_chains(observation, flat, visible_mirrors.find(observation, flat, scene), obstacles)
+    away = np.einsum("pij,j->pi", found.isometry[:, :, :3], position) + found.isometry[:, :, 3] - position
+    path, ahead = np.linalg.norm(away, axis=1), away @ axis
+    off = np.linalg.norm(np.cross(away, axis), axis=1) / np.where(ahead > 0, ahead, 1e-9)
+    order = np.where(np.linalg.det(found.isometry[:, :, :3]) > 0, 2, 3)
+    return np.sum((found.amplitude * np.exp(2j * np.pi * path / LAMBDA) * fan(off, spread))[order == bounces])
+
+
+HERE, THERE = np.array([8.3705, 5.6786, 1.1985]), np.array([5.4405, 6.1516, 1.1822])
+
+
+@pytest.mark.parametrize(
+    ("position", "target", "bounces"),
+    [
+        (HERE, (8.712, 7.0, 1.1985), 2),  # a cabinet's side and the wall
+        (HERE, (8.3705, 7.0, 0.0), 2),  # wall and floor
+        (THERE, (5.4405, 5.0, 2.7), 2),  # wall and ceiling
+        (THERE, (5.4405, 5.0, -1.52), 3),  # floor, wall and ceiling
+    ],
+)
+def test_corners_that_there_are(office, position, target, bounces):
+    """Within 1.5 dB of physical optics on the last surface that rays meet."""
+    axis = (np.array(target) - position) / np.linalg.norm(np.array(target) - position)
+    truth = bounced(office[0], position, UP, axis, 0.2, bounces, LAMBDA)
+    found = by_chains(office, position, axis, 0.2, bounces)
+    assert 20 * np.log10(abs(found / truth)) == pytest.approx(0, abs=1.5)
+
+
+@pytest.mark.parametrize(
+    ("position", "edge", "spread"),
+    [
+        (HERE, (8.712, 6.48, 1.1985), 0.1),  # of the cabinet
+        (HERE, (11.14, 7.0, 1.1985), 0.1),  # of doorways
+        (THERE, (4.21, 7.0, 1.1822), 0.1),
+        (THERE, (1.72, 7.0, 1.1822), 0.05),
+    ],
+)
+def test_outer_edges_are_no_corners(office, position, edge, spread):
+    """No ray comes back over both faces of an outer edge: 20 dB and more below what a corner there would return."""
+    distance = np.linalg.norm(edge - position)
+    axis, corner = (edge - position) / distance, LAMBDA / (8 * np.pi * distance)
+    assert abs(bounced(office[0], position, UP, axis, spread, 2, LAMBDA)) < 0.1 * corner
+    assert abs(by_chains(office, position, axis, spread, 2)) < 0.1 * corner

@@ -1,0 +1,152 @@
+"""Small things as points: how many, how strong, and that they are of the world."""
+
+import numpy as np
+import pytest
+from scipy import stats
+from scipy.special import gamma
+
+from radarize.errors import InputError
+from radarize.radar.presets import PRESETS
+from radarsim.propagation.antenna import ISOTROPIC
+from radarsim.propagation.clutter import (
+    CROSS_SECTION,
+    EXPONENT,
+    NEAREST,
+    ON_FLOORS,
+    ON_TOPS,
+    ON_WALLS,
+    STANDOFF,
+    UNDER_CEILINGS,
+    Clutter,
+    Cluttered,
+)
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.propagation.surface import Surface
+from radarsim.world import shapes
+from radarsim.world.life import Life
+from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
+
+CONFIG = PRESETS["radarize"]
+K = 2 * np.pi / CONFIG.wavelength
+
+
+def room(clutter=1.0, **parts):
+    """A hall of 12 x 10 x 3 m with a desk, seen from inside."""
+    parts = parts or {
+        "floor": shapes.rectangle((6, 0, 0), (12, 10), (0, 0, 1)),
+        "ceiling": shapes.rectangle((6, 0, 3), (12, 10), (0, 0, -1)),
+        "wall": shapes.rectangle((12, 0, 1.5), (10, 3), (-1, 0, 0)),
+        "desk": shapes.rectangle((6, 0, 0.75), (4, 4), (0, 0, 1)),
+    }
+    objects = [SceneObject(name, mesh, MATERIALS["wood"]) for name, mesh in parts.items()]
+    return Scene("room", objects, life=Life(clutter=clutter))
+
+
+def clutter(scene, seed=0):
+    return Clutter(scene, np.random.default_rng(seed))
+
+
+def everything(found):
+    return found.near(np.zeros((1, 3)), 100.0)
+
+
+def test_densities_by_what_things_are_on():
+    """Counts are Poisson's about density times area, with the level; each near its surface, on its outside."""
+    z = np.concatenate([everything(clutter(room(2.0), seed)).position for seed in range(40)])
+    ranges = {
+        "floor": ((z[:, 2] < 0.4) & (z[:, 0] < 11.6), ON_FLOORS * 116),
+        "ceiling": ((z[:, 2] > 2.6) & (z[:, 0] < 11.6), UNDER_CEILINGS * 116),
+        "desk": ((z[:, 2] > 0.75) & (z[:, 2] < 1.2) & (z[:, 0] < 9), ON_TOPS * 16),
+        "wall": ((z[:, 0] > 11.6) & (z[:, 2] > 0.4) & (z[:, 2] < 2.6), ON_WALLS * 10 * 2.2),
+    }  # fmt: skip
+    for inside, expected in ranges.values():
+        expected *= 2 * 40
+        assert abs(inside.sum() - expected) < 4 * np.sqrt(expected) + 0.02 * expected
+    off = 12 - z[ranges["wall"][0], 0]
+    assert off.min() >= NEAREST
+    assert abs(off.mean() - NEAREST - STANDOFF) < 0.003
+
+
+def test_cross_sections_are_weibulls():
+    """Their law, and so the power a square metre of wall sends back: density times mean."""
+    sigma = np.concatenate([everything(clutter(room(5.0), seed)).sigma for seed in range(10)])
+    scale = CROSS_SECTION / gamma(1 + 1 / EXPONENT)
+    assert stats.kstest(sigma, stats.weibull_min(EXPONENT, scale=scale).cdf).pvalue > 0.01
+    assert abs(sigma.mean() / CROSS_SECTION - 1) < 0.05
+
+
+def test_those_seen_over_mirrors_have_the_power_of_all():
+    place = room(80.0)
+    found = Scatterers.joined([everything(clutter(place, seed)) for seed in range(20)])
+    for weights in (found.bounces, found.bounces_twice):
+        assert abs(np.sum(weights * found.sigma) / np.sum(found.sigma) - 1) < 0.03
+        assert np.mean(weights > 0) < 0.3
+
+
+def test_same_things_from_everywhere():
+    """They belong to the world and its seed, not to who looks."""
+    one = clutter(room())
+    here, there = (one.near(np.array([[x, 0.0, 1.0]]), 4.0) for x in (5.0, 6.0))
+    rows = [set(map(tuple, np.column_stack([s.position, s.sigma, s.phase]))) for s in (here, there)]
+    both = {row for row in rows[0] if np.linalg.norm(np.subtract(row[:3], (6.0, 0.0, 1.0))) < 4.0}
+    assert len(both) > 100
+    assert both <= rows[1]
+    assert np.array_equal(everything(one).position, everything(clutter(room())).position)
+    assert len(everything(clutter(room(), 1))) != 0
+    assert not np.array_equal(everything(one).sigma[:10], everything(clutter(room(), 1)).sigma[:10])
+
+
+def test_coherent_under_motion():
+    """An echo's phase moves by 2k times the way gone towards its thing, whatever the direction; nothing is redrawn."""
+    found = EchoFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
+    step = np.array([0.004, -0.003, 0.002])
+    start = np.array([3.0, 0.5, 1.0])
+    fields, places = [], []
+    for position in (start, start + step):
+        echoes = found(position, np.eye(3))
+        ahead = echoes.points[:, 0, 0] > start[0] + 1
+        places.append(echoes.points[ahead, 0])
+        way = np.linalg.norm(places[-1] - position, axis=1)
+        fields.append(echoes.amplitude[ahead] * np.exp(2j * K * way))
+    assert np.array_equal(*places)
+    assert len(places[0]) > 100
+    away = places[0] - start
+    towards = away @ step / np.linalg.norm(away, axis=1)
+    # to the first order in the step over the distance, 1 m or more
+    error = np.angle(fields[1] * fields[0].conj() * np.exp(2j * K * towards))
+    assert np.abs(error).max() < K * step @ step / 1.0
+
+
+def test_hidden_things_are_not_seen():
+    parts = {
+        "wall": shapes.rectangle((4, 0, 1.5), (2, 1), (-1, 0, 0)),
+        "screen": shapes.rectangle((2, 0, 1.5), (3, 3), (-1, 0, 0)),
+    }
+    scene = room(10.0, **parts)
+    things = clutter(scene)
+    found = EchoFinder(scene, things, None, CONFIG, antenna=ISOTROPIC)
+    seen = found(np.array([0.0, 0.0, 1.5]), np.eye(3)).points[:, 0]
+    assert len(seen) > 50
+    assert seen[:, 0].max() < 2
+    assert everything(things).position[:, 0].max() > 3.5
+
+
+def test_none_at_level_nought():
+    """A scene of level 0 has the scatterers of its surfaces, drawn as without clutter."""
+    scene = room(0.0)
+    rng = np.random.default_rng(0)
+    both = Cluttered(Surface(scene, rng), Clutter(scene, rng))
+    alone = Surface(scene, np.random.default_rng(0))
+    place = np.array([[3.0, 0.0, 1.0]])
+    assert np.array_equal(both.near(place, 5.0).position, alone.near(place, 5.0).position)
+    assert len(both) == len(alone)
+
+
+def test_more_than_memory_holds():
+    wall = SceneObject("wall", shapes.rectangle((0, 0, 0), (1900, 1900), (1, 0, 0)), MATERIALS["wood"])
+    place = Scene("plain", [wall], life=Life(clutter=10))
+    with pytest.raises(InputError, match="clutter is 10, which makes 1.3e.08 points"):
+        clutter(place)

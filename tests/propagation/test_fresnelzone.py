@@ -1,0 +1,92 @@
+"""What stands in the first Fresnel zones of a flash or a chain: Kirchhoff's integral, and no steps."""
+
+import numpy as np
+import pytest
+
+from radarize.radar.presets import PRESETS
+from radarsim.propagation.antenna import ISOTROPIC
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.world import shapes
+from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
+from tests.propagation.brute_force import past_pole
+
+CONFIG = PRESETS["radarize"]
+LAMBDA = CONFIG.wavelength
+WALL = SceneObject("wall", shapes.rectangle((2, 0, 0), (6, 6), (-1, 0, 0)), MATERIALS["metal"])
+#: Two sides of a wedge of 60 deg about (3, -0.5), and a way into it: over the first one square onto the second.
+SLOPE, RISE = np.cos(np.pi / 6), np.sin(np.pi / 6)
+WEDGE = [
+    SceneObject(
+        f"side {side}",
+        shapes.rectangle((3 - 1.6 * SLOPE, -0.5 + side * 1.6 * RISE, 0), (3, 6), (-RISE, -side * SLOPE, 0)),
+        MATERIALS["metal"],
+    )
+    for side in (1, -1)
+]
+
+
+def left(walls, things, path):
+    """What things that stand in the way, and do not echo, leave of the images at a path length, dB."""
+    reflectors = Reflectors.of(Scene("walls", walls), CONFIG)
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    fields = []
+    for objects in ([*walls, *things], walls):
+        finder = EchoFinder(Scene("all", objects), nothing, reflectors, CONFIG, antenna=ISOTROPIC)
+        found = finder(np.zeros(3), np.eye(3))
+        fields.append(found.amplitude[np.abs(np.linalg.norm(found.images[:, :, 3], axis=1) - path) < 1e-3].sum())
+    return 20 * np.log10(abs(fields[0]) / abs(fields[1]) + 1e-9)
+
+
+def pole(x, y, radius=0.005, tilt=0.0):
+    """A thin pole that leans in the plane across the way."""
+    upright = shapes.cylinder((0, 0, 0), radius, 3.0, 24)
+    return SceneObject("pole", shapes.placed(upright, (x, y, 0.0), (tilt, 0.0, 0.0)), MATERIALS["metal"])
+
+
+#: Of the pole's offsets, m: steps of 6 mm through the first zones.
+OFFSETS = np.arange(-7, 8) * 0.006
+
+
+def wall_past_pole(offsets=OFFSETS, distance=1.0):
+    """Kirchhoff's and the simulated level of a wall's flash, 2 m away, past a pole of 1 cm at a distance, dB."""
+    truth = [20 * np.log10(abs(past_pole(y, 0.01, (distance, 4 - distance), 4.0, LAMBDA))) for y in offsets]
+    return np.array(truth), np.array([left([WALL], [pole(distance, y)], 4.0) for y in offsets])
+
+
+def test_a_pole_before_a_wall():
+    """In steps of 6 mm over its zones, where one ray went from 0 to -106 dB."""
+    truth, found = wall_past_pole()
+    middle = np.abs(OFFSETS) < 0.032
+    assert truth[middle].max() < -2 and truth.min() > -4
+    assert np.abs(found - truth)[middle].max() < 2 and np.sqrt(np.mean((found - truth) ** 2)) < 1.2
+    assert np.abs(np.diff(found)).max() < 3.0
+
+
+@pytest.mark.parametrize("tilt", [30.0, 90.0])
+def test_a_pole_however_it_leans(tilt):
+    truth = 20 * np.log10(abs(past_pole(0.0, 0.01, (1.0, 3.0), 4.0, LAMBDA)))
+    assert left([WALL], [pole(1.0, 0.0, tilt=np.deg2rad(tilt))], 4.0) == pytest.approx(truth, abs=1.5)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.012, 0.024])
+def test_a_pole_within_a_chain(offset):
+    """Between the sides of a wedge, where the way is 2.5 m long if it is unfolded."""
+    foot, normal = np.array([3.0, -0.5]), np.array([-RISE, -SLOPE])
+    place = np.array([2.5, offset])
+    x, y = place - 2 * np.dot(place - foot, normal) * normal
+    truth = 20 * np.log10(abs(past_pole(offset, 0.01, (2.5, 3.5), 6.0, LAMBDA)))
+    assert left(WEDGE, [pole(x, y)], 6.0) == pytest.approx(truth, abs=1.5)
+
+
+def test_an_edge_that_covers_the_flash_bit_by_bit():
+    """Half a plane: half the field, -6 dB either way, where its edge meets the way, and no step on either side."""
+    steps = np.arange(-10, 11) * 0.005
+    board = [shapes.rectangle((1.0, y - 0.5, 0), (1.0, 3.0), (-1, 0, 0)) for y in steps]
+    found = np.array([left([WALL], [SceneObject("board", mesh, MATERIALS["metal"])], 4.0) for mesh in board])
+    assert np.interp(0.0, steps, found) == pytest.approx(-12, abs=1.5)
+    assert abs(found[0]) < 1 and found[-1] < -25
+    assert np.abs(np.diff(10 ** (found / 20))).max() < 0.25

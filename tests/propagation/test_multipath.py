@@ -1,0 +1,298 @@
+"""Legs over mirrors and through slabs: phantoms where the image method puts them, transmission, reciprocity."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from radarize.heatmaps import Heatmaps
+from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.radar.presets import PRESETS
+from radarsim.propagation.antenna import ISOTROPIC as ISOTROPIC_ANTENNA
+from radarsim.propagation.antenna import Antenna, amplitude_gain, gain_pattern
+from radarsim.propagation.coefficients import TABLE, reflection, transmission
+from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.propagation.surface import Surface
+from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
+from radarsim.world.shapes import box, rectangle
+from tests.propagation.brute_force import kirchhoff_mirror, transfer_matrix
+from tests.propagation.rigs import Rig, burst
+
+CONFIG = PRESETS["radarize"]
+LAMBDA = CONFIG.wavelength
+HERE, AHEAD = np.zeros(3), np.eye(3)
+NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+
+
+def sheet(name, material, position, size, facing):
+    return SceneObject(name, rectangle(position, size, facing), MATERIALS[material])
+
+
+def finder(objects, place, **options):
+    scene = Scene("test", objects)
+    return EchoFinder(scene, Scatterers.points(place, np.ones(1)), Reflectors.of(scene, CONFIG), CONFIG, **options)
+
+
+def points_of(echoes, provenance):
+    """Point echoes of one cause, and their amplitudes."""
+    some = echoes.of(provenance)
+    return some.points, some.amplitude[: len(some.points)]
+
+
+DOOR = sheet("door", "metal", (2.0, 0, 0), (3.0, 2.4), (-1, 0, 0))
+GLASS = sheet("glass", "glass", (1.5, 1.0, 0), (5.0, 2.4), (0, -1, 0))
+LEFT = sheet("left", "metal", (1.5, 1.2, 0), (5.0, 2.4), (0, -1, 0))
+AT_END = sheet("end", "metal", (3.0, 0, 0), (2.4, 2.4), (-1, 0, 0))
+
+
+@pytest.mark.parametrize(
+    ("objects", "place", "phantom"),
+    [
+        pytest.param([DOOR], (0.6, 0.55, 0.0), (3.4, 0.55, 0.0), id="cul-de-sac behind a metal door"),
+        pytest.param([GLASS], (2.6, 0.3, 0.1), (2.6, 1.7, 0.1), id="corridor with glass"),
+        pytest.param([LEFT, AT_END], (2.4, 0.5, 0.0), (2.4, 1.9, 0.0), id="two-wall corner, side wall"),
+        pytest.param([LEFT, AT_END], (2.4, 0.5, 0.0), (3.6, 0.5, 0.0), id="two-wall corner, end wall"),
+    ],
+)
+def test_phantom_in_the_heat_map(objects, place, phantom):
+    """Out and back over the same mirror: a phantom at the image, within one range bin and one degree."""
+    echoes = finder(objects, place)(HERE, AHEAD).of(Provenance.GHOST_2)
+    seen = [k for k, p in enumerate(echoes.points) if np.allclose(p, phantom)]
+    assert len(seen) == 1
+    echoes = type(echoes)(echoes.points[seen], echoes.images[:0], echoes.amplitude[seen], echoes.provenance[seen])
+    signal = burst(CONFIG, echoes, Rig())
+    signal = signal / np.abs(signal).max() * 3000
+    maps = Heatmaps(CONFIG)
+    adc = np.rint(np.stack([signal.real, signal.imag], axis=-1)).astype(np.int16)
+    power = maps.range_azimuth(adc[None])[0].numpy()
+    r, a = np.unravel_index(np.argmax(power), power.shape)
+    assert abs(maps.ranges[r] - np.linalg.norm(phantom)) < CONFIG.range_resolution
+    assert abs(np.rad2deg(maps.azimuths[a] - np.arctan2(phantom[1], phantom[0]))) <= 1.0
+
+
+def test_all_phantoms_of_a_corner():
+    """Two walls at right angles: three images of a target, and every way to go out by one and back by another."""
+    place = np.array([2.4, 0.5, 0.0])
+    left, end = place * [1, -1, 1] + [0, 2.4, 0], place * [-1, 1, 1] + [6.0, 0, 0]
+    both = np.array([end[0], left[1], 0.0])
+    echoes = finder([LEFT, AT_END], place, range=8.0)(HERE, AHEAD)
+    first, _ = points_of(echoes, Provenance.GHOST_1)
+    expected = [(place, left), (left, place), (place, end), (end, place)]
+    assert np.sort(first.reshape(4, 6), axis=0) == pytest.approx(np.sort(np.reshape(expected, (4, 6)), axis=0))
+    second, amplitude = points_of(echoes, Provenance.GHOST_2)
+    expected = [(left, left), (end, end), (left, end), (end, left), (place, both), (both, place)]
+    known = np.array([np.ravel(e) for e in expected])
+    places = second.reshape(-1, 6)
+    for e in known:
+        here = np.linalg.norm(places - e, axis=1) < 1e-6
+        assert here.any()
+        # radar equation over both legs; conductors reflect all, so only antenna and distance count
+        gain = [amplitude_gain(*q, gain_pattern()) / np.linalg.norm(q) for q in (e[:3], e[3:])]
+        truth = LAMBDA / (4 * np.pi) ** 1.5 * gain[0] * gain[1]
+        assert 20 * np.log10(abs(amplitude[here].sum()) / truth) == pytest.approx(0, abs=0.2)
+    assert all(np.linalg.norm(known - e, axis=1).min() < 1e-6 for e in places)
+
+
+def test_the_hidden_are_seen_over_mirrors():
+    """A target behind a metal board gives no direct echo, but one out and back over the wall."""
+    board = SceneObject("board", box((1.2, 0, 0), (0.05, 0.6, 2.0)), MATERIALS["metal"])
+    place = np.array([2.4, 0.0, 0.0])
+    echoes = finder([LEFT, board], place)(HERE, AHEAD)
+    assert not len(points_of(echoes, Provenance.DIRECT)[0]) and not len(points_of(echoes, Provenance.GHOST_1)[0])
+    points, _ = points_of(echoes, Provenance.GHOST_2)
+    assert points == pytest.approx(np.array([[[2.4, 2.4, 0], [2.4, 2.4, 0]]]))
+
+
+@pytest.mark.parametrize("angle", [0.0, 30.0, 55.0])
+@pytest.mark.parametrize("tm", [False, True])
+@pytest.mark.parametrize("material", ["glass", "plasterboard"])
+def test_pane_in_front_of_a_target(material, tm, angle):
+    """Loss and phase of a pane, passed twice, against the transfer matrix; turned upright it is TE, tipped over TM."""
+    place, tilt = np.array([3.0, 0, 0]), np.deg2rad(angle)
+    facing = (-np.cos(tilt), 0, np.sin(tilt)) if tm else (-np.cos(tilt), np.sin(tilt), 0)
+    pane = sheet("pane", material, (1.5, 0, 0), (2.0, 2.0), facing)
+    echoes = EchoFinder(Scene("pane", [pane]), Scatterers.points(place, np.ones(1)), None, CONFIG)(HERE, AHEAD)
+    assert list(echoes.provenance) == [Provenance.THROUGH_SLAB]
+    free = EchoFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)(HERE, AHEAD)
+    path = 2 * np.linalg.norm(echoes.points[0, 0])
+    found = echoes.amplitude[0] * np.exp(2j * np.pi * (path - 6.0) / LAMBDA) / free.amplitude[0]
+    m, f = MATERIALS[material], CONFIG.center_frequency
+
+    def truth(frequency):
+        """tau relative to the air that the pane takes the place of, twice; conjugated as in the beat signal."""
+        layer = [(m.permittivity_at(frequency), m.thickness)]
+        tau, _ = transfer_matrix(layer, np.cos(tilt), frequency, tm)
+        air = np.exp(2j * np.pi * frequency / SPEED_OF_LIGHT * m.thickness * np.cos(tilt))
+        return np.conj(tau * air) ** 2
+
+    assert 20 * np.log10(abs(found / truth(f))) == pytest.approx(0, abs=0.1)
+    assert np.rad2deg(np.angle(found / truth(f))) == pytest.approx(0, abs=2.0)
+    assert 0 < path - 6.0 < 0.06  # two passages of a slab slow the wave down by millimetres each
+
+
+@pytest.mark.parametrize("tm", [False, True])
+@pytest.mark.parametrize("material", [name for name, m in MATERIALS.items() if m.thickness])
+def test_slabs_reflect_as_they_transmit(material, tm):
+    """Mirrors and ways through have the coefficients of one slab: the transfer matrix, and no energy is made."""
+    m, f = MATERIALS[material], CONFIG.center_frequency
+    cosine = np.linspace(0, 1, TABLE)[8:]
+    smooth = replace(m, roughness=0.0)
+    back, (through, _) = (reflection(smooth, CONFIG)[int(tm), 8:], transmission(smooth, CONFIG))
+    through = through[int(tm), 8:]
+    truth = [transfer_matrix([(m.permittivity_at(f), m.thickness)], c, f, tm) for c in cosine]
+    sign = -1 if tm else 1  # P.2040 counts TM by the magnetic field
+    assert np.abs(through) == pytest.approx(np.abs([t for t, _ in truth]), abs=1e-6)
+    assert back == pytest.approx(sign * np.conj([r for _, r in truth]), abs=1e-6)
+    assert np.max(np.abs(back) ** 2 + np.abs(through) ** 2) <= 1 + 1e-9
+
+
+@pytest.mark.parametrize("closed", [False, True], ids=["sheet", "closed body"])
+def test_a_pane_flashes_once(closed):
+    """Face on, a pane echoes lambda |r| / (8 pi R) with r of the slab, be it a sheet or a body with two faces."""
+    pane = sheet("pane", "glass", (1.5, 0, 0), (4.0, 4.0), (-1, 0, 0))
+    if closed:
+        pane = SceneObject("pane", box((1.503, 0, 0), (0.006, 4.0, 4.0)), MATERIALS["glass"])
+    scene = Scene("pane", [pane])
+    echoes = EchoFinder(scene, NOTHING, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC_ANTENNA)(HERE, AHEAD)
+    m, f = MATERIALS["glass"], CONFIG.center_frequency
+    _, r = transfer_matrix([(m.permittivity_at(f), m.thickness)], 1.0, f, False)
+    apparent = np.linalg.norm(echoes.images[:, :, 3], axis=1)
+    near = np.abs(apparent / 2 - 1.5) < 0.02
+    assert 20 * np.log10(np.abs(echoes.amplitude[near]) / (LAMBDA * abs(r) / (12 * np.pi))) == pytest.approx(
+        [0], abs=0.05
+    )
+
+
+def test_delay_of_a_slab():
+    """A low-loss slab that hardly reflects makes the target look (sqrt(eps - sin^2) - cos) d further away."""
+    place, board = np.array([3.0, 0, 0]), MATERIALS["plasterboard"]
+    pane = sheet("pane", "plasterboard", (1.5, 0, 0), (2.0, 2.0), (-1, 0, 0))
+    echoes = EchoFinder(Scene("pane", [pane]), Scatterers.points(place, np.ones(1)), None, CONFIG)(HERE, AHEAD)
+    index = np.sqrt(board.permittivity_at(CONFIG.center_frequency)).real
+    further = np.linalg.norm(echoes.points[0, 0]) - 3.0
+    assert further == pytest.approx((index - 1) * board.thickness, abs=1e-3)
+
+
+def test_walls_and_doors():
+    """A stud wall is two boards, a door leaf one slab of its own thickness; concrete lets nothing through."""
+    place = np.array([3.0, 0, 0])
+    f = CONFIG.center_frequency
+
+    def level(*objects):
+        echoes = EchoFinder(Scene("x", list(objects)), Scatterers.points(place, np.ones(1)), None, CONFIG)(HERE, AHEAD)
+        return abs(echoes.amplitude).sum()
+
+    free = EchoFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)(HERE, AHEAD).amplitude[0].real
+    boards = [sheet(f"board {x}", "plasterboard", (x, 0, 0), (2.0, 2.0), (-1, 0, 0)) for x in (1.5, 1.6, 1.7)]
+    board = MATERIALS["plasterboard"]
+    one = abs(transfer_matrix([(board.permittivity_at(f), board.thickness)], 1.0, f, False)[0])
+    assert level(*boards[:2]) / free == pytest.approx(one**4, rel=0.01)
+    assert level(*boards) == 0  # given up: three boards
+    door = SceneObject("door", box((1.5, 0, 0), (0.04, 2.0, 2.0)), MATERIALS["chipboard"])
+    leaf = abs(transfer_matrix([(MATERIALS["chipboard"].permittivity_at(f), 0.04)], 1.0, f, False)[0])
+    assert level(door) / free == pytest.approx(leaf**2, rel=0.01)
+    assert level(SceneObject("wall", box((1.5, 0, 0), (0.2, 2.0, 2.0)), MATERIALS["concrete"])) == 0
+
+
+@pytest.fixture(scope="module")
+def office():
+    scene = Scene.load("office")
+    surface = Surface(scene, np.random.default_rng(0), 60.0)
+    return EchoFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 7.5e-9)
+
+
+def there_and_back(echoes, place):
+    """Field of each echo from one antenna beside a place to another, and with TX and RX swapped."""
+
+    def field(tx, rx):
+        points = np.linalg.norm(tx - echoes.points[:, 0], axis=1) + np.linalg.norm(echoes.points[:, 1] - rx, axis=1)
+        images = np.linalg.norm(tx - echoes.images[:, :, :3] @ rx - echoes.images[:, :, 3], axis=1)
+        return echoes.amplitude * np.exp(2j * np.pi * np.concatenate([points, images]) / LAMBDA)
+
+    one, other = place + [0.0, 0.010, 0.002], place - [0.0, 0.012, 0.003]
+    return field(one, other), field(other, one)
+
+
+@pytest.mark.parametrize(("place", "yaw"), [((6.0, 6.0, 1.2), 0.1), ((3.0, 3.0, 1.3), 2.0), ((13.0, 9.0, 1.1), -1.0)])
+def test_reciprocity_of_an_office(office, place, yaw):
+    """With the places of TX and RX swapped the field is the same to -60 dB, whatever the cause of the echoes."""
+    place = np.array(place)
+    echoes = office(place, Rotation.from_euler("z", yaw).as_matrix())
+    assert len(echoes.of(Provenance.GHOST_1)) and len(echoes.of(Provenance.GHOST_2))
+    there, back = there_and_back(echoes, place)
+    for cause in (None, *Provenance):
+        some = slice(None) if cause is None else echoes.provenance == cause
+        difference = abs(there[some].sum() - back[some].sum())
+        assert difference <= 1e-3 * np.sqrt(np.sum(np.abs(there[some]) ** 2))
+
+
+def test_thinning_keeps_the_power_of_ghosts():
+    """Of a sampled surface few scatterers are seen over mirrors, with the power of all: within 0.5 dB over 12 draws."""
+    wall = sheet("wall", "brick", (3.0, 0, 0), (1.6, 1.6), (-1, 0, 0))
+    scene = Scene("room", [LEFT, wall])
+    facets = Reflectors.of(scene, CONFIG)
+    power = {"thinned": np.zeros(2), "whole": np.zeros(2)}
+    for seed in range(12):
+        scatterers = Surface(scene, np.random.default_rng(seed), 800.0).all()
+        ones = np.ones(len(scatterers))
+        whole = replace(scatterers, bounces=ones, bounces_twice=ones)
+        for name, some in (("thinned", scatterers), ("whole", whole)):
+            echoes = EchoFinder(scene, some, facets, CONFIG)(HERE, AHEAD)
+            for k, cause in enumerate((Provenance.GHOST_1, Provenance.GHOST_2)):
+                power[name][k] += np.sum(np.abs(points_of(echoes, cause)[1]) ** 2)
+    assert 10 * np.log10(power["thinned"] / power["whole"]) == pytest.approx(0, abs=0.5)
+
+
+@pytest.mark.parametrize("half", [(0.02, 0.02), (0.05, 0.03), (0.1, 0.1), (0.245, 0.25), (0.255, 0.25), (0.6, 0.5)])
+@pytest.mark.parametrize("off", [0.0, 0.03])
+def test_a_mirror_of_any_size(half, off):
+    """A ghost is as strong as what the aperture passes of its Fresnel zones: Kirchhoff's integral.
+
+    Within 1.1 dB: edges farther off than 2 Fresnel units fade from the sum.
+    """
+    place = np.array([3.0 + 2 * off, 0.0, 0.0])
+    board = SceneObject("board", rectangle((1.5, 1.0, 0), (2 * half[0], 2 * half[1]), (0, -1, 0)), MATERIALS["metal"])
+    echoes = finder([board], place, antenna=ISOTROPIC_ANTENNA)(HERE, AHEAD).of(Provenance.GHOST_1)
+    assert len(echoes.points) == 2
+    other = LAMBDA / (4 * np.pi) ** 1.5 / np.linalg.norm(place)
+    truth = abs(kirchhoff_mirror(half, place, LAMBDA)) * other
+    assert 20 * np.log10(abs(echoes.amplitude[0]) / truth) == pytest.approx(0, abs=1.1)
+
+
+def test_an_antenna_of_high_gain_has_its_ghosts():
+    """The search knows the antenna's peak: what 30 dBi lift above the threshold is found."""
+    place, lift = np.array([2.6, 0.3, 0.1]), 19.5
+    weak = finder([GLASS], place)(HERE, AHEAD)
+    ghosts = weak.of(Provenance.GHOST_2).amplitude
+    antenna = Antenna(peak_dbi=10.5 + lift)
+    strong = finder([GLASS], place, antenna=antenna, threshold=abs(ghosts).max() * 10)(HERE, AHEAD)
+    found = strong.of(Provenance.GHOST_2).amplitude
+    assert 20 * np.log10(abs(found).max() / abs(ghosts).max()) == pytest.approx(2 * lift, abs=0.01)
+
+
+def test_a_corner_behind_a_pane():
+    """A metal corner seen through 6 mm of glass: the pane's transmission twice over."""
+    plates = [
+        sheet("left", "metal", (3.0, 0.1, 0), (0.2, 0.2), (0, -1, 0)),
+        sheet("end", "metal", (3.1, 0, 0), (0.2, 0.2), (-1, 0, 0)),
+    ]
+    pane = sheet("pane", "glass", (1.5, 0, 0), (2.0, 2.0), (-1, 0, 0))
+
+    def level(objects):
+        scene = Scene("corner", objects)
+        echoes = EchoFinder(scene, NOTHING, Reflectors.of(scene, CONFIG), CONFIG)(HERE, AHEAD)
+        turns = np.abs(np.trace(echoes.images[:, :, :3], axis1=1, axis2=2) + 1) < 1e-9
+        near = turns & (np.abs(echoes.images[:, 0, 3] - 6.2) < 0.05)
+        return echoes.amplitude[near]
+
+    m, f = MATERIALS["glass"], CONFIG.center_frequency
+    tau, _ = transfer_matrix([(m.permittivity_at(f), m.thickness)], 1.0, f, False)
+    clear, behind = level(plates), level([*plates, pane])
+    assert len(clear) and len(behind)
+    assert 20 * np.log10(abs(behind).max() / abs(clear).max() / abs(tau) ** 2) == pytest.approx(0, abs=0.1)

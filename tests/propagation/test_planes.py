@@ -1,0 +1,113 @@
+"""Flat regions of scanned meshes echo as planes; polygons are covered by rectangles."""
+
+import numpy as np
+import pytest
+import shapely
+import trimesh
+
+from radarize.radar.presets import PRESETS
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.world import planes, shapes
+from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
+from tests.propagation.rigs import field
+
+CONFIG = PRESETS["radarize"]
+
+
+def scanned_wall(seed, noise, step=0.05, size=2.0):
+    """A wall at x = 2 m, facing -x, as a scanner gives it: triangles of `step`, corners off by `noise` RMS."""
+    n = round(size / step) + 1
+    y, z = np.meshgrid(np.linspace(-size / 2, size / 2, n), np.linspace(-size / 2, size / 2, n), indexing="ij")
+    vertices = np.stack([np.full(y.size, 2.0), y.ravel(), z.ravel()], axis=1)
+    vertices += np.random.default_rng(seed).normal(0, noise, vertices.shape)
+    i = np.arange(n * n).reshape(n, n)
+    a, b, c, d = i[:-1, :-1].ravel(), i[1:, :-1].ravel(), i[1:, 1:].ravel(), i[:-1, 1:].ravel()
+    return trimesh.Trimesh(vertices, np.concatenate([np.stack([a, c, b], 1), np.stack([a, d, c], 1)]), process=False)
+
+
+def coherent_field(mesh, position):
+    """Sum of all flashes, edges and corners that can be seen."""
+    scene = Scene("scan", [SceneObject("wall", mesh, MATERIALS["concrete"])])
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    echoes = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(position, np.eye(3))
+    return field(echoes, position, CONFIG.wavelength)
+
+
+@pytest.mark.parametrize("position", [(0, 0, 0), (0.3, 0.4, -0.2), (0, 0.97, 0.3)])
+def test_a_scanned_wall_does_not_sparkle(position):
+    """A 2 m wall of 5 cm triangles with 0.5 mm noise returns within 1 dB of the flat one, whatever the seed."""
+    position = np.array(position, float)
+    flat = abs(coherent_field(scanned_wall(0, 0.0), position))
+    for seed in range(8):
+        assert 20 * np.log10(abs(coherent_field(scanned_wall(seed, 5e-4), position)) / flat) == pytest.approx(0, abs=1)
+
+
+def test_a_scanned_corner_is_two_planes():
+    """Two noisy walls that share an edge stay apart."""
+    wall = scanned_wall(3, 5e-4, size=1.0)
+    other = wall.copy()
+    other.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 0, 1], [2, 0.5, 0]))
+    corner = trimesh.util.concatenate([wall, other])
+    corner.merge_vertices(digits_vertex=2)
+    areas = sorted(corner.area_faces[r].sum() for r in planes.regions(corner))[-2:]
+    assert areas == pytest.approx([1, 1], abs=0.15)
+
+
+def test_curved_surfaces_are_no_planes():
+    """A finely tessellated pipe and ball bend too much: none of their facets grows beyond itself."""
+    for mesh, side in ((shapes.cylinder((0, 0, 0), 0.05, 1, 60), 2), (shapes.sphere((0, 0, 0), 0.1), 1)):
+        on_side = [r for r in planes.regions(mesh) if abs(mesh.face_normals[r[0]] @ [0, 0, 1]) < 0.999]
+        assert max(len(r) for r in on_side) <= side
+
+
+def tiled(quads, region):
+    """Quadrilaterals that do not overlap and together are a region."""
+    shapes_ = [shapely.Polygon(q) for q in quads]
+    assert sum(s.area for s in shapes_) == pytest.approx(region.area)
+    assert shapely.union_all(shapes_).symmetric_difference(region).area < 1e-5
+
+
+def test_right_angles_are_covered_exactly():
+    """An L of two rectangles, a wall with a window of four, a wall with a doorway of three."""
+    window = shapely.box(0, 0, 5, 3) - shapely.box(1, 1, 2, 2)
+    doorway = shapely.box(0, 0, 5, 3) - shapely.box(1, 0, 2, 2)
+    ell = shapely.Polygon([(0, 0), (4, 0), (4, 1), (1, 1), (1, 3), (0, 3)])
+    for region, count in ((ell, 2), (window, 4), (doorway, 3)):
+        quads = planes.trapezoids(region)
+        assert len(quads) == count
+        tiled(quads, region)
+
+
+@pytest.mark.parametrize(
+    ("region", "count"),
+    [
+        (shapely.Polygon([(0, 0), (1, 0), (0.7, 0.6), (0.2, 0.6)]), 1),
+        (shapely.Polygon([(0, 0), (1, 0), (0, 0.8)]), 1),
+        (shapely.Polygon([(0, 0), (1, 0.2), (0.3, 0.8)]), 2),
+        (shapely.Point(0, 0).buffer(0.5, quad_segs=3), 6),
+        (shapely.Point(0, 0).buffer(0.5, quad_segs=3) - shapely.box(0, -0.1, 1, 0.1), 8),
+    ],
+    ids=["trapezoid", "right triangle", "triangle", "disc", "notched disc"],
+)
+def test_slanted_edges_are_covered_exactly(region, count):
+    quads = planes.trapezoids(region)
+    assert len(quads) <= count
+    tiled(quads, region)
+    for quad in quads:
+        inner = shapely.box(*planes.inner_rectangle(quad))
+        assert inner.difference(shapely.Polygon(quad)).area < 1e-9
+        assert inner.area > 0.3 * shapely.Polygon(quad).area
+
+
+def test_an_ell_shaped_wall_flashes_where_it_is():
+    """The coherent echo of an L-shaped mesh is that of a large wall in front of it and none in front of the notch."""
+    ell = shapely.Polygon([(-1, -1), (1, -1), (1, 0), (0, 0), (0, 1), (-1, 1)])
+    mesh = shapes.polygon(ell, (2, 0, 0), (0, -1, 0), (0, 0, 1))
+    wall = abs(coherent_field(scanned_wall(0, 0.0), np.zeros(3)))
+    beside, notch = (abs(coherent_field(mesh, np.array(p))) for p in ([0.0, 0.5, 0.5], [0.0, -0.5, 0.5]))
+    assert 20 * np.log10(beside / wall) == pytest.approx(0, abs=2)
+    assert notch < 0.2 * wall

@@ -1,0 +1,91 @@
+"""Round bodies seen over mirrors, against the physical-optics integral between two images of the radar."""
+
+import numpy as np
+import pytest
+
+from radarize.radar.presets import PRESETS
+from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.mechanisms import curved_ghosts
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.world import shapes
+from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
+from tests.propagation.rigs import isotropic
+
+CONFIG = PRESETS["radarize"]
+LAMBDA = CONFIG.wavelength
+WALL = SceneObject("wall", shapes.rectangle((1.5, 1.0, 0), (4.0, 3.0), (0, -1, 0)), MATERIALS["metal"])
+
+
+def ghosts(body, wall=WALL):
+    """Ghosts of a metal body as seen from the origin."""
+    found = Reflectors.of(Scene("ghosts", [wall, SceneObject("body", body, MATERIALS["metal"])]), CONFIG)
+    facing = np.flatnonzero(np.abs(found.flat.normal[:, 1]) > 0.99)[:1]
+    return curved_ghosts.find(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found)
+
+
+def summed(points, normals, areas, one, two, image):
+    """(1 / (j lambda)) int cos exp(jk (r1 + r2)) / (r1 r2) dA over what both places light, relative to a path."""
+    a, b = points - one, points - two
+    r1, r2 = np.linalg.norm(a, axis=1), np.linalg.norm(b, axis=1)
+    cos1, cos2 = -np.sum(a * normals, axis=1) / r1, -np.sum(b * normals, axis=1) / r2
+    # shadows are drawn softly: a sharp rim would echo
+    lit = np.clip(np.minimum(cos1, cos2) / 0.3, 0, 1)
+    lit = lit * lit * (3 - 2 * lit)
+    field = lit * (cos1 + cos2) / 2 * np.exp(2j * np.pi * (r1 + r2 - image) / LAMBDA) / (r1 * r2)
+    return np.sum(field * areas) / (1j * LAMBDA) * LAMBDA / (4 * np.pi)
+
+
+def sphere(center, radius, around=1600, across=800):
+    theta = (np.arange(across) + 0.5) / across * np.pi
+    phi = np.arange(around) / around * 2 * np.pi
+    theta, phi = (x.ravel() for x in np.meshgrid(theta, phi, indexing="ij"))
+    normal = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=1)
+    return center + radius * normal, normal, radius**2 * np.sin(theta) * np.pi / across * 2 * np.pi / around
+
+
+def pole(center, radius, length, around=400, along=2500):
+    z = ((np.arange(along) + 0.5) / along - 0.5) * length
+    phi = np.arange(around) / around * 2 * np.pi
+    z, phi = (x.ravel() for x in np.meshgrid(z, phi, indexing="ij"))
+    normal = np.stack([np.cos(phi), np.sin(phi), 0 * phi], axis=1)
+    place = center + radius * normal + z[:, None] * [0, 0, 1]
+    return place, normal, np.full(len(z), radius * 2 * np.pi / around * length / along)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "pole"])
+def test_ghosts_of_round_bodies(kind):
+    """A 10 cm sphere and a 3 cm pole beside a metal wall: straight and over the wall, and over it both ways."""
+    center = np.array([2.5, 0.2, 0.1])
+    if kind == "sphere":
+        body, surface = shapes.sphere(center, 0.1, 4), sphere(center, 0.1)
+    else:
+        body, surface = shapes.placed(shapes.cylinder((0, 0, 0), 0.03, 1.2, 24), center), pole(center, 0.03, 1.2)
+    found = ghosts(body)
+    here, image = np.zeros(3), np.array([0.0, 2.0, 0.0])
+    assert sorted(found.bounces) == [1, 1, 2]
+    for ghost in (found[k : k + 1] for k in range(3)):
+        mirrored = np.abs(ghost.points[0, :, 1] - 0.2) > 0.5
+        one, two = (image if m else here for m in mirrored)
+        path = np.linalg.norm(ghost.points[0], axis=1).sum()
+        truth = summed(*surface, one, two, path)
+        assert 20 * np.log10(abs(ghost.amplitude[0]) / abs(truth)) == pytest.approx(0, abs=0.7)
+        # each conductor turns the sign of an upright field; over j from stationary phase, once for every wall
+        turned = ghost.amplitude[0] / truth * (-1) ** (1 + ghost.bounces[0])
+        assert np.rad2deg(np.angle(turned)) == pytest.approx(0, abs=6)
+
+
+def test_a_finder_has_them():
+    """A lamp beside a wall: its ghosts are among the echoes; a board in the way of the wall hides them."""
+    lamp = SceneObject("lamp", shapes.sphere((2.5, 0.2, 0.1), 0.1, 3), MATERIALS["metal"])
+    board = SceneObject("board", shapes.box((1.3, 0.75, 0), (0.8, 0.05, 1.0)), MATERIALS["metal"])
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    found = []
+    for objects in ([WALL, lamp], [WALL, lamp, board]):
+        scene = Scene("lamp", objects)
+        echoes = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(np.zeros(3), np.eye(3))
+        at_image = np.linalg.norm(echoes.points - [2.5, 1.8, 0.1], axis=2) < 0.11
+        found.append(at_image.any(axis=1).sum())
+    assert found == [3, 0]

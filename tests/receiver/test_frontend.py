@@ -1,0 +1,303 @@
+"""Each effect of the front end against its closed form, and against the ideal where it is switched off."""
+
+import numpy as np
+import pytest
+
+from radarize.errors import InputError
+from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.radar.presets import PRESETS
+from radarsim.propagation.antenna import ISOTROPIC, Antenna, amplitude_gain, gain_pattern
+from radarsim.receiver.frontend import FrontEnd
+from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, PhaseNoise
+
+CONFIG = PRESETS["radarize"]
+SHAPE = CONFIG.frame_shape[:-1]
+N = CONFIG.samples
+OFF = FrontEndConfig.ideal()
+
+
+def db(power):
+    return 10 * np.log10(power)
+
+
+def rng():
+    return np.random.default_rng(1)
+
+
+def tone(beat_bins, level_db, config=CONFIG):
+    """An echo of `level_db` (received over transmitted power) that fills a bin."""
+    n = np.arange(config.samples)
+    line = 10 ** (level_db / 20) * np.exp(2j * np.pi * beat_bins * n / config.samples)
+    return np.broadcast_to(line.astype(np.complex64), config.frame_shape[:-1])
+
+
+def power_by_bin(counts):
+    """Mean power per bin over all traces, counts^2."""
+    return np.mean(np.abs(np.fft.fft(counts, axis=-1) / counts.shape[-1]) ** 2, axis=(0, 1, 2))
+
+
+# --- thermal noise ---------------------------------------------------------------------------------------------------
+def noise_factor(gain):
+    """15.6 dB at 30 dB of receive gain, 15 dB at 48 dB, and Friis's line between."""
+    later = (10**1.56 - 10**1.5) / (10**-3.0 - 10**-4.8)  # noise factor of all that follows the gain
+    return 10**1.5 + later * (10 ** (-gain / 10) - 10**-4.8)
+
+
+@pytest.mark.parametrize("gain", [24.0, 30.0, 38.0, 48.0])
+def test_noise_by_receive_gain(gain):
+    """k T B F G with the noise figure of the gain."""
+    config = CONFIG.model_copy(update={"rx_gain_db": gain})
+    counts = FrontEnd(config, FrontEndConfig.ideal(noise=True)).receive(np.zeros(SHAPE, np.complex64), rng())
+    watts = 1.380649e-23 * 290 * CONFIG.sample_rate * noise_factor(gain) * 10 ** (gain / 10)
+    expected = watts / (1e-3 * 10**0.5) * 32767**2
+    assert db(np.mean(np.abs(counts) ** 2) / expected) == pytest.approx(0, abs=0.05)
+
+
+def test_noise_figure_of_one_measurement_holds_for_every_gain():
+    settings = FrontEndConfig(noise_figure_db={30: 13.0})
+    assert db(settings.noise_factor(24)) == db(settings.noise_factor(48)) == pytest.approx(13.0)
+
+
+# --- converter -------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("bits", [8, 10, 12])
+def test_quantisation_noise(bits):
+    """A full-scale sine over the noise of b bits: 6.02 b + 1.76 dB."""
+    front = FrontEnd(CONFIG, FrontEndConfig.ideal(adc_bits=bits))
+    phase = 2 * np.pi * rng().random((64, *SHAPE[1:]))
+    counts = (32767 * np.exp(1j * phase)).astype(np.complex64)
+    error = front.convert(counts)[..., 0] - counts.real
+    within = np.abs(counts.real) < 32767 - 2 ** (16 - bits)
+    ratio = np.mean(counts.real**2) / np.mean(error[within] ** 2)
+    assert db(ratio) == pytest.approx(6.02 * bits + 1.76, abs=0.1)
+    assert not np.any(front.convert(counts) % 2 ** (16 - bits))
+
+
+def test_full_scale_is_a_power():
+    """A tone of full-scale power at the converter reads 32767 counts."""
+    front = FrontEnd(CONFIG, OFF)
+    level = OFF.full_scale_dbm - CONFIG.rx_gain_db - OFF.tx_power_dbm
+    assert np.abs(front.receive(tone(20, level), rng())).max() == pytest.approx(32767, rel=1e-5)
+
+
+# --- leakage ---------------------------------------------------------------------------------------------------------
+def test_leakage_level_and_place():
+    """A static tone at slope x delay, at its level behind the high-pass filter, a phase of its own per channel."""
+    delay, level = 8e-9, -50.0
+    settings = FrontEndConfig.ideal(leakage=Leakage(level_db=level, delay=delay), high_pass=True)
+    counts = FrontEnd(CONFIG, settings, rng()).receive(np.zeros(SHAPE, np.complex64), rng())
+    assert np.allclose(counts, counts[:1])
+    spectrum = np.abs(np.fft.fft(counts[0], 64 * N, axis=-1)) / N
+    assert spectrum.argmax(axis=-1) / 64 * CONFIG.range_resolution == pytest.approx(
+        np.full((3, 4), SPEED_OF_LIGHT * delay / 2), abs=CONFIG.range_resolution / 64
+    )
+    beat = CONFIG.slope * delay
+    filtered = beat**4 / (beat**2 + 175e3**2) / (beat**2 + 350e3**2)
+    dbm = level + 12 + db(filtered)
+    expected = 20 * np.log10(32767) + dbm + CONFIG.rx_gain_db - settings.full_scale_dbm
+    assert 20 * np.log10(spectrum.max(axis=-1)) == pytest.approx(np.full((3, 4), expected), abs=0.01)
+    assert len(np.unique(np.angle(counts[0, :, :, 0]).round(3))) == 12
+
+
+def test_measured_leakage_is_taken_as_it_is():
+    channels = tuple(Channel(gain_db=-40 - k, phase_deg=10 * k) for k in range(12))
+    config = CONFIG.model_copy(update={"tx_order": (2, 0), "rx": (1, 3)})
+    front = FrontEnd(config, FrontEndConfig.ideal(leakage=Leakage(channels=channels)))
+    assert 20 * np.log10(np.abs(front.leakage)) == pytest.approx(np.array([[-41, -43], [-49, -51]]))
+    assert np.rad2deg(np.angle(front.leakage)) == pytest.approx(np.array([[10, 30], [90, 110]]))
+
+
+# --- phase noise -----------------------------------------------------------------------------------------------------
+def skirt(cell, level_db=-40.0, settings=None, config=CONFIG):
+    """Power by bin around an echo in a cell, over the echo's power."""
+    settings = settings or FrontEndConfig.ideal(phase_noise=PhaseNoise())
+    counts = FrontEnd(config, settings).receive(tone(cell, level_db, config), rng())
+    power = power_by_bin(counts)
+    return power / power[cell]
+
+
+def law(cell, offset_bins, mask_db=lambda f: np.where(f < 316e3, -83, -93 - 20 * np.log10(f / 1e6)), config=CONFIG):
+    """4 L(f) sin^2(pi f tau) over the width of a bin."""
+    step = config.sample_rate / config.samples
+    f, tau = np.abs(offset_bins) * step, cell / config.bandwidth
+    return 10 ** (mask_db(f) / 10) * 4 * np.sin(np.pi * f * tau) ** 2 * step
+
+
+@pytest.mark.parametrize("cell", [20, 45, 90])
+def test_phase_noise_skirt(cell):
+    found = skirt(cell)
+    bins = np.arange(N)
+    for low, high in ((5, 12), (13, 30), (31, 60)):
+        ring = (np.abs(bins - cell) >= low) & (np.abs(bins - cell) < high)
+        expected = law(cell, bins[ring] - cell).mean()
+        assert db(found[ring].mean() / expected) == pytest.approx(0, abs=0.4)
+
+
+def test_phase_noise_at_one_megahertz():
+    """The data sheet's point itself: -93 dBc/Hz less the range correlation of 4.3 m, and 2 dB less in 76-77 GHz."""
+    cell, off = 90, 42  # 42 bins are 1.0 MHz
+    assert off * CONFIG.sample_rate / N == pytest.approx(1e6, rel=2e-3)
+    expected = -93 + db(4 * np.sin(np.pi * 1e6 * cell / CONFIG.bandwidth) ** 2) + db(CONFIG.sample_rate / N)
+    assert db(skirt(cell)[cell - off - 1 : cell - off + 2].mean()) == pytest.approx(expected, abs=0.6)
+    low = CONFIG.model_copy(update={"start_frequency": 76e9, "slope": 20e12})
+    low_law = law(cell, np.arange(40, 45), config=low).mean()
+    assert db(skirt(cell, config=low)[cell - 44 : cell - 39].mean() / low_law) == pytest.approx(-2.0, abs=0.6)
+
+
+def test_near_echoes_have_no_skirt():
+    """Range correlation: 6 dB less for half the delay; the leakage's skirt is that of its own delay, tiny."""
+    far, near = skirt(80)[20:40].mean(), skirt(10)[70:90].mean()
+    offset = db(law(80, np.arange(20, 40) - 80).mean() / law(10, np.arange(70, 90) - 10).mean())
+    assert offset > 15
+    assert db(far / near) == pytest.approx(offset, abs=0.5)
+    leak = FrontEndConfig.ideal(leakage=Leakage(level_db=-20, delay=0.5e-9), phase_noise=PhaseNoise())
+    counts = FrontEnd(CONFIG, leak).receive(np.zeros(SHAPE, np.complex64), rng())
+    power = power_by_bin(counts - counts.mean(axis=0))[10:80]
+    f = np.arange(10, 80) * CONFIG.sample_rate / N
+    density = np.where(f < 316e3, -83, -93 - 20 * np.log10(f / 1e6))
+    carrier = (FrontEnd(CONFIG, leak).scale * 0.1) ** 2
+    expected = carrier * np.mean(10 ** (density / 10) * 4 * np.sin(np.pi * f * 0.5e-9) ** 2) * CONFIG.sample_rate / N
+    assert db(power.mean() / expected) == pytest.approx(0, abs=0.4)
+
+
+def test_phase_noise_is_common_to_the_receivers_of_a_chirp():
+    counts = FrontEnd(CONFIG, FrontEndConfig.ideal(phase_noise=PhaseNoise())).receive(tone(60, -40), rng())
+    rest = counts - counts.mean(axis=(0, 1), keepdims=True)
+    within = np.abs(np.vdot(rest[:, :, 0], rest[:, :, 3])) / np.linalg.norm(rest[:, :, 0]) ** 2
+    between = np.abs(np.vdot(rest[1:], rest[:-1])) / np.linalg.norm(rest) ** 2
+    assert within > 0.999 and between < 0.2
+
+
+def test_skirts_below_the_noise_may_be_left_out():
+    """The speed-up for weak echoes takes away less than 1 % of the noise in any bin."""
+    settings = FrontEndConfig.ideal(noise=True, phase_noise=PhaseNoise())
+    weak, plain = (FrontEnd(CONFIG, s).receive(tone(60, -75), rng()) for s in (settings, OFF))
+    noise = power_by_bin(weak - plain)
+    assert db(noise / FrontEnd(CONFIG, settings)._bin_noise) == pytest.approx(np.zeros(N), abs=1.2)
+
+
+# --- image -----------------------------------------------------------------------------------------------------------
+@pytest.mark.parametrize("cell", [3, 30, 44])
+def test_image_rejection(cell):
+    """30 dB below the echo at the opposite beat frequency, where nothing filters it."""
+    counts = FrontEnd(CONFIG, FrontEndConfig.ideal(image_rejection_db=30.0)).receive(tone(cell, -60), rng())
+    power = power_by_bin(counts)
+    assert db(power[N - cell] / power[cell]) == pytest.approx(-30, abs=0.01)
+    others = np.delete(power, [cell, N - cell])
+    assert db(others.max() / power[cell]) < -80
+
+
+def test_complex_sampling_filters_images_away():
+    """As in real captures: images of near echoes only, by the decimation filter's response at -f."""
+    settings = FrontEndConfig.ideal(image_rejection_db=30.0, band=Band(low=-0.06))
+    near = power_by_bin(FrontEnd(CONFIG, settings).receive(tone(2, -60), rng()))
+    assert db(near[N - 2] / near[2]) == pytest.approx(-30 + 20 * np.log10(1 - 2 / N / 0.06), abs=0.01)
+    far = power_by_bin(FrontEnd(CONFIG, settings).receive(tone(20, -60), rng()))
+    assert db(far[N - 20] / far[20]) < -80
+
+
+# --- channels --------------------------------------------------------------------------------------------------------
+def test_mismatch_statistics():
+    """Within +-0.5 dB and +-3 deg, spread over most of it, a product of TX and RX errors, by the board's seed."""
+    boards = np.stack([FrontEnd(CONFIG, rng=np.random.default_rng(k)).channel for k in range(400)])
+    gain, phase = 20 * np.log10(np.abs(boards)), np.rad2deg(np.angle(boards))
+    assert 0.4 < np.abs(gain).max() <= 0.5 and 2.4 < np.abs(phase).max() <= 3.0
+    # the sum of two uniform errors of half the bound has a variance of bound^2 / 6
+    assert gain.std() == pytest.approx(0.5 / np.sqrt(6), rel=0.1) and abs(gain.mean()) < 0.02
+    assert phase.std() == pytest.approx(3 / np.sqrt(6), rel=0.1) and abs(phase.mean()) < 0.15
+    ratio = boards[:, :, 1:] / boards[:, :, :1]
+    assert np.allclose(ratio, ratio[:, :1])
+    assert np.array_equal(boards[5], FrontEnd(CONFIG, rng=np.random.default_rng(5)).channel)
+
+
+def test_mismatch_acts_on_every_echo():
+    front = FrontEnd(CONFIG, FrontEndConfig.ideal(mismatch=Mismatch(gain_db=2, phase_deg=40)), rng())
+    counts, plain = front.receive(tone(30, -60), rng()), FrontEnd(CONFIG, OFF).receive(tone(30, -60), rng())
+    assert np.allclose(counts / plain, front.channel[:, :, None], rtol=1e-4)
+
+
+# --- antenna ---------------------------------------------------------------------------------------------------------
+def test_antenna_pattern():
+    """10.5 dBi; 3 dB down at 28 deg azimuth and 14 deg elevation, 6 dB at 50 and 20."""
+    tables = gain_pattern()
+    for azimuth, elevation, expected in ((0, 0, 10.5), (28, 0, 7.5), (-50, 0, 4.5), (0, 14, 7.5), (0, -20, 4.5)):
+        a, e = np.deg2rad([azimuth, elevation])
+        gain = amplitude_gain(np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e), tables)
+        assert 20 * np.log10(gain) == pytest.approx(expected, abs=0.01)
+    assert amplitude_gain(-1.0, 0.1, 0.0, tables) == 0
+    assert amplitude_gain(1.0, 2.0, -1.0, gain_pattern(ISOTROPIC)) == 1
+
+
+# --- switches and files ----------------------------------------------------------------------------------------------
+def test_everything_off_is_the_ideal():
+    """Only a scale is left: counts are the signal times the full-scale factor, to float32."""
+    signal = (rng().normal(size=(*SHAPE, 2)) * 1e-4).astype(np.float32).view(np.complex64)[..., 0]
+    front = FrontEnd(CONFIG, OFF)
+    scale = 32767 * 10 ** ((CONFIG.rx_gain_db - 5 + 12 - CONFIG.tx_backoff_db) / 20)
+    assert np.allclose(front.receive(signal, rng()), signal * scale, rtol=1e-5)
+    assert np.array_equal(front.if_response(np.array([0.01, 3.0, 100.0])), np.ones(3))
+
+
+@pytest.mark.parametrize(
+    "switch",
+    [
+        {"noise": False},
+        {"leakage": None},
+        {"mismatch": None},
+        {"phase_noise": None},
+        {"high_pass": False},
+        {"band": None},
+        {"image_rejection_db": None},
+        {"antenna": None},
+    ],
+    ids=lambda s: next(iter(s)),
+)
+def test_each_switch_does_something_alone(switch):
+    """With everything on but one, the samples differ from those with everything on."""
+    name = next(iter(switch))
+    on, off = FrontEnd(CONFIG, FrontEndConfig(), rng()), FrontEnd(CONFIG, FrontEndConfig(**switch), rng())
+    if name == "antenna":
+        assert off.settings.pattern == ISOTROPIC and on.settings.pattern == Antenna()
+    elif name == "high_pass":
+        assert abs(off.if_response(np.array(0.5))) == 1 > abs(on.if_response(np.array(0.5)))
+    else:
+        a, b = (f.receive(tone(3, -40), rng()) for f in (on, off))
+        assert not np.allclose(a, b)
+
+
+def test_parts_by_cause_add_up():
+    """With noise off, what each signal makes and the leakage are together what the front end makes of their sum."""
+    front = FrontEnd(CONFIG, FrontEndConfig(noise=False, phase_noise=None), rng())
+    signals = [tone(3, -60), tone(30.3, -70), tone(70.9, -80)]
+    parts, whole = front.by_cause(signals), front.receive(np.sum(signals, axis=0), rng())
+    assert len(parts) == 4
+    assert np.abs(np.sum(parts, axis=0) - whole).max() < 1e-5 * np.abs(whole).max()
+
+
+def test_files_round_trip(tmp_path):
+    settings = FrontEndConfig(noise_figure_db={30: 14.0}, leakage=None, mismatch=Mismatch(gain_db=1), adc_bits=12)
+    settings.save(tmp_path / "board.yaml", ["measured on a Sunday"])
+    assert FrontEndConfig.load(tmp_path / "board.yaml") == settings
+    assert (tmp_path / "board.yaml").read_text().startswith("# measured on a Sunday")
+    (tmp_path / "part.yaml").write_text("tx_power_dbm: 10\n")
+    assert FrontEndConfig.load(tmp_path / "part.yaml") == FrontEndConfig(tx_power_dbm=10)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("tx_powr: 3", "tx_powr: unknown key"),
+        ("adc_bits: 24", "adc_bits is 24"),
+        ("leakage: {level_db: 10}", "leakage.level_db is 10"),
+        ("mismatch: {channels: [{gain_db: 0, phase_deg: 0}]}", "channels has 1 entries, expected 12"),
+        ("antenna: {azimuth: {degrees: [0, 50], loss_db: [0, 3]}}", "expected ascending from 0 to 90"),
+        ("phase_noise: {offset_hz: [1e6, 1e5], dbc_hz: [-90, -100]}", "ascending"),
+        ("[1, 2]", "holds list"),
+        ("a: [", "malformed YAML"),
+    ],
+)
+def test_bad_files_are_refused_in_a_sentence(tmp_path, text, words):
+    path = tmp_path / "bad.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        FrontEndConfig.load(path)
+    assert words in str(caught.value) and "bad.yaml" in str(caught.value) and "\n" not in str(caught.value)

@@ -1,0 +1,90 @@
+"""Materials against Fresnel's formulas in closed form and the ITU's numbers."""
+
+import numpy as np
+import pytest
+
+from radarize.errors import InputError
+from radarsim.world.materials import MATERIALS, Material, constant, itu_permittivity, material, skin
+
+FREQUENCY = 77e9
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("concrete", 0.39),
+        ("glass", 0.43),
+        ("floorboard", 0.32),
+        ("plasterboard", 0.25),
+        ("chipboard", 0.23),
+        ("wood", 0.17),
+        ("ceiling board", 0.10),
+        ("metal", 1.0),
+    ],
+)
+def test_reflection_at_normal_incidence(name, expected):
+    te, tm = MATERIALS[name].fresnel(np.array([1.0]), FREQUENCY)
+    assert abs(te[0]) == pytest.approx(expected, abs=0.006)
+    assert te[0] == pytest.approx(-tm[0])
+
+
+def test_permittivity_follows_the_recommendation():
+    # P.2040: concrete 5.24, sigma = 0.0462 f^0.7822 S/m; e^{+jwt} puts losses below the real axis.
+    eps = material("concrete").permittivity_at(FREQUENCY)
+    assert eps.real == pytest.approx(5.24)
+    assert eps.imag == pytest.approx(-0.0462 * 77**0.7822 / (2 * np.pi * FREQUENCY * 8.8541878e-12), rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "edges"), [("brick", (40, 110)), ("plywood", (40, 100)), ("marble", (60, 100))])
+def test_gap_between_bands_is_bridged_without_a_step(name, edges):
+    ghz = np.array([edges[0], edges[0] + 1e-6, *np.linspace(*edges, 9)[1:-1], edges[1] - 1e-6, edges[1]])
+    eps = np.array([itu_permittivity(name, f * 1e9) for f in ghz])
+    sigma = -eps.imag * ghz
+    for values in (eps.real, sigma):
+        steps = np.diff(values)
+        assert np.all(steps >= -1e-9) or np.all(steps <= 1e-9)
+        assert abs(steps[0]) < 1e-6 and abs(steps[-1]) < 1e-6
+
+
+def test_every_material_is_lossy_and_reflects_less_than_all():
+    cosines = np.linspace(0.01, 1, 50)
+    for item in MATERIALS.values():
+        if item.conductor:
+            continue
+        assert item.permittivity_at(FREQUENCY).imag < 0
+        for gamma in item.fresnel(cosines, FREQUENCY):
+            assert np.all(np.abs(gamma) < 1)
+
+
+def test_brewster_angle_and_snell():
+    # Lossless eps = 4: TM vanishes at tan(theta) = 2; TE there is (1 - 4) / (1 + 4).
+    item = Material("test", constant(4.0, 0.0), 0.0, 0.0)
+    te, tm = item.fresnel(np.cos([np.arctan(2.0)]), FREQUENCY)
+    assert abs(tm[0]) < 1e-12
+    assert te[0] == pytest.approx(-0.6)
+
+
+def test_conductor():
+    te, tm = MATERIALS["metal"].fresnel(np.linspace(0, 1, 5), FREQUENCY)
+    assert np.all(te == -1) and np.all(tm == 1)
+
+
+def test_slab_conserves_energy_and_resonates():
+    wavelength = 299792458.0 / FREQUENCY
+    half_wave = Material("test", constant(4.0, 0.0), 0.0, 0.0, thickness=wavelength / 4)  # half a wave inside, n = 2
+    gamma, tau = half_wave.slab(np.array([1.0]), FREQUENCY)
+    assert np.all(np.abs(gamma) < 1e-12) and np.abs(tau) == pytest.approx(1.0)
+    other = Material("test", constant(4.0, 0.0), 0.0, 0.0, thickness=1.234e-3)
+    gamma, tau = other.slab(np.linspace(0.1, 1, 20), FREQUENCY)
+    assert np.abs(gamma) ** 2 + np.abs(tau) ** 2 == pytest.approx(1.0)
+
+
+def test_skin_meets_published_values():
+    # Gabriel's dry skin at 60 GHz: 7.98 - 10.9j.
+    assert skin(60e9) == pytest.approx(7.98 - 10.9j, abs=0.05)
+
+
+def test_names():
+    assert material("itu_ceiling_board") is MATERIALS["ceiling board"]
+    with pytest.raises(InputError, match="'unobtainium'.*concrete.*wood"):
+        material("unobtainium")

@@ -1,0 +1,69 @@
+"""The places of the multipath stress test do what they are there for, more at every level."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from radarize.radar.presets import PRESETS
+from radarsim.dataset.specification import Specification
+from radarsim.motion.statistics import crossings
+from radarsim.motion.walk import Walk
+from radarsim.propagation.echoes import Provenance
+from radarsim.scenario import Scenario
+from radarsim.sensors.causes import CAUSES
+from radarsim.sensors.ghosts import NOISE, Ghosts
+from radarsim.sensors.scan import PlanarScan
+from radarsim.world.scene import Scene
+
+CONFIG = PRESETS["radarize"]
+TASKS = Specification.load("stress").tasks
+GHOSTS = (Provenance.GHOST_1, Provenance.GHOST_2, Provenance.GHOST_3)
+
+
+def caused_by(*causes: Provenance) -> Callable[[np.ndarray, np.ndarray], float]:
+    """Share of the cells above the noise that these causes fill."""
+
+    def share(cause: np.ndarray, true: np.ndarray) -> float:
+        heard = (cause != NOISE) & (cause != CAUSES.index("leakage"))
+        return float(np.isin(cause, causes)[heard].mean())
+
+    return share
+
+
+def before_the_surface(cause: np.ndarray, true: np.ndarray) -> float:
+    """Share of the cells in front of the first surface in which something is."""
+    ranges = CONFIG.ranges[:, None]
+    front = (ranges > 0.4) & (ranges < true[:, None] - 0.15)
+    return float((cause != NOISE)[front].mean())
+
+
+#: What rises with the level, and by how much at least from level 0 to 3.
+CLAIMS = {
+    "corner": (caused_by(*GHOSTS), 0.15),
+    "cul-de-sac": (caused_by(*GHOSTS), 0.08),
+    "glass-corridor": (caused_by(*GHOSTS, Provenance.THROUGH_SLAB), 0.15),
+    "mirror-cabinet": (caused_by(*GHOSTS), 0.15),
+    "overhead": (before_the_surface, 0.05),
+    "shelves": (caused_by(*GHOSTS), 0.15),
+    "people": (caused_by(Provenance.MOVING), 0.1),
+}
+
+
+@pytest.mark.parametrize("place", CLAIMS)
+def test_every_level_is_worse_than_the_one_before(place):
+    tasks = [task for task in TASKS if task.building == place]
+    measure, least = CLAIMS[place]
+    found, motion = [], None
+    for task in tasks:
+        scene = Scene.load(task.scene)
+        if motion is None:
+            walk = np.array(task.waypoints)
+            motion = Walk(task.platform, waypoints=walk).through(scene, task.seed)
+            assert motion.duration >= task.duration
+        assert not crossings(motion.until(task.duration), scene)
+        scenario = Scenario(scene, motion, CONFIG, seed=task.seed)
+        frames = scenario.frames(np.arange(1.0, 14.0, 2.0))
+        cause, true = Ghosts(scenario).observe(frames), PlanarScan(scenario).observe(frames)
+        found.append(measure(cause["truth/cause"], true["truth/scan"]))
+    assert len(found) == 4 and np.all(np.diff(found) > 0) and found[3] - found[0] > least, found

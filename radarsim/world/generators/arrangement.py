@@ -1,21 +1,18 @@
 """What stands in the rooms of the plain office: pieces here and there along the walls, as they find room."""
 
-from collections.abc import Callable
-
 import numpy as np
 from shapely.geometry import box as area
 
-from radarsim.world.generators import furniture
-from radarsim.world.generators.furniture import Piece
+from radarsim.world.generators.furniture import Piece, make
 from radarsim.world.generators.layout import FloorPlan
 from radarsim.world.generators.rooms import Room, Site, footprint
 
-_ALONG_WALLS: dict[str, tuple[Callable[[np.random.Generator], Piece], ...]] = {
-    "corridor": (furniture.cabinet, furniture.extinguisher, furniture.cabinet, furniture.bin),
-    "office": (furniture.cabinet, furniture.shelf, furniture.bin, furniture.whiteboard, furniture.cabinet),
-    "meeting": (furniture.whiteboard, furniture.cabinet, furniture.whiteboard),
-    "storage": (furniture.cabinet,) * 3 + (furniture.shelf,) * 3 + (furniture.printer, furniture.bin),
-    "lounge": (furniture.sofa, furniture.sofa, furniture.table, furniture.shelf, furniture.printer),
+_ALONG_WALLS = {
+    "corridor": ("cabinet", "extinguisher", "cabinet", "bin"),
+    "office": ("cabinet", "shelf", "bin", "whiteboard", "cabinet"),
+    "meeting": ("whiteboard", "cabinet", "whiteboard"),
+    "storage": (*("cabinet",) * 3, *("shelf",) * 3, "printer", "bin"),
+    "lounge": ("sofa", "sofa", "table", "shelf", "printer"),
 }
 
 
@@ -23,16 +20,16 @@ def arrange(site: Site, room: Room, plan: FloorPlan) -> None:
     """Put furniture into a room; ways and doors stay free."""
     if room.kind == "office":
         for _ in range(3):
-            yaw = site.against_wall(room, furniture.desk(site.rng), gap=0.2)
+            yaw = site.against_wall(room, make("desk", site.rng), gap=0.2)
             if yaw is not None:
                 site.seat(room, *room.taken[-1].centroid.coords[0], yaw, ignore_kept=True)
     elif room.kind == "meeting":
         _meeting(site, room)
-    for make in _ALONG_WALLS[room.kind]:
+    for kind in _ALONG_WALLS[room.kind]:
         if room.kind == "corridor":
-            _along_corridor(site, room, make(site.rng), plan)
+            _along_corridor(site, room, make(kind, site.rng), plan)
         else:
-            site.against_wall(room, make(site.rng))
+            site.against_wall(room, make(kind, site.rng))
 
 
 def _along_corridor(site: Site, room: Room, piece: Piece, plan: FloorPlan) -> None:
@@ -49,7 +46,7 @@ def _along_corridor(site: Site, room: Room, piece: Piece, plan: FloorPlan) -> No
 
 def _meeting(site: Site, room: Room) -> None:
     """A table where the ways through the room leave space, with chairs along its sides."""
-    rng, piece = site.rng, furniture.table(site.rng)
+    rng, piece = site.rng, make("table", site.rng)
     for _ in range(60 if min(room.size) > 2.4 else 0):
         x, y = rng.uniform(room.x0 + 1.2, room.x1 - 1.2), rng.uniform(room.y0 + 1.2, room.y1 - 1.2)
         yaw = rng.choice([0.0, np.pi / 2])

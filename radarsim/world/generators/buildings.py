@@ -14,8 +14,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
 from radarsim.world import shapes
-from radarsim.world.generators import furniture, joinery, walls
+from radarsim.world.generators import joinery, walls
 from radarsim.world.generators.furnishing import furnish
+from radarsim.world.generators.furniture import make
 from radarsim.world.generators.layout import FloorPlan
 from radarsim.world.generators.openings import Opening
 from radarsim.world.generators.rooms import Room, Site
@@ -95,7 +96,7 @@ def fit(site: Site, plan: FloorPlan, opening: Opening) -> None:
 def equip(site: Site, plan: FloorPlan, furnish: Callable[[Site, Room, FloorPlan], None] | None) -> None:
     """Lamps in all rooms, and furniture where there is some."""
     style = plan.style
-    lamp = furniture.lamp(style.height, *style.lamp[:2])
+    lamp = make("lamp", height=style.height, d=style.lamp[0], w=style.lamp[1])
     for room in plan.rooms:
         along_x = style.plain or room.size[0] > room.size[1]
         site.lamps(room, lamp, style.lamp[2], np.pi / 2 if along_x else 0.0)

@@ -13,9 +13,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from shapely.geometry import box as area
 
-from radarsim.world.generators import furniture
 from radarsim.world.generators.arrangement import arrange
 from radarsim.world.generators.buildings import equip, fit, surfaces
+from radarsim.world.generators.furniture import make
 from radarsim.world.generators.officeplan import OfficePlan
 from radarsim.world.generators.rooms import Site
 from radarsim.world.generators.skeleton import Block, Skeleton
@@ -60,7 +60,7 @@ class Office(BaseModel):
             fit(site, plan, opening)
             if opening.kind == "window" and opening.room.kind != "corridor":
                 width = plan.window(opening.room)[1]
-                piece = furniture.radiator(rng, width=min(1.2, width))
+                piece = make("radiator", w=min(1.2, width))
                 site.put(opening.room, piece, *opening.room.wall_place(opening.side, opening.low + width / 2, 0.1))
         surfaces(site, plan)
         equip(site, plan, arrange if self.furnished else None)

@@ -40,8 +40,7 @@ from radarize.errors import InputError
 from radarize.files import within
 from radarize.yamlfile import read_yaml
 from radarsim.world import shapes
-from radarsim.world.generators.buildings import Building
-from radarsim.world.generators.office import Office
+from radarsim.world.generators.buildings import Building, Office
 from radarsim.world.generators.small_objects import small_objects
 from radarsim.world.interferers import Interferer
 from radarsim.world.materials import Material, constant, decibel, material

@@ -12,8 +12,7 @@ from radarsim.motion.planner import plan_motion
 from radarsim.propagation.bodies import recognise
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.world import shapes
-from radarsim.world.generators.buildings import Building
-from radarsim.world.generators.office import Office
+from radarsim.world.generators.buildings import Building, Office
 from radarsim.world.generators.small_objects import OBJECTS, RUNS, placed, shaped, small_objects
 from radarsim.world.generators.spots import Spots
 from radarsim.world.importers import Options, import_scene

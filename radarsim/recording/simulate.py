@@ -71,7 +71,8 @@ def planned(
         scene: as there.
         seed: of the tour, the scatterers and the noise.
         radar: preset, configuration file or configuration.
-        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
+        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: the
+            board's own.
         engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver, for comparison. Its known defects
             stand at the head of `physics.pathsolver`: corners, small facets and half of the ghosts are wrong, and
             speckle is drawn anew for every frame.
@@ -89,7 +90,7 @@ def planned(
     config, cfg_text = load_config(radar)
     check_limits(config)
     way, names = Walk(**walk), tuple(chosen(sensors))
-    settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
+    settings = FrontEndConfig.load(frontend, config.board) if isinstance(frontend, (str, Path)) else frontend
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     motion = way.through(world, seed)
     world = crowded(world, motion, people, seed)

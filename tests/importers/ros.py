@@ -75,7 +75,7 @@ class BagWriter:
         """
         received = time + (config.burst_time if latency is None else latency)
         words = encode(samples[None], config)
-        pairs = np.asarray(calibration if calibration is not None else config.channel_calibration, float).reshape(-1)
+        pairs = config.channel_factors.ravel().view(float) if calibration is None else np.ravel(calibration)
         loops, tx, rx, count, _ = config.frame_shape
         self.write(
             RADAR, FRAME, received, header=self.header(stamp), platform="xWR18xx", adc_output_fmt=1, max_range=4.0,

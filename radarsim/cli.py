@@ -36,7 +36,7 @@ def simulate(
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
     frontend: Annotated[
-        Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else an IWR1843BOOST.")
+        Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else the board's.")
     ] = None,
     sensors: Annotated[
         str,
@@ -121,7 +121,7 @@ def twin(
     at: Annotated[
         str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="Place of a radar at rest, instead of poses.")
     ] = "",
-    frontend: Annotated[Path | None, typer.Option(help="A front-end file (.yaml); else an IWR1843BOOST.")] = None,
+    frontend: Annotated[Path | None, typer.Option(help="A front-end file (.yaml); else the board's own.")] = None,
     calibrate: Annotated[
         bool, typer.Option("--calibrate", help="Fit the front end to the recording first; kept beside, as .yaml.")
     ] = False,

@@ -41,7 +41,7 @@ class Scenario:
         scene: the world.
         motion: of the radar.
         config: of the radar.
-        front_end: what its board is made of; default: an IWR1843BOOST.
+        front_end: what its board is made of; default: what the board's file says.
         seed: of scatterers, noise, sensors' errors, and what differs from board to board.
         sensors: beside the radar, names from `radarsim.sensors.suite.SENSORS`; none changes the radar's samples.
     """
@@ -49,9 +49,13 @@ class Scenario:
     scene: Scene
     motion: Motion
     config: RadarConfig
-    front_end: FrontEndConfig = FrontEndConfig()
+    front_end: FrontEndConfig | None = None
     seed: int = 0
     sensors: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        if self.front_end is None:
+            object.__setattr__(self, "front_end", FrontEndConfig.of(self.config.board))
 
     def frames(self, times: Float[np.ndarray, "frame"], end: float | None = None) -> "Frames":
         """The frames that start at `times`, ascending, s; nothing is computed before it is asked for.

@@ -77,7 +77,7 @@ def room(*sensors: str, seed: int = 4, seconds: float = 1.3) -> Scenario:
     """Somebody in a room, and everything that noise, boards and phases are drawn for; the radar swings on an arm."""
     places, mounting = np.array([[0.8, 1.5], [1.9, 2.0]]), Mounting.of((0.2, 0.05, 0.1), (2, 3, -1))
     walk = Walk("cart", seconds, waypoints=places, mounting=mounting)
-    return Scenario(SCENE, walk.through(SCENE, seed), CONFIG, FrontEndConfig(), seed, sensors)
+    return Scenario(SCENE, walk.through(SCENE, seed), CONFIG, FrontEndConfig.of(CONFIG.board), seed, sensors)
 
 
 def recorded(scenario: Scenario, path: Path, **options) -> Path:
@@ -219,7 +219,7 @@ def test_what_another_run_has_left_is_not_gone_on_with(tmp_path):
     scenario = room()
     expected = recorded(scenario, tmp_path / "whole.h5").read_bytes()
     emptier = Scene("room", [item for item in SCENE.objects if item.name != "pipe"], SCENE.movers)
-    emptier = Scenario(emptier, scenario.motion, CONFIG, FrontEndConfig(), scenario.seed)
+    emptier = Scenario(emptier, scenario.motion, CONFIG, FrontEndConfig.of(CONFIG.board), scenario.seed)
     for other in (room(seed=5), emptier):
         until_killed(other, tmp_path / "a.h5", 33)
         recorded(scenario, tmp_path / "a.h5")

@@ -8,12 +8,15 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import RadarConfig
+from radarsim.propagation.antenna import Antenna, gain_pattern
 from radarsim.propagation.coefficients import TABLE
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
 from radarsim.receiver.synthesis import Synthesizer
 
 ISOTROPIC = (np.ones(181), np.ones(181), 1.0)
+#: The pattern of the elements of the presets' board.
+ELEMENT = gain_pattern(Antenna.of("iwr1843boost"))
 
 
 @dataclass

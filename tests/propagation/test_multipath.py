@@ -10,7 +10,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC as ISOTROPIC_ANTENNA
-from radarsim.propagation.antenna import Antenna, amplitude_gain, gain_pattern
+from radarsim.propagation.antenna import Antenna, amplitude_gain
 from radarsim.propagation.coefficients import TABLE, reflection, transmission
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.paths import Kind
@@ -22,7 +22,7 @@ from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import box, rectangle
 from tests.propagation.brute_force import kirchhoff_mirror, transfer_matrix
-from tests.propagation.rigs import Rig, burst
+from tests.propagation.rigs import ELEMENT, Rig, burst
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -93,7 +93,7 @@ def test_all_phantoms_of_a_corner():
         here = np.linalg.norm(places - e, axis=1) < 1e-6
         assert here.any()
         # radar equation over both legs; conductors reflect all, so only antenna and distance count
-        gain = [amplitude_gain(*q, gain_pattern()) / np.linalg.norm(q) for q in (e[:3], e[3:])]
+        gain = [amplitude_gain(*q, ELEMENT) / np.linalg.norm(q) for q in (e[:3], e[3:])]
         truth = LAMBDA / (4 * np.pi) ** 1.5 * gain[0] * gain[1]
         assert 20 * np.log10(abs(amplitude[here].sum()) / truth) == pytest.approx(0, abs=0.2)
     assert all(np.linalg.norm(known - e, axis=1).min() < 1e-6 for e in places)

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import gain_pattern
+from radarsim.propagation.antenna import Antenna, gain_pattern
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.path_types import PathType, PathTypes
 from radarsim.propagation.reflectors import Reflectors
@@ -28,7 +28,9 @@ def found(objects, points=NOTHING):
     scene = Scene("place", [SceneObject(f"{k}", mesh, MATERIALS[name]) for k, (mesh, name) in enumerate(objects)])
     paths = PathFinder(scene, points, Reflectors.of(scene, CONFIG), CONFIG, 1e-9)(HERE, AHEAD)
     lengths = paths.lengths(CONFIG, STILL, 0.0)[..., 0]
-    (types,) = PathTypes(scene, CONFIG, gain_pattern())([paths], [lengths], HERE[None], AHEAD[None])
+    (types,) = PathTypes(scene, CONFIG, gain_pattern(Antenna.of(CONFIG.board)))(
+        [paths], [lengths], HERE[None], AHEAD[None]
+    )
     return paths, types
 
 

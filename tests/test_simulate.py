@@ -9,7 +9,7 @@ import pytest
 from radarize.errors import InputError
 from radarize.recording import Recording
 from radarsim.motion.planner import plan_motion
-from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.recording.simulate import simulate
 from radarsim.sensors.causes import CAUSES
@@ -94,25 +94,14 @@ def test_iq_by_cause_adds_up(tmp_path):
         about = recording.describe("truth/adc_by_cause")["about"]
         count = recording.read("truth/echoes")
     assert parts.shape == (len(adc), len(CAUSES), *adc.shape[1:])
-    assert all(p.name.lower() in about for p in Provenance) and "leakage" in about
+    assert all(p.name.lower() in about for p in PathType) and "leakage" in about
     inside = np.abs(adc).max(axis=-1, keepdims=True) < 32767
     error = (parts.sum(axis=1) - adc) * inside
     # half a count of rounding, and float16's 11 bits of each part
     assert np.sqrt(np.mean(error**2)) < 0.5
     assert np.abs(error).max() < 1 + 2**-10 * np.abs(parts).max()
-    for k in range(len(Provenance)):
+    for k in range(len(PathType)):
         assert np.any(parts[:, k]) == np.any(count[:, k])
-
-
-def test_sionna_engine(tmp_path):
-    """Sionna's paths make a recording of the same shape, and it says whose they are."""
-    path = simulate("physics/wall", tmp_path / "x.h5", engine="sionna", trajectory=still(tmp_path), duration=0.1)
-    with Recording(path) as recording:
-        assert recording.attributes["engine"] == "sionna"
-        adc = recording.adc(0, 1)[0].astype(float)
-        ranges = recording.config.ranges
-    power = np.abs(np.fft.fft(adc[..., 0] + 1j * adc[..., 1], axis=-1)).mean(axis=(0, 1, 2))
-    assert ranges[power.argmax()] == pytest.approx(3.0, abs=0.05)
 
 
 @pytest.mark.parametrize(("name", "size"), [("corridor", (40, 9.6)), ("floor", (50, 30))])
@@ -123,12 +112,6 @@ def test_large_scenes_can_be_walked(name, size):
     assert plan_motion(scene, "handheld", 5.0, np.random.default_rng(0)).duration == 5.0
 
 
-def still(folder):
-    path = folder / "still.tum"
-    path.write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(5)))
-    return path
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -136,7 +119,6 @@ def still(folder):
         ({"duration": 1e-3}, "at least one frame"),
         ({"platform": "drone"}, "drone"),
         ({"radar": "nothing.cfg"}, "nothing.cfg"),
-        ({"engine": "unreal"}, "unreal"),
         ({"frontend": Path("nowhere.yaml")}, "nowhere.yaml"),
         ({"scene": "nowhere"}, "nowhere"),
     ],

@@ -1,6 +1,6 @@
 """The small things that a room is full of, as points: on desks and shelves, on walls and under ceilings.
 
-Objects down to 2 cm are drawn (`radarsim.world.generators.things`). What is smaller, and the parts of larger ones
+Objects down to 2 cm are drawn (`radarsim.world.generators.small_objects`). What is smaller, and parts of larger ones
 (handles, edges, screws, plugs), is a Poisson process with a density per square metre of the surface that they stand or
 hang on, and their radar cross sections follow Weibull's law: so Ram, Singh and Ghatak (IEEE Open J. Signal Process. 2,
 2021) model the discrete clutter of rooms. The exponent of a cross section (1: Swerling's, the smaller the spikier)
@@ -63,11 +63,11 @@ class Clutter:
         corners, normals = scene.triangles, scene.normals
         sides = corners[:, 1:] - corners[:, :1]
         area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
-        middles = corners.mean(axis=1)
-        mean = scene.life.clutter * densities(scene, middles, normals) * area
+        middles, level = corners.mean(axis=1), scene.surface_settings.clutter
+        mean = level * densities(scene, middles, normals) * area
         if mean.sum() > MOST:
             raise InputError(
-                f"scene {scene.name}: clutter is {scene.life.clutter:g}, which makes {mean.sum():.2g} points, expected "
+                f"scene {scene.name}: clutter is {level:g}, which makes {mean.sum():.2g} points, expected "
                 f"at most {MOST:g}"
             )
         count = rng.poisson(mean)
@@ -114,7 +114,7 @@ def densities(
 def crowding(scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
     """Share of what falls on surfaces that their things would scatter if none were in another's shadow: above 1 where
     they are many."""
-    return scene.life.clutter * densities(scene, place, normal) * CROSS_SECTION / 4
+    return scene.surface_settings.clutter * densities(scene, place, normal) * CROSS_SECTION / 4
 
 
 def uncovered(

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.bodies import recognise
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.smooth import pieces
@@ -61,5 +61,5 @@ def test_any_shape_is_covered_and_found(mesh, rotation, material):
     scene = Scene("one", [SceneObject("body", mesh, MATERIALS[material]), FLOOR])
     reflectors = Reflectors.of(scene, CONFIG)
     assert area(reflectors.flat.corners) == pytest.approx(flat_area(mesh) + 64, abs=0.01 * flat_area(mesh) + 1e-6)
-    echoes = EchoFinder(scene, NOTHING, reflectors, CONFIG)(np.array([0.0, 0.0, 1.0]), np.eye(3))
+    echoes = PathFinder(scene, NOTHING, reflectors, CONFIG)(np.array([0.0, 0.0, 1.0]), np.eye(3))
     assert np.isfinite(echoes.amplitude).all()

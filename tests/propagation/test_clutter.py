@@ -21,17 +21,17 @@ from radarsim.propagation.clutter import (
 )
 from radarsim.propagation.coefficients import TABLE
 from radarsim.propagation.fields import facing
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.scatteringpattern import scattering
 from radarsim.propagation.surface import Cluttered, Surface
 from radarsim.propagation.transmission import Transmission
 from radarsim.world import shapes
-from radarsim.world.life import Life
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
+from radarsim.world.surface_settings import SurfaceSettings
 
 CONFIG = PRESETS["radarize"]
 K = 2 * np.pi / CONFIG.wavelength
@@ -46,7 +46,7 @@ def room(clutter=1.0, **parts):
         "desk": shapes.rectangle((6, 0, 0.75), (4, 4), (0, 0, 1)),
     }
     objects = [SceneObject(name, mesh, MATERIALS["wood"]) for name, mesh in parts.items()]
-    return Scene("room", objects, life=Life(clutter=clutter))
+    return Scene("room", objects, surface_settings=SurfaceSettings(clutter=clutter))
 
 
 #: Where the surface of each kind is, which way it faces, what it is of, and how many things are on a square metre.
@@ -66,7 +66,7 @@ def lone(kind, level):
         SceneObject("square", shapes.rectangle(center, (SIDE, SIDE), facing_), MATERIALS[material]),
         SceneObject("crumb", shapes.box((0, 90, 0.005), (0.01, 0.01, 0.01)), MATERIALS["metal"]),
     ]
-    return Scene("lone", objects, life=Life(clutter=level))
+    return Scene("lone", objects, surface_settings=SurfaceSettings(clutter=level))
 
 
 def sphere(steps=45):
@@ -150,7 +150,7 @@ def test_same_things_from_everywhere():
 
 def test_coherent_under_motion():
     """An echo's phase moves by 2k times the way gone towards its thing, whatever the direction; nothing is redrawn."""
-    found = EchoFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
+    found = PathFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
     step = np.array([0.004, -0.003, 0.002])
     start = np.array([3.0, 0.5, 1.0])
     fields, places = [], []
@@ -176,7 +176,7 @@ def test_hidden_things_are_not_seen():
     }
     scene = room(10.0, **parts)
     things = clutter(scene)
-    found = EchoFinder(scene, things, None, CONFIG, antenna=ISOTROPIC)
+    found = PathFinder(scene, things, None, CONFIG, antenna=ISOTROPIC)
     seen = found(np.array([0.0, 0.0, 1.5]), np.eye(3)).points[:, 0]
     assert len(seen) > 50
     assert seen[:, 0].max() < 2
@@ -196,7 +196,7 @@ def test_none_at_level_nought():
 
 def test_more_than_memory_holds():
     wall = SceneObject("wall", shapes.rectangle((0, 0, 0), (1900, 1900), (1, 0, 0)), MATERIALS["wood"])
-    place = Scene("plain", [wall], life=Life(clutter=10))
+    place = Scene("plain", [wall], surface_settings=SurfaceSettings(clutter=10))
     with pytest.raises(InputError, match="clutter is 10, which makes 1.3e.08 points"):
         clutter(place)
 

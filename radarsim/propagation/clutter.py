@@ -17,7 +17,7 @@ add up to the share s that would be scattered if no point were in another's shad
 would without them (`uncovered`).
 
 A point keeps its place, cross section and phase for good, so it is coherent under motion; it is hidden, mirrored and
-seen through panes as any other scatterer is.
+seen through panes as any other scatterer is, but not from behind its own surface.
 """
 
 from dataclasses import replace
@@ -75,7 +75,7 @@ class Clutter:
         place = scattered(corners[on], rng)
         place += (NEAREST + rng.exponential(STANDOFF, len(on)))[:, None] * normals[on]
         size = rng.exponential(1.0, len(on))
-        sigma = cross_section(size) * _in_the_open(crowding(scene, middles, normals))[on]
+        sigma = cross_section(size) * in_the_open(crowding(scene, middles, normals))[on]
         self._points = replace(
             Scatterers.points(place, sigma, rng.uniform(0, 2 * np.pi, len(on))),
             normal=normals[on],
@@ -124,7 +124,7 @@ def uncovered(
     return np.exp(-crowding(scene, place, normal))
 
 
-def _in_the_open(crowding: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+def in_the_open(crowding: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
     """What is left of each thing's cross section on average, with the shadows of the others."""
     return -np.expm1(-crowding) / np.maximum(crowding, 1e-12)
 

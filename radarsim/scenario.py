@@ -15,14 +15,14 @@ from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.machine.threads import one_blas_thread
 from radarsim.motion.trajectory import Motion
 from radarsim.propagation.antenna import gain_pattern
-from radarsim.propagation.clutter import Clutter, Cluttered
+from radarsim.propagation.clutter import Clutter
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.obstacles import Obstacles
 from radarsim.propagation.path_types import PathTypes
 from radarsim.propagation.paths import Paths
 from radarsim.propagation.reflectors import Reflectors
-from radarsim.propagation.surface import Surface
+from radarsim.propagation.surface import Cluttered, Surface
 from radarsim.propagation.unevenness import Heights
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import FrontEndConfig

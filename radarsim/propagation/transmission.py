@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from radarize.radar.config import RadarConfig
+from radarsim.propagation.clutter import uncovered
 from radarsim.propagation.coefficients import TABLE, as_slab, transmission
 from radarsim.world.scene import Scene
 
@@ -31,6 +32,8 @@ class Transmission:
             self._body.append(whole)
         self._table, self._body = np.array(self._table), np.array(self._body)
         self._factor = np.array([t for _, (t, _) in tables.values()]).reshape(-1, 2, TABLE)
+        #: what small things on a face leave of the amplitude
+        self._left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
         self._delay = np.array([d for _, (_, d) in tables.values()]).reshape(-1, TABLE)
 
     def passage(
@@ -61,6 +64,7 @@ class Transmission:
             passes = leaving | ((self._table[item] >= 0) & (slabs[w] <= MOST_SLABS))
             factor[w[~passes]] = 0
             w, at, triangle, item, leaving = (x[passes] for x in (w, at, triangle, item, leaving))
+            factor[w] *= self._left[triangle]
             n = ~leaving
             gain, extra = self._through(self._table[item[n]], way[w[n]], self.scene.normals[triangle[n]], up[w[n]])
             factor[w[n]] *= gain

@@ -9,7 +9,7 @@ from radarsim.motion.pedestrians import crowded
 from radarsim.motion.walk import Walk
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
-from tests.distances import column, least_distance, obstacles
+from tests.motion.distances import column, least_distance, obstacles
 
 TIMES = np.arange(0, 20, 0.07)
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from ridges import CONFIG, data_set, write
 from typer.testing import CliRunner
 
 from radarize.cli import app
@@ -24,6 +23,7 @@ from radarize.nets.weights import header_of, load, read
 from radarize.recording import Recording
 from radarize.training.team import Team
 from radarize.training.train import Options, train
+from tests.training.ridges import CONFIG, data_set, write
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 

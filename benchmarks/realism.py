@@ -25,8 +25,8 @@ from radarsim.motion.walk import Walk as WayThrough
 from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
 from radarsim.world.description import find
-from radarsim.world.life import DRAWN, Life
 from radarsim.world.scene import Scene
+from radarsim.world.surface_settings import IDEAL, SurfaceSettings
 
 SCENES = "office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"
 #: dB, that a picture shows below its largest.
@@ -70,19 +70,24 @@ def beam_misfit(pictures: UInt8[np.ndarray, "frame range azimuth"], antennas: in
 
 
 def simulated(
-    name: str, life: tuple[Life, Life], transmitters: tuple[int, ...], every: int, duration: float, seed: int
+    name: str,
+    surfaces: tuple[SurfaceSettings, SurfaceSettings],
+    transmitters: tuple[int, ...],
+    every: int,
+    duration: float,
+    seed: int,
 ) -> tuple[tuple, Motion]:
     """Shares of a walk by cart, of every few frames, and the walk.
 
     Args:
         name: scene.
-        life: how lived-in it is: its geometry (things), and what physics adds (points, unevenness).
+        surfaces: settings of its geometry (small objects), and of what physics adds (points, unevenness).
         transmitters: of the pictures.
         every: of so many frames one is simulated.
         duration: s.
         seed: of walk and world.
     """
-    drawn, added = life
+    drawn, added = surfaces
     scene = Scene.of(read_yaml(find(name)) | asdict(drawn), name)
     scene = Scene(name, scene.objects, scene.movers, added)
     scenario = Scenario(scene, WayThrough("cart", duration).through(scene, seed), CONFIG, seed=seed)
@@ -103,13 +108,13 @@ def row(about: str, found: list[tuple[float, float, float]]) -> dict[str, object
 
 #: What is added to the rooms, step by step, and the transmitters of the pictures.
 STEPS = {
-    "bare rooms, eight antennas as published": ((DRAWN, DRAWN), polar.PUBLISHED),
-    "bare rooms, four antennas as measured": ((DRAWN, DRAWN), polar.MEASURED),
-    "uneven walls": ((DRAWN, Life(unevenness=1.0)), polar.MEASURED),
-    "things": ((Life(clutter=1.0), DRAWN), polar.MEASURED),
-    "points": ((DRAWN, Life(clutter=1.0)), polar.MEASURED),
-    "clutter: things and points": ((Life(clutter=1.0), Life(clutter=1.0)), polar.MEASURED),
-    "clutter and uneven walls": ((Life(1.0, 1.0), Life(1.0, 1.0)), polar.MEASURED),
+    "bare rooms, eight antennas as published": ((IDEAL, IDEAL), polar.PUBLISHED),
+    "bare rooms, four antennas as measured": ((IDEAL, IDEAL), polar.MEASURED),
+    "uneven walls": ((IDEAL, SurfaceSettings(unevenness=1.0)), polar.MEASURED),
+    "small objects": ((SurfaceSettings(clutter=1.0), IDEAL), polar.MEASURED),
+    "points": ((IDEAL, SurfaceSettings(clutter=1.0)), polar.MEASURED),
+    "clutter: small objects and points": ((SurfaceSettings(clutter=1.0), SurfaceSettings(clutter=1.0)), polar.MEASURED),
+    "clutter and uneven walls": ((SurfaceSettings(1.0, 1.0), SurfaceSettings(1.0, 1.0)), polar.MEASURED),
 }
 PARSER = command_line(
     __doc__,
@@ -130,11 +135,11 @@ def main() -> None:
             if part == "train":
                 beams = {antennas: float(np.median(each)) for antennas, each in misfits.items()}
             walks += [Walk(f"RadarHD, {part}", None, None, simulated=False)] * len(found)
-        for number, (about, (life, transmitters)) in enumerate(STEPS.items()):
+        for number, (about, (surfaces, transmitters)) in enumerate(STEPS.items()):
             found = []
             for k, name in enumerate(SCENES):
                 report(number * len(SCENES) + k, len(STEPS) * len(SCENES))
-                kept, motion = simulated(name, life, transmitters, options.every, options.duration, options.seed)
+                kept, motion = simulated(name, surfaces, transmitters, options.every, options.duration, options.seed)
                 found.append(kept)
                 walks.append(walked(name, options.seed, motion))
             rows.append(row(about, found))

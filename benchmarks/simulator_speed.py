@@ -1,7 +1,7 @@
 """How fast the simulator is, and how exact, on three scenes with the `radarize` preset.
 
 Three ways to the frames of the first scene in one run: this simulator; the same echoes as a direct sum in float64; and
-`--engine sionna`, the paths of Sionna RT's own solver at the same poses.
+the paths of Sionna RT's own solver at the same poses (`benchmarks.sionna`).
 """
 
 import tempfile
@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, timed, walked
+from benchmarks.sionna import DEPTH, RAYS, SionnaScenario
 from radarize.radar.presets import PRESETS
 from radarsim.machine.threads import default_workers
-from radarsim.propagation.pathsolver import DEPTH, RAYS
 from radarsim.recording.batches import TOGETHER, Batches
 from radarsim.recording.simulate import planned, record
 from radarsim.scenario import Scenario
@@ -22,9 +22,9 @@ from tests.propagation.brute_force import direct_sum
 CONFIG = PRESETS["radarize"]
 
 
-def walk(name: str, times: np.ndarray, seed: int, **options: object) -> Scenario:
+def walk(name: str, times: np.ndarray, seed: int) -> Scenario:
     """A handheld walk, its first frames made."""
-    scenario, *_ = planned(name, seed=seed, duration=len(times) * CONFIG.frame_period + 1, **options)
+    scenario, *_ = planned(name, seed=seed, duration=len(times) * CONFIG.frame_period + 1)
     assert scenario.frames(times[:TOGETHER]).samples.any()
     return scenario
 
@@ -115,13 +115,14 @@ def main() -> None:
     seconds, error = summed(scenarios[first], times[few])
     ways.append((f"{first}: direct sum, float64", seconds, echoes, "the same echoes, samples"))
 
-    other, counts, spent = walk(first, times, options.seed, engine="sionna"), [], []  # its kernels are compiled now
+    other, counts, spent = SionnaScenario.of(scenarios[first]), [], []
+    assert other.frames(times[:1]).samples.any()  # its kernels are compiled now
     for t in np.linspace(0, times[-1], options.sionna_frames):
-        frames = other.frames([t])
+        frames = other.frames(np.array([t]))
         _, took = timed(getattr, frames, "samples")
         spent.append(took)
         counts.append(len(frames.echoes[0]))
-    ways.append((f"{first}: --engine sionna", np.median(spent), np.mean(counts), "int16 I/Q with noise"))
+    ways.append((f"{first}: paths of Sionna RT", np.median(spent), np.mean(counts), "int16 I/Q with noise"))
 
     notes += [
         f"Fast synthesis against the direct sum of the same echoes: error power {error:.1f} dB (worst frame).",

@@ -40,7 +40,9 @@ def main() -> None:
 
     def all_of(material: str) -> Scene:
         return Scene(
-            "office", [replace(thing, material=MATERIALS[material]) for thing in office.objects], life=office.life
+            "office",
+            [replace(thing, material=MATERIALS[material]) for thing in office.objects],
+            surface_settings=office.surface_settings,
         )
 
     twins: list[tuple[str, Scene, Change | None, int]] = [

@@ -36,22 +36,22 @@ class Assumed(NamedTuple):
     """What the lidar does not tell.
 
     Attributes:
-        life: see `radarsim.world.scene.Life`.
+        surfaces: see `radarsim.world.surface_settings.SurfaceSettings`.
         walls: their material.
         room: floor to ceiling, m.
         sensor: its height, m.
     """
 
-    life: dict[str, float] = {"clutter": 1.0, "unevenness": 1.0}  # noqa: RUF012
+    surfaces: dict[str, float] = {"clutter": 1.0, "unevenness": 1.0}  # noqa: RUF012
     walls: str = "plasterboard"
     room: float = 2.7
     sensor: float = 1.0
 
 
 ASSUMED = {
-    "walls alone": Assumed(life={}),
+    "walls alone": Assumed(surfaces={}),
     "clutter and unevenness": Assumed(),
-    "clutter x 3": Assumed(life={"clutter": 3.0, "unevenness": 1.0}),
+    "clutter x 3": Assumed(surfaces={"clutter": 3.0, "unevenness": 1.0}),
     "walls of concrete": Assumed(walls="concrete"),
     "rooms of 4 m": Assumed(room=4.0),
     "sensor at 0.5 m": Assumed(sensor=0.5),
@@ -80,7 +80,7 @@ def scene(log: Path, assumed: Assumed) -> Path:
     found = read_yaml(path)
     for part in found["objects"]:
         part["material"] = assumed.walls if part["name"] == "walls" else part["material"]
-    path.write_text(yaml.safe_dump(found | assumed.life, sort_keys=False))
+    path.write_text(yaml.safe_dump(found | assumed.surfaces, sort_keys=False))
     return path
 
 

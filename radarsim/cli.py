@@ -38,13 +38,6 @@ def simulate(
     frontend: Annotated[
         Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else an IWR1843BOOST.")
     ] = None,
-    engine: Annotated[
-        Literal["radarsim", "sionna"],
-        typer.Option(
-            help="sionna: paths of Sionna RT's own solver, to compare with. It misses corners and half of the ghosts, "
-            "makes every facet an infinite mirror, and draws speckle anew in every frame: do not train on it."
-        ),
-    ] = "radarsim",
     sensors: Annotated[
         str,
         typer.Option(
@@ -65,7 +58,6 @@ def simulate(
         written = simulate(
             scene, output, platform=platform, trajectory=trajectory, waypoints=waypoints, duration=duration, seed=seed,
             people=people, mounting=Mounting.parse(mounting) if mounting else None, radar=radar, frontend=frontend,
-            engine=engine,
             sensors=[name.strip() for name in sensors.split(",") if name.strip()],
             workers=workers or default_workers(), progress=report,
         )  # fmt: skip

@@ -19,7 +19,6 @@ from radarsim.propagation.echoes import Echoes
 from radarsim.propagation.finder import EchoFinder
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.obstacles import Obstacles
-from radarsim.propagation.pathsolver import PathSolverFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.surface import Surface
 from radarsim.propagation.unevenness import Heights
@@ -43,10 +42,6 @@ class Scenario:
         front_end: what its board is made of; default: an IWR1843BOOST.
         seed: of scatterers, noise, sensors' errors, and what differs from board to board.
         sensors: beside the radar, names from `radarsim.sensors.suite.SENSORS`; none changes the radar's samples.
-        engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver (see `physics.pathsolver`).
-
-    Raises:
-        InputError: no such engine.
     """
 
     scene: Scene
@@ -55,11 +50,6 @@ class Scenario:
     front_end: FrontEndConfig = FrontEndConfig()
     seed: int = 0
     sensors: tuple[str, ...] = ()
-    engine: str = "radarsim"
-
-    def __post_init__(self):
-        if self.engine not in ("radarsim", "sionna"):
-            raise InputError(f"engine is {self.engine!r}, expected radarsim or sionna")
 
     def frames(self, times: Float[np.ndarray, "frame"], end: float | None = None) -> "Frames":
         """The frames that start at `times`, ascending, s; nothing is computed before it is asked for.
@@ -100,12 +90,9 @@ class Scenario:
         return FrontEnd(self.config, self.front_end, self.rng("board"))
 
     @cached_property
-    def finder(self) -> EchoFinder | PathSolverFinder:
+    def finder(self) -> EchoFinder:
         """Finds the echoes of a pose."""
         weakest, antenna = self.board.weakest, self.front_end.pattern
-        if self.engine == "sionna":
-            seed = int(self.rng("sionna").integers(2**31))
-            return PathSolverFinder(self.scene, self.config, weakest, antenna, seed)
         reach = SPEED_OF_LIGHT * self.board.passband[1] / (2 * self.config.slope)
         scatterers = Cluttered(Surface(self.scene, self.rng("surface")), Clutter(self.scene, self.rng("clutter")))
         reflectors = Reflectors.of(self.scene, self.config, Heights.of(self.scene, self.rng("unevenness")))

@@ -13,10 +13,10 @@ from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.surface import Surface
 from radarsim.propagation.unevenness import SCALES, Heights
 from radarsim.world import shapes
-from radarsim.world.life import Life
 from radarsim.world.materials import material
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
+from radarsim.world.surface_settings import SurfaceSettings
 from tests.propagation.rigs import Rig, burst, field
 from tests.propagation.test_echoes import speckle as speckles
 from tests.propagation.test_multipath import there_and_back
@@ -81,7 +81,7 @@ def small_things(axis) -> str:
     """What is smaller than 2 cm is a Poisson process on every surface; larger things are drawn. Cross sections follow
     Weibull's distribution, P(> s) = exp(-(s / s0)^0.7)."""
     wall = SceneObject("wall", shapes.rectangle((3, 0, 1.5), (40, 3), (-1, 0, 0)), material("wood"))
-    things = Clutter(Scene("wall", [wall], life=Life(clutter=1)), np.random.default_rng(0))
+    things = Clutter(Scene("wall", [wall], surface_settings=SurfaceSettings(clutter=1)), np.random.default_rng(0))
     sigma = np.sort(things.near(np.zeros((1, 3)), 50.0).sigma)
     weibull = stats.weibull_min(EXPONENT, scale=CROSS_SECTION / gamma(1 + 1 / EXPONENT))
     dbsm, share = db(sigma), (np.arange(len(sigma)) + 0.5) / len(sigma)
@@ -102,7 +102,7 @@ def uneven_walls(axis) -> str:
     steps, level, walls = np.append(np.geomspace(2e-3, 0.3, 16), 10.0), 0.25, 300
     place = np.stack([np.full_like(steps, 2.0), steps, np.zeros_like(steps)], axis=1)
     place = np.concatenate([[[2.0, 0.0, 0.0]], place])
-    scene, factors = Scene("wall", [wall], life=Life(unevenness=level)), []
+    scene, factors = Scene("wall", [wall], surface_settings=SurfaceSettings(unevenness=level)), []
     for seed in range(walls):
         heights = Heights.of(scene, np.random.default_rng(seed))
         factors.append(heights.factors(place, place * [0, 1, 1], np.ones(len(place)), LAMBDA))

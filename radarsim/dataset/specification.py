@@ -50,7 +50,7 @@ from radarsim.world.description import Description, described, find, shipped, sp
 from radarsim.world.validation import format_validation_error
 
 #: What a building here may say of itself that stands beside `building` in a scene file.
-LIFE = "clutter", "unevenness", "interferers"
+OF_SCENE = "clutter", "unevenness", "interferers"
 #: Recordings that a data set may stand for: a count with a digit too many takes all memory.
 MOST = 20_000
 Platform = Literal["handheld", "cart", "robot"]
@@ -247,9 +247,9 @@ class Specification(Strict):
             return f"{file}@{level}" if level else str(file)
         if level:
             raise InputError(f"buildings.{building}: is generated and has no levels, expected a scene file")
-        life = {key: given[key] for key in LIFE if key in given}
+        settings = {key: given[key] for key in OF_SCENE if key in given}
         place = {} if floor is None else {"floor": floor}
-        description = {"building": {key: given[key] for key in given if key not in LIFE} | place} | life
+        description = {"building": {key: given[key] for key in given if key not in OF_SCENE} | place} | settings
         try:
             Description.model_validate(description)
         except ValidationError as error:

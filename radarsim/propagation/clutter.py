@@ -1,6 +1,6 @@
 """The small things that a room is full of, as points: on desks and shelves, on walls and under ceilings.
 
-Objects down to 2 cm are drawn (`radarsim.world.generators.things`). What is smaller, and the parts of larger ones
+Objects down to 2 cm are drawn (`radarsim.world.generators.small_objects`). What is smaller, and parts of larger ones
 (handles, edges, screws, plugs), is a Poisson process with a density per square metre of the surface that they stand or
 hang on, and their radar cross sections follow Weibull's law: so Ram, Singh and Ghatak (IEEE Open J. Signal Process. 2,
 2021) model the discrete clutter of rooms. The exponent of a cross section (1: Swerling's, the smaller the spikier)
@@ -55,10 +55,11 @@ class Clutter:
         corners, normals = scene.triangles, scene.normals
         sides = corners[:, 1:] - corners[:, :1]
         area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
-        mean = scene.life.clutter * densities(scene) * area
+        level = scene.surface_settings.clutter
+        mean = level * densities(scene) * area
         if mean.sum() > MOST:
             raise InputError(
-                f"scene {scene.name}: clutter is {scene.life.clutter:g}, which makes {mean.sum():.2g} points, expected "
+                f"scene {scene.name}: clutter is {level:g}, which makes {mean.sum():.2g} points, expected "
                 f"at most {MOST:g}"
             )
         count = rng.poisson(mean)

@@ -41,8 +41,8 @@ def simulate(
         workers: processes beside this one that make frames; 1: this one does. A script that asks for more needs an
             ``if __name__ == "__main__"``, as whatever starts processes does.
         progress: called with (frames done, frames in all).
-        plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, engine, sensors, platform,
-            duration, trajectory, waypoints, mounting, people.
+        plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, sensors, platform, duration,
+            trajectory, waypoints, mounting, people.
 
     Returns:
         the path written.
@@ -60,7 +60,6 @@ def planned(
     seed: int = 0,
     radar: str | RadarConfig = "radarize",
     frontend: Path | FrontEndConfig | None = None,
-    engine: str = "radarsim",
     sensors: Sequence[str] = (),
     people: int = 0,
     **walk: object,
@@ -72,9 +71,6 @@ def planned(
         seed: of the tour, the scatterers and the noise.
         radar: preset, configuration file or configuration.
         frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
-        engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver, for comparison. Its known defects
-            stand at the head of `physics.pathsolver`: corners, small facets and half of the ghosts are wrong, and
-            speckle is drawn anew for every frame.
         sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
             are the same whatever is chosen.
         people: who walk about near the radar's way (see `crowd`).
@@ -93,7 +89,7 @@ def planned(
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     motion = way.through(world, seed)
     world = crowded(world, motion, people, seed)
-    scenario = Scenario(world, motion, config, settings, seed, names, engine)
+    scenario = Scenario(world, motion, config, settings, seed, names)
     about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
     return scenario, cfg_text, about | ({"people": people} if people else {})
 
@@ -156,7 +152,7 @@ def facts(scenario: Scenario) -> dict[str, object]:
         "scene": scenario.scene.name,
         "seed": scenario.seed,
         "radarsim_version": __version__,
-        "engine": scenario.engine,
+        "engine": "radarsim",
         "front_end": scenario.front_end.model_dump_json(),
         "motion": Statistics.of(scenario.motion, scenario.scene).json(),
         "warnings": crossings(scenario.motion, scenario.scene),

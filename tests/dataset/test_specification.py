@@ -50,7 +50,7 @@ def test_recordings_of_a_specification(tmp_path):
     assert len({task.seed for task in tasks}) == 7
 
 
-def test_buildings_say_how_lived_in_they_are(tmp_path):
+def test_buildings_have_clutter_and_unevenness(tmp_path):
     """Clutter, unevenness and other radars stand beside the building in its scene, and change neither seed nor walk."""
     lived = load(tmp_path, buildings=PLAIN["buildings"] | {"old": {"kind": "B", "seed": 3, "clutter": 2}})
     assert lived.tasks[1].scene == {"building": {"kind": "B", "seed": 3, "floor": 2}, "clutter": 2}

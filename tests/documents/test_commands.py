@@ -30,7 +30,7 @@ TYPED_INSTEAD = (
     # Shorter.
     (r"--duration \d+", WALK),
     (r"^(radarsim simulate (?!.*--(?:duration|waypoints|trajectory)).*)$", rf"\1 {WALK}"),
-    (r"^(radarsim simulate .*--(?:engine sionna|sensors adc-by-cause)).*$", r"\1 --duration 0.1"),
+    (r"^(radarsim simulate .*--sensors adc-by-cause).*$", r"\1 --duration 0.1"),
     (r"^radarsim dataset (\S+)", r"radarsim dataset short/\1.yaml"),
     (r"--epochs \d+", "--epochs 1"),
     (r"^((?:radarize|torchrun .* -m radarize\.cli) train (?!.*--epochs).*)$", r"\1 --epochs 1"),

@@ -24,10 +24,10 @@ from radarsim.propagation.finder import EchoFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.surface import Surface
 from radarsim.world import shapes
-from radarsim.world.life import Life
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
+from radarsim.world.surface_settings import SurfaceSettings
 
 CONFIG = PRESETS["radarize"]
 K = 2 * np.pi / CONFIG.wavelength
@@ -42,7 +42,7 @@ def room(clutter=1.0, **parts):
         "desk": shapes.rectangle((6, 0, 0.75), (4, 4), (0, 0, 1)),
     }
     objects = [SceneObject(name, mesh, MATERIALS["wood"]) for name, mesh in parts.items()]
-    return Scene("room", objects, life=Life(clutter=clutter))
+    return Scene("room", objects, surface_settings=SurfaceSettings(clutter=clutter))
 
 
 def clutter(scene, seed=0):
@@ -147,6 +147,6 @@ def test_none_at_level_nought():
 
 def test_more_than_memory_holds():
     wall = SceneObject("wall", shapes.rectangle((0, 0, 0), (1900, 1900), (1, 0, 0)), MATERIALS["wood"])
-    place = Scene("plain", [wall], life=Life(clutter=10))
+    place = Scene("plain", [wall], surface_settings=SurfaceSettings(clutter=10))
     with pytest.raises(InputError, match="clutter is 10, which makes 1.3e.08 points"):
         clutter(place)

@@ -14,10 +14,10 @@ from radarsim.propagation.level_of_detail import detail, share
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.surface import DENSITY, Surface
 from radarsim.world import shapes
-from radarsim.world.life import Life
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
+from radarsim.world.surface_settings import SurfaceSettings
 from tests.propagation.rigs import Rig, burst
 
 CONFIG = PRESETS["radarize"]
@@ -235,7 +235,11 @@ def test_cost_does_not_depend_on_the_building():
 def test_a_room_in_one_mesh_has_the_floor_of_one_in_parts():
     """As in a scan: scatterers, flat parts and small things on floor and ceiling are told from those on walls."""
     parts = [item.mesh for item in SCENE.objects]
-    whole = Scene("scan", [SceneObject("room", shapes.joined(*parts), MATERIALS["concrete"])], life=Life(clutter=1.0))
+    whole = Scene(
+        "scan",
+        [SceneObject("room", shapes.joined(*parts), MATERIALS["concrete"])],
+        surface_settings=SurfaceSettings(clutter=1.0),
+    )
     found = Surface(whole, np.random.default_rng(0)).all()
     assert (found.horizontal == (np.abs(np.abs(found.position[:, 2]) - 1.3) < 1e-6)).all()
     flat = Reflectors.of(whole, CONFIG).flat

@@ -92,29 +92,12 @@ def test_iq_by_cause_adds_up(tmp_path):
         assert np.any(parts[:, k]) == np.any(count[:, k])
 
 
-def test_sionna_engine(tmp_path):
-    """Sionna's paths make a recording of the same shape, and it says whose they are."""
-    path = simulate("physics/wall", tmp_path / "x.h5", engine="sionna", trajectory=still(tmp_path), duration=0.1)
-    with Recording(path) as recording:
-        assert recording.attributes["engine"] == "sionna"
-        adc = recording.adc(0, 1)[0].astype(float)
-        ranges = recording.config.ranges
-    power = np.abs(np.fft.fft(adc[..., 0] + 1j * adc[..., 1], axis=-1)).mean(axis=(0, 1, 2))
-    assert ranges[power.argmax()] == pytest.approx(3.0, abs=0.05)
-
-
 @pytest.mark.parametrize(("name", "size"), [("corridor", (40, 9.6)), ("floor", (50, 30))])
 def test_large_scenes_can_be_walked(name, size):
     """The benchmark's buildings have their size, and a tour through them."""
     scene = Scene.load(name)
     assert np.ptp(scene.bounds, axis=0)[:2] == pytest.approx(size)
     assert plan_motion(scene, "handheld", 5.0, np.random.default_rng(0)).duration == 5.0
-
-
-def still(folder):
-    path = folder / "still.tum"
-    path.write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(5)))
-    return path
 
 
 @pytest.mark.parametrize(
@@ -124,7 +107,6 @@ def still(folder):
         ({"duration": 1e-3}, "at least one frame"),
         ({"platform": "drone"}, "drone"),
         ({"radar": "nothing.cfg"}, "nothing.cfg"),
-        ({"engine": "unreal"}, "unreal"),
         ({"frontend": Path("nowhere.yaml")}, "nowhere.yaml"),
         ({"scene": "nowhere"}, "nowhere"),
     ],

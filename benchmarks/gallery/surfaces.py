@@ -6,8 +6,7 @@ from scipy.special import gamma
 
 from benchmarks.gallery.drawing import AHEAD, CONFIG, FOUND, HERE, LAMBDA, THEORY, compare
 from radarsim.propagation.clutter import CROSS_SECTION, EXPONENT, ON_WALLS, Clutter
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.surface import Surface
@@ -42,7 +41,7 @@ def decorrelation(axis) -> str:
     place."""
     shifts = np.geomspace(1e-4, 0.1, 16)
     own, frozen, kept = [], [], []
-    finders = [EchoFinder(None, clutter(np.random.default_rng(k), 3000), None, CONFIG, range=9.0) for k in range(40)]
+    finders = [PathFinder(None, clutter(np.random.default_rng(k), 3000), None, CONFIG, range=9.0) for k in range(40)]
     first = [f(HERE, AHEAD) for f in finders]
     start = np.array([field(e, HERE, LAMBDA) for e in first])
     for shift in shifts:
@@ -67,7 +66,7 @@ def convergence(axis) -> str:
     for count in counts:
         power = []
         for seed in range(draws):
-            finder = EchoFinder(None, clutter(np.random.default_rng((count, seed)), count), None, once, range=9.0)
+            finder = PathFinder(None, clutter(np.random.default_rng((count, seed)), count), None, once, range=9.0)
             spectrum = np.fft.fft(burst(once, finder(HERE, AHEAD), Rig()), axis=-1)
             power.append(np.mean(np.abs(spectrum[..., 67:85]) ** 2))  # 3 to 3.8 m
         levels.append(db(np.mean(power)))
@@ -120,16 +119,16 @@ def uneven_walls(axis) -> str:
 
 
 def reciprocity(axis) -> str:
-    """The field stays the same when transmitter and receiver swap places. Tested for each cause of echoes in the
-    office."""
+    """The field stays the same when transmitter and receiver swap places. Tested for each number of bounces in
+    the office."""
     scene = Scene.load("office")
     surface = Surface(scene, np.random.default_rng(1), density=60.0)
     position = np.array([8.0, 6.0, 1.2])
-    echoes = EchoFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 1e-7)(position, AHEAD)
+    echoes = PathFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 1e-7)(position, AHEAD)
     (there, back), names, levels = there_and_back(echoes, position), [], []
-    for cause in sorted(map(Provenance, set(echoes.provenance))):
-        some = echoes.provenance == cause
-        names.append(f"{cause.name.lower()} ({some.sum()})".replace("_", " "))
+    for bounces in np.unique(echoes.bounces):
+        some = echoes.bounces == bounces
+        names.append(f"{bounces} bounces ({some.sum()})")
         levels.append(2 * db(abs((there - back)[some].sum()) / abs(there[some].sum()) + 1e-15))
     axis.barh(names, levels, color="tab:red")
     axis.axvline(-60, color="black", lw=1)

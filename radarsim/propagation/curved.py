@@ -145,6 +145,18 @@ def path_over(shape, one, two):
 
 
 @njit
+def facing_point(shape, place):
+    """The point of a curved surface that faces a place, m."""
+    pivot, axis, radius = vec(shape[1:4]), vec(shape[4:7]), shape[7]
+    if shape[0] == QUADRIC:
+        return stationary((pivot, axis, vec(shape[8:11]), shape[11], shape[12]), place, place)[0]
+    a = minus(place, pivot)
+    height = dot(a, axis)
+    foot = moved(pivot, height, axis) if shape[0] == LINE else pivot
+    return moved(foot, radius, unit(moved(a, -height, axis)))
+
+
+@njit
 def stationary(quadric, one, two):
     """Where a way between two places over a quadric is stationary, by Newton's steps.
 

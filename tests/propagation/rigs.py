@@ -59,9 +59,7 @@ def isotropic(position, wavelength, rotation=None, range_=100.0):
 
 def field(echoes, position, wavelength):
     """Sum of all echoes at one antenna at a position, at one frequency."""
-    away = np.linalg.norm(echoes.points - position, axis=2).sum(axis=1)
-    mirrored = np.einsum("eij,j->ei", echoes.images[:, :, :3], position) + echoes.images[:, :, 3]
-    lengths = np.concatenate([away, np.linalg.norm(position - mirrored, axis=1)])
+    lengths = np.linalg.norm(echoes.apparent(position) - position, axis=2).sum(axis=1)
     return complex(np.sum(echoes.amplitude * np.exp(2j * np.pi * lengths / wavelength)))
 
 

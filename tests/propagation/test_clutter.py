@@ -20,7 +20,7 @@ from radarsim.propagation.clutter import (
     Clutter,
     Cluttered,
 )
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.surface import Surface
 from radarsim.world import shapes
@@ -101,7 +101,7 @@ def test_same_things_from_everywhere():
 
 def test_coherent_under_motion():
     """An echo's phase moves by 2k times the way gone towards its thing, whatever the direction; nothing is redrawn."""
-    found = EchoFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
+    found = PathFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
     step = np.array([0.004, -0.003, 0.002])
     start = np.array([3.0, 0.5, 1.0])
     fields, places = [], []
@@ -127,7 +127,7 @@ def test_hidden_things_are_not_seen():
     }
     scene = room(10.0, **parts)
     things = clutter(scene)
-    found = EchoFinder(scene, things, None, CONFIG, antenna=ISOTROPIC)
+    found = PathFinder(scene, things, None, CONFIG, antenna=ISOTROPIC)
     seen = found(np.array([0.0, 0.0, 1.5]), np.eye(3)).points[:, 0]
     assert len(seen) > 50
     assert seen[:, 0].max() < 2

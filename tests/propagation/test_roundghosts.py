@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.mechanisms import curved_ghosts
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
@@ -85,7 +85,7 @@ def test_a_finder_has_them():
     found = []
     for objects in ([WALL, lamp], [WALL, lamp, board]):
         scene = Scene("lamp", objects)
-        echoes = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(np.zeros(3), np.eye(3))
+        echoes = PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(np.zeros(3), np.eye(3))
         at_image = np.linalg.norm(echoes.points - [2.5, 1.8, 0.1], axis=2) < 0.11
         found.append(at_image.any(axis=1).sum())
     assert found == [3, 0]

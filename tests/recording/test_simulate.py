@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from radarize.errors import InputError
 from radarize.recording import Recording
 from radarsim.motion.planner import plan_motion
-from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.recording import batches
 from radarsim.recording.simulate import simulate
@@ -82,13 +82,13 @@ def test_iq_by_cause_adds_up(tmp_path):
         about = recording.describe("truth/adc_by_cause")["about"]
         count = recording.read("truth/echoes")
     assert parts.shape == (len(adc), len(CAUSES), *adc.shape[1:])
-    assert all(p.name.lower() in about for p in Provenance) and "leakage" in about
+    assert all(p.name.lower() in about for p in PathType) and "leakage" in about
     inside = np.abs(adc).max(axis=-1, keepdims=True) < 32767
     error = (parts.sum(axis=1) - adc) * inside
     # half a count of rounding, and float16's 11 bits of each part
     assert np.sqrt(np.mean(error**2)) < 0.5
     assert np.abs(error).max() < 1 + 2**-10 * np.abs(parts).max()
-    for k in range(len(Provenance)):
+    for k in range(len(PathType)):
         assert np.any(parts[:, k]) == np.any(count[:, k])
 
 

@@ -258,7 +258,7 @@ def test_what_cannot_be_used_is_named(small, tmp_path, change, expected):
 
 def test_recordings_of_two_radars_or_broken_truth_are_refused(tmp_path):
     good = write(tmp_path / "a.h5", "velocity", 5)
-    from walks import walk
+    from tests.training.walks import walk
 
     with pytest.raises(InputError, match="b.h5: has maps of rows 8 instead of 16 as in a.h5, expected one radar's"):
         Table.read([good, walk(tmp_path / "b.h5")], ("doppler_azimuth",), (VELOCITY,))

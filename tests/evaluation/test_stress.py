@@ -3,13 +3,13 @@
 import h5py
 import numpy as np
 import pytest
-from fake_run import write_run
 
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import SOURCES, missed, sources
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, RecordingWriter, Stream
 from radarize.runfolder.reader import Scans
+from tests.evaluation.fake_run import write_run
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
 LABELS = ("direct", "floor_ceiling", "through_slab", "ghost", "moving", "leakage")

@@ -134,7 +134,7 @@ def test_simulate_takes_the_file(tmp_path):
     """From a recording to a front-end file to a recording that calibrates to the same file."""
     settings = FrontEndConfig.of(CONFIG.board, full_scale_dbm=0.0, leakage=Leakage(level_db=-38))
     settings.save(tmp_path / "made.yaml")
-    first = simulate("office", tmp_path / "a.h5", duration=0.3, seed=2, frontend=tmp_path / "made.yaml")
+    first = simulate("office", tmp_path / "a.h5", duration=0.1, seed=2, frontend=tmp_path / "made.yaml")
     found = calibrate(first, tmp_path / "found.yaml").settings
     assert found.full_scale_dbm == pytest.approx(0.0, abs=0.5)
     simulate("office", tmp_path / "b.h5", duration=0.1, seed=2, frontend=tmp_path / "found.yaml")

@@ -62,7 +62,7 @@ def test_every_level_is_worse_than_the_one_before(place):
             assert motion.duration >= task.duration
         assert not crossings(motion.until(task.duration), scene)
         scenario = Scenario(scene, motion, CONFIG, seed=task.seed)
-        frames = scenario.frames(np.arange(1.0, 14.0, 2.0))
+        frames = scenario.frames(np.arange(1.0, 14.0, 4.0))
         cause, true = Ghosts(scenario).observe(frames), PlanarScan(scenario).observe(frames)
         found.append(measure(cause["truth/cause"], true["truth/scan"]))
     assert len(found) == 4 and np.all(np.diff(found) > 0) and found[3] - found[0] > least, found

@@ -104,8 +104,16 @@ def upright(up, direction):
 
 @njit
 def upwards(rotation):
-    """Where the board's upper edge points, of a sensor that is turned so to the world."""
-    return rotation[0, 2], rotation[1, 2], rotation[2, 2]
+    """Where the board's upper edge points, of a sensor that is turned so to the world.
+
+    It leans forward by nothing that matters, so that straight up and down have a field, too: along boresight, as the
+    directions before them have.
+    """
+    lean = 1e-6
+    return (
+        rotation[0, 2] + lean * rotation[0, 0], rotation[1, 2] + lean * rotation[1, 0],
+        rotation[2, 2] + lean * rotation[2, 0],
+    )  # fmt: skip
 
 
 @njit

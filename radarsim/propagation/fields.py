@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from radarsim.propagation.antenna import amplitude_gain
-from radarsim.propagation.coefficients import TABLE
+from radarsim.propagation.coefficients import mirror
 
 
 @njit
@@ -124,20 +124,16 @@ def sent(up, direction):
 
 
 @njit
-def reflected(field, arriving, leaving, normal, reflection):
+def reflected(field, arriving, leaving, normal, layer):
     """A transverse field after a mirror: TE and TM parts times their Fresnel coefficients.
 
     Args:
         field: complex vector.
         arriving, leaving: unit directions of travel.
         normal: of the mirror, on either side.
-        reflection: its table, (TE / TM, cosine).
+        layer: what it is made of (`coefficients.layer`).
     """
-    cosine = min(abs(dot(arriving, normal)), 1.0)
-    at = cosine * (TABLE - 1)
-    j = min(int(at), TABLE - 2)
-    te = reflection[0, j] + (at - j) * (reflection[0, j + 1] - reflection[0, j])
-    tm = reflection[1, j] + (at - j) * (reflection[1, j + 1] - reflection[1, j])
+    te, tm = mirror(layer, min(abs(dot(arriving, normal)), 1.0))
     across = cross(arriving, normal)
     size = length(across)
     if size < 1e-6:

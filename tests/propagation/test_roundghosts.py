@@ -5,7 +5,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.coefficients import TABLE
 from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.finder import EchoFinder
 from radarsim.propagation.mechanisms import curved_ghosts
@@ -15,7 +14,7 @@ from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import conductors, isotropic
+from tests.propagation.rigs import conductors, isotropic, layer
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -89,8 +88,7 @@ def leg_ghosts(bottom, tilt):
     both as the sum of the two orders of floor and leg."""
     half = 0.35 - bottom / 2
     center, turned = np.array([2.0, 0, 0.7 - half]), Rotation.from_euler("y", tilt, degrees=True)
-    gamma = np.broadcast_to(np.array([[-1.0], [1.0]]), (2, TABLE)).astype(complex)
-    leg = RoundBodies.of([(center, turned.apply([0, 0, 1.0]), 0.03, half, gamma)])
+    leg = RoundBodies.of([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
     found = curved_ghosts.find(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, leg))
     points, normals, areas = pole(np.zeros(3), 0.03, 2 * half)
     points, normals = turned.apply(points) + center, turned.apply(normals)

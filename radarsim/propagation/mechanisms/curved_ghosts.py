@@ -115,9 +115,7 @@ def _find(observation, frame, flat, seen, curved, found):
             for j in range(max(i, 1), ways):
                 way = mirrors[i], vec(images[i]), mirrors[j], vec(images[j])
                 place, aim, n, size = _strength(observation, flat, bodies, b, way)
-                count += _add(
-                    observation, frame, flat, way, (place, aim, n, size, bodies.reflection[b]), (found, count)
-                )
+                count += _add(observation, frame, flat, way, (place, aim, n, size, bodies.layer[b]), (found, count))
     for k in range(len(patches.ball)):
         ways = _ways(observation, p, flat, seen, (vec(patches.ball[k]), patches.ball[k, 3]), (mirrors, images))
         for i in range(ways):
@@ -125,7 +123,7 @@ def _find(observation, frame, flat, seen, curved, found):
                 for turn in range(2 if patches.two_sided[k] else 1):
                     of, way = (k, 1.0 - 2.0 * turn), (mirrors[i], vec(images[i]), mirrors[j], vec(images[j]))
                     aim, quadric, place, size = strength(observation, patches, of, way[1], way[3])
-                    echo = place, aim, quadric[2], size, patches.reflection[k]
+                    echo = place, aim, quadric[2], size, patches.layer[k]
                     count += _add(observation, frame, flat, way, echo, (found, count))
     return count
 
@@ -137,11 +135,11 @@ def _add(observation, frame, flat, way, echo, found):
     Args:
         observation, frame, flat: of `_find`.
         way: mirrors and images of the radar out and back.
-        echo: place P, a lit point for rays to aim at, normal, amplitude from image to image, reflection.
+        echo: place P, a lit point for rays to aim at, normal, amplitude from image to image, layer.
         found: ghosts so far, and how many.
     """
     one, source, two, sink = way
-    place, aim, n, size, reflection = echo
+    place, aim, n, size, layer = echo
     ghosts, count = found
     if abs(size) * observation.peak_gain**2 <= observation.threshold:
         return 0
@@ -151,7 +149,7 @@ def _add(observation, frame, flat, way, echo, found):
     value = size * out[1] * back[1]
     if abs(value) <= observation.threshold:
         return 0
-    value *= _polarisation(upwards(observation.rotation[frame]), flat, way, aim, n, reflection)
+    value *= _polarisation(upwards(observation.rotation[frame]), flat, way, aim, n, layer)
     if abs(value) <= observation.threshold:
         return 0
     clear, ways = along(aim, 2e-3, n), 1 if one == two else 2
@@ -282,7 +280,7 @@ def _over(observation, frame, flat, m, source, place):
 
 
 @njit
-def _polarisation(up, flat, way, place, n, reflection):
+def _polarisation(up, flat, way, place, n, layer):
     """Product of the reflection coefficients, an upright field sent and taken.
 
     Directions are those from the images: where the body stands on the mirror, both reflections are at one place.
@@ -290,17 +288,17 @@ def _polarisation(up, flat, way, place, n, reflection):
     Args:
         up: of the board.
         flat, way: mirrors and images of the radar out and back.
-        place, n, reflection: of the body.
+        place, n, layer: of the body.
     """
     one, source, two, sink = way
     there, back = unit(minus(place, source)), unit(minus(sink, place))
     first, last = _turned(flat, one, there), _turned(flat, two, back)
     field = sent(up, first)
     if one >= 0:
-        field = reflected(field, first, there, vec(flat.normal[one]), flat.reflection[one])
-    field = reflected(field, there, back, n, reflection)
+        field = reflected(field, first, there, vec(flat.normal[one]), flat.layer[one])
+    field = reflected(field, there, back, n, layer)
     if two >= 0:
-        field = reflected(field, back, last, vec(flat.normal[two]), flat.reflection[two])
+        field = reflected(field, back, last, vec(flat.normal[two]), flat.layer[two])
     return dot(field, upright(up, last))
 
 

@@ -19,7 +19,7 @@ from radarsim.propagation.clutter import (
     UNDER_CEILINGS,
     Clutter,
 )
-from radarsim.propagation.coefficients import TABLE
+from radarsim.propagation.coefficients import mirror
 from radarsim.propagation.fields import facing
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
@@ -220,27 +220,13 @@ def test_no_surface_gives_more_than_falls_on_it(kind, level):
         source = np.cos(angle) * normal + np.sin(angle) * tangent
         te = np.cross(normal, tangent)
         ends = np.tile(center + 1.0 * source, (2, 1)), np.tile(center - 1.0 * source, (2, 1))
-        gamma_ = at(facets.reflection[0], np.cos(angle))
+        gamma_ = np.array(mirror(facets.layer[0], np.cos(angle)))
         passed = np.mean(np.abs(through.passage(*ends, np.array([te, np.cross(source, te)]))[0]) ** 2)
         diffuse = scattered(surface, normal, source)
         small = scattered(things, normal, source) if len(things) else 0.0
         shares.append(small)
         assert np.mean(np.abs(gamma_) ** 2) + diffuse + small + passed <= 1
         # what is scattered is taken from the mirror, the rough surface and what passes alike
-        taken = 1 - np.mean(np.abs(gamma_) ** 2) / np.mean(np.abs(at(plain.reflection[0], np.cos(angle))) ** 2)
+        taken = 1 - np.mean(np.abs(gamma_) ** 2) / np.mean(np.abs(np.array(mirror(plain.layer[0], np.cos(angle)))) ** 2)
         assert small == pytest.approx(taken, rel=4 * spread / np.sqrt(max(len(things), 1)))
     assert np.ptp(shares) < 0.01 * max(shares) + 1e-9
-
-
-def at(table, cosine):
-    """A table of coefficients at the nearest cosine."""
-    return table[:, round(cosine * (TABLE - 1))]
-
-
-@pytest.mark.parametrize(("kind", "decibel"), [("wall", -0.4), ("desk", -1.2), ("floor", -0.1), ("ceiling", -0.3)])
-def test_mean_return_at_45_degrees(kind, decibel):
-    """At level 1 a square metre returns 0.1 m^2 a thing at 45 deg, less what stands in the shadow of others."""
-    things = everything(clutter(lone(kind, 1.0), 3))
-    cosine = np.cos(np.pi / 4)
-    returned = np.sum(things.sigma * scattering(cosine, cosine, 1.0, things.lobe[0])) / SIDE**2
-    assert 10 * np.log10(returned / (0.1 * KINDS[kind][3])) == pytest.approx(decibel, abs=0.3)

@@ -29,6 +29,8 @@ SPECIFICATION = {
     "recordings": [{"building": "office", "platform": "cart", "count": 2, "duration": 0.5}],
 }
 EPOCHS = 4
+#: s that a capture lives once its file is there.
+LIVES = 1.5, 6.0
 
 
 @dataclass(frozen=True)
@@ -117,7 +119,7 @@ def captures(kills: int, folder: Path, rng: np.random.Generator) -> dict[str, ob
             while not part.exists() and process.poll() is None:
                 time.sleep(0.005)
             first = time.time()
-            time.sleep(float(rng.uniform(1.5, 6.0)))
+            time.sleep(float(rng.uniform(*LIVES)))
             os.killpg(process.pid, signal.SIGKILL)
             end = time.time()
             process.wait()
@@ -182,7 +184,8 @@ def main(options: argparse.Namespace) -> Page:
         notes=[
             "SIGKILL to the command and all that it has started, at moments drawn evenly from the time that it takes "
             "with warm kernels; then it is begun again. Where it comes to its end first, it begins anew in another "
-            "folder; after the last kill it is let through. A capture is killed 1.5-6 s after its file is there; "
+            "folder; after the last kill it is let through. A capture is killed "
+            f"{LIVES[0]:g}-{LIVES[1]:g} s after its file is there; "
             "frames lost are those from then on that the rescued recording lacks.",
             "Compared are bytes: of all recordings, of trajectories and map, of the trained network; and the figures "
             "of the benchmark's table.",

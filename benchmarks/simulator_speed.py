@@ -35,7 +35,7 @@ def pace(scenario: Scenario, times: np.ndarray) -> tuple[float, float, float]:
     spent, counts = [], []
     for batch in np.split(times, range(TOGETHER, len(times), TOGETHER)):
         frames = scenario.frames(batch)
-        echoes, finding = timed(getattr, frames, "echoes")
+        echoes, finding = timed(getattr, frames, "paths")
         _, rest = timed(getattr, frames, "samples")
         spent.append(((finding + rest) / len(batch), finding / len(batch)))
         counts += map(len, echoes)
@@ -59,7 +59,7 @@ def summed(scenario: Scenario, times: np.ndarray) -> tuple[float, float]:
     """The direct sum of the same echoes: median s per frame, and the fast synthesis' worst error power, dB."""
     seconds, errors = [], []
     for t in times:
-        (present,) = scenario.frames([t]).echoes
+        (present,) = scenario.frames([t]).paths
         beat = present.lengths(CONFIG, scenario.motion, t), present.amplitude
         truth, spent = timed(direct_sum, CONFIG, *beat)
         seconds.append(spent)
@@ -119,7 +119,7 @@ def main(options: argparse.Namespace) -> Page:
         frames = other.frames(np.array([t]))
         _, took = timed(getattr, frames, "samples")
         spent.append(took)
-        counts.append(len(frames.echoes[0]))
+        counts.append(len(frames.paths[0]))
     ways.append((f"{first}: paths of Sionna RT", np.median(spent), np.mean(counts), "int16 I/Q with noise"))
 
     notes += [

@@ -35,7 +35,7 @@ DEPTH = 3
 
 @dataclass(frozen=True)
 class Paths:
-    """The paths of a frame, in place of `Echoes`.
+    """The paths of a frame, in place of `radarsim.propagation.paths.Paths`.
 
     Attributes:
         length: out and back, between the centres of the arrays in the middle of the burst, m.
@@ -55,7 +55,7 @@ class Paths:
         return len(self.amplitude)
 
     def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "path virtual 3"]:
-        """Path lengths over the burst, as `Echoes.lengths`: shorter by what an antenna moves along the path."""
+        """Path lengths over the burst, as `Paths.lengths`: shorter by what an antenna moves along the path."""
         times = time + BurstClock.of(config).nodes
         position, rotation = motion.position(times), motion.rotation(times).as_matrix()
         tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1) - self.tx_center
@@ -67,13 +67,13 @@ class Paths:
 
 
 class PathSolverFinder:
-    """Finds paths as `EchoFinder` finds echoes.
+    """Finds paths as `PathFinder` does.
 
     Args:
         scene: the world.
         config: radar configuration.
         weakest: paths below this amplitude are left out.
-        antenna: the elements' pattern; default: the IWR1843BOOST's.
+        antenna: the elements' pattern; default: the board's.
         seed: of Sionna's samples.
     """
 
@@ -81,7 +81,7 @@ class PathSolverFinder:
         self, scene: Scene, config: RadarConfig, weakest: float = 0.0, antenna: Antenna | None = None, seed: int = 0
     ):
         self.scene, self.config, self.weakest, self.seed = scene, config, weakest, seed
-        self._pattern = gain_pattern(antenna)
+        self._pattern = gain_pattern(antenna or Antenna.of(config.board))
         world = scene.sionna  # before the import: it looks for LLVM
         import sionna.rt as rt
 

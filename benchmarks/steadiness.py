@@ -18,8 +18,8 @@ from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.motion.walk import Walk
 from radarsim.propagation import fresnelzone
-from radarsim.propagation.echoes import Echoes
 from radarsim.propagation.fresnelzone import Lattice
+from radarsim.propagation.paths import Paths
 from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
@@ -37,7 +37,7 @@ DENSE = {
 TONES = CONFIG.center_frequency + CONFIG.bandwidth * np.linspace(-0.5, 0.5, 9)
 
 
-def field(echoes: Echoes, scenario: Scenario, time: float) -> Complex[np.ndarray, "virtual tone"]:
+def field(echoes: Paths, scenario: Scenario, time: float) -> Complex[np.ndarray, "virtual tone"]:
     """What the antennas receive of echoes at the middle of the frame that starts then, over the sweep."""
     paths = echoes.lengths(CONFIG, scenario.motion, time)[:, :, 0]
     cycles = paths[..., None] * TONES / SPEED_OF_LIGHT
@@ -49,7 +49,7 @@ def changes(scenario: Scenario, times: Float[np.ndarray, "frame"]) -> Float[np.n
     found: list[float] = []
     for first in range(0, len(times) - 1, TOGETHER - 1):
         some = times[first : first + TOGETHER]
-        frames = scenario.frames(some).echoes
+        frames = scenario.frames(some).paths
         for before, after, time in zip(frames, frames[1:], some[1:], strict=False):
             expected, there = field(before, scenario, time), field(after, scenario, time)
             power = np.sum(np.abs(there - expected) ** 2) / np.sum(np.abs(expected) ** 2)

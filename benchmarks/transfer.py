@@ -47,7 +47,7 @@ def simulated(
     maker, parts = MapMaker(config), []
     for number, (scene, stays) in enumerate(scenes.values()):
         for second, motion in enumerate(stays):  # people move on meanwhile
-            scenario = Scenario(scene, motion, config, board or FrontEndConfig(), seed + number)
+            scenario = Scenario(scene, motion, config, board, seed + number)
             parts.append(maker(scenario.frames([second + 0.25]).samples))
     return {name: np.concatenate([part[name] for part in parts]) for name in maker.names}
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.references.rigs import polar
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.importers.parameters import Given
@@ -28,7 +29,6 @@ from radarsim.receiver.phasenoise import density
 from radarsim.recording.simulate import simulate
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import polar
 
 PRESET = PRESETS["radarize"]
 MEASURED = tuple((float(k), 0.5) for k in range(12))

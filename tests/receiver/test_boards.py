@@ -247,6 +247,7 @@ def test_a_front_end_file_changes_fields_of_the_boards(tmp_path):
         ("rx_sign: [-1, 1", "rx_sign: [-2, 1", "rx_sign.0 is -2"),
         ("chip:", "chips: iwr6843\nchip:", "chips"),
         (OWN, "[1, 2]", "holds a list"),
+        ("front_end:", "front_end:\n  2026-01-01: 3", "front_end is {"),
         ("design_frequency: 61.0e+9", "design_frequency: 61", "design_frequency is 61"),
     ],
 )

@@ -35,7 +35,7 @@ DEPTH = 3
 
 @dataclass(frozen=True)
 class Paths:
-    """The paths of a frame, in place of `Echoes`.
+    """The paths of a frame, in place of `radarsim.propagation.paths.Paths`.
 
     Attributes:
         length: out and back, between the centres of the arrays in the middle of the burst, m.
@@ -55,7 +55,7 @@ class Paths:
         return len(self.amplitude)
 
     def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "path virtual 3"]:
-        """Path lengths over the burst, as `Echoes.lengths`: shorter by what an antenna moves along the path."""
+        """Path lengths over the burst, as `Paths.lengths`: shorter by what an antenna moves along the path."""
         times = time + BurstClock.of(config).nodes
         position, rotation = motion.position(times), motion.rotation(times).as_matrix()
         tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1) - self.tx_center
@@ -67,7 +67,7 @@ class Paths:
 
 
 class PathSolverFinder:
-    """Finds paths as `EchoFinder` finds echoes.
+    """Finds paths as `PathFinder` does.
 
     Args:
         scene: the world.

@@ -42,7 +42,7 @@ def simulate(
         str,
         typer.Option(
             help="Also record, comma-separated: depth, occupancy, tracking, imu, points, ghosts, or all; and "
-            "adc-by-cause, I/Q split by cause, before noise (a much larger file)."
+            "paths, every path above the noise; adc-by-cause, I/Q split by path type, before noise (much larger files)."
         ),
     ] = "",
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,

@@ -122,10 +122,10 @@ def band_edge(profile: Float[np.ndarray, "sample"]) -> tuple[Band, float]:
     best, least = Band(), np.inf
     for flat in np.arange(0.8, 1.0, 0.005):
         for high in np.arange(max(flat, 0.98) + 0.02, 1.5, 0.02):
-            model = 20 * np.log10(np.interp(x[upper], [flat, high], [1.0, 0.0]))
-            misfit = np.mean(np.abs(model - measured))
+            band = Band(flat=round(float(flat), 3), high=round(float(high), 3))
+            misfit = np.mean(np.abs(10 * np.log10(band.noise(x[upper])) - measured))
             if misfit < least:
-                best, least = Band(flat=round(float(flat), 3), high=round(float(high), 3)), misfit
+                best, least = band, misfit
     return best, fall
 
 

@@ -127,9 +127,7 @@ class FrontEnd:
 
     def _decimation(self, beat: np.ndarray) -> np.ndarray:
         band = self.settings.band
-        if band is None:
-            return np.ones(np.shape(beat))
-        return np.interp(beat / self.config.sample_rate, [band.low, 0.0, band.flat, band.high], [0.0, 1.0, 1.0, 0.0])
+        return np.ones(np.shape(beat)) if band is None else band.response(beat / self.config.sample_rate)
 
     # --- the chain ---------------------------------------------------------------------------------------------------
     def digitize(
@@ -202,12 +200,13 @@ class FrontEnd:
         return (amplitude[:, :, None] * tone).astype(np.complex64)
 
     def _thermal(self, shape: tuple[int, ...], rng: np.random.Generator) -> Complex[np.ndarray, "loop tx rx sample"]:
-        """Thermal noise by bin, coloured by the decimation filter."""
+        """Thermal noise by bin, coloured by the decimation filter; without one, that of a sample rate's width."""
         if not self.settings.noise:
             return np.zeros(shape, np.complex64)
-        level = np.sqrt(self._bin_noise / 2) * self._decimation(self._bins)
+        band, x = self.settings.band, self._bins / self.config.sample_rate
+        level = np.sqrt(self._bin_noise / 2 * (1.0 if band is None else band.noise(x)))
         draw = rng.standard_normal((*shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
-        return draw * level.astype(np.float32)
+        return draw * np.float32(level)
 
     def _image(self, bins: Complex[np.ndarray, "*trace sample"]) -> Complex[np.ndarray, "*trace sample"]:
         """Image of bin b at -b, as far as the decimation filter lets it through; bin -b is bin N - b."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from jaxtyping import Float
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from radarize.errors import InputError
@@ -118,6 +119,15 @@ class Band(_Strict):
         if self.high <= self.flat:
             raise ValueError(f"high is {self.high}, expected above flat = {self.flat}")
         return self
+
+    def response(self, x: Float[np.ndarray, "*n"] | float) -> Float[np.ndarray, "*n"] | float:
+        """Amplitude response at beat frequencies as fractions of the sample rate."""
+        return np.interp(x, [self.low, 0.0, self.flat, self.high], [0.0, 1.0, 1.0, 0.0])
+
+    def noise(self, x: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+        """Power of white noise that is sampled behind the filter, over what it is before: all aliases add up."""
+        aliases = np.arange(np.floor(self.low) - 1, np.ceil(self.high) + 1)
+        return np.sum(self.response(np.add.outer(aliases, x)) ** 2, axis=0)
 
 
 class FrontEndConfig(_Strict):

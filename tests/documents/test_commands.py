@@ -19,9 +19,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from given import ALL, DATASETS, GIVEN, SECONDS, STUDIO, specification
-from pages import FIRST, PAGES, ROOT, THEN, Command, commands
 
+from tests.documents.given import ALL, DATASETS, GIVEN, SECONDS, STUDIO, specification
+from tests.documents.pages import FIRST, PAGES, ROOT, THEN, Command, commands
 from tests.virtual import free_ports
 
 WALK = f"--duration {SECONDS}"

@@ -6,7 +6,7 @@ import pytest
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import Band, FrontEndConfig
@@ -17,7 +17,7 @@ HERE = np.zeros(3)
 
 
 def point_echoes(place, sigma=1.0):
-    return EchoFinder(None, Scatterers.points(place, np.full(len(np.atleast_2d(place)), sigma)), None, CONFIG)(
+    return PathFinder(None, Scatterers.points(place, np.full(len(np.atleast_2d(place)), sigma)), None, CONFIG)(
         HERE, np.eye(3)
     )
 
@@ -59,7 +59,7 @@ def test_doppler_of_a_lever_arm(rate):
     """Turning about a point 0.4 m behind the sensor moves it sideways at omega x r, left for a left turn."""
     rig = Rig(yaw_rate=rate, yaw=-rate * CONFIG.burst_center, lever=(0.4, 0, 0))
     place = np.array([0.4, 0, 0]) + polar(3.0, 40)
-    finder = EchoFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)
+    finder = PathFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)
     signal = burst(CONFIG, finder(np.array([0.4, 0, 0]), np.eye(3)), rig)
     truth = 0.4 * rate * np.sin(np.deg2rad(40))
     *_, speed, _ = locate(CONFIG, signal, (3.0, np.deg2rad(40), 0.0, truth))

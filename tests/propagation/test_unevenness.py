@@ -5,7 +5,7 @@ import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.unevenness import SCALES, Heights
@@ -105,7 +105,7 @@ def test_heights_are_as_rough_as_they_say():
 
 def finder(scene):
     field = Heights.of(scene, np.random.default_rng(0))
-    return EchoFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG, field), CONFIG, antenna=ISOTROPIC)
+    return PathFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG, field), CONFIG, antenna=ISOTROPIC)
 
 
 def flash(scene, place):

@@ -20,7 +20,7 @@ from radarsim.dataset.variant import Variant
 from radarsim.emulator.simulation import Simulation
 from radarsim.motion.trajectory import Motion
 from radarsim.motion.walk import Walk
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import FrontEndConfig
@@ -224,7 +224,7 @@ def test_echoes_of_the_aop_have_its_gain(azimuth, elevation, loss):
     """The radar equation with 5 dBi, and 6 dB less either way at the edge of the field of view."""
     config = radar("iwr6843aop")
     point = Scatterers.points(polar(2.0, azimuth, elevation)[None], np.array([0.5]))
-    power = np.abs(EchoFinder(None, point, None, config)(np.zeros(3), np.eye(3)).amplitude[0]) ** 2
+    power = np.abs(PathFinder(None, point, None, config)(np.zeros(3), np.eye(3)).amplitude[0]) ** 2
     gain = 10 ** ((5.0 - loss) / 10)
     law = gain**2 * config.wavelength**2 * 0.5 / ((4 * np.pi) ** 3 * 2.0**4)
     assert 10 * np.log10(power / law) == pytest.approx(0, abs=0.05)

@@ -6,7 +6,7 @@ import pytest
 from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.calibrate import calibrate
 from radarsim.receiver.frontend import FrontEnd
@@ -26,7 +26,7 @@ def record(path, settings, board, config=CONFIG, velocity=(0, 0, 0), targets=((2
     sigma = np.array([0.3, 0.3][: len(targets)] + [1e-6] * 200)
     scatterers = Scatterers.points(np.array(place), sigma, rng.uniform(0, 2 * np.pi, len(place)))
     front, rig = FrontEnd(config, settings, np.random.default_rng(board)), Rig(velocity=velocity)
-    finder, synthesize = EchoFinder(None, scatterers, None, config), Synthesizer(config)
+    finder, synthesize = PathFinder(None, scatterers, None, config), Synthesizer(config)
     with RecordingWriter(path, config) as writer:
         for k in range(4):
             time = k * config.frame_period
@@ -134,7 +134,7 @@ def test_simulate_takes_the_file(tmp_path):
     """From a recording to a front-end file to a recording that calibrates to the same file."""
     settings = FrontEndConfig.of(CONFIG.board, full_scale_dbm=0.0, leakage=Leakage(level_db=-38))
     settings.save(tmp_path / "made.yaml")
-    first = simulate("office", tmp_path / "a.h5", duration=0.3, seed=2, frontend=tmp_path / "made.yaml")
+    first = simulate("office", tmp_path / "a.h5", duration=0.1, seed=2, frontend=tmp_path / "made.yaml")
     found = calibrate(first, tmp_path / "found.yaml").settings
     assert found.full_scale_dbm == pytest.approx(0.0, abs=0.5)
     simulate("office", tmp_path / "b.h5", duration=0.1, seed=2, frontend=tmp_path / "found.yaml")

@@ -59,6 +59,18 @@ def test_noise_figure_of_one_measurement_holds_for_every_gain():
     assert db(settings.noise_factor(24)) == db(settings.noise_factor(48)) == pytest.approx(13.0)
 
 
+@pytest.mark.parametrize("band", [Band(), Band(low=-0.3, flat=0.8, high=1.4)], ids=["default", "wide"])
+def test_noise_folds_as_echoes_do(band):
+    """Its spectrum is that of white noise of the same density at eight times the rate, filtered and decimated."""
+    front = FrontEnd(CONFIG, FrontEndConfig.ideal(noise=True, band=band))
+    found = sum(power_by_bin(front.receive(np.zeros(SHAPE, np.complex64), np.random.default_rng(k))) for k in range(8))
+    white = rng().normal(size=(3000, 8 * N, 2)).view(complex)[..., 0] * np.sqrt(front._bin_noise * N / 2 * 8)
+    beat = np.fft.fftfreq(8 * N, 1 / (8 * CONFIG.sample_rate))
+    sampled = np.fft.ifft(np.fft.fft(white) * front.beat_response(beat))[:, ::8]
+    truth = power_by_bin(sampled[:, None, None])
+    assert db(found / 8 / truth) == pytest.approx(np.zeros(N), abs=0.5)
+
+
 # --- converter -------------------------------------------------------------------------------------------------------
 @pytest.mark.parametrize("bits", [8, 10, 12])
 def test_quantisation_noise(bits):

@@ -57,7 +57,7 @@ class RoundBodies(Table):
     axis: Float[np.ndarray, "body 3"]
     radius: Float[np.ndarray, "body"]
     half: Float[np.ndarray, "body"]
-    layer: Complex[np.ndarray, "body 4"]
+    layer: Complex[np.ndarray, "body 5"]
 
     @classmethod
     def of(cls, rows: list[tuple]) -> "RoundBodies":

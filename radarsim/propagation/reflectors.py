@@ -46,7 +46,7 @@ class Flat(Table):
     half: Float[np.ndarray, "facet 2"]
     two_sided: Bool[np.ndarray, "facet"]
     horizontal: Bool[np.ndarray, "facet"]
-    layer: Complex[np.ndarray, "facet 4"]
+    layer: Complex[np.ndarray, "facet 5"]
     lag: Float[np.ndarray, "facet"]
     finish: Float[np.ndarray, "facet"]
     plate: Int[np.ndarray, "facet"]

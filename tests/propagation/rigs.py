@@ -38,7 +38,7 @@ class Rig:
 def layer(gamma=-1.0):
     """A half space that reflects so, head on (TE); a conductor for -1."""
     eps = complex(1, -np.inf) if gamma == -1 else ((1 - gamma) / (1 + gamma)) ** 2
-    return np.array([eps, 0, 0, gamma], complex)
+    return np.array([eps, 0, 0, gamma, 1], complex)
 
 
 def conductors(*plates, gamma=-1.0):

@@ -230,3 +230,12 @@ def test_no_surface_gives_more_than_falls_on_it(kind, level):
         taken = 1 - np.mean(np.abs(gamma_) ** 2) / np.mean(np.abs(np.array(mirror(plain.layer[0], np.cos(angle)))) ** 2)
         assert small == pytest.approx(taken, rel=4 * spread / np.sqrt(max(len(things), 1)))
     assert np.ptp(shares) < 0.01 * max(shares) + 1e-9
+
+
+@pytest.mark.parametrize(("kind", "decibel"), [("wall", -0.4), ("desk", -1.2), ("floor", -0.1), ("ceiling", -0.3)])
+def test_mean_return_at_45_degrees(kind, decibel):
+    """At level 1 a square metre returns 0.1 m^2 a thing at 45 deg, less what stands in the shadow of others."""
+    things = everything(clutter(lone(kind, 1.0), 3))
+    cosine = np.cos(np.pi / 4)
+    returned = np.sum(things.sigma * scattering(cosine, cosine, 1.0, things.lobe[0])) / SIDE**2
+    assert 10 * np.log10(returned / (0.1 * KINDS[kind][3])) == pytest.approx(decibel, abs=0.3)

@@ -129,6 +129,7 @@ def test_a_board_outside_the_package_in_a_recording(own, tmp_path):
     own.unlink()
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.config == config and str(recording.config.board) == "mine"
+        assert hash(recording.config) == hash(config)  # functions of a radar are cached
         assert found(recording.config, recording.adc(0, 1))[1:] == pytest.approx((20, 12), abs=2)
 
 

@@ -5,8 +5,7 @@ import numpy as np
 from benchmarks.gallery.drawing import AHEAD, CONFIG, HERE, LAMBDA, THEORY, compare, target, walls_of
 from radarize.radar.array import virtual_positions
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
@@ -95,10 +94,10 @@ def small_mirrors(axis) -> str:
     for side in sides:
         board = SceneObject("board", shapes.rectangle((1.5, 1.0, 0), (side, side), (0, -1, 0)), MATERIALS["metal"])
         scene = Scene("mirror", [board])
-        finder = EchoFinder(
+        finder = PathFinder(
             scene, Scatterers.points(place, np.ones(1)), Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC
         )
-        found.append(2 * db(abs(finder(HERE, AHEAD).of(Provenance.GHOST_1).amplitude[0])))
+        found.append(2 * db(abs(finder(HERE, AHEAD).where(bounces=1, through=False, moving=False).amplitude[0])))
         theory.append(2 * db(straight * abs(kirchhoff_mirror((side / 2, side / 2), place, LAMBDA))))
     worst = compare(axis, sides, np.array(theory), np.array(found))
     return (

@@ -16,7 +16,7 @@ from benchmarks.gallery.drawing import (
 from radarize.heatmaps import Heatmaps
 from radarsim.propagation.antenna import ISOTROPIC, gain_pattern
 from radarsim.propagation.coefficients import layer, mirror, sweep_share, window
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
@@ -117,7 +117,7 @@ def hollow_wall(axis) -> str:
 def phantom(axis) -> str:
     """A metal door mirrors a target, so it appears a second time behind the door. Range-azimuth map of all echoes."""
     scene, place = Scene("door", [DOOR]), np.array([0.6, 0.55, 0.0])
-    finder = EchoFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Reflectors.of(scene, CONFIG), CONFIG)
+    finder = PathFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Reflectors.of(scene, CONFIG), CONFIG)
     maps, signal = Heatmaps(CONFIG), burst(CONFIG, finder(HERE, AHEAD), Rig())
     signal *= 20000 / np.abs(signal).max()
     power = maps.range_azimuth(np.rint(np.stack([signal.real, signal.imag], axis=-1)).astype(np.int16)[None])[0].numpy()

@@ -18,7 +18,7 @@ brackets have positive real parts.
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Complex
+from jaxtyping import Complex, Float
 from numba import njit
 
 from radarize.radar.config import RadarConfig
@@ -26,8 +26,9 @@ from radarsim.world.materials import Material
 from radarsim.world.objects import SceneObject
 
 #: Columns of a layer: permittivity (-inf j: conductor), electric thickness k d (0: opaque half space), the exponent by
-#: which roughness weakens what it mirrors head on, and the coefficient of that as in the beat signal.
-LAYER, HEAD_ON = 4, 3
+#: which roughness weakens what it mirrors head on, the coefficient of that as in the beat signal, and the share of the
+#: amplitude that small objects before it leave (`clutter.uncovered`).
+LAYER, HEAD_ON, UNCOVERED = 5, 3, 4
 #: Closed bodies up to this mean thickness (m) are one homogeneous slab: door leaves, table tops.
 THICKEST_BODY = 0.05
 
@@ -44,20 +45,28 @@ def as_slab(item: SceneObject) -> tuple[Material, bool]:
     return item.material, False
 
 
-def layer(material: Material, config: RadarConfig) -> Complex[np.ndarray, "4"]:
+def layer(material: Material, config: RadarConfig) -> Complex[np.ndarray, "5"]:
     """What `mirror` and `window` take of a material as thick as it acts."""
     frequency, wavenumber = config.center_frequency, 2 * np.pi / config.wavelength
     found = np.empty(LAYER, complex)
     found[0], found[1] = material.permittivity_at(frequency), wavenumber * (material.thickness or 0.0)
     found[2] = -np.log(material.coherent_factor(np.ones(1), frequency)[0])
+    found[UNCOVERED] = 1.0
     found[HEAD_ON] = mirror(found, 1.0)[0]
+    return found
+
+
+def covered(layers: Complex[np.ndarray, "*n 5"], left: Float[np.ndarray, "*#n"] | float) -> Complex[np.ndarray, "*n 5"]:
+    """Layers of whose reflection small objects leave a share of the amplitude."""
+    found = layers.copy()
+    found[..., HEAD_ON:] = layers[..., HEAD_ON:] * left
     return found
 
 
 @njit(cache=True)
 def mirror(layer, cosine):
     """What a layer mirrors of TE and TM at a cosine of incidence, roughness included, as in the beat signal."""
-    left = np.exp(-layer[2].real * cosine * cosine)
+    left = layer[UNCOVERED].real * np.exp(-layer[2].real * cosine * cosine)
     if np.isinf(layer[0].imag):
         return -left + 0j, left + 0j
     te, tm, root = _half_space(layer[0], cosine)

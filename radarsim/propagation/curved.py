@@ -57,7 +57,7 @@ class RoundBodies(Table):
     axis: Float[np.ndarray, "body 3"]
     radius: Float[np.ndarray, "body"]
     half: Float[np.ndarray, "body"]
-    layer: Complex[np.ndarray, "body 4"]
+    layer: Complex[np.ndarray, "body 5"]
 
     @classmethod
     def of(cls, rows: list[tuple]) -> "RoundBodies":
@@ -142,6 +142,18 @@ def path_over(shape, one, two):
     if shape[0] == LINE:
         return length(minus(one, mirrored(two, place, n)))
     return length(minus(one, place)) + length(minus(two, place))
+
+
+@njit
+def facing_point(shape, place):
+    """The point of a curved surface that faces a place, m."""
+    pivot, axis, radius = vec(shape[1:4]), vec(shape[4:7]), shape[7]
+    if shape[0] == QUADRIC:
+        return stationary((pivot, axis, vec(shape[8:11]), shape[11], shape[12]), place, place)[0]
+    a = minus(place, pivot)
+    height = dot(a, axis)
+    foot = moved(pivot, height, axis) if shape[0] == LINE else pivot
+    return moved(foot, radius, unit(moved(a, -height, axis)))
 
 
 @njit

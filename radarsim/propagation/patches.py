@@ -63,10 +63,10 @@ class Patches(NamedTuple):
     begin: Int[np.ndarray, "piece+1 3"]
     ball: Float[np.ndarray, "piece 4"]
     two_sided: Bool[np.ndarray, "piece"]
-    layer: Complex[np.ndarray, "piece 4"]
+    layer: Complex[np.ndarray, "piece 5"]
 
     @classmethod
-    def of(cls, rows: list[tuple[Piece, bool, Complex[np.ndarray, "4"]]]) -> "Patches":
+    def of(cls, rows: list[tuple[Piece, bool, Complex[np.ndarray, "5"]]]) -> "Patches":
         """All of some pieces, each with whether it shows both sides and how it reflects."""
         pieces = [row[0] for row in rows]
         sizes = [(len(p.place), len(p.faces), len(p.border)) for p in pieces]

@@ -1,6 +1,6 @@
 """What reflects like a mirror: the flat parts of a scene, each with its aperture, and its round bodies."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,7 +8,8 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.bodies import recognise
-from radarsim.propagation.coefficients import LAYER, as_slab, lag, layer
+from radarsim.propagation.clutter import uncovered
+from radarsim.propagation.coefficients import LAYER, as_slab, covered, lag, layer
 from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.hashgrid import Grid
 from radarsim.propagation.patches import Patches
@@ -30,7 +31,7 @@ class Flat(Table):
         half: half the rectangle's side lengths along u and v, m.
         two_sided: sheets without a volume show both sides.
         horizontal: part of a floor or ceiling.
-        layer: what they are made of (`coefficients.layer`).
+        layer: what they are made of (`coefficients.layer`), and how much of it small objects leave uncovered.
         lag: how much later than its face the head-on echo comes, m (`coefficients.lag`).
         finish: how uneven they are over plaster, see `unevenness.FINISHES`.
         plate, frame: the moving plate that they belong to (`movingplates`), and the frame in which they stand so;
@@ -45,7 +46,7 @@ class Flat(Table):
     half: Float[np.ndarray, "facet 2"]
     two_sided: Bool[np.ndarray, "facet"]
     horizontal: Bool[np.ndarray, "facet"]
-    layer: Complex[np.ndarray, "facet 4"]
+    layer: Complex[np.ndarray, "facet 5"]
     lag: Float[np.ndarray, "facet"]
     finish: Float[np.ndarray, "facet"]
     plate: Int[np.ndarray, "facet"]
@@ -100,17 +101,20 @@ class Reflectors:
         """The reflectors of a scene."""
         flat, inner, bodies, smooth = [], [], [], []
         tables: dict[Material, tuple[np.ndarray, float]] = {}
-        for item in scene.objects:
+        left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
+        for number, item in enumerate(scene.objects):
             slab, whole = as_slab(item)
             if slab not in tables:
                 tables[slab] = layer(slab, config), lag(slab, config)
             made_of, late = tables[slab]
             round_, is_round = recognise(item.mesh)
             finish = FINISHES.get(item.material.name, 0.0)
-            bodies += [(b.center, b.axis, b.radius, b.half, made_of) for b in round_]
             # physical optics holds down to about a wavelength
             curved, is_curved = pieces(item.mesh, ~is_round, config.wavelength**2)
-            smooth += [(piece, item.two_sided, made_of) for piece in curved]
+            # a body has one table, and nowhere more energy than falls on it
+            bent = covered(made_of, left[scene.triangle_object == number].min(where=is_round | is_curved, initial=1.0))
+            bodies += [(b.center, b.axis, b.radius, b.half, bent) for b in round_]
+            smooth += [(piece, item.two_sided, bent) for piece in curved]
             found = plates(item.mesh, ~(is_round | is_curved), config.wavelength**2)
             hollow = slab.thickness is not None and not (whole or item.two_sided)
             middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
@@ -122,7 +126,10 @@ class Reflectors:
                     inwards = -slab.thickness * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
-        return cls(_table(flat), RoundBodies.of(bodies), _table(inner), Patches.of(smooth), heights)
+        outer = _table(flat)
+        seen = np.sqrt(uncovered(scene, outer.corners.mean(axis=1), outer.normal))
+        outer = replace(outer, layer=covered(outer.layer, seen[:, None]))
+        return cls(outer, RoundBodies.of(bodies), _table(inner), Patches.of(smooth), heights)
 
 
 def _table(rows: list[tuple]) -> Flat:

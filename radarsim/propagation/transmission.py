@@ -5,6 +5,7 @@ from jaxtyping import Complex, Float
 from numba import njit
 
 from radarize.radar.config import RadarConfig
+from radarsim.propagation.clutter import uncovered
 from radarsim.propagation.coefficients import LAYER, as_slab, layer, sweep_share, window
 from radarsim.propagation.fields import cross, dot, unit, upright
 from radarsim.propagation.fields import vector as vec
@@ -35,6 +36,8 @@ class Transmission:
         self._layer, self._body = np.array(self._layer), np.array(self._body)
         self._layers = np.array([row for _, row in layers.values()]).reshape(-1, LAYER)
         self._share = sweep_share(config)
+        #: what small objects on a face leave of the amplitude
+        self._left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
 
     def passage(
         self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], up: Float[np.ndarray, "n 3"]
@@ -64,6 +67,7 @@ class Transmission:
             passes = leaving | ((self._layer[item] >= 0) & (slabs[w] <= MOST_SLABS))
             factor[w[~passes]] = 0
             w, at, triangle, item, leaving = (x[passes] for x in (w, at, triangle, item, leaving))
+            factor[w] *= self._left[triangle]
             n = ~leaving
             slab = self._layers[self._layer[item[n]]]
             gain, extra = _through(slab, way[w[n]], self.scene.normals[triangle[n]], up[w[n]], self._share)

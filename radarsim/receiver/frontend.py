@@ -16,15 +16,13 @@ import numpy as np
 import scipy.fft
 from jaxtyping import Complex, Float, Int16
 
-from radarize.radar.array import BOARDS
+from radarize.radar.boards import load_board
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.receiver.phasenoise import Skirts
 
 BOLTZMANN = 1.380649e-23
 ROOM_TEMPERATURE = 290.0
-#: Hz, of the IF amplifier (SWRS228): as far as the receiver hears where no decimation filter closes before.
-_IF_BANDWIDTH = 10e6
 
 
 class FrontEnd:
@@ -32,7 +30,7 @@ class FrontEnd:
 
     Args:
         config: radar configuration; gives receive gain, transmit back-off, filter corners, sample rate.
-        settings: what the front end is made of; default: an IWR1843BOOST's.
+        settings: what the front end is made of; default: what the board's file says.
         rng: draws what stays the same for a board: mismatch, phases of the leakage. Default: board number 0.
 
     Attributes:
@@ -49,11 +47,11 @@ class FrontEnd:
         settings: FrontEndConfig | None = None,
         rng: np.random.Generator | None = None,
     ):
-        self.config, self.settings = config, settings or FrontEndConfig()
+        self.config, self.settings = config, settings or FrontEndConfig.of(config.board)
         rng = np.random.default_rng(0) if rng is None else rng
         enabled = np.ix_(config.tx, config.rx)
         # Some boards feed receivers from the far side of the patch.
-        self.channel = (self._draw_channel(rng) * BOARDS[config.board].rx_sign)[enabled]
+        self.channel = (self._draw_channel(rng) * load_board(config.board).rx_sign)[enabled]
         self.leakage = self._draw_leakage(rng)[enabled]
         self._bins = np.arange(config.samples) * config.sample_rate / config.samples
         self._skirts = None
@@ -112,8 +110,8 @@ class FrontEnd:
     @property
     def passband(self) -> tuple[float, float]:
         """Beat frequencies between which anything passes, Hz."""
-        band, rate = self.settings.band, self.config.sample_rate
-        return (-_IF_BANDWIDTH, _IF_BANDWIDTH) if band is None else (band.low * rate, band.high * rate)
+        band, rate, edge = self.settings.band, self.config.sample_rate, self.settings.if_bandwidth_hz
+        return (-edge, edge) if band is None else (band.low * rate, band.high * rate)
 
     def if_response(self, path_length: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"] | complex:
         """Response of the IF chain to an echo of a path length (out and back, m)."""

@@ -70,7 +70,7 @@ class Batches:
             InputError: the recording is to begin with them, and none of its frames has an echo.
         """
         frames = self.frames(first, last)
-        if first == 0 and not any(map(len, frames.echoes)):
+        if first == 0 and not any(map(len, frames.paths)):
             self._require_echoes()
         arrived = np.True_ if self.valid is None else self.valid[first:last, ..., None, None, None]
         return Batch(frames.samples * arrived, self.suite.observe(frames, first, self.start))
@@ -109,7 +109,7 @@ class Batches:
     def _require_echoes(self) -> None:
         """Refuse a recording of nothing, as a look at some frames all over it tells."""
         some = np.unique(np.linspace(0, len(self.times) - 1, TOGETHER).astype(int))
-        if not any(map(len, self.scenario.frames(self.times[some]).echoes)):
+        if not any(map(len, self.scenario.frames(self.times[some]).paths)):
             raise InputError(
                 f"scene {self.scenario.scene.name}: no frame has an echo, expected surfaces that face the radar within "
                 f"{self.scenario.config.max_range:.1f} m of it"

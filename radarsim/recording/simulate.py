@@ -42,8 +42,8 @@ def simulate(
             where starting them would take longer than they save. A script that asks for more than 1 needs an
             ``if __name__ == "__main__"``, as whatever starts processes does.
         progress: called with (frames done, frames in all).
-        plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, engine, sensors, platform,
-            duration, trajectory, waypoints, mounting, people.
+        plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, sensors, platform, duration,
+            trajectory, waypoints, mounting, people.
 
     Returns:
         the path written.
@@ -61,7 +61,6 @@ def planned(
     seed: int = 0,
     radar: str | RadarConfig = "radarize",
     frontend: Path | FrontEndConfig | None = None,
-    engine: str = "radarsim",
     sensors: Sequence[str] = (),
     people: int = 0,
     **walk: object,
@@ -72,10 +71,7 @@ def planned(
         scene: as there.
         seed: of the tour, the scatterers and the noise.
         radar: preset, configuration file or configuration.
-        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
-        engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver, for comparison. Its known defects
-            stand at the head of `physics.pathsolver`: corners, small facets and half of the ghosts are wrong, and
-            speckle is drawn anew for every frame.
+        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: the board's own.
         sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
             are the same whatever is chosen.
         people: who walk about near the radar's way (see `crowd`).
@@ -90,11 +86,11 @@ def planned(
     config, cfg_text = load_config(radar)
     check_limits(config)
     way, names = Walk(**walk), tuple(chosen(sensors))
-    settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
+    settings = FrontEndConfig.load(frontend, config.board) if isinstance(frontend, (str, Path)) else frontend
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     motion = way.through(world, seed)
     world = crowded(world, motion, people, seed)
-    scenario = Scenario(world, motion, config, settings, seed, names, engine)
+    scenario = Scenario(world, motion, config, settings, seed, names)
     about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
     return scenario, cfg_text, about | ({"people": people} if people else {})
 
@@ -157,7 +153,7 @@ def facts(scenario: Scenario) -> dict[str, object]:
         "scene": scenario.scene.name,
         "seed": scenario.seed,
         "radarsim_version": __version__,
-        "engine": scenario.engine,
+        "engine": "radarsim",
         "front_end": scenario.front_end.model_dump_json(),
         "motion": Statistics.of(scenario.motion, scenario.scene).json(),
         "warnings": crossings(scenario.motion, scenario.scene),

@@ -22,9 +22,9 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
-``clutter`` and ``unevenness`` say how far the place is from its drawing (see `life.Life`): 1 as in rooms that are
-lived in; left out, 0: not at all. With clutter the scene has more objects (see `things`). ``interferers`` are other
-radars that send there (see `interferers`); levels change and add them, too.
+``clutter`` and ``unevenness`` are the clutter and roughness settings (`SurfaceSettings`): 1 as in furnished rooms that
+are in use; default 0. With clutter the scene has more objects (`small_objects`). ``interferers`` are other radars that
+send there (`interferers`); levels change and add them, too.
 """
 
 import re
@@ -40,22 +40,21 @@ from radarize.errors import InputError
 from radarize.files import within
 from radarize.yamlfile import read_yaml
 from radarsim.world import shapes
-from radarsim.world.generators.buildings import Building
-from radarsim.world.generators.office import Office
-from radarsim.world.generators.things import things
+from radarsim.world.generators.buildings import Building, Office
+from radarsim.world.generators.small_objects import small_objects
 from radarsim.world.interferers import Interferer
-from radarsim.world.life import Life
 from radarsim.world.materials import Material, constant, decibel, material
 from radarsim.world.movers import Mover
 from radarsim.world.objects import SceneObject
 from radarsim.world.squareness import out_of_square
+from radarsim.world.surface_settings import SurfaceSettings
 from radarsim.world.validation import format_validation_error
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=10)]
 Vector = tuple[Number, Number, Number]
-Parts = tuple[str, list[SceneObject], list[Mover], Life, list[Interferer]]
+Parts = tuple[str, list[SceneObject], list[Mover], SurfaceSettings, list[Interferer]]
 
 
 class _Strict(BaseModel):
@@ -184,9 +183,9 @@ class Description(_Strict):
     interferers: list[Interferer] = []
 
     @property
-    def life(self) -> Life:
-        """What tells the place from its drawing."""
-        return Life(self.clutter, self.unevenness)
+    def surface_settings(self) -> SurfaceSettings:
+        """Clutter and roughness."""
+        return SurfaceSettings(self.clutter, self.unevenness)
 
 
 def split_level(name: str | Path) -> tuple[str, int]:
@@ -242,7 +241,7 @@ def meshes(path: Path) -> list[Path]:
 
 
 def read(path: Path, level: int = 0) -> Parts:
-    """Name, objects, movers, life and interferers of a scene file at one of its levels.
+    """Name, objects, movers, surface settings and interferers of a scene file at one of its levels.
 
     Raises:
         InputError: unreadable, malformed YAML, unknown key, value, material, mesh file or level.
@@ -253,7 +252,7 @@ def read(path: Path, level: int = 0) -> Parts:
 
 
 def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
-    """Name ("" where it has none), objects, movers, life and interferers of a description as read from YAML.
+    """Name (or ""), objects, movers, surface settings and interferers of a description as read from YAML.
 
     Args:
         data: the description.
@@ -269,14 +268,14 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
         objects = [SceneObject(o.name, o.mesh(folder), _material(o), o.solid) for o in description.objects]
         if description.building:
             objects += description.building.build()
-        objects += things(objects, description.clutter)
+        objects += small_objects(objects, description.clutter)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
     if description.building:
         objects = out_of_square(objects, description.unevenness, description.building.seed)
-    return description.name, objects, description.moving, description.life, description.interferers
+    return description.name, objects, description.moving, description.surface_settings, description.interferers
 
 
 def described(data: object, source: str, level: int = 0) -> Description:
@@ -292,13 +291,13 @@ def described(data: object, source: str, level: int = 0) -> Description:
         if not 0 <= level <= len(plain.levels):
             raise InputError(f"{source}: level is {level}, expected 0 to {len(plain.levels)}")
         for changes in plain.levels[:level]:
-            data = _laid_upon(data, changes)
+            data = apply_level(data, changes)
         return Description.model_validate(data)
     except ValidationError as error:
         raise InputError(f"{source}: {format_validation_error(error, data)}") from error
 
 
-def _laid_upon(data: dict, changes: Level) -> dict:
+def apply_level(data: dict, changes: Level) -> dict:
     """A description with the changes of a level."""
     parts = {}
     for part in ("objects", "moving", "interferers"):

@@ -8,13 +8,13 @@ import time
 from pathlib import Path
 
 import pytest
-from fakes import FakeSpecification, fake
 
 from radarize.errors import DiskFull, InputError
 from radarize.jobs import News
 from radarize.recording import Recording
 from radarsim.dataset import physics, run
 from radarsim.dataset.run import make
+from tests.dataset.fakes import FakeSpecification, fake
 
 ROOT = Path(__file__).parents[2]
 
@@ -135,7 +135,7 @@ def test_only_a_held_folder_is_anothers(tmp_path):
 ORPHANS = """
 import sys
 from pathlib import Path
-from fakes import FakeSpecification, fake
+from tests.dataset.fakes import FakeSpecification, fake
 from radarsim.dataset.run import make
 
 if __name__ == "__main__":
@@ -146,7 +146,7 @@ if __name__ == "__main__":
 def test_workers_end_with_a_killed_parent_and_runs_exclude_each_other(tmp_path):
     script, folder = tmp_path / "script.py", tmp_path / "out"
     script.write_text(ORPHANS)
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     parent = subprocess.Popen([sys.executable, script, folder], env=environment)
     part = folder / "b.h5.part"
     waited = time.monotonic() + 60

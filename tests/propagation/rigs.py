@@ -8,12 +8,15 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import RadarConfig
+from radarsim.propagation.antenna import Antenna, gain_pattern
 from radarsim.propagation.coefficients import LAYER
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
 from radarsim.receiver.synthesis import Synthesizer
 
 ISOTROPIC = (np.ones(181), np.ones(181), 1.0)
+#: The pattern of the elements of the presets' board.
+ELEMENT = gain_pattern(Antenna.of("iwr1843boost"))
 
 
 @dataclass
@@ -35,7 +38,7 @@ class Rig:
 def layer(gamma=-1.0):
     """A half space that reflects so, head on (TE); a conductor for -1."""
     eps = complex(1, -np.inf) if gamma == -1 else ((1 - gamma) / (1 + gamma)) ** 2
-    return np.array([eps, 0, 0, gamma], complex)
+    return np.array([eps, 0, 0, gamma, 1], complex)
 
 
 def conductors(*plates, gamma=-1.0):
@@ -65,9 +68,7 @@ def isotropic(position, wavelength, rotation=None, range_=100.0):
 
 def field(echoes, position, wavelength):
     """Sum of all echoes at one antenna at a position, at one frequency."""
-    away = np.linalg.norm(echoes.points - position, axis=2).sum(axis=1)
-    mirrored = np.einsum("eij,j->ei", echoes.images[:, :, :3], position) + echoes.images[:, :, 3]
-    lengths = np.concatenate([away, np.linalg.norm(position - mirrored, axis=1)])
+    lengths = np.linalg.norm(echoes.apparent(position) - position, axis=2).sum(axis=1)
     return complex(np.sum(echoes.amplitude * np.exp(2j * np.pi * lengths / wavelength)))
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
@@ -35,7 +35,7 @@ def left(walls, things, path):
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     fields = []
     for objects in ([*walls, *things], walls):
-        finder = EchoFinder(Scene("all", objects), nothing, reflectors, CONFIG, antenna=ISOTROPIC)
+        finder = PathFinder(Scene("all", objects), nothing, reflectors, CONFIG, antenna=ISOTROPIC)
         found = finder(np.zeros(3), np.eye(3))
         fields.append(found.amplitude[np.abs(np.linalg.norm(found.images[:, :, 3], axis=1) - path) < 1e-3].sum())
     return 20 * np.log10(abs(fields[0]) / abs(fields[1]) + 1e-9)

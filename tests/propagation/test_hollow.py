@@ -9,8 +9,7 @@ import shapely
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
@@ -30,7 +29,7 @@ def echoes(*objects):
     """What faces the radar at the origin."""
     scene = Scene("hollow", list(objects))
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-    return EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)(np.zeros(3), np.eye(3))
+    return PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)(np.zeros(3), np.eye(3))
 
 
 def profile(spectrum):
@@ -101,5 +100,5 @@ def test_inner_faces_count_where_the_material_lets_through():
     for name in ("chipboard", "metal", "wood"):
         found = echoes(SceneObject("cabinet", shapes.box((NEAR + 0.2, 0, 0), (0.4, 2, 2)), MATERIALS[name]))
         path = np.linalg.norm(found.images[:, :, 3], axis=1)
-        far[name] = (np.abs(path / 2 - NEAR - 0.4) < 0.05) & (found.provenance == Provenance.THROUGH_SLAB)
+        far[name] = (np.abs(path / 2 - NEAR - 0.4) < 0.05) & found.through
     assert far["chipboard"].any() and not far["metal"].any() and not far["wood"].any()

@@ -1,6 +1,7 @@
 """Images of the radar in two and three mirrors: box rooms, dihedral and trihedral corners."""
 
 from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,9 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation import apertures, plates
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.antenna import Antenna, gain_pattern
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.mechanisms import image_chains
+from radarsim.propagation.path_types import PathType, PathTypes
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd
@@ -177,19 +179,28 @@ def test_box_room_has_all_its_images(monkeypatch):
     assert known.all()
 
 
-def test_causes_in_a_box_room():
-    """Edges and corners of a room echo from where they stand; images behind its walls are ghosts, by order."""
+def test_ghosts_of_a_box_room():
+    """Edges and corners of a room echo from where they stand; images farther behind its walls than the radar can
+    resolve are ghosts."""
     scene = Scene.load("physics/room")
-    finder = EchoFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Reflectors.of(scene, CONFIG), CONFIG)
+    finder = PathFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Reflectors.of(scene, CONFIG), CONFIG)
     position = np.array([0.37, -0.21, 1.23])
     finder.range = 8.0
-    echoes = finder(position, looking(direction(0.2, 0.1)))
-    apparent = (position + echoes.images[:, :, :3] @ position + echoes.images[:, :, 3]) / 2
+    pose = looking(direction(0.2, 0.1))
+    paths = finder(position, pose)
+    apparent = (position + paths.images[:, :, :3] @ position + paths.images[:, :, 3]) / 2
     low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
-    inside = np.all((apparent > low - 1e-6) & (apparent < high + 1e-6), axis=1)
-    real = echoes.provenance <= Provenance.FLOOR_CEILING
-    assert np.array_equal(inside, real)
-    assert len(echoes.of(Provenance.GHOST_3)) and real.sum() > 10
+    outside = np.maximum(np.maximum(low - apparent, apparent - high), 0).max(axis=1)
+    types = PathTypes(scene, CONFIG, gain_pattern(Antenna.of(CONFIG.board)))
+    still = SimpleNamespace(
+        position=lambda t: np.tile(position, (len(t), 1)),
+        rotation=lambda t: Rotation.from_matrix(np.tile(pose, (len(t), 1, 1))),
+    )
+    lengths = paths.lengths(CONFIG, still, 0.0)[..., 0]
+    (found,) = types([paths], [lengths], position[None], pose[None])
+    assert (found[outside < 1e-6] <= PathType.FLOOR_CEILING).all() and (outside < 1e-6).sum() > 10
+    far = outside > 1.0
+    assert far.sum() > 5 and (found[far] == PathType.GHOST).mean() > 0.9
 
 
 def test_images_fade_out_before_their_paths_get_too_long():

@@ -6,19 +6,18 @@ import pytest
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import gain_pattern
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import Band, FrontEndConfig
-from tests.propagation.rigs import Rig, burst, locate, polar
+from tests.propagation.rigs import ELEMENT, Rig, burst, locate, polar
 
 CONFIG = PRESETS["radarize"]
 HERE = np.zeros(3)
 
 
 def point_echoes(place, sigma=1.0):
-    return EchoFinder(None, Scatterers.points(place, np.full(len(np.atleast_2d(place)), sigma)), None, CONFIG)(
+    return PathFinder(None, Scatterers.points(place, np.full(len(np.atleast_2d(place)), sigma)), None, CONFIG)(
         HERE, np.eye(3)
     )
 
@@ -32,7 +31,7 @@ def test_point_target_obeys_the_radar_equation(range_, azimuth, elevation):
     signal = burst(CONFIG, point_echoes(place, sigma=0.5), Rig())
     guess = (range_ + 0.01, np.deg2rad(azimuth + 1), np.deg2rad(elevation - 1), 0.02)
     found_range, found_azimuth, found_elevation, speed, amplitude = locate(CONFIG, signal, guess)
-    az, el, _ = gain_pattern()
+    az, el, _ = ELEMENT
     degrees = np.linspace(0, 90, 181)
     gain = np.interp(abs(azimuth), degrees, az) ** 2 * np.interp(abs(elevation), degrees, el) ** 2
     expected = gain**2 * CONFIG.wavelength**2 * 0.5 / ((4 * np.pi) ** 3 * range_**4)
@@ -60,7 +59,7 @@ def test_doppler_of_a_lever_arm(rate):
     """Turning about a point 0.4 m behind the sensor moves it sideways at omega x r, left for a left turn."""
     rig = Rig(yaw_rate=rate, yaw=-rate * CONFIG.burst_center, lever=(0.4, 0, 0))
     place = np.array([0.4, 0, 0]) + polar(3.0, 40)
-    finder = EchoFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)
+    finder = PathFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)
     signal = burst(CONFIG, finder(np.array([0.4, 0, 0]), np.eye(3)), rig)
     truth = 0.4 * rate * np.sin(np.deg2rad(40))
     *_, speed, _ = locate(CONFIG, signal, (3.0, np.deg2rad(40), 0.0, truth))

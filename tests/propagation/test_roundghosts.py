@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.curved import RoundBodies
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.mechanisms import curved_ghosts
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
@@ -119,7 +119,7 @@ def test_a_finder_has_them():
     found = []
     for objects in ([WALL, lamp], [WALL, lamp, board]):
         scene = Scene("lamp", objects)
-        echoes = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(np.zeros(3), np.eye(3))
+        echoes = PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(np.zeros(3), np.eye(3))
         at_image = np.linalg.norm(echoes.points - [2.5, 1.8, 0.1], axis=2) < 0.11
         found.append(at_image.any(axis=1).sum())
     assert found == [3, 0]

@@ -5,7 +5,7 @@ import pytest
 
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd
 from tests.propagation.rigs import Rig, burst
@@ -23,7 +23,7 @@ def ridge(rig):
     middle = np.array([CONFIG.burst_center])
     center, attitude = rig.position(middle)[0], rig.rotation(middle).as_matrix()[0]
     scatterers = Scatterers.points(place + center, 1e-3 * range_**4, rng.uniform(0, 2 * np.pi, n))
-    echoes = EchoFinder(None, scatterers, None, CONFIG)(center, attitude)
+    echoes = PathFinder(None, scatterers, None, CONFIG)(center, attitude)
     front = FrontEnd(CONFIG)
     adc = front.digitize(burst(CONFIG, echoes, rig), rng)
     maps = Heatmaps(CONFIG)

@@ -18,7 +18,7 @@ from jaxtyping import Complex, Float, Int
 from numba import njit
 
 from radarsim.propagation.apertures import STRIP_FAR, aperture, passes, strip
-from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
     along,
     cross,
@@ -36,12 +36,10 @@ from radarsim.propagation.fields import (
 )
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.obstacles import Obstacles
 from radarsim.propagation.patches import strength
-from radarsim.propagation.pointechoes import PointEchoes
+from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat, Reflectors
 from radarsim.propagation.table import Table, filled
-from radarsim.propagation.visible_mirrors import Mirrors
 
 #: Steps to the point between two images; each shrinks the error by at least the share of the radius in the distance.
 STEPS = 12
@@ -71,24 +69,24 @@ class RoundGhosts(Table):
         return (self.mirrors >= 0).sum(axis=1)
 
 
-def seen(
-    observation: Observation, flat: Flat, mirrors: list[Mirrors], reflectors: Reflectors, obstacles: Obstacles
-) -> PointEchoes:
-    """Ghosts that nothing hides; slabs are opaque to them."""
-    found = [find(observation, k, flat, some.seen, reflectors) for k, some in enumerate(mirrors)]
+def find(view: View) -> Paths:
+    """Ghosts above the threshold that nothing hides; slabs are opaque to them."""
+    observation, flat, reflectors = view.observation, view.flat, view.environment.reflectors
+    if reflectors is None:
+        return Paths.none()
+    found = [ghosts(observation, k, flat, some.seen, reflectors) for k, some in enumerate(view.mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
     n = 2 * len(every)
-    factor, _ = obstacles.way(
+    passed = view.obstacles.way(
         observation, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), np.zeros(n, bool)
-    )
-    clear = (factor != 0).reshape(-1, 2).all(axis=1)
-    frame, every = frame[clear], every[clear]
-    cause = np.where(every.bounces == 1, Provenance.GHOST_1, Provenance.GHOST_2).astype(np.uint8)
-    mirrors = np.stack([every.mirrors, np.full_like(every.mirrors, -1)], axis=2)
-    return PointEchoes(frame, every.points, mirrors, np.full(len(frame), -1), every.amplitude, cause)
+    ).after_one_another(2)
+    mirrors = np.full((len(every), 4), -1)
+    mirrors[:, [0, 2]] = every.mirrors
+    paths = Paths.of(Kind.POINT, every.points, every.amplitude, frame=frame, bounces=every.bounces, mirrors=mirrors)
+    return paths[passed.factor != 0]
 
 
-def find(
+def ghosts(
     observation: Observation, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], reflectors: Reflectors
 ) -> RoundGhosts:
     """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""

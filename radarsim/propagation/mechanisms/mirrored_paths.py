@@ -25,7 +25,7 @@ from radarsim.propagation.fields import (
 )
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.paths import OneWay
+from radarsim.propagation.one_way import OneWay
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.targets import Targets
 

@@ -1,10 +1,10 @@
-"""Echoes by Sionna RT's own `PathSolver`, for comparison with `EchoFinder`.
+"""Propagation paths by Sionna RT's `PathSolver`, compared with this simulator by `benchmarks.simulator_speed`.
 
 Paths are traced anew for every frame between the centres of the transmit and the receive array; antennas and motion
 within the burst follow from each path's directions (far field, plane waves). Sionna's coefficients leave out
 exp(-j 2 pi f tau); the synthesis puts it in.
 
-What is known to be wrong with it as a radar, measured on version 2.2.0, and no fault of the code here:
+Known errors of Sionna RT 2.2.0 as a radar simulator. Do not train on these recordings:
 
 * Corner returns vanish: of a box room, 12 of 18 second-order and 8 of 38 third-order images are missing.
 * Every facet is an infinite mirror: plates of 2 cm and of 2 m at 3 m both return pi R^2 = 28 m^2; a finely
@@ -15,17 +15,18 @@ What is known to be wrong with it as a radar, measured on version 2.2.0, and no 
 * Reciprocity fails: specular-then-diffuse paths are found, diffuse-then-specular ones are not: half of all ghosts.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
-from jaxtyping import Complex, Float, UInt8
+from jaxtyping import Complex, Float
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.propagation.antenna import Antenna, amplitude_gain, gain_pattern
 from radarsim.propagation.burst import BurstClock, parabola
-from radarsim.propagation.echoes import Provenance
+from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
 
 RAYS = 100_000
@@ -34,14 +35,13 @@ DEPTH = 3
 
 @dataclass(frozen=True)
 class Paths:
-    """The paths of a frame; stands in for `Echoes`.
+    """The paths of a frame, in place of `radarsim.propagation.paths.Paths`.
 
     Attributes:
         length: out and back, between the centres of the arrays in the middle of the burst, m.
         departure, arrival: unit vectors from the sensor along the first and back along the last leg, world.
         tx_center, rx_center: centres of the arrays in the middle of the burst, world, m.
         amplitude: square root of received over transmitted power, with phase, as in the beat signal.
-        provenance: `Provenance.DIRECT` for paths of one bounce, `GHOST` for more.
     """
 
     length: Float[np.ndarray, "path"]
@@ -50,13 +50,12 @@ class Paths:
     tx_center: Float[np.ndarray, "3"]
     rx_center: Float[np.ndarray, "3"]
     amplitude: Complex[np.ndarray, "path"]
-    provenance: UInt8[np.ndarray, "path"]
 
     def __len__(self) -> int:
         return len(self.amplitude)
 
     def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "path virtual 3"]:
-        """Path lengths over the burst, as `Echoes.lengths`: shorter by what an antenna moves along the path."""
+        """Path lengths over the burst, as `Paths.lengths`: shorter by what an antenna moves along the path."""
         times = time + BurstClock.of(config).nodes
         position, rotation = motion.position(times), motion.rotation(times).as_matrix()
         tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1) - self.tx_center
@@ -68,13 +67,13 @@ class Paths:
 
 
 class PathSolverFinder:
-    """Finds paths where `EchoFinder` finds echoes. Read the module's first lines before believing it.
+    """Finds paths as `PathFinder` does.
 
     Args:
         scene: the world.
         config: radar configuration.
         weakest: paths below this amplitude are left out.
-        antenna: the elements' pattern; default: the IWR1843BOOST's.
+        antenna: the elements' pattern; default: the board's.
         seed: of Sionna's samples.
     """
 
@@ -82,7 +81,7 @@ class PathSolverFinder:
         self, scene: Scene, config: RadarConfig, weakest: float = 0.0, antenna: Antenna | None = None, seed: int = 0
     ):
         self.scene, self.config, self.weakest, self.seed = scene, config, weakest, seed
-        self._pattern = gain_pattern(antenna)
+        self._pattern = gain_pattern(antenna or Antenna.of(config.board))
         world = scene.sionna  # before the import: it looks for LLVM
         import sionna.rt as rt
 
@@ -116,7 +115,7 @@ class PathSolverFinder:
             refraction=False, seed=self.seed,
         )  # fmt: skip
         real, imaginary = (part.numpy().ravel() for part in found.a)
-        delay, bounces = found.tau.numpy().ravel(), (found.interactions.numpy() != 0).sum(axis=0).ravel()
+        delay = found.tau.numpy().ravel()
         departure = _unit(found.theta_t.numpy().ravel(), found.phi_t.numpy().ravel())
         arrival = _unit(found.theta_r.numpy().ravel(), found.phi_r.numpy().ravel())
         gain = [np.array([amplitude_gain(*d, self._pattern) for d in u @ rotation]) for u in (departure, arrival)]
@@ -125,11 +124,24 @@ class PathSolverFinder:
         amplitude *= gain[0] * gain[1] if len(amplitude) else 1
         keep = (np.abs(amplitude) > self.weakest) & (delay > 0)
         keep &= SPEED_OF_LIGHT * delay < 2 * 1.05 * self.config.max_range
-        provenance = np.where(bounces > 1, Provenance.GHOST_1, Provenance.DIRECT).astype(np.uint8)
         return Paths(
-            SPEED_OF_LIGHT * delay[keep].astype(float), departure[keep], arrival[keep], tx, rx, amplitude[keep],
-            provenance[keep],
-        )  # fmt: skip
+            SPEED_OF_LIGHT * delay[keep].astype(float), departure[keep], arrival[keep], tx, rx, amplitude[keep]
+        )
+
+
+class SionnaScenario(Scenario):
+    """A scenario whose echoes are the paths of Sionna RT."""
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "SionnaScenario":
+        """The same scenario with Sionna RT's paths."""
+        return cls(*(getattr(scenario, field.name) for field in fields(Scenario)))
+
+    @cached_property
+    def finder(self) -> PathSolverFinder:
+        """Finds the paths of a pose."""
+        seed = int(self.rng("sionna").integers(2**31))
+        return PathSolverFinder(self.scene, self.config, self.board.weakest, self.front_end.pattern, seed)
 
 
 def _unit(zenith: Float[np.ndarray, "n"], azimuth: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:

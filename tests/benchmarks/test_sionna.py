@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from benchmarks.sionna import PathSolverFinder, SionnaScenario
 from radarize.radar.array import virtual_positions
 from radarize.radar.presets import PRESETS
+from radarsim.motion.trajectory import Motion
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.pathsolver import PathSolverFinder
 from radarsim.receiver.synthesis import Synthesizer
+from radarsim.scenario import Scenario
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
@@ -76,3 +78,11 @@ def test_same_pose_same_paths(wall):
     finder = PathSolverFinder(wall, CONFIG)
     first, again = finder(np.zeros(3), np.eye(3)), finder(np.zeros(3), np.eye(3))
     assert len(first) > 0 and np.array_equal(np.sort(first.length), np.sort(again.length))
+
+
+def test_frames_of_a_scenario():
+    """The strongest range of a frame is the wall's, 3 m."""
+    scenario = SionnaScenario.of(Scenario(Scene.load("physics/wall"), Motion.still((0, 0, 0)), CONFIG))
+    adc = scenario.frames(np.zeros(1)).samples[0].astype(float)
+    power = np.abs(np.fft.fft(adc[..., 0] + 1j * adc[..., 1], axis=-1)).mean(axis=(0, 1, 2))
+    assert CONFIG.ranges[power.argmax()] == pytest.approx(3.0, abs=0.05)

@@ -6,7 +6,7 @@ import pytest
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.platforms import PLATFORMS
 from radarsim.world.scene import Scene
-from tests.distances import column, least_distance, obstacles
+from tests.motion.distances import column, least_distance, obstacles
 
 DURATION = 30.0
 SEEDS = np.random.default_rng(2024).integers(10_000, size=12)

@@ -1,54 +1,43 @@
-"""Whole recordings from the simulator: reproducible, readable, and true to their own truth."""
+"""Whole recordings from the simulator: readable, and true to their own truth."""
 
-import hashlib
+from multiprocessing import active_children
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
 from radarize.recording import Recording
 from radarsim.motion.planner import plan_motion
-from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.recording.simulate import simulate
 from radarsim.sensors.causes import CAUSES
+from radarsim.world import shapes
+from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 
 
 @pytest.fixture(scope="module")
 def walk(tmp_path_factory):
-    """Half a second of the office by hand."""
-    return simulate("office", tmp_path_factory.mktemp("sim") / "walk.h5", duration=0.5, seed=5)
-
-
-def digest(path):
-    with Recording(path) as recording:
-        names = [n for n in recording.names()]
-        return {n: hashlib.sha256(np.ascontiguousarray(recording.file[n][:]).tobytes()).hexdigest() for n in names}
-
-
-def test_same_seed_same_bytes(walk, tmp_path):
-    again = simulate("office", tmp_path / "again.h5", duration=0.5, seed=5)
-    other = simulate("office", tmp_path / "other.h5", duration=0.5, seed=6)
-    assert digest(walk) == digest(again)
-    assert digest(walk)["radar/adc"] != digest(other)["radar/adc"]
+    """A third of a second of the office by hand."""
+    return simulate("office", tmp_path_factory.mktemp("sim") / "walk.h5", duration=0.3, seed=5)
 
 
 def test_the_recording_says_what_it_is(walk):
     with Recording(walk) as recording:
-        assert len(recording) == 15
+        assert len(recording) == 9
         assert recording.attributes["scene"] == "office" and recording.attributes["seed"] == 5
         assert np.allclose(np.diff(recording.times), 33.333e-3)
-        assert recording.valid(0, 15).all()
+        assert recording.valid(0, 9).all()
         time = recording.read("truth/time")
         assert np.allclose(time - recording.times, recording.config.burst_center)
 
 
 def test_truth_is_consistent(walk):
     """Velocity is the derivative of position, in the sensor's frame."""
-    from scipy.spatial.transform import Rotation
-
     with Recording(walk) as recording:
         time, pose, velocity = (recording.read(f"truth/{n}") for n in ("time", "pose", "velocity"))
     between = np.diff(pose[:, :3], axis=0) / np.diff(time)[:, None]
@@ -58,8 +47,6 @@ def test_truth_is_consistent(walk):
 
 def test_true_scan_meets_the_floor_plan(walk):
     """The ends of the true scan lie on the walls of the true plan."""
-    from scipy.spatial.transform import Rotation
-
     with Recording(walk) as recording:
         pose, scan = recording.read("truth/pose")[0], recording.read("truth/scan")[0]
         azimuths, plan = recording.read("truth/scan_azimuths"), recording.read("truth/floor_plan")
@@ -83,10 +70,10 @@ def test_causes_are_counted(walk):
 
 def test_iq_by_cause_adds_up(tmp_path):
     """Without noise, phase noise and clipping, the parts' sum is the recording itself, to rounding."""
-    settings = FrontEndConfig(noise=False, phase_noise=None)
+    settings = FrontEndConfig.of(CONFIG.board, noise=False, phase_noise=None)
     settings.save(tmp_path / "quiet.yaml")
     path = simulate(
-        "office", tmp_path / "x.h5", duration=0.15, seed=3, frontend=tmp_path / "quiet.yaml", sensors=["adc-by-cause"]
+        "office", tmp_path / "x.h5", duration=0.05, seed=3, frontend=tmp_path / "quiet.yaml", sensors=["adc-by-cause"]
     )
     with Recording(path) as recording:
         parts = recording.read("truth/adc_by_cause").astype(np.float32)
@@ -94,25 +81,14 @@ def test_iq_by_cause_adds_up(tmp_path):
         about = recording.describe("truth/adc_by_cause")["about"]
         count = recording.read("truth/echoes")
     assert parts.shape == (len(adc), len(CAUSES), *adc.shape[1:])
-    assert all(p.name.lower() in about for p in Provenance) and "leakage" in about
+    assert all(p.name.lower() in about for p in PathType) and "leakage" in about
     inside = np.abs(adc).max(axis=-1, keepdims=True) < 32767
     error = (parts.sum(axis=1) - adc) * inside
     # half a count of rounding, and float16's 11 bits of each part
     assert np.sqrt(np.mean(error**2)) < 0.5
     assert np.abs(error).max() < 1 + 2**-10 * np.abs(parts).max()
-    for k in range(len(Provenance)):
+    for k in range(len(PathType)):
         assert np.any(parts[:, k]) == np.any(count[:, k])
-
-
-def test_sionna_engine(tmp_path):
-    """Sionna's paths make a recording of the same shape, and it says whose they are."""
-    path = simulate("physics/wall", tmp_path / "x.h5", engine="sionna", trajectory=still(tmp_path), duration=0.1)
-    with Recording(path) as recording:
-        assert recording.attributes["engine"] == "sionna"
-        adc = recording.adc(0, 1)[0].astype(float)
-        ranges = recording.config.ranges
-    power = np.abs(np.fft.fft(adc[..., 0] + 1j * adc[..., 1], axis=-1)).mean(axis=(0, 1, 2))
-    assert ranges[power.argmax()] == pytest.approx(3.0, abs=0.05)
 
 
 @pytest.mark.parametrize(("name", "size"), [("corridor", (40, 9.6)), ("floor", (50, 30))])
@@ -123,12 +99,6 @@ def test_large_scenes_can_be_walked(name, size):
     assert plan_motion(scene, "handheld", 5.0, np.random.default_rng(0)).duration == 5.0
 
 
-def still(folder):
-    path = folder / "still.tum"
-    path.write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(5)))
-    return path
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -136,7 +106,6 @@ def still(folder):
         ({"duration": 1e-3}, "at least one frame"),
         ({"platform": "drone"}, "drone"),
         ({"radar": "nothing.cfg"}, "nothing.cfg"),
-        ({"engine": "unreal"}, "unreal"),
         ({"frontend": Path("nowhere.yaml")}, "nowhere.yaml"),
         ({"scene": "nowhere"}, "nowhere"),
     ],
@@ -146,3 +115,10 @@ def test_bad_input_is_refused_in_a_sentence(tmp_path, arguments, words):
         simulate(**{"scene": "office", "output": tmp_path / "x.h5", "duration": 1.0, **arguments})
     assert words in str(caught.value) and "\n" not in str(caught.value)
     assert not (tmp_path / "x.h5").exists()
+
+
+def test_what_fails_in_another_process_is_said_here(tmp_path):
+    far = SceneObject("far", shapes.rectangle((90, 0, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
+    with pytest.raises(InputError, match="scene away: no frame has an echo"):
+        simulate(Scene("away", [far]), tmp_path / "x.h5", trajectory=still(tmp_path), duration=1.1, workers=2)
+    assert not active_children() and not (tmp_path / "x.h5").exists()

@@ -1,4 +1,4 @@
-"""Things in lived-in rooms: on their surfaces and in nothing, as many as asked for, the same ones every time."""
+"""Small objects: on their surfaces and in nothing, as many as asked for, the same ones every time."""
 
 from itertools import product
 
@@ -12,11 +12,9 @@ from radarsim.motion.planner import plan_motion
 from radarsim.propagation.bodies import recognise
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.world import shapes
-from radarsim.world.generators.belongings import RUNS, THINGS
-from radarsim.world.generators.buildings import Building
-from radarsim.world.generators.office import Office
+from radarsim.world.generators.buildings import Building, Office
+from radarsim.world.generators.small_objects import OBJECTS, RUNS, placed, shaped, small_objects
 from radarsim.world.generators.spots import Spots
-from radarsim.world.generators.things import placed, things
 from radarsim.world.importers import Options, import_scene
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
@@ -136,13 +134,15 @@ def test_as_many_as_asked_for():
     for level in (0.5, 1.0, 4.0):
         some = placed(objects, level)
         for kind in ("sprinkler", "smoke detector", "socket"):
-            wanted = level * THINGS[kind].often * (walls if THINGS[kind].on == "wall" else area)
+            wanted = level * OBJECTS[kind].often * (walls if OBJECTS[kind].surface == "wall" else area)
             assert abs(len(some[kind]) - wanted) < 4 * np.sqrt(wanted) + 0.03 * wanted, kind
     few, usual = (
-        sum(len(s) for kind, s in placed(objects, level).items() if THINGS.get(kind) and THINGS[kind].on == "top")
+        sum(
+            len(s) for kind, s in placed(objects, level).items() if OBJECTS.get(kind) and OBJECTS[kind].surface == "top"
+        )
         for level in (0.1, 1.0)
     )
-    wanted = sum(t.often for t in THINGS.values() if t.on == "top") * area / 4
+    wanted = sum(t.often for t in OBJECTS.values() if t.surface == "top") * area / 4
     assert abs(few - 0.1 * wanted) < 4 * np.sqrt(0.1 * wanted) + 0.08 * 0.1 * wanted  # few are in one another's way
     assert 0.5 * wanted < usual < wanted
 
@@ -153,13 +153,13 @@ def test_without_clutter_it_is_the_drawing(drawn):
     assert bytes_of(Scene.of(described | {"clutter": 0}, "b").objects) == bytes_of(drawn["B"])
 
 
-def test_same_surfaces_same_things(drawn):
+def test_same_surfaces_same_small_objects(drawn):
     lived = Scene.of({"building": {"kind": "office", "seed": 7}, "clutter": 1}, "office")
-    own = things(drawn["office"], 1.0)
+    own = small_objects(drawn["office"], 1.0)
     assert own
     assert bytes_of(lived.objects) == bytes_of(drawn["office"] + own)
     crate = SceneObject("crate", shapes.box((16.5, 6.0, 0.2), (0.4, 0.4, 0.4)), MATERIALS["wood"])
-    assert bytes_of(things([*drawn["office"], crate], 1.0)) != bytes_of(own)
+    assert bytes_of(small_objects([*drawn["office"], crate], 1.0)) != bytes_of(own)
 
 
 @pytest.mark.parametrize("name", PLANS)
@@ -188,12 +188,12 @@ def test_what_is_merged_reflects_as_each_would(found):
     """Flat parts and round bodies of merged things are those of the things; nothing is a sheet, a slab or a floor."""
     alone, sorts = [], set()
     for kind, spots in found["office"].items():
-        told = RUNS[kind] if kind in RUNS else THINGS[kind]
+        about = RUNS[kind] if kind in RUNS else OBJECTS[kind]
         for k in range(min(len(spots), 4)):
-            mesh = told.shape(spots.size[k])
+            mesh = shaped(about, spots.size[k])
             mesh.vertices = mesh.vertices @ spots.axes[k] + spots.place[k]
-            alone.append(SceneObject(f"{kind} {k}", mesh, MATERIALS[told.material], solid=True))
-            sorts.add(told.material)
+            alone.append(SceneObject(f"{kind} {k}", mesh, MATERIALS[about.material], solid=True))
+            sorts.add(about.material)
     merged = [
         SceneObject(what, shapes.joined(*(o.mesh for o in alone if o.material.name == what)), MATERIALS[what], True)
         for what in sorts
@@ -209,9 +209,9 @@ def test_what_is_merged_reflects_as_each_would(found):
     assert not one.flat.horizontal.any()
 
 
-@pytest.mark.parametrize("kind", [k for k, told in THINGS.items() if told.shape.__name__ in ("stick", "rod")])
+@pytest.mark.parametrize("kind", [k for k, about in OBJECTS.items() if about.shape in ("stick", "rod")])
 def test_round_things_are_round_bodies(kind):
     """So that their echo is a cylinder's closed form (`tests.propagation.test_curved`)."""
-    told = THINGS[kind]
-    (body,), _ = recognise(told.shape(np.array(told.most)))
-    assert body.radius == pytest.approx(min(told.most[:2] if told.shape.__name__ == "stick" else told.most[1:]) / 2)
+    about = OBJECTS[kind]
+    (body,), _ = recognise(shaped(about, np.array(about.most)))
+    assert body.radius == pytest.approx(min(about.most[:2] if about.shape == "stick" else about.most[1:]) / 2)

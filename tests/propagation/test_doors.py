@@ -8,8 +8,8 @@ from radarize.errors import InputError
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.coefficients import as_slab, lag
 from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.media import as_slab, lag
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.paths import Kind
 from radarsim.propagation.reflectors import Reflectors

@@ -7,7 +7,7 @@ import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation import plates
-from radarsim.propagation.coefficients import HEAD_ON
+from radarsim.propagation.media import HEAD_ON
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS

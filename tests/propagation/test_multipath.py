@@ -312,7 +312,7 @@ def test_an_antenna_of_high_gain_has_its_ghosts():
     place, lift = np.array([2.6, 0.3, 0.1]), 19.5
     weak = finder([GLASS], place)(HERE, AHEAD)
     ghosts = weak.where(bounces=2, through=False, moving=False).amplitude
-    antenna = Antenna(peak_dbi=10.5 + lift)
+    antenna = Antenna.of(CONFIG.board).model_copy(update={"peak_dbi": 10.5 + lift})
     strong = finder([GLASS], place, antenna=antenna, threshold=abs(ghosts).max() * 10)(HERE, AHEAD)
     found = strong.where(bounces=2, through=False, moving=False).amplitude
     assert 20 * np.log10(abs(found).max() / abs(ghosts).max()) == pytest.approx(2 * lift, abs=0.01)

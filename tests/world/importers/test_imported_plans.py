@@ -94,7 +94,7 @@ def test_echoes_of_imported_walls_are_those_of_native_ones(tmp_path):
     for item in native.objects:  # seen from inside
         item.mesh.invert()
     plan = Scene.load(import_scene(draw_map(tmp_path), tmp_path / "out").path)
-    vertices, faces = trimesh.remesh.subdivide_to_size(*(lambda m: (m.vertices, m.faces))(native.objects[0].mesh), 0.25)
+    vertices, faces = trimesh.remesh.subdivide_to_size(*(lambda m: (m.vertices, m.faces))(native.objects[0].mesh), 0.15)
     scan = trimesh.Trimesh(vertices, faces, process=False)
     scan.merge_vertices()
     scan.vertices = scan.vertices + np.random.default_rng(1).normal(0, 0.003, scan.vertices.shape)

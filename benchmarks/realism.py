@@ -7,17 +7,18 @@ is told from training walks alone: what a row of four or of eight antennas makes
 each frame's strongest cell.
 """
 
+import argparse
 import io
 import lzma
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from benchmarks.results import SHARED, Data, Walk, command_line, publish, walked
+from benchmarks.results import SHARED, Data, Page, Walk, script, tracked, walked
 from radarize import polar
-from radarize.console import progress
 from radarize.radar.presets import PRESETS
 from radarize.yamlfile import read_yaml
 from radarsim.motion.trajectory import Motion
@@ -116,39 +117,32 @@ STEPS = {
     "clutter: small objects and points": ((SurfaceSettings(clutter=1.0), SurfaceSettings(clutter=1.0)), polar.MEASURED),
     "clutter and uneven walls": ((SurfaceSettings(1.0, 1.0), SurfaceSettings(1.0, 1.0)), polar.MEASURED),
 }
-PARSER = command_line(
-    __doc__,
+
+
+@script(
+    "How much of a radar's picture is filled, in simulated rooms and real ones",
     recordings=(SHARED / "radarhd", "folder of the real walks"),
     every=(10, "of so many frames one is looked at"),
     duration=(15.0, "of simulated walks, s"),
     seed=(0, "of walks and worlds"),
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     rows, walks = [], []
-    with progress("walks") as report:
-        for part in ("train", "test"):
-            found, misfits = real(options.recordings, part, options.every)
-            rows.append(row(f"real, {part}", found))
-            if part == "train":
-                beams = {antennas: float(np.median(each)) for antennas, each in misfits.items()}
-            walks += [Walk(f"RadarHD, {part}", None, None, simulated=False)] * len(found)
-        for number, (about, (surfaces, transmitters)) in enumerate(STEPS.items()):
-            found = []
-            for k, name in enumerate(SCENES):
-                report(number * len(SCENES) + k, len(STEPS) * len(SCENES))
-                kept, motion = simulated(name, surfaces, transmitters, options.every, options.duration, options.seed)
-                found.append(kept)
-                walks.append(walked(name, options.seed, motion))
-            rows.append(row(about, found))
-    publish(
-        "realism",
-        "How much of a radar's picture is filled, in simulated rooms and real ones",
+    for part in ("train", "test"):
+        found, misfits = real(options.recordings, part, options.every)
+        rows.append(row(f"real, {part}", found))
+        if part == "train":
+            beams = {antennas: float(np.median(misfit)) for antennas, misfit in misfits.items()}
+        walks += [Walk(f"RadarHD, {part}", None, None, simulated=False)] * len(found)
+    kept = []
+    for (surfaces, transmitters), name in tracked([*product(STEPS.values(), SCENES)], "walks"):
+        found, motion = simulated(name, surfaces, transmitters, options.every, options.duration, options.seed)
+        kept.append(found)
+        walks.append(walked(name, options.seed, motion))
+    rows += [row(about, kept[k * len(SCENES) : (k + 1) * len(SCENES)]) for k, about in enumerate(STEPS)]
+    return Page(
         rows,
         data=Data("RadarHD's walks and walks by cart with their chirps", tuple(walks), options.seed),
-        networks=(),
         notes=[
             f"Cells of at least {100 * polar.THRESHOLD:g} % of the frame's largest magnitude, in RadarHD's picture "
             "chain (one loop, no windows, 256 ranges by 64 azimuths); means over walks, and the least and the "
@@ -159,7 +153,3 @@ def main() -> None:
             "are only reported.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

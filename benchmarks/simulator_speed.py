@@ -4,13 +4,14 @@ Three ways to the frames of the first scene in one run: this simulator; the same
 the paths of Sionna RT's own solver at the same poses (`benchmarks.sionna`).
 """
 
+import argparse
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, timed, walked
+from benchmarks.results import Data, Page, memory_mb, peak_memory_mb, script, timed, walked
 from benchmarks.sionna import DEPTH, RAYS, SionnaScenario
 from radarize.radar.presets import PRESETS
 from radarsim.machine.threads import default_workers
@@ -79,20 +80,17 @@ def memory_growth(scenario: Scenario, frames: int) -> str:
     return f"{early:.0f} MB early, {late:.0f} MB late, over {frames} frames"
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "Simulator speed, preset radarize",
     frames=(240, "of a walk"),
     recorded_frames=(1800, "of a recording by several processes"),
     direct_frames=(2, "summed directly"),
     sionna_frames=(20, "by Sionna's paths"),
     memory_frames=(0, "frames of a long run that watches memory"),
     seed=(0, "of walks and worlds"),
+    scenes=(["office", "corridor", "floor"], "the first in detail", {"nargs": "+", "type": str}),
 )
-PARSER.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor"], help="the first in detail")
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     times, first = np.arange(options.frames) * CONFIG.frame_period, options.scenes[0]
     ways, notes, scenarios = [], [], {}  # ways: words, s per frame, echoes or paths, and what they give
     for name in options.scenes:
@@ -134,12 +132,16 @@ def main() -> None:
     ]
     if options.memory_frames:
         notes.append(f"{first}: memory {memory_growth(scenarios[first], options.memory_frames)}.")
-    publish(
-        "simulator_speed",
-        "Simulator speed, preset radarize",
+    return Page(
         [
-            {"way": way, "ms per frame": 1e3 * float(s), "frames/s": 1 / float(s), "times slower": float(s / fastest),
-             "echoes or paths": int(count), "gives": gives}
+            {
+                "way": way,
+                "ms per frame": 1e3 * float(s),
+                "frames/s": 1 / float(s),
+                "times slower": float(s / fastest),
+                "echoes or paths": int(count),
+                "gives": gives,
+            }
             for way, s, count, gives in ways
         ],
         data=Data(
@@ -147,10 +149,5 @@ def main() -> None:
             tuple(walked(name, options.seed, scenario.motion) for name, scenario in scenarios.items()),
             options.seed,
         ),
-        networks=(),
         notes=notes,
-    )  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()
+    )

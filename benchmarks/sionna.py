@@ -73,7 +73,7 @@ class PathSolverFinder:
         scene: the world.
         config: radar configuration.
         weakest: paths below this amplitude are left out.
-        antenna: the elements' pattern; default: the IWR1843BOOST's.
+        antenna: the elements' pattern; default: the board's.
         seed: of Sionna's samples.
     """
 
@@ -81,7 +81,7 @@ class PathSolverFinder:
         self, scene: Scene, config: RadarConfig, weakest: float = 0.0, antenna: Antenna | None = None, seed: int = 0
     ):
         self.scene, self.config, self.weakest, self.seed = scene, config, weakest, seed
-        self._pattern = gain_pattern(antenna)
+        self._pattern = gain_pattern(antenna or Antenna.of(config.board))
         world = scene.sionna  # before the import: it looks for LLVM
         import sionna.rt as rt
 

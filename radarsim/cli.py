@@ -36,13 +36,13 @@ def simulate(
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
     frontend: Annotated[
-        Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else an IWR1843BOOST.")
+        Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else the board's.")
     ] = None,
     sensors: Annotated[
         str,
         typer.Option(
             help="Also record, comma-separated: depth, occupancy, tracking, imu, points, ghosts, or all; and "
-            "adc-by-cause, I/Q split by cause, before noise (a much larger file)."
+            "paths, every path above the noise; adc-by-cause, I/Q split by path type, before noise (much larger files)."
         ),
     ] = "",
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
@@ -121,7 +121,7 @@ def twin(
     at: Annotated[
         str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="Place of a radar at rest, instead of poses.")
     ] = "",
-    frontend: Annotated[Path | None, typer.Option(help="A front-end file (.yaml); else an IWR1843BOOST.")] = None,
+    frontend: Annotated[Path | None, typer.Option(help="A front-end file (.yaml); else the board's own.")] = None,
     calibrate: Annotated[
         bool, typer.Option("--calibrate", help="Fit the front end to the recording first; kept beside, as .yaml.")
     ] = False,

@@ -15,14 +15,14 @@ from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.machine.threads import one_blas_thread
 from radarsim.motion.trajectory import Motion
 from radarsim.propagation.antenna import gain_pattern
-from radarsim.propagation.clutter import Clutter, Cluttered
+from radarsim.propagation.clutter import Clutter
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.obstacles import Obstacles
 from radarsim.propagation.path_types import PathTypes
 from radarsim.propagation.paths import Paths
 from radarsim.propagation.reflectors import Reflectors
-from radarsim.propagation.surface import Surface
+from radarsim.propagation.surface import Cluttered, Surface
 from radarsim.propagation.unevenness import Heights
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import FrontEndConfig
@@ -41,7 +41,7 @@ class Scenario:
         scene: the world.
         motion: of the radar.
         config: of the radar.
-        front_end: what its board is made of; default: an IWR1843BOOST.
+        front_end: what its board is made of; default: what the board's file says.
         seed: of scatterers, noise, sensors' errors, and what differs from board to board.
         sensors: beside the radar, names from `radarsim.sensors.suite.SENSORS`; none changes the radar's samples.
     """
@@ -49,9 +49,13 @@ class Scenario:
     scene: Scene
     motion: Motion
     config: RadarConfig
-    front_end: FrontEndConfig = FrontEndConfig()
+    front_end: FrontEndConfig | None = None
     seed: int = 0
     sensors: tuple[str, ...] = ()
+
+    def __post_init__(self):
+        if self.front_end is None:
+            object.__setattr__(self, "front_end", FrontEndConfig.of(self.config.board))
 
     def frames(self, times: Float[np.ndarray, "frame"], end: float | None = None) -> "Frames":
         """The frames that start at `times`, ascending, s; nothing is computed before it is asked for.

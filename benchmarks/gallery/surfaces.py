@@ -5,7 +5,7 @@ from scipy import stats
 from scipy.special import gamma
 
 from benchmarks.gallery.drawing import AHEAD, CONFIG, FOUND, HERE, LAMBDA, THEORY, compare
-from radarsim.propagation.clutter import CROSS_SECTION, EXPONENT, ON_WALLS, Clutter
+from radarsim.propagation.clutter import CROSS_SECTION, EXPONENT, ON_WALLS, Clutter, in_the_open
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
@@ -78,17 +78,18 @@ def convergence(axis) -> str:
 
 def small_things(axis) -> str:
     """What is smaller than 2 cm is a Poisson process on every surface; larger things are drawn. Cross sections follow
-    Weibull's distribution, P(> s) = exp(-(s / s0)^0.7)."""
+    Weibull's distribution, P(> s) = exp(-(s / s0)^0.7), and take from the wall what they scatter."""
     wall = SceneObject("wall", shapes.rectangle((3, 0, 1.5), (40, 3), (-1, 0, 0)), material("wood"))
     things = Clutter(Scene("wall", [wall], surface_settings=SurfaceSettings(clutter=1)), np.random.default_rng(0))
     sigma = np.sort(things.near(np.zeros((1, 3)), 50.0).sigma)
-    weibull = stats.weibull_min(EXPONENT, scale=CROSS_SECTION / gamma(1 + 1 / EXPONENT))
+    mean = CROSS_SECTION * in_the_open(np.array([ON_WALLS * CROSS_SECTION / 4]))[0]
+    weibull = stats.weibull_min(EXPONENT, scale=mean / gamma(1 + 1 / EXPONENT))
     dbsm, share = db(sigma), (np.arange(len(sigma)) + 0.5) / len(sigma)
     axis.plot(dbsm, weibull.cdf(sigma), **THEORY)
     axis.plot(dbsm[::20], share[::20], **FOUND)
     return (
         f"Points per square metre of wall: {len(sigma) / 120:.2f}, set to {ON_WALLS:g}. Their mean: "
-        f"{db(sigma.mean()):.1f} dBsm, set to {db(CROSS_SECTION):.1f}. Kolmogorov-Smirnov test: p = "
+        f"{db(sigma.mean()):.1f} dBsm head-on, set to {db(mean):.1f}. Kolmogorov-Smirnov test: p = "
         f"{stats.kstest(sigma, weibull.cdf).pvalue:.2f}. The densities were chosen by comparison with RadarHD's "
         "training walks, never with its test walks (`benchmarks.realism`)."
     )

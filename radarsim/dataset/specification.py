@@ -10,7 +10,7 @@
       - {building: A, floors: [0, 1], platform: handheld, count: 15, duration: 60}
       - {building: shop, platform: [cart, robot], count: 2, duration: 20, people: 3, variants: [plain]}
     radar: radarize                    # preset or .cfg file
-    frontend: board.yaml               # as `radarsim calibrate` writes it; an IWR1843BOOST's by default
+    frontend: board.yaml               # as `radarsim calibrate` writes it; the board's own by default
     sensors: [depth, imu]              # or all, or none
     storage: raw                       # or heatmaps: no samples, about a tenth of the size, for training
     variants:                          # every recording once for each, with the same seed and walk
@@ -164,7 +164,7 @@ class Specification(Strict):
         radar = self._beside(self.radar)
         frontend = None if self.frontend is None else self._beside(self.frontend)
         fixed = {"radar": radar, "frontend": frontend, "sensors": self._sensors(), "storage": self.storage}
-        variants = {f"_{key}": variant for key, variant in self.variants.items()} or {"": Variant()}
+        variants = {f"_{key}": each.with_board(self._beside) for key, each in self.variants.items()} or {"": Variant()}
         made_in = [[f"_{key}" for key in group.variants] or list(variants) for group in self.recordings]
         total = sum(g.count * len(g.platforms) * len(keys) for g, keys in zip(self.recordings, made_in, strict=True))
         if total > MOST:
@@ -222,7 +222,7 @@ class Specification(Strict):
         try:
             config, _ = load_config(variant.radar_of(radar))
             check_limits(config)
-            settings = variant.frontend_of(frontend)
+            settings = variant.frontend_of(frontend, config.board)
         except InputError as error:
             raise InputError(f"variants.{key[1:]}: {error}" if key else str(error)) from error
         return config, hashlib.sha256((config.model_dump_json() + settings.model_dump_json()).encode()).hexdigest()

@@ -170,7 +170,7 @@ class Task:
         places = None if self.waypoints is None else np.array(self.waypoints)
         walk = Walk(self.platform, self.duration, waypoints=places, mounting=self.variant.mounted)
         config, cfg_text = load_config(self.variant.radar_of(self.radar))
-        front_end = self.variant.frontend_of(self.frontend)
+        front_end = self.variant.frontend_of(self.frontend, config.board)
         motion = walk.through(mild, self.seed)
         scene = crowded(scene, motion, self.people, self.seed)
         return Scenario(scene, motion, config, front_end, self.seed, self.sensors), cfg_text

@@ -1,25 +1,34 @@
-"""How objects reflect and transmit: coefficients tabled over the cosine of the angle of incidence.
+"""How objects reflect and transmit: layers, and their coefficients at an angle of incidence.
 
 A sheet is a slab of its material's thickness, and so is each face of a thick closed body of such a material (hollow: a
 cabinet of boards, a stud wall); its inner faces lie that much further in. A thin closed body is one slab as thick as
 itself. All else is an opaque half space. What a slab reflects and what it lets through are of one formula (ITU-R
 P.2040-4, eqs. 42, 43), which is Airy's sum over the waves between its faces, at the centre of the sweep. How it turns
-over the sweep is a delay, that of the group.
+over the middle half of the sweep is a delay, that of the group.
+
+With p = exp(-j k d root), root = sqrt(eps - sin^2), a slab of half-space coefficient g has
+
+    gamma = g (1 - p^2) / (1 - g^2 p^2),        tau = (1 - g^2) p / (1 - g^2 p^2).
+
+Both are worked out anew for every ray: between the faces of a door leaf of 40 mm, fringes follow one another by some
+degrees, too close for a table. And their turn over the sweep needs no unwrapping: that of p is k d Re(root), and the
+brackets have positive real parts.
 """
 
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Complex, Float
+from numba import njit
 
-from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+from radarize.radar.config import RadarConfig
 from radarsim.world.materials import Material
 from radarsim.world.objects import SceneObject
 
-#: Entries of the tables.
-TABLE = 65
-#: From the centre of the sweep to where delays are measured, Hz.
-_STEP = 0.25e9
+#: Columns of a layer: permittivity (-inf j: conductor), electric thickness k d (0: opaque half space), the exponent by
+#: which roughness weakens what it mirrors head on, the coefficient of that as in the beat signal, and the share of the
+#: amplitude that small objects before it leave (`clutter.uncovered`).
+LAYER, HEAD_ON, UNCOVERED = 5, 3, 4
 #: Closed bodies up to this mean thickness (m) are one homogeneous slab: door leaves, table tops.
 THICKEST_BODY = 0.05
 
@@ -36,42 +45,78 @@ def as_slab(item: SceneObject) -> tuple[Material, bool]:
     return item.material, False
 
 
-def reflection(material: Material, config: RadarConfig) -> Complex[np.ndarray, "2 cosine"]:
-    """Coefficients for TE and TM with the factor that roughness leaves, as in the beat signal (conjugate)."""
-    cosine, frequency = np.linspace(0, 1, TABLE), config.center_frequency
-    return np.conj(material.slab(cosine, frequency)[0]) * material.coherent_factor(cosine, frequency)
+def layer(material: Material, config: RadarConfig) -> Complex[np.ndarray, "5"]:
+    """What `mirror` and `window` take of a material as thick as it acts."""
+    frequency, wavenumber = config.center_frequency, 2 * np.pi / config.wavelength
+    found = np.empty(LAYER, complex)
+    found[0], found[1] = material.permittivity_at(frequency), wavenumber * (material.thickness or 0.0)
+    found[2] = -np.log(material.coherent_factor(np.ones(1), frequency)[0])
+    found[UNCOVERED] = 1.0
+    found[HEAD_ON] = mirror(found, 1.0)[0]
+    return found
+
+
+def covered(layers: Complex[np.ndarray, "*n 5"], left: Float[np.ndarray, "*#n"] | float) -> Complex[np.ndarray, "*n 5"]:
+    """Layers of whose reflection small objects leave a share of the amplitude."""
+    found = layers.copy()
+    found[..., HEAD_ON:] = layers[..., HEAD_ON:] * left
+    return found
+
+
+@njit(cache=True)
+def mirror(layer, cosine):
+    """What a layer mirrors of TE and TM at a cosine of incidence, roughness included, as in the beat signal."""
+    left = layer[UNCOVERED].real * np.exp(-layer[2].real * cosine * cosine)
+    if np.isinf(layer[0].imag):
+        return -left + 0j, left + 0j
+    te, tm, root = _half_space(layer[0], cosine)
+    if layer[1].real > 0:
+        square = np.exp(-2j * layer[1].real * root)
+        te = te * (1 - square) / (1 - te * te * square)
+        tm = tm * (1 - square) / (1 - tm * tm * square)
+    return left * te.conjugate(), left * tm.conjugate()
+
+
+@njit(cache=True)
+def window(layer, cosine, share):
+    """What a slab lets through of TE and TM, relative to the air in its place and as in the beat signal, and by how
+    much it delays the mean of both, in units of 1 / k.
+
+    Args:
+        layer, cosine: as `mirror` has them.
+        share: of the frequency, over which the delay is taken.
+    """
+    turn, (te, tm, root) = layer[1].real, _half_space(layer[0], cosine)
+    once = np.exp(-1j * turn * root)
+    loops = 1 - te * te * once * once, 1 - tm * tm * once * once
+    air = once * np.exp(1j * turn * cosine)
+    through = (1 - te * te) * air / loops[0], (1 - tm * tm) * air / loops[1]
+    low, high = np.exp(-2j * turn * (1 - share / 2) * root), np.exp(-2j * turn * (1 + share / 2) * root)
+    rest = np.angle(1 - te * te * high) - np.angle(1 - te * te * low)
+    rest += np.angle(1 - tm * tm * high) - np.angle(1 - tm * tm * low)
+    return through[0].conjugate(), through[1].conjugate(), turn * (root.real - cosine) + rest / 2 / share
+
+
+@njit(cache=True)
+def _half_space(permittivity, cosine):
+    """Coefficients of an endless depth for TE and TM (`Material.fresnel`), and sqrt(eps - sin^2)."""
+    root = np.sqrt(permittivity - (1 - cosine * cosine))
+    return (cosine - root) / (cosine + root), (permittivity * cosine - root) / (permittivity * cosine + root), root
 
 
 def lag(material: Material, config: RadarConfig) -> float:
     """How much later than its front face's a material's head-on echo comes, m; before it (< 0) where the waves from
     both faces nearly cancel."""
-
-    def head_on(frequency):
-        return material.slab(np.ones(1), frequency)[0]
-
-    return float(_delay(head_on, config)[0]) if material.thickness is not None else 0.0
-
-
-def transmission(
-    material: Material, config: RadarConfig
-) -> tuple[Complex[np.ndarray, "2 cosine"], Float[np.ndarray, "cosine"]]:
-    """Coefficients for TE and TM, relative to free space and as in the beat signal (conjugate), and delay (m).
-
-    tau counts from face to face, in which a plane wave in air turns by k d cos(theta). The delay is that of the group,
-    -d arg(tau) / dk over the sweep.
-    """
-    cosine = np.linspace(0, 1, TABLE)
-
-    def excess(frequency):
-        wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT
-        return material.slab(cosine, frequency)[1] * np.exp(1j * wavenumber * material.thickness * cosine)
-
-    delay = _delay(excess, config)
-    return np.conj(excess(config.center_frequency)), np.maximum(delay, 0)
+    eps, turn = layer(material, config)[:2]
+    if turn == 0 or np.isinf(eps.imag):
+        return 0.0
+    te, _, root = _half_space(eps, 1.0)
+    share = sweep_share(config)
+    low, high = (np.exp(-2j * turn.real * (1 + s * share / 2) * root) for s in (-1, 1))
+    rest = np.angle(1 - te * te * high) - np.angle(1 - te * te * low) - np.angle(1 - high) + np.angle(1 - low)
+    return float(rest / share) * config.wavelength / (2 * np.pi)
 
 
-def _delay(coefficients, config):
-    """-d arg / dk at the centre of the sweep, m, of the mean over polarisations (rows)."""
-    low, high = (coefficients(config.center_frequency + s * _STEP) for s in (-1, 1))
-    turn = np.angle(np.mean(high * low.conj(), axis=0) + 1e-300)
-    return -turn / (2 * np.pi * 2 * _STEP / SPEED_OF_LIGHT)
+def sweep_share(config: RadarConfig) -> float:
+    """The middle half of the sweep, over which delays are taken, as a share of its centre frequency."""
+    return config.bandwidth / 2 / config.center_frequency

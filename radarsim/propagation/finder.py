@@ -37,7 +37,7 @@ class PathFinder:
         config: radar configuration.
         threshold: echoes below this amplitude are left out.
         range: largest one-way range of interest, m; default: 5 % beyond the radar's maximum.
-        antenna: the elements' pattern; default: the IWR1843BOOST's.
+        antenna: the elements' pattern; default: the board's.
         moving: what moves by itself.
     """
 
@@ -55,7 +55,7 @@ class PathFinder:
         self.config, self.threshold = config, threshold
         self.environment = Environment.of(scene, surface, reflectors, config, moving)
         self.range = 1.05 * config.max_range if range is None else range
-        self._pattern = gain_pattern(antenna)
+        self._pattern = gain_pattern(antenna or Antenna.of(config.board))
 
     def __call__(
         self, position: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"], time: float = 0.0

@@ -70,7 +70,7 @@ def planned(
         scene: as there.
         seed: of the tour, the scatterers and the noise.
         radar: preset, configuration file or configuration.
-        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
+        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: the board's own.
         sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
             are the same whatever is chosen.
         people: who walk about near the radar's way (see `crowd`).
@@ -85,7 +85,7 @@ def planned(
     config, cfg_text = load_config(radar)
     check_limits(config)
     way, names = Walk(**walk), tuple(chosen(sensors))
-    settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
+    settings = FrontEndConfig.load(frontend, config.board) if isinstance(frontend, (str, Path)) else frontend
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     motion = way.through(world, seed)
     world = crowded(world, motion, people, seed)

@@ -12,6 +12,7 @@ from radarsim.sensors.depth import DepthCamera, DepthStrip
 from radarsim.sensors.ghosts import Ghosts
 from radarsim.sensors.imu import Imu
 from radarsim.sensors.lidar import Lidar
+from radarsim.sensors.paths import TruePaths
 from radarsim.sensors.points import ChipPoints
 from radarsim.sensors.pose import TruePose
 from radarsim.sensors.scan import Occupancy, PlanarScan
@@ -31,9 +32,10 @@ SENSORS = {
     "ghosts": Ghosts,
     "lidar": Lidar,
     "adc-by-cause": AdcByCause,
+    "paths": TruePaths,
 }
-#: Not part of ``all``: either depth camera writes the same stream, and the other is several times the recording.
-_APART = {"depth-strip", "adc-by-cause"}
+#: Not part of ``all``: either depth camera writes the same stream, the others are as large as the recording or larger.
+_APART = {"depth-strip", "adc-by-cause", "paths"}
 
 
 def chosen(names: Sequence[str]) -> list[str]:

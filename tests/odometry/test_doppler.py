@@ -5,7 +5,6 @@ import pytest
 
 from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import DopplerVelocity, _fit
-from radarize.radar.array import BOARDS
 from radarize.radar.presets import PRESETS
 from tests.batches import batch
 from tests.echoes import record
@@ -169,8 +168,7 @@ def test_other_configurations(room, preset):
 
 def test_four_antennas_in_a_row_claim_little(room):
     """They hardly tell bearings: velocities are off by some tenths, and what is claimed knows of it."""
-    fields = {"board": "iwr6843aop", "start_frequency": 60e9}
-    config = CONFIG.model_copy(update=fields | {"channel_calibration": BOARDS["iwr6843aop"].channel_calibration})
+    config = CONFIG.changed("radar", board="iwr6843aop", start_frequency=60e9)
     adc = np.concatenate([burst(room, v, yaw=y, config=config) for v in VELOCITIES[:6] for y in (0.3, 2.1)])
     truth = np.repeat(VELOCITIES[:6], 2, axis=0)
     found = DopplerVelocity(Heatmaps(config)).estimate(batch(config, adc, np.arange(len(adc))))

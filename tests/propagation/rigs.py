@@ -8,12 +8,15 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import RadarConfig
-from radarsim.propagation.coefficients import TABLE
+from radarsim.propagation.antenna import Antenna, gain_pattern
+from radarsim.propagation.coefficients import LAYER
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
 from radarsim.receiver.synthesis import Synthesizer
 
 ISOTROPIC = (np.ones(181), np.ones(181), 1.0)
+#: The pattern of the elements of the presets' board.
+ELEMENT = gain_pattern(Antenna.of("iwr1843boost"))
 
 
 @dataclass
@@ -32,16 +35,22 @@ class Rig:
         return np.outer(t, self.velocity) + self.rotation(t).apply(self.lever)
 
 
-def conductors(*plates, reflection=(-1.0, 1.0)):
+def layer(gamma=-1.0):
+    """A half space that reflects so, head on (TE); a conductor for -1."""
+    eps = complex(1, -np.inf) if gamma == -1 else ((1 - gamma) / (1 + gamma)) ** 2
+    return np.array([eps, 0, 0, gamma, 1], complex)
+
+
+def conductors(*plates, gamma=-1.0):
     """Conducting rectangles: (centre, side directions u and v, half sides); the normal is u x v."""
     center, u, v, half = (np.array(column, float) for column in zip(*plates, strict=True))
     none, n = np.zeros(len(plates), bool), len(plates)
     u_, v_ = half[:, :1] * u, half[:, 1:] * v
     corners = center[:, None] + np.stack([-u_ - v_, u_ - v_, u_ + v_, v_ - u_], axis=1)
-    gamma = np.broadcast_to(np.array(reflection)[:, None], (n, 2, TABLE)).astype(complex)
+    layers = np.broadcast_to(layer(gamma), (n, LAYER))
     still = np.full(n, -1)
     even = np.zeros(n), np.zeros(n)
-    return Flat(corners, center, np.cross(u, v), u, v, half, none, none, gamma.copy(), *even, still, still)
+    return Flat(corners, center, np.cross(u, v), u, v, half, none, none, layers.copy(), *even, still, still)
 
 
 def polar(range_, azimuth_deg=0.0, elevation_deg=0.0):

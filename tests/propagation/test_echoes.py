@@ -6,7 +6,7 @@ import yaml
 from scipy import stats
 
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import amplitude_gain, gain_pattern
+from radarsim.propagation.antenna import amplitude_gain
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.paths import Kind
 from radarsim.propagation.reflectors import Reflectors
@@ -16,7 +16,7 @@ from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import rectangle
-from tests.propagation.rigs import Rig, burst, field
+from tests.propagation.rigs import ELEMENT, Rig, burst, field
 
 CONFIG = PRESETS["radarize"]
 HERE, AHEAD = np.zeros(3), np.eye(3)
@@ -50,7 +50,7 @@ def test_ghosts_stand_where_the_image_method_puts_them(corner):
     # radar equation with both legs, a conductor's coefficient and the antenna's gain in both directions
     out, back = np.linalg.norm(place), np.linalg.norm(image)
     isotropic = CONFIG.wavelength / (4 * np.pi) ** 1.5 / (out * back)
-    gain = amplitude_gain(*place, gain_pattern()) * amplitude_gain(*image, gain_pattern())
+    gain = amplitude_gain(*place, ELEMENT) * amplitude_gain(*image, ELEMENT)
     assert abs(echoes.amplitude[0]) == pytest.approx(isotropic * gain, rel=0.02)
     assert echoes.amplitude[0] == echoes.amplitude[1]
 

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation import apertures, plates
-from radarsim.propagation.antenna import gain_pattern
+from radarsim.propagation.antenna import Antenna, gain_pattern
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.mechanisms import image_chains
 from radarsim.propagation.path_types import PathType, PathTypes
@@ -191,7 +191,7 @@ def test_ghosts_of_a_box_room():
     apparent = (position + paths.images[:, :, :3] @ position + paths.images[:, :, 3]) / 2
     low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
     outside = np.maximum(np.maximum(low - apparent, apparent - high), 0).max(axis=1)
-    types = PathTypes(scene, CONFIG, gain_pattern())
+    types = PathTypes(scene, CONFIG, gain_pattern(Antenna.of(CONFIG.board)))
     still = SimpleNamespace(
         position=lambda t: np.tile(position, (len(t), 1)),
         rotation=lambda t: Rotation.from_matrix(np.tile(pose, (len(t), 1, 1))),

@@ -6,12 +6,11 @@ import pytest
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import gain_pattern
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import Band, FrontEndConfig
-from tests.propagation.rigs import Rig, burst, locate, polar
+from tests.propagation.rigs import ELEMENT, Rig, burst, locate, polar
 
 CONFIG = PRESETS["radarize"]
 HERE = np.zeros(3)
@@ -32,7 +31,7 @@ def test_point_target_obeys_the_radar_equation(range_, azimuth, elevation):
     signal = burst(CONFIG, point_echoes(place, sigma=0.5), Rig())
     guess = (range_ + 0.01, np.deg2rad(azimuth + 1), np.deg2rad(elevation - 1), 0.02)
     found_range, found_azimuth, found_elevation, speed, amplitude = locate(CONFIG, signal, guess)
-    az, el, _ = gain_pattern()
+    az, el, _ = ELEMENT
     degrees = np.linspace(0, 90, 181)
     gain = np.interp(abs(azimuth), degrees, az) ** 2 * np.interp(abs(elevation), degrees, el) ** 2
     expected = gain**2 * CONFIG.wavelength**2 * 0.5 / ((4 * np.pi) ** 3 * range_**4)

@@ -6,7 +6,7 @@ import pytest
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import amplitude_gain, gain_pattern
+from radarsim.propagation.antenna import amplitude_gain
 from radarsim.propagation.burst import BurstClock
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.movingtargets import MovingTargets
@@ -18,7 +18,7 @@ from radarsim.world.movers import Door, Fan, Person
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import rectangle
-from tests.propagation.rigs import Rig, polar
+from tests.propagation.rigs import ELEMENT, Rig, polar
 
 CONFIG = PRESETS["radarize"]
 NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
@@ -157,7 +157,7 @@ def test_cross_section_of_a_person():
     person = Person(name="p", path=((3.0, 0),), floor=-1.0, cross_section=0.5)
     finder, _ = alone([person])
     echoes = finder(np.zeros(3), np.eye(3), 0.0)
-    gain = np.array([amplitude_gain(*point, gain_pattern()) for point in echoes.points[:, 0]])
+    gain = np.array([amplitude_gain(*point, ELEMENT) for point in echoes.points[:, 0]])
     scale = CONFIG.wavelength / (4 * np.pi) ** 1.5 * gain**2 / np.sum(echoes.points[:, 0] ** 2, axis=1)
     found = np.sum((np.abs(echoes.amplitude) / scale) ** 2)
     assert 10 * np.log10(found / 0.5) == pytest.approx(0, abs=1.5)  # limbs hide one another

@@ -7,6 +7,7 @@ import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation import plates
+from radarsim.propagation.coefficients import HEAD_ON
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
@@ -21,7 +22,7 @@ LAMBDA = CONFIG.wavelength
 def plate(half, gamma=-1.0, center=(0.0, 0.0, 0.0)):
     """A rectangle in the plane x = 0, facing -x, sides along y and z."""
     x, y, z = np.eye(3)
-    return conductors((center, z, y, half[::-1]), reflection=(gamma, -gamma))
+    return conductors((center, z, y, half[::-1]), gamma=gamma)
 
 
 def field(facets, position):
@@ -160,5 +161,5 @@ def test_small_plates_keep_their_echo(material, side):
     mesh = shapes.rectangle((distance, 0, 0), (side, side), (-1, 0, 0))
     scene = Scene("plate", [SceneObject("plate", mesh, MATERIALS[material])])
     flat = Reflectors.of(scene, CONFIG).flat
-    truth = abs(flat.reflection[0, 0, -1] * physical_optics((side / 2, side / 2), (-distance, 0, 0), 401))
+    truth = abs(flat.layer[0, HEAD_ON] * physical_optics((side / 2, side / 2), (-distance, 0, 0), 401))
     assert 20 * np.log10(abs(field(flat, (0, 0, 0))) / truth) == pytest.approx(0, abs=0.3)

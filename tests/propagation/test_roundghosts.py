@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
+from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.mechanisms import curved_ghosts
 from radarsim.propagation.reflectors import Reflectors
@@ -12,11 +14,15 @@ from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import isotropic
+from tests.propagation.rigs import conductors, isotropic, layer
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
 WALL = SceneObject("wall", shapes.rectangle((1.5, 1.0, 0), (4.0, 3.0), (0, -1, 0)), MATERIALS["metal"])
+
+
+FLOOR = conductors(((2, 0, 0), (1, 0, 0), (0, 1, 0), (2.5, 2.0)))
+HIGH = np.array([0.0, 0.0, 0.8])
 
 
 def ghosts(body, wall=WALL):
@@ -75,6 +81,34 @@ def test_ghosts_of_round_bodies(kind):
         # each conductor turns the sign of an upright field; over j from stationary phase, once for every wall
         turned = ghost.amplitude[0] / truth * (-1) ** (1 + ghost.bounces[0])
         assert np.rad2deg(np.angle(turned)) == pytest.approx(0, abs=6)
+
+
+def leg_ghosts(bottom, tilt):
+    """Ghosts over a metal floor of a leg 2 m off, up to 0.7 m and tilted (deg), and the integral over what is above it,
+    both as the sum of the two orders of floor and leg."""
+    half = 0.35 - bottom / 2
+    center, turned = np.array([2.0, 0, 0.7 - half]), Rotation.from_euler("y", tilt, degrees=True)
+    leg = RoundBodies.of([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
+    found = curved_ghosts.find(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, leg))
+    points, normals, areas = pole(np.zeros(3), 0.03, 2 * half)
+    points, normals = turned.apply(points) + center, turned.apply(normals)
+    lit = points[:, 2] > 0
+    truth = 2 * summed(points[lit], normals[lit], areas[lit], HIGH, HIGH * [1, 1, -1], 0.0)
+    path = np.linalg.norm(found.points - HIGH, axis=2).sum(axis=1)
+    return np.sum(found.amplitude * np.exp(2j * np.pi * path / LAMBDA)), truth
+
+
+@pytest.mark.parametrize("bottom", [0.0, -0.4, 0.03])
+@pytest.mark.parametrize("tilt", [0.0, 1e-6, -1e-6, 0.05, -0.05, 0.5, -0.5])
+def test_a_leg_on_a_level_floor(bottom, tilt):
+    """A table leg that stands on a metal floor, in it, or above it; only what is above the floor makes ghosts.
+
+    With the floor it is a corner of 90 deg, whose ghosts come from its foot; tilted, from above or from below that.
+    """
+    value, truth = leg_ghosts(bottom, tilt)
+    assert 20 * np.log10(abs(value) / abs(truth)) == pytest.approx(0, abs=0.5)
+    # Two conductors: upright fields keep their sign.
+    assert np.rad2deg(np.angle(-value / truth)) == pytest.approx(0, abs=6)
 
 
 def test_a_finder_has_them():

@@ -7,7 +7,7 @@ import pytest
 from scipy import stats
 
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import amplitude_gain, gain_pattern
+from radarsim.propagation.antenna import amplitude_gain
 from radarsim.propagation.clutter import Clutter
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.level_of_detail import detail, share
@@ -18,7 +18,7 @@ from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.surface_settings import SurfaceSettings
-from tests.propagation.rigs import Rig, burst
+from tests.propagation.rigs import ELEMENT, Rig, burst
 
 CONFIG = PRESETS["radarize"]
 AHEAD = np.eye(3)
@@ -46,7 +46,7 @@ def surface(seed=0, **options):
 def weights(scatterers, position):
     """Amplitude factor of each scatterer from a position, looking along x."""
     offset = scatterers.position - position
-    shares = [share(amplitude_gain(*d, gain_pattern()) / gain_pattern().peak_gain, np.linalg.norm(d)) for d in offset]
+    shares = [share(amplitude_gain(*d, ELEMENT) / ELEMENT.peak_gain, np.linalg.norm(d)) for d in offset]
     return np.array([detail(rank, used) for rank, used in zip(scatterers.rank, shares, strict=True)])
 
 
@@ -112,7 +112,7 @@ def test_mean_power_does_not_depend_on_distance():
             finder = PathFinder(None, Surface(board, np.random.default_rng(seed)), None, CONFIG)
             echoes = finder(np.array([-distance, 0, 0]), AHEAD)
             place = echoes.points[:, 0] + [distance, 0, 0]
-            gain = np.array([amplitude_gain(*d, gain_pattern()) for d in place])
+            gain = np.array([amplitude_gain(*d, ELEMENT) for d in place])
             away = np.linalg.norm(place, axis=1)
             power += np.sum(np.abs(echoes.amplitude) ** 2 * (away / gain) ** 4 / (distance / away) ** 2)
         levels.append(10 * np.log10(power))

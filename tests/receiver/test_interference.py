@@ -138,7 +138,7 @@ GHOST = {"start": 8e-9}  # its chirps begin as ours do, but for a beat within th
 )
 def test_power_is_friis(distance, bearing, gains):
     """P G G' (lambda / 4 pi d)^2 with both patterns, over the transmitted power; and no more of what backs off."""
-    board = FrontEndConfig.ideal(band=Band(), antenna=FrontEndConfig().antenna)
+    board = FrontEndConfig.ideal(band=Band(), antenna=FrontEndConfig.of(CONFIG.board).antenna)
     for backoff in (0, 6):
         radar = {"loops": 8, "tx_backoff_db": backoff}
         found = signal(facing(distance, bearing, radar=radar, **GHOST), front_end=board)
@@ -251,7 +251,7 @@ ROBOT = {
 
 def walk(*others: dict) -> Scenario:
     scene = Scene.of(ROOM | {"interferers": list(others)}, "room")
-    return Scenario(scene, Motion.linear((0, 0, 1), (0.5, 0.1, 0)), CONFIG, FrontEndConfig(), seed=3)
+    return Scenario(scene, Motion.linear((0, 0, 1), (0.5, 0.1, 0)), CONFIG, FrontEndConfig.of(CONFIG.board), seed=3)
 
 
 def test_frames_are_functions_of_their_instants():

@@ -71,7 +71,7 @@ def test_causes_are_counted(walk):
 
 def test_iq_by_cause_adds_up(tmp_path):
     """Without noise, phase noise and clipping, the parts' sum is the recording itself, to rounding."""
-    settings = FrontEndConfig(noise=False, phase_noise=None)
+    settings = FrontEndConfig.of(CONFIG.board, noise=False, phase_noise=None)
     settings.save(tmp_path / "quiet.yaml")
     path = simulate(
         "office", tmp_path / "x.h5", duration=0.05, seed=3, frontend=tmp_path / "quiet.yaml", sensors=["adc-by-cause"]

@@ -22,7 +22,7 @@ def seen():
     """Three frames of people in an office: (ghost sensor, its rows, map of the I/Q by cause)."""
     scene = Scene.load("visitors")
     motion = Walk("handheld", 5.0).through(scene, 1)
-    scenario = Scenario(scene, motion, CONFIG, FrontEndConfig(mismatch=None), seed=1)
+    scenario = Scenario(scene, motion, CONFIG, FrontEndConfig.of(CONFIG.board, mismatch=None), seed=1)
     sensor, frames = Ghosts(scenario), scenario.frames(np.array([1.4, 4.1, 4.9]))
     iq = AdcByCause(scenario).observe(frames)["truth/adc_by_cause"].astype(np.float32)
     maps = Heatmaps(CONFIG, azimuths=AZIMUTHS)

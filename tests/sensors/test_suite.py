@@ -47,7 +47,7 @@ def test_unknown_and_excluding_sensors_are_refused(tmp_path):
     with pytest.raises(InputError, match="depth and depth-strip"):
         chosen(["all", "depth-strip"])
     assert chosen(["imu", "imu", "depth-strip"]) == ["depth-strip", "imu"]
-    assert set(chosen(["all"])) == set(SENSORS) - {"depth-strip", "adc-by-cause"}
+    assert set(chosen(["all"])) == set(SENSORS) - {"depth-strip", "adc-by-cause", "paths"}
     assert not (tmp_path / "a.h5").exists()
 
 

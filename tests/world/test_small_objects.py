@@ -204,7 +204,7 @@ def test_what_is_merged_reflects_as_each_would(found):
         assert len(tables[0].center) == len(tables[1].center)
         rows = [np.lexsort(t.center.round(6).T) for t in tables]
         assert np.allclose(tables[0].center[rows[0]], tables[1].center[rows[1]], atol=1e-6)
-        assert np.allclose(tables[0].reflection[rows[0]], tables[1].reflection[rows[1]])
+        assert np.allclose(tables[0].layer[rows[0]], tables[1].layer[rows[1]])
     assert not len(one.inner.center)
     assert not one.flat.horizontal.any()
 

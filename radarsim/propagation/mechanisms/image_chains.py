@@ -321,7 +321,7 @@ def _chain(way, p, path, ray, observation, frame, flat, room):
             planes[count, 0], planes[count, 1], planes[count, 2] = nx, ny, offset
             count += 1
         after = along(now, -2 * slope, n)
-        field = reflected(field, now, after, n, flat.reflection[m])
+        field = reflected(field, now, after, n, flat.layer[m])
         start = mirrored(start, c, n)
         f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
         now = after

@@ -1,15 +1,19 @@
 """What stands in a room, by its kind: pieces in rows along the walls, tables in the middle, as people arrange them."""
 
+from pathlib import Path
+
 import numpy as np
 from shapely.geometry import box as area
 
+from radarize.yamlfile import read_yaml
 from radarsim.world import shapes
-from radarsim.world.generators.furniture import Piece, make
+from radarsim.world.generators.furniture import Piece, evaluate, make
 from radarsim.world.generators.layout import FloorPlan
 from radarsim.world.generators.openings import OPPOSITE
 from radarsim.world.generators.rooms import Room, Site, footprint
 from radarsim.world.generators.stairs import stairs
 
+_ROOMS = read_yaml(Path(__file__).with_suffix(".yaml"))
 #: Clear width left beside things in a corridor, m.
 CLEAR = 1.25
 
@@ -24,7 +28,12 @@ def furnish(site: Site, room: Room, plan: FloorPlan) -> None:
         layout.stairs()
         return
     layout.at_windows()
-    _KINDS[room.kind](layout)
+    if room.kind == "lecture":
+        _lecture(layout)
+    elif room.kind == "lounge":
+        _lounge(layout)
+    else:
+        layout.arrange(_ROOMS[room.kind])
 
 
 class _Layout:
@@ -89,6 +98,21 @@ class _Layout:
                 at += 0.15
         return places
 
+    def arrange(self, steps: list[dict]) -> None:
+        """Put furniture as `furnishing.yaml` says."""
+        short, long = sorted(self.room.size)
+        for step in steps:
+            more = {name: value for name, value in step.items() if name not in ("at", "put", "count")}
+            side, kind = step["at"], step["put"]
+            kind = kind if isinstance(kind, str) else kind[int(self.rng.random() >= 0.5)]
+            count = int(evaluate(step.get("count", 1), {"area": short * long, "short": short, "long": long}))
+            if side == "middle":
+                self.tables(count, kind, **more)
+            elif kind == "desk":
+                self.desks(getattr(self, side), count)
+            else:
+                self.line(getattr(self, side), kind, count, **more)
+
     def desks(self, side: str, count: int) -> None:
         """Desks along a wall, a chair at each."""
         for place in self.line(side, "desk", count, start=self.rng.uniform(0.3, 0.6), gap=0.4, off=0.06):
@@ -97,6 +121,8 @@ class _Layout:
     def tables(self, rows: int, kind: str, seats: tuple[int, ...] = (), gap: float = 0.01, **given: float) -> None:
         """Tables in the middle, end to end along the room's longer side, with chairs along `seats` (their sides)."""
         room = self.room
+        if not rows:
+            return
         along_x = room.size[0] >= room.size[1]
         yaw = np.pi / 2 if along_x else 0.0
         pieces = [self.made(kind, **given) for _ in range(rows)]
@@ -131,27 +157,6 @@ class _Layout:
         x = room.x1 - length / 2 if at_low else room.x0 + length / 2
         y = room.y1 - width / 2 if door.side == "s" else room.y0 + width / 2
         self.site.put(room, stairs(self.site.height, width, length), x, y, -np.pi / 2 if at_low else np.pi / 2)
-
-
-def _office(x: _Layout) -> None:
-    area = x.room.size[0] * x.room.size[1]
-    x.desks(x.left, 2)
-    x.desks(x.right, 2 if area > 14 else 0)
-    x.desks(x.back, int(area / 15))
-    if area > 34:
-        x.tables(2, "desk", (1,))
-    x.line(x.front, "cabinet", 2)
-    x.line(x.right, "shelf", 1, start=2.0)
-    x.line(x.left, "shelf" if x.rng.random() < 0.5 else "cabinet", 1, start=2.4)
-    x.line(x.front, "bin", 1)
-    x.line(x.right, "whiteboard", 1, start=0.8)
-
-
-def _meeting(x: _Layout) -> None:
-    x.tables(max(1, int((max(x.room.size) - 2.4) / 1.7)), "table", (-1, 1), w=1.6)
-    x.line(x.left, "whiteboard", 1, start=1.0)
-    x.line(x.right, "cabinet", 1, start=1.4)
-    x.line(x.front, "bin", 1)
 
 
 def _lecture(x: _Layout) -> None:
@@ -191,50 +196,6 @@ def _lounge(x: _Layout) -> None:
     x.line(x.left, "vending", 1)
     x.tables(1, "table", (-1, 1), w=1.2)
     x.line(x.front, "plant", 1)
-
-
-def _lab(x: _Layout) -> None:
-    x.line(x.left, "lab bench", 4, gap=0.01)
-    x.line(x.right, "lab bench", 3, gap=0.01)
-    x.line(x.front, "cabinet", 2)
-    if min(x.room.size) > 4.6:
-        x.tables(max(1, int((max(x.room.size) - 2.6) / 1.8)), "lab bench")
-    x.line(x.right, "shelf", 1, material="wood")
-
-
-def _library(x: _Layout) -> None:
-    x.line(x.left, "shelf", 6, gap=0.01)
-    x.line(x.right, "shelf", 6, gap=0.01)
-    x.line(x.front, "shelf", 3, gap=0.01)
-    x.tables(1, "table", (-1, 1))
-
-
-def _storage(x: _Layout) -> None:
-    x.line(x.left, "shelf", 5, gap=0.02)
-    x.line(x.right, "cabinet", 3, gap=0.02)
-    x.line(x.back, "cabinet", 2, gap=0.02)
-    x.line(x.front, "shelf", 2, gap=0.02)
-    x.tables(1, "shelf")
-    x.line(x.back, "printer", 1)
-
-
-def _kitchen(x: _Layout) -> None:
-    x.line(x.left, "fridge", 1)
-    x.line(x.left, "counter", 4, gap=0.005)
-    x.tables(1, "table", (-1, 1), w=1.6)
-    x.line(x.front, "bin", 1)
-
-
-def _toilet(x: _Layout) -> None:
-    x.line(x.left, "cubicle", 3, gap=0.0, start=0.03)
-    x.line(x.right, "basin", 3, start=0.5, gap=0.1, off=0.005)
-    x.line(x.front, "bin", 1)
-
-
-_KINDS = {
-    "office": _office, "meeting": _meeting, "lecture": _lecture, "lounge": _lounge, "lab": _lab, "library": _library,
-    "storage": _storage, "kitchen": _kitchen, "toilet": _toilet,
-}  # fmt: skip
 
 
 def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:

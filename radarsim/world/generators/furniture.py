@@ -13,7 +13,7 @@ from radarsim.world import shapes
 
 #: What formulas in the file may use beside a piece's variables.
 _NAMES = {name: getattr(np, name) for name in ("arange", "cos", "linspace", "pi", "sin")}
-_NAMES |= {"__builtins__": {}, "min": min, "range": range}
+_NAMES |= {"__builtins__": {}, "max": max, "min": min, "range": range}
 
 
 @dataclass(frozen=True)

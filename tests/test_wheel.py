@@ -12,6 +12,7 @@ import pytest
 
 from radarize import __version__
 from radarize.extras import EXTRAS
+from radarize.radar.boards import BOARDS
 from radarsim.dataset import physics
 
 ROOT = Path(__file__).parents[1]
@@ -87,8 +88,9 @@ def test_the_wheel_holds_what_the_repository_does(wheel):
     found = set(zipfile.ZipFile(wheel).namelist())
     scenes = {f"radarsim/scenes/{path.relative_to(ROOT / 'scenes')}" for path in (ROOT / "scenes").rglob("*.*")}
     weights = {f"radarize/weights/{path.name}" for path in (ROOT / "radarize" / "weights").iterdir()}
+    boards = {f"radarize/radar/boards/{name}.yaml" for name in BOARDS}
     pages = {"radarize/capture/live.html", "radarize/report/templates/page.html"}
-    assert found >= scenes | weights | pages
+    assert found >= scenes | weights | boards | pages
     assert {name.split("/")[0] for name in found} == {"radarize", "radarsim", f"radarize-{__version__}.dist-info"}
     assert wheel.stat().st_size < 20e6
 

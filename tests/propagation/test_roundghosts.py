@@ -29,7 +29,7 @@ def ghosts(body, wall=WALL):
     """Ghosts of a metal body as seen from the origin."""
     found = Reflectors.of(Scene("ghosts", [wall, SceneObject("body", body, MATERIALS["metal"])]), CONFIG)
     facing = np.flatnonzero(np.abs(found.flat.normal[:, 1]) > 0.99)[:1]
-    return curved_ghosts.find(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found)
+    return curved_ghosts.ghosts(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found)
 
 
 def summed(points, normals, areas, one, two, image):
@@ -89,7 +89,7 @@ def leg_ghosts(bottom, tilt):
     half = 0.35 - bottom / 2
     center, turned = np.array([2.0, 0, 0.7 - half]), Rotation.from_euler("y", tilt, degrees=True)
     leg = RoundBodies.of([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
-    found = curved_ghosts.find(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, leg))
+    found = curved_ghosts.ghosts(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, leg))
     points, normals, areas = pole(np.zeros(3), 0.03, 2 * half)
     points, normals = turned.apply(points) + center, turned.apply(normals)
     lit = points[:, 2] > 0

@@ -17,7 +17,7 @@ _NAMES = {name: getattr(np, name) for name in ("arange", "cos", "linspace", "pi"
 _NAMES |= {"__builtins__": {}, "max": max, "min": min, "range": range}
 _ARITHMETIC = (
     ast.Expression, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Tuple, ast.List, ast.Subscript, ast.Slice,
-    ast.Call, ast.expr_context, ast.operator, ast.unaryop,
+    ast.Call, ast.Compare, ast.expr_context, ast.operator, ast.unaryop, ast.cmpop,
 )  # fmt: skip
 
 

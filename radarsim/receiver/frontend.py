@@ -123,7 +123,7 @@ class FrontEnd:
         if self.settings.high_pass:
             for corner in self.config.high_pass:
                 response = response * (1j * beat / (1j * beat + corner))
-        return response
+        return np.asarray(response)
 
     def _decimation(self, beat: np.ndarray) -> np.ndarray:
         band = self.settings.band

@@ -113,7 +113,7 @@ class EchoFinder:
         if len(self.plates):
             moving, hollow = self.plates.faces(observation)
             flat, inner = Flat.joined([flat, moving]), Flat.joined([inner, hollow])
-        return flat, Flat.joined([flat, inner]), visible_mirrors.find(observation, flat, self.scene)
+        return flat, Flat.joined([flat, inner]), visible_mirrors.find(observation, flat, self.obstacles)
 
     def _straight(self, observation: Observation, targets: Targets, candidates: Candidates) -> OneWay:
         """Straight paths worth an echo, through slabs last."""

@@ -1,10 +1,14 @@
 """What passes through walls, panes and doors: loss, phase and delay of thin slabs on a ray's way."""
 
+from functools import cached_property
+
 import numpy as np
+import trimesh
 from jaxtyping import Complex, Float
 
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.coefficients import TABLE, as_slab, transmission
+from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 
 #: A ray is given up behind this many slabs: one stud wall with a board on either side, or two panes.
@@ -32,6 +36,15 @@ class Transmission:
         self._table, self._body = np.array(self._table), np.array(self._body)
         self._factor = np.array([t for _, (t, _) in tables.values()]).reshape(-1, 2, TABLE)
         self._delay = np.array([d for _, (_, d) in tables.values()]).reshape(-1, TABLE)
+
+    @cached_property
+    def opaque(self) -> Scene | None:
+        """What of the scene nothing passes, as one object; None: nothing."""
+        solid = [item for item, table in zip(self.scene.objects, self._table, strict=True) if table < 0]
+        if not solid or len(solid) == len(self._table):
+            return self.scene if solid else None
+        mesh = trimesh.util.concatenate([item.mesh for item in solid])
+        return Scene(self.scene.name, [SceneObject("opaque", mesh, solid[0].material)])
 
     def passage(
         self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], up: Float[np.ndarray, "n 3"]

@@ -41,7 +41,7 @@ def by_chains(office, position, axis, spread, bounces):
     nobody = MovingTargets([], np.random.default_rng(0))
     plates = MovingPlates(nobody, CONFIG, CLEARANCE)
     obstacles = Obstacles(scene, Transmission(scene, CONFIG, CLEARANCE), nobody, plates)
-    found = images.by_chains(observation, flat, visible_mirrors.find(observation, flat, scene), obstacles)
+    found = images.by_chains(observation, flat, visible_mirrors.find(observation, flat, obstacles), obstacles)
     away = np.einsum("pij,j->pi", found.isometry[:, :, :3], position) + found.isometry[:, :, 3] - position
     path, ahead = np.linalg.norm(away, axis=1), away @ axis
     off = np.linalg.norm(np.cross(away, axis), axis=1) / np.where(ahead > 0, ahead, 1e-9)

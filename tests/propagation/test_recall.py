@@ -15,7 +15,7 @@ CONFIG = PRESETS["radarize"]
 GHOSTS = Provenance.GHOST_1, Provenance.GHOST_2, Provenance.GHOST_3
 
 
-def every_mirror(observation, flat, scene):
+def every_mirror(observation, flat, obstacles):
     """All reflectors that turn a face to the radar, and after them all before which they stand, as corners tell."""
     found = []
     for p in observation.position:

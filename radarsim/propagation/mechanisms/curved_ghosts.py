@@ -11,7 +11,7 @@ geometric optics with its caustics (Deschamps, Proc. IEEE 60(9), 1972). A cylind
 its axis, and borders that of other smooth surfaces (`patches`).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Complex, Float, Int
@@ -35,6 +35,7 @@ from radarsim.propagation.fields import (
     write,
 )
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fresnelzone import LEAST_LOSS
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Obstacles
 from radarsim.propagation.patches import strength
@@ -72,16 +73,22 @@ class RoundGhosts(Table):
 def seen(
     observation: Observation, flat: Flat, mirrors: list[Mirrors], reflectors: Reflectors, obstacles: Obstacles
 ) -> PointEchoes:
-    """Ghosts that nothing hides; slabs are opaque to them."""
+    """Ghosts that nothing hides, weakened and delayed where they pass slabs."""
     found = [find(observation, k, flat, some.seen, reflectors) for k, some in enumerate(mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
     n = 2 * len(every)
-    factor, _ = obstacles.way(
-        observation, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), np.zeros(n, bool)
+    allowed = np.abs(every.amplitude) > LEAST_LOSS * observation.threshold
+    factor, delay = obstacles.way(
+        observation, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), np.repeat(allowed, 2)
     )
-    clear = (factor != 0).reshape(-1, 2).all(axis=1)
-    frame, every = frame[clear], every[clear]
+    amplitude = every.amplitude * factor.reshape(-1, 2).prod(axis=1)
+    away = every.points - observation.position[frame, None]  # a delay moves the point away
+    away *= 1 + delay.reshape(-1, 2, 1) / np.linalg.norm(away, axis=2, keepdims=True)
+    every = replace(every, amplitude=amplitude, points=observation.position[frame, None] + away)
+    heard = np.abs(amplitude) > observation.threshold
+    frame, every, passes = frame[heard], every[heard], (factor != 1).reshape(-1, 2).any(axis=1)[heard]
     cause = np.where(every.bounces == 1, Provenance.GHOST_1, Provenance.GHOST_2).astype(np.uint8)
+    cause[passes] = Provenance.THROUGH_SLAB
     mirrors = np.stack([every.mirrors, np.full_like(every.mirrors, -1)], axis=2)
     return PointEchoes(frame, every.points, mirrors, np.full(len(frame), -1), every.amplitude, cause)
 

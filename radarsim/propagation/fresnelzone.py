@@ -19,7 +19,7 @@ from numba import njit
 from radarsim.propagation.fields import cross, dot, minus
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.obstacles import Obstacles
+from radarsim.propagation.obstacles import Obstacles, Passage
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table
 
@@ -80,8 +80,8 @@ class Stretches(Table):
 
 def passage(
     observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, size: Float[np.ndarray, "stretch"]
-) -> tuple[Complex[np.ndarray, "stretch"], Float[np.ndarray, "stretch"]]:
-    """What is left of waves along stretches, as an amplitude, and their delay (m).
+) -> Passage:
+    """What is left of waves along stretches.
 
     Args:
         observation, flat, obstacles: the frames, the mirrors, and what is in the way.
@@ -90,27 +90,32 @@ def passage(
             so much above the threshold that it matters.
     """
     worth = size > LEAST_LOSS * observation.threshold
-    factor, delay = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
+    found = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
     rows = np.flatnonzero(size > LEAST_SPLIT * observation.threshold)
     few, begin, end, inside = _rays(flat, stretches[rows], _FEW)
     clear = obstacles.clear(observation, stretches.frame[rows[few]], begin, end)
     # Alike are all that are as the ray in the middle; then what that met is all there is.
     unlike = np.zeros(len(rows), int)
-    np.add.at(unlike, few, clear != (factor[rows[few]] == 1))
+    np.add.at(unlike, few, clear != (found.factor[rows[few]] == 1))
     rows = rows[(unlike > 0) & (inside.sum(axis=1) >= _FEWEST)]
     many, begin, end, inside = _rays(flat, stretches[rows], _MANY)
-    passed, late = obstacles.passage(observation, stretches.frame[rows[many]], begin, end, np.ones(len(many), bool))
+    passed = obstacles.passage(observation, stretches.frame[rows[many]], begin, end, np.ones(len(many), bool))
+    late, strength = passed.delay, np.abs(passed.factor) ** 2
     weight = np.where(inside, _MANY.weight, 0)
     weight /= weight.sum(axis=1, keepdims=True)
     wavenumber = 2j * np.pi / observation.wavelength
-    field, power, later = np.zeros(len(rows), complex), np.full(len(rows), 1e-30), np.zeros(len(rows))
-    np.add.at(field, many, weight[inside] * passed * np.exp(wavenumber * late))
-    np.add.at(power, many, np.abs(passed) ** 2)
-    np.add.at(later, many, np.abs(passed) ** 2 * late)
+    field, clear = np.zeros(len(rows), complex), np.zeros(len(rows), complex)
+    power, later, slabs = np.full(len(rows), 1e-30), np.zeros(len(rows)), np.zeros(len(rows))
+    np.add.at(field, many, weight[inside] * passed.factor * np.exp(wavenumber * late))
+    np.add.at(clear, many, weight[inside] * (passed.blocked == 0))
+    np.add.at(power, many, strength)
+    np.add.at(later, many, strength * late)
+    np.add.at(slabs, many, strength * passed.through)
     later /= power
     field *= np.minimum(1, _MOST / np.maximum(np.abs(field), 1e-12)) * np.exp(-wavenumber * later)
-    factor[rows], delay[rows] = field, later
-    return factor, delay
+    found.factor[rows], found.delay[rows], found.through[rows] = field, later, slabs > power / 2
+    found.blocked[rows] = 1 - np.minimum(np.abs(clear), 1)
+    return found
 
 
 def _rays(flat: Flat, stretches: Stretches, lattice: Lattice):

@@ -1,19 +1,22 @@
 """The run of a data set, whatever makes its recordings: progress, failures, killed workers, resuming, refusals."""
 
 import os
+import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
-from fakes import FakeSpecification, fake
 
-from radarize.errors import InputError
+from radarize.errors import DiskFull, InputError
 from radarize.jobs import News
 from radarize.recording import Recording
-from radarsim.dataset import run
+from radarsim.dataset import physics, run
 from radarsim.dataset.run import make
+from tests.dataset.fakes import FakeSpecification, fake
+
+ROOT = Path(__file__).parents[2]
 
 
 def made(folder: Path) -> dict[str, bytes]:
@@ -80,10 +83,34 @@ def test_recordings_of_other_parameters_are_named_and_kept(tmp_path):
     assert outcome.kept == ["a"] and outcome.made == ["b"]
 
 
-def test_a_full_disk_ends_the_run(tmp_path):
-    tasks = fake("a", "full disk"), fake("b"), fake("c")
-    with pytest.raises(InputError, match="no space left on the device; 0 of 3 recordings are finished"):
-        make(FakeSpecification(*tasks), tmp_path, workers=1, say=lambda line: None)
+def test_a_full_disk_ends_the_run(small_disk):
+    """Whatever the system's language, for the worker's error carries what it is; a room without space does not."""
+    tasks = fake("a", "small rooms"), fake("b"), fake("c", "full disk"), fake("d")
+    with pytest.raises(DiskFull, match="no space left on the device; 1 of 4 recordings are finished"):
+        make(FakeSpecification(*tasks), small_disk, workers=1, say=lambda line: None)
+
+
+def test_recordings_of_other_physics_are_named_and_made_anew(tmp_path, monkeypatch):
+    task = FakeSpecification(fake("a"))
+    make(task, tmp_path, workers=1, say=lambda line: None)
+    monkeypatch.setattr(physics, "digest", lambda: "other")
+    with pytest.raises(InputError, match=r'a has physics "[0-9a-f]{16}", now "other"; --replace makes such recordings'):
+        make(task, tmp_path)
+
+
+def test_physics_are_the_sources_wherever_they_are(tmp_path):
+    """Installed, without what was compiled, they have the same digest; with a changed line of the propagation another,
+    of a report not."""
+    for package in ("radarsim", "radarize"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
+    shutil.copytree(ROOT / "scenes", tmp_path / "radarsim" / "scenes")
+    digest = physics.digest.__wrapped__
+    same = digest(tmp_path)
+    assert same == digest(ROOT) == physics.digest()
+    for file, changes in (("radarsim/twin/report.py", False), ("radarsim/propagation/fields.py", True)):
+        with (tmp_path / file).open("a") as source:
+            source.write("# changed\n")
+        assert (digest(tmp_path) != same) == changes
 
 
 def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
@@ -108,7 +135,7 @@ def test_only_a_held_folder_is_anothers(tmp_path):
 ORPHANS = """
 import sys
 from pathlib import Path
-from fakes import FakeSpecification, fake
+from tests.dataset.fakes import FakeSpecification, fake
 from radarsim.dataset.run import make
 
 if __name__ == "__main__":
@@ -119,7 +146,7 @@ if __name__ == "__main__":
 def test_workers_end_with_a_killed_parent_and_runs_exclude_each_other(tmp_path):
     script, folder = tmp_path / "script.py", tmp_path / "out"
     script.write_text(ORPHANS)
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     parent = subprocess.Popen([sys.executable, script, folder], env=environment)
     part = folder / "b.h5.part"
     waited = time.monotonic() + 60

@@ -4,17 +4,17 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from benchmarks.references import corners
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.paths import Kind
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation import corners
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -50,15 +50,14 @@ LEVEL = {"L": (FLOOR, RAISED), "T": (FLOOR_ON, RAISED), "T of a box and a sheet"
 def echo(objects, position, target, isometry):
     """Sum of all images by an isometry (3 x 3), and whether any of them passes a slab."""
     scene = Scene("junction", list(objects))
-    finder = EchoFinder(scene, NOTHING, Reflectors.of(scene, CONFIG), CONFIG, 1e-9, antenna=ISOTROPIC)
+    finder = PathFinder(scene, NOTHING, Reflectors.of(scene, CONFIG), CONFIG, 1e-9, antenna=ISOTROPIC)
     away = target - position
     yaw, pitch = np.arctan2(away[1], away[0]), -np.arcsin(away[2] / np.linalg.norm(away))
     found = finder(position, Rotation.from_euler("ZYX", [yaw, pitch, 0]).as_matrix())
     here = np.abs(found.images[:, :, :3] - isometry).max(axis=(1, 2)) < 1e-6
     path = np.linalg.norm(position - found.images[here, :, :3] @ position - found.images[here, :, 3], axis=1)
-    some = len(found.points) + np.flatnonzero(here)
-    slab = (found.provenance[some] == Provenance.THROUGH_SLAB).any()
-    return np.sum(found.amplitude[some] * np.exp(2j * np.pi * path / LAMBDA)), slab
+    some = found.where(kind=Kind.IMAGE)[here]
+    return np.sum(some.amplitude * np.exp(2j * np.pi * path / LAMBDA)), some.through.any()
 
 
 def check(objects, position, target, isometry):

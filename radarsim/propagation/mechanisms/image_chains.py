@@ -24,7 +24,9 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
+from radarsim.propagation import fresnelzone
 from radarsim.propagation.apertures import CORNERS, FAR, depth, kirchhoff, outlines, overlap
+from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
     along,
     cross,
@@ -41,7 +43,10 @@ from radarsim.propagation.fields import (
     write,
 )
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
+from radarsim.propagation.isometry import inverse
 from radarsim.propagation.observation import Observation
+from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table, filled
 
@@ -67,6 +72,65 @@ class Chains(Table):
     isometry: Float[np.ndarray, "chain 3 4"]
     amplitude: Complex[np.ndarray, "chain"]
     stops: Float[np.ndarray, "chain 3 3"]
+
+
+def find(view: View) -> Paths:
+    """Chains of two and three mirrors above the threshold, either way round."""
+    observation, flat = view.observation, view.flat
+    found = [chains(flat, some.pairs, observation, k) for k, some in enumerate(view.mirrors)]
+    frame = np.repeat(np.arange(len(found)), [len(f) for f in found])
+    every = Chains.joined(found)
+    two = every.mirrors[:, 1] == every.mirrors[:, 2]
+    stretches = _stretches(observation, flat, frame, every)
+    size = np.abs(every.amplitude).repeat(4)
+    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, size).after_one_another(4)
+    directions = []
+    for reverse, rows in (
+        (False, np.arange(len(every))),
+        (True, np.flatnonzero(every.mirrors[:, 0] != every.mirrors[:, 2])),
+    ):
+        order = every.mirrors[rows, ::-1] if reverse else every.mirrors[rows]
+        mirrors = np.full((len(rows), 4), -1)
+        mirrors[:, :3] = np.where(two[rows, None], order[:, [1, 2, 0]] if reverse else order, order)
+        mirrors[two[rows], 2] = -1
+        isometry = inverse(every.isometry[rows]) if reverse else every.isometry[rows]
+        paths = Paths.of(
+            Kind.IMAGE, isometry, every.amplitude[rows], frame=frame[rows], bounces=3 - two[rows], mirrors=mirrors
+        )
+        directions.append(paths.behind(observation, passed[rows]))
+    return Paths.joined(directions)
+
+
+def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "chain"], chains: Chains) -> Stretches:
+    """The four stretches of each chain, of two mirrors one of no length."""
+    here = observation.position[frame, None]
+    stops = np.concatenate([here, chains.stops, here], axis=1)
+    way = np.diff(stops, axis=1)
+    size = np.linalg.norm(way, axis=2)
+    there, whole = np.cumsum(size, axis=1)[:, :3], size.sum(axis=1)[:, None]
+    unit = np.sqrt(observation.wavelength * there * (whole - there) / (2 * whole))
+    now = way[:, 0] / size[:, 0, None]
+    aside = np.cross(now, observation.rotation[frame, :, 2])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    axes = np.stack([aside, np.cross(now, aside)], axis=1)
+    apart = np.empty((len(frame), 5, 2, 3))  # of a unit aside, by stop
+    apart[:, 0] = AT_RADAR * unit[:, 0, None, None] * axes
+    for k in range(3):
+        normal = flat.normal[chains.mirrors[:, k]]
+        lift = np.einsum("cad,cd->ca", axes, normal)[..., None]
+        slope = np.einsum("cd,cd->c", now, normal)[:, None]
+        apart[:, k + 1] = unit[:, k, None, None] * (axes - lift * (now / slope)[:, None])  # in the mirror's plane
+        last = (chains.mirrors[:, k] == chains.mirrors[:, min(k + 1, 2)]) & (k < 2)  # twice: it reflects once
+        axes = np.where(last[:, None, None], axes, axes - 2 * lift * normal[:, None])
+        now = np.where(last[:, None], now, now - 2 * slope * normal)
+    apart[:, 4] = AT_RADAR * unit[:, 2, None, None] * axes
+    two = chains.mirrors[:, 1] == chains.mirrors[:, 2]
+    mirrors = np.where(two[:, None] & (np.arange(3) == 2), -1, chains.mirrors)
+    return Stretches(
+        np.repeat(frame, 4), stops[:, :-1].reshape(-1, 3), stops[:, 1:].reshape(-1, 3),
+        apart[:, :-1].reshape(-1, 2, 3), apart[:, 1:].reshape(-1, 2, 3),
+        *(np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4])),
+    )  # fmt: skip
 
 
 class _Orders(NamedTuple):
@@ -256,7 +320,7 @@ def _chain(way, p, path, ray, observation, frame, flat, room):
             if count < 0:
                 return none
         after = along(now, -2 * slope, n)
-        field = reflected(field, now, after, n, flat.reflection[m])
+        field = reflected(field, now, after, n, flat.layer[m])
         start = mirrored(start, c, n)
         f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
         now, last = after, n

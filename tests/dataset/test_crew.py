@@ -25,8 +25,10 @@ def made(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
+    """Recordings that this process has made."""
     folder = tmp_path_factory.mktemp("undisturbed")
-    make(FakeSpecification(*(fake(name) for name in "abcd")), folder, workers=2, say=lambda line: None)
+    for name in "abcd":
+        fake(name).make(folder, lambda done, total: None)
     return made(folder)
 
 
@@ -47,7 +49,7 @@ def test_failures_do_not_stop_the_others(undisturbed, tmp_path):
     """A bad tour, a bug, and a process that is killed each time: named, and nothing half-written stays."""
     tasks = fake("a", "fails"), fake("b", "breaks"), fake("x", "killed"), fake("c"), fake("d")
     lines = []
-    outcome = make(FakeSpecification(*tasks), tmp_path, workers=2, say=lines.append)
+    outcome = make(FakeSpecification(*tasks), tmp_path, workers=1, say=lines.append)
     assert sorted(outcome.made) == ["c", "d"]
     assert outcome.failed["a"] == "a: no room to move"
     assert outcome.failed["b"] == "b: internal error, ZeroDivisionError: odd"
@@ -67,13 +69,14 @@ def test_half_written_recordings_are_redone(undisturbed, tmp_path):
     specification = FakeSpecification(*(fake(name) for name in "abcd"))
     for name, cut in (("a.h5.part", 5000), ("b.h5", 5000), ("c.h5", None)):  # half-written, cut short, whole
         (tmp_path / name).write_bytes(undisturbed[name[:4]][:cut])
-    outcome = make(specification, tmp_path, workers=2, say=lambda line: None)
+    outcome = make(specification, tmp_path, workers=1, say=lambda line: None)
     assert outcome.kept == ["c"] and sorted(outcome.made) == ["a", "b", "d"]
     assert made(tmp_path) == undisturbed
 
 
 def test_recordings_of_other_parameters_are_named_and_kept(tmp_path):
-    make(FakeSpecification(fake("a"), fake("b")), tmp_path, workers=1, say=lambda line: None)
+    for name in "ab":
+        fake(name).make(tmp_path, lambda done, total: None)
     before = made(tmp_path)
     longer = FakeSpecification(fake("a"), fake("b", frames=5))
     with pytest.raises(InputError, match=r"b has frames 4, now 5; --replace makes such recordings anew"):

@@ -17,6 +17,8 @@ from radarsim.emulator.disturbance import Disturbance
 from radarsim.emulator.simulation import Simulation
 from radarsim.emulator.source import Playback
 from radarsim.motion.walk import Walk
+from radarsim.recording.simulate import simulate
+from tests.dataset import hall
 from tests.emulator.client import SMALL, attached
 from tests.packets import packets
 from tests.virtual import CONFIG, record
@@ -159,13 +161,13 @@ class Slow(Playback):
 
 
 def test_a_scene_is_simulated_as_simulate_does_it(tmp_path):
-    from radarsim.recording.simulate import simulate
-
+    (tmp_path / "hall.yaml").write_text(hall.HALL)
     (tmp_path / "small.cfg").write_text(write_cfg(SMALL))
-    simulate("office", tmp_path / "office.h5", duration=0.2, seed=3, radar=str(tmp_path / "small.cfg"))
-    with Recording(tmp_path / "office.h5") as recording:
+    same = {"seed": 3, "radar": str(tmp_path / "small.cfg")}
+    way = {"platform": "cart", "duration": 0.2, "waypoints": np.array(hall.WAY)}
+    with Recording(simulate(tmp_path / "hall.yaml", tmp_path / "hall.h5", **same, **way)) as recording:
         expected = encode(recording.adc(0, len(recording)), SMALL).tobytes()
-    walk = Simulation("office", Walk(duration=0.2), seed=3, radar=str(tmp_path / "small.cfg"))
+    walk = Simulation(str(tmp_path / "hall.yaml"), Walk(**way), **same)
     with attached(walk) as (emulator, client, said):
         client.record()
         assert client.configure(SMALL)[-1].endswith("Done\n\r" + PROMPT)

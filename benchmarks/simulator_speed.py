@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.references.brute_force import direct_sum
 from benchmarks.results import Data, Page, memory_mb, peak_memory_mb, script, timed, walked
 from benchmarks.sionna import DEPTH, RAYS, SionnaScenario
 from radarize.radar.presets import PRESETS
@@ -18,7 +19,6 @@ from radarsim.machine.threads import default_workers
 from radarsim.recording.batches import TOGETHER, Batches
 from radarsim.recording.simulate import planned, record
 from radarsim.scenario import Scenario
-from tests.propagation.brute_force import direct_sum
 
 CONFIG = PRESETS["radarize"]
 

@@ -45,11 +45,12 @@ def simulate(
             "paths, every path above the noise; adc-by-cause, I/Q split by path type, before noise (much larger files)."
         ),
     ] = "",
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; by default one per core, fewer for short recordings.")
+    ] = None,
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
     from radarize.recording import Recording, keeping
-    from radarsim.machine.threads import default_workers
     from radarsim.motion.statistics import Statistics
     from radarsim.motion.trajectory import Mounting
     from radarsim.recording.simulate import simulate
@@ -59,7 +60,7 @@ def simulate(
             scene, output, platform=platform, trajectory=trajectory, waypoints=waypoints, duration=duration, seed=seed,
             people=people, mounting=Mounting.parse(mounting) if mounting else None, radar=radar, frontend=frontend,
             sensors=[name.strip() for name in sensors.split(",") if name.strip()],
-            workers=workers or default_workers(), progress=report,
+            workers=workers, progress=report,
         )  # fmt: skip
     with Recording(written) as recording:
         print(Statistics.from_json(recording.attributes["motion"]))

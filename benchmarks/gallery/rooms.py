@@ -13,6 +13,15 @@ from benchmarks.gallery.drawing import (
     THEORY,
     compare,
 )
+from benchmarks.references.box_room import images_of_a_room, lattice
+from benchmarks.references.brute_force import transfer_matrix
+from benchmarks.references.doors import HALF, MIDDLE, foot_speed, lengths, swinging
+from benchmarks.references.doors import finder as finder_of
+from benchmarks.references.front_end import db
+from benchmarks.references.hollow_walls import NEAR, PANES, RANGES, pane, peak, stud_wall
+from benchmarks.references.poles import wall_past_pole
+from benchmarks.references.reciprocity import DOOR
+from benchmarks.references.rigs import Rig, burst
 from radarize.heatmaps import Heatmaps
 from radarsim.propagation.antenna import ISOTROPIC, gain_pattern
 from radarsim.propagation.coefficients import layer, mirror, sweep_share, window
@@ -22,15 +31,6 @@ from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world.materials import material
 from radarsim.world.scene import Scene
-from tests.propagation.brute_force import transfer_matrix
-from tests.propagation.rigs import Rig, burst
-from tests.propagation.test_doors import HALF, MIDDLE, foot_speed, lengths, swinging
-from tests.propagation.test_doors import finder as finder_of
-from tests.propagation.test_fresnelzone import wall_past_pole
-from tests.propagation.test_hollow import NEAR, PANES, RANGES, pane, peak, stud_wall
-from tests.propagation.test_imagemethod import images_of_a_room, lattice
-from tests.propagation.test_multipath import DOOR
-from tests.receiver.test_frontend import db
 
 
 def box_room(axis) -> str:

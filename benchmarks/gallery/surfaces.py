@@ -5,6 +5,10 @@ from scipy import stats
 from scipy.special import gamma
 
 from benchmarks.gallery.drawing import AHEAD, CONFIG, FOUND, HERE, LAMBDA, THEORY, compare
+from benchmarks.references.front_end import db
+from benchmarks.references.reciprocity import there_and_back
+from benchmarks.references.rigs import Rig, burst, field
+from benchmarks.references.speckle import speckle as speckles
 from radarsim.propagation.clutter import CROSS_SECTION, EXPONENT, ON_WALLS, Clutter, in_the_open
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
@@ -16,10 +20,6 @@ from radarsim.world.materials import material
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.surface_settings import SurfaceSettings
-from tests.propagation.rigs import Rig, burst, field
-from tests.propagation.test_echoes import speckle as speckles
-from tests.propagation.test_multipath import there_and_back
-from tests.receiver.test_frontend import db
 
 
 def clutter(rng: np.random.Generator, count: int) -> Scatterers:

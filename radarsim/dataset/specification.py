@@ -46,7 +46,7 @@ from radarize.yamlfile import read_yaml
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task, content
 from radarsim.dataset.variant import Attributes, Strict, Variant
-from radarsim.world.description import Description, described, find, shipped, split_level
+from radarsim.world.description import described, description_model, find, shipped, split_level
 from radarsim.world.validation import format_validation_error
 
 #: What a building here may say of itself that stands beside `building` in a scene file.
@@ -251,7 +251,7 @@ class Specification(Strict):
         place = {} if floor is None else {"floor": floor}
         description = {"building": {key: given[key] for key in given if key not in OF_SCENE} | place} | settings
         try:
-            Description.model_validate(description)
+            description_model().model_validate(description)
         except ValidationError as error:
             raise InputError(
                 f"buildings.{building}: {format_validation_error(error, description).removeprefix('building.')}"

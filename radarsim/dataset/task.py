@@ -12,6 +12,7 @@ from radarize import __version__
 from radarize.errors import InputError
 from radarize.radar.presets import load_config
 from radarize.recording import Recording
+from radarsim.dataset import physics
 from radarsim.dataset.variant import Attributes, Variant
 from radarsim.world.description import meshes, split_level
 
@@ -70,8 +71,11 @@ class Task:
 
     @property
     def parameters(self) -> dict[str, object]:
-        """Everything that decides the recording's bytes; files by their content, so that they may move."""
-        found = asdict(self) | {"sensors": list(self.sensors), "version": __version__}
+        """Everything that decides the recording's bytes; files by their content, so that they may move.
+
+        The version is there beside the sources of the physics for what else makes a recording: heat maps, compression.
+        """
+        found = asdict(self) | {"sensors": list(self.sensors), "version": __version__, "physics": physics.digest()}
         for file in ("radar", "frontend"):
             found[file] = found[file] and Path(found[file]).name
         found["attributes"] = self.attributes or None  # older recordings know no such fields

@@ -44,8 +44,9 @@ class Antenna(BaseModel):
 
     @classmethod
     def of(cls, board: str | Board) -> "Antenna":
-        """The pattern in a board's file."""
-        return cls.model_validate(load_board(board).front_end["antenna"])
+        """The pattern in a board's file; isotropic where there is none."""
+        given = load_board(board).front_end.get("antenna")
+        return cls.model_validate(given) if given else ISOTROPIC
 
 
 #: Equal gain in all directions in front of the board.

@@ -56,10 +56,10 @@ def layer(material: Material, config: RadarConfig) -> Complex[np.ndarray, "5"]:
     return found
 
 
-def covered(layers: Complex[np.ndarray, "*n 5"], left: Float[np.ndarray, "*#n"] | float) -> Complex[np.ndarray, "*n 5"]:
+def covered(layers: Complex[np.ndarray, "*n 5"], left: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n 5"]:
     """Layers of whose reflection small objects leave a share of the amplitude."""
     found = layers.copy()
-    found[..., HEAD_ON:] = layers[..., HEAD_ON:] * left
+    found[..., HEAD_ON:] = layers[..., HEAD_ON:] * np.asarray(left)[..., None]
     return found
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.radar.config import RadarConfig
+from radarsim import plugins
 from radarsim.propagation import tracks
 from radarsim.propagation.antenna import Antenna, gain_pattern
 from radarsim.propagation.environment import Environment, View
@@ -21,10 +22,8 @@ from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.surface import Surface
 from radarsim.world.scene import Scene
 
-#: Ways in which an echo comes about.
-MECHANISMS: tuple[Callable[[View], Paths], ...] = (
-    diffuse.find, specular.find, image_chains.find, curved_ghosts.find
-)  # fmt: skip
+#: Ways in which an echo comes about; plug-ins append theirs.
+MECHANISMS: list[Callable[[View], Paths]] = [diffuse.find, specular.find, image_chains.find, curved_ghosts.find]
 
 
 class PathFinder:
@@ -52,6 +51,7 @@ class PathFinder:
         antenna: Antenna | None = None,
         moving: MovingTargets | None = None,
     ):
+        plugins.load()
         self.config, self.threshold = config, threshold
         self.environment = Environment.of(scene, surface, reflectors, config, moving)
         self.range = 1.05 * config.max_range if range is None else range

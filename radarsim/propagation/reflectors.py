@@ -112,7 +112,9 @@ class Reflectors:
             # physical optics holds down to about a wavelength
             curved, is_curved = pieces(item.mesh, ~is_round, config.wavelength**2)
             # a body has one table, and nowhere more energy than falls on it
-            bent = covered(made_of, left[scene.triangle_object == number].min(where=is_round | is_curved, initial=1.0))
+            bent = covered(
+                made_of, float(left[scene.triangle_object == number].min(where=is_round | is_curved, initial=1.0))
+            )
             bodies += [(b.center, b.axis, b.radius, b.half, bent) for b in round_]
             smooth += [(piece, item.two_sided, bent) for piece in curved]
             found = plates(item.mesh, ~(is_round | is_curved), config.wavelength**2)
@@ -128,7 +130,7 @@ class Reflectors:
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
         outer = _table(flat)
         seen = np.sqrt(uncovered(scene, outer.corners.mean(axis=1), outer.normal))
-        outer = replace(outer, layer=covered(outer.layer, seen[:, None]))
+        outer = replace(outer, layer=covered(outer.layer, seen))
         return cls(outer, RoundBodies.of(bodies), _table(inner), Patches.of(smooth), heights)
 
 

@@ -29,7 +29,7 @@ def simulate(
     scene: str | Path | Scene,
     output: Path,
     *,
-    workers: int = 1,
+    workers: int | None = 1,
     progress: Callable[[int, int], None] | None = None,
     **plan: object,
 ) -> Path:
@@ -38,7 +38,8 @@ def simulate(
     Args:
         scene: a scene, its YAML file, or the name of one that comes with the project.
         output: recording to write.
-        workers: processes beside this one that make frames; 1: this one does. A script that asks for more needs an
+        workers: processes beside this one that make frames, 16 at a time; 1: this one does; None: one per core, fewer
+            where starting them would take longer than they save. A script that asks for more than 1 needs an
             ``if __name__ == "__main__"``, as whatever starts processes does.
         progress: called with (frames done, frames in all).
         plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, sensors, platform, duration,
@@ -100,7 +101,7 @@ def record(
     *,
     cfg_text: str = "",
     attributes: Mapping[str, object] | None = None,
-    workers: int = 1,
+    workers: int | None = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write a recording of a scenario; what a killed run has left of the very same one is taken over.

@@ -31,21 +31,21 @@ class CauseCounts(Sensor):
 
 
 class AdcByCause(Sensor):
-    """I/Q of each cause before noise and converter."""
+    """I/Q of each cause before noise and converter, of which a part may exceed what either that or a float16 holds."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
         names = CAUSES if not scenario.scene.interferers else (*CAUSES[:-1], "interference", CAUSES[-1])
         about = "I/Q before noise and converter, by cause, which add up: " + ", ".join(names)
         shape = (len(names), *scenario.config.frame_shape)
-        self.streams = {"truth/adc_by_cause": Stream(shape, "f2", "ADC counts", about)}
+        self.streams = {"truth/adc_by_cause": Stream(shape, "f4", "ADC counts", about)}
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The parts."""
         others = [frames.interference] if self.scenario.scene.interferers else []
         each = zip(frames.lengths, frames.received, frames.types, *others, strict=True)
         parts = np.stack([self._split(*one) for one in each])
-        return {"truth/adc_by_cause": np.stack([parts.real, parts.imag], axis=-1).astype(np.float16)}
+        return {"truth/adc_by_cause": np.stack([parts.real, parts.imag], axis=-1).astype(np.float32)}
 
     @one_blas_thread
     def _split(

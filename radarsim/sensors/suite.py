@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from radarize.errors import InputError
+from radarsim import plugins
 from radarsim.machine.threads import one_blas_thread
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import AdcByCause, CauseCounts
@@ -21,7 +22,7 @@ from radarsim.sensors.tracking import TrackingCamera
 
 #: Sensors that cost next to nothing and are always there.
 ALWAYS = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}
-#: Sensors to choose from.
+#: Sensors to choose from; plug-ins enter theirs.
 SENSORS = {
     "depth": DepthCamera,
     "depth-strip": DepthStrip,
@@ -45,6 +46,7 @@ def chosen(names: Sequence[str]) -> list[str]:
     Raises:
         InputError: there is no such sensor, or two exclude each other.
     """
+    plugins.load()
     for name in names:
         if name not in SENSORS and name != "all":
             raise InputError(f"sensors: {name!r} is unknown, expected all or some of {', '.join(SENSORS)}")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.rigs import Rig, locate, polar
 from benchmarks.sionna import PathSolverFinder, SionnaScenario
 from radarize.radar.array import virtual_positions
 from radarize.radar.presets import PRESETS
@@ -14,7 +15,6 @@ from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import rectangle
-from tests.propagation.rigs import Rig, locate, polar
 
 CONFIG = PRESETS["radarize"]
 

@@ -1,6 +1,7 @@
 """The run of a data set, whatever makes its recordings: progress, failures, killed workers, resuming, refusals."""
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -8,12 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from radarize.errors import InputError
+from radarize.errors import DiskFull, InputError
 from radarize.jobs import News
 from radarize.recording import Recording
-from radarsim.dataset import run
+from radarsim.dataset import physics, run
 from radarsim.dataset.run import make
 from tests.dataset.fakes import FakeSpecification, fake
+
+ROOT = Path(__file__).parents[2]
 
 
 def made(folder: Path) -> dict[str, bytes]:
@@ -83,10 +86,34 @@ def test_recordings_of_other_parameters_are_named_and_kept(tmp_path):
     assert outcome.kept == ["a"] and outcome.made == ["b"]
 
 
-def test_a_full_disk_ends_the_run(tmp_path):
-    tasks = fake("a", "full disk"), fake("b"), fake("c")
-    with pytest.raises(InputError, match="no space left on the device; 0 of 3 recordings are finished"):
-        make(FakeSpecification(*tasks), tmp_path, workers=1, say=lambda line: None)
+def test_a_full_disk_ends_the_run(small_disk):
+    """Whatever the system's language, for the worker's error carries what it is; a room without space does not."""
+    tasks = fake("a", "small rooms"), fake("b"), fake("c", "full disk"), fake("d")
+    with pytest.raises(DiskFull, match="no space left on the device; 1 of 4 recordings are finished"):
+        make(FakeSpecification(*tasks), small_disk, workers=1, say=lambda line: None)
+
+
+def test_recordings_of_other_physics_are_named_and_made_anew(tmp_path, monkeypatch):
+    task = FakeSpecification(fake("a"))
+    make(task, tmp_path, workers=1, say=lambda line: None)
+    monkeypatch.setattr(physics, "digest", lambda: "other")
+    with pytest.raises(InputError, match=r'a has physics "[0-9a-f]{16}", now "other"; --replace makes such recordings'):
+        make(task, tmp_path)
+
+
+def test_physics_are_the_sources_wherever_they_are(tmp_path):
+    """Installed, without what was compiled, they have the same digest; with a changed line of the propagation another,
+    of a report not."""
+    for package in ("radarsim", "radarize"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
+    shutil.copytree(ROOT / "scenes", tmp_path / "radarsim" / "scenes")
+    digest = physics.digest.__wrapped__
+    same = digest(tmp_path)
+    assert same == digest(ROOT) == physics.digest()
+    for file, changes in (("radarsim/twin/report.py", False), ("radarsim/propagation/fields.py", True)):
+        with (tmp_path / file).open("a") as source:
+            source.write("# changed\n")
+        assert (digest(tmp_path) != same) == changes
 
 
 def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):

@@ -5,6 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.references.brute_force import bounced, fan
+from benchmarks.references.corners import looking
+from benchmarks.references.rigs import isotropic
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.environment import Environment, View
 from radarsim.propagation.mechanisms import image_chains
@@ -12,9 +15,6 @@ from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world.materials import MATERIALS
 from radarsim.world.scene import Scene
-from tests.propagation.brute_force import bounced, fan
-from tests.propagation.corners import looking
-from tests.propagation.rigs import isotropic
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from benchmarks.references.rigs import Rig, burst, isotropic, locate
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
@@ -17,7 +18,6 @@ from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import Rig, burst, isotropic, locate
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength

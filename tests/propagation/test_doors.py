@@ -4,37 +4,38 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from benchmarks.references.doors import (
+    CONFIG,
+    HALF,
+    HEIGHT,
+    HINGE,
+    INSTANTS,
+    MIDDLE,
+    NOTHING,
+    THICKNESS,
+    WIDTH,
+    door,
+    finder,
+    foot_speed,
+    lengths,
+    swinging,
+)
+from benchmarks.references.rigs import field
 from radarize.errors import InputError
 from radarize.radar.array import rx_positions, tx_positions
-from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import ISOTROPIC
 from radarsim.propagation.coefficients import as_slab, lag
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.paths import Kind
-from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.surface import Surface
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
-from radarsim.world.movers import Door
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import Rig, field
 
-CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
 HERE, AHEAD = np.zeros(3), np.eye(3)
-NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-#: Behind the radar, where it sees nothing: a scene has to have something that stands.
-BEHIND = SceneObject("behind", shapes.rectangle((-9, 0, 0), (0.1, 0.1), (-1, 0, 0)), MATERIALS["wood"])
-HINGE, WIDTH, HEIGHT, THICKNESS = np.array([2.0, -0.45, 0.0]), 0.9, 2.0, 0.04
-
-
-def door(angle, material="wood", **values):
-    """One that stands still at an angle, deg from the x axis, if nothing else is said."""
-    place = {"hinge": tuple(HINGE), "width": WIDTH, "height": HEIGHT, "thickness": THICKNESS}
-    return Door(name="door", material=material, **(place | {"angles": (angle, angle)} | values))
 
 
 def standing(angle, material="wood"):
@@ -43,15 +44,6 @@ def standing(angle, material="wood"):
     center = HINGE + WIDTH / 2 * np.array([np.cos(turn), np.sin(turn), 0])
     leaf = shapes.placed(shapes.box((0, 0, 0), (WIDTH, THICKNESS, HEIGHT)), center, (0, 0, turn))
     return SceneObject("leaf", leaf, MATERIALS[material])
-
-
-def finder(things, movers=(), surface=NOTHING):
-    """Of a scene with some things, and movers without scatterers of their own."""
-    scene = Scene("door", [BEHIND, *things])
-    moving = MovingTargets(list(movers), np.random.default_rng(0))
-    moving.sigma[:] = 1e-30
-    reflectors = Reflectors.of(scene, CONFIG)
-    return PathFinder(scene, surface, reflectors, CONFIG, 1e-13, antenna=ISOTROPIC, moving=moving)
 
 
 def both(angle, things=(), surface=NOTHING, material="wood"):
@@ -140,17 +132,6 @@ def test_chains_over_a_door():
         assert np.abs(moves.where(moving=True).images - image).max(axis=(1, 2)).min() < 1e-9
 
 
-def swinging(angle):
-    """A door on its way, at an angle (deg) at the time `MIDDLE`, some 0.8 rad/s fast."""
-    return door(0, angles=(angle - 30, angle + 30), period=4.0)
-
-
-#: The middle of a burst, s, and the ends of it and the middle after that.
-MIDDLE = 1.0
-HALF = (CONFIG.chirp_times.max() - CONFIG.chirp_times.min()) / 2
-INSTANTS = np.array([-1.0, 0.0, 1.0])
-
-
 def reflection(mover, t):
     """That in the face of a door that is turned to the origin: matrix and offset."""
     low, high = np.deg2rad(mover.angles)
@@ -158,18 +139,6 @@ def reflection(mover, t):
     normal = np.array([-np.sin(angle), np.cos(angle), 0.0])
     normal *= -np.sign(HINGE @ normal)
     return np.eye(3) - 2 * np.outer(normal, normal), 2 * (HINGE @ normal + THICKNESS / 2) * normal
-
-
-def foot_speed(mover):
-    """At which the point of a swinging door nearest the radar closes in at `MIDDLE`, m/s: omega times its way along."""
-    angle, rate = np.deg2rad(np.mean(mover.angles)), np.pi / mover.period * np.deg2rad(np.ptp(mover.angles))
-    return -rate * HINGE @ [np.cos(angle), np.sin(angle), 0.0]
-
-
-def lengths(echoes):
-    """Paths of echoes at the instants, (echo, virtual, instant), m."""
-    fit = echoes.lengths(CONFIG, Rig(), MIDDLE - CONFIG.burst_center)
-    return np.stack([fit @ [1, s, s * s] for s in INSTANTS], axis=-1)
 
 
 TX, RX = tx_positions(CONFIG), rx_positions(CONFIG)

@@ -5,7 +5,8 @@ import pytest
 import yaml
 from scipy import stats
 
-from radarize.radar.presets import PRESETS
+from benchmarks.references.rigs import ELEMENT, Rig, burst
+from benchmarks.references.speckle import AHEAD, CONFIG, HERE, speckle
 from radarsim.propagation.antenna import amplitude_gain
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.paths import Kind
@@ -16,10 +17,7 @@ from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import rectangle
-from tests.propagation.rigs import ELEMENT, Rig, burst, field
 
-CONFIG = PRESETS["radarize"]
-HERE, AHEAD = np.zeros(3), np.eye(3)
 WALL = {"shape": "rectangle", "name": "wall", "material": "metal", "size": [8, 3], "position": [0, 1.5, 0],
         "facing": [0, -1, 0]}  # fmt: skip
 
@@ -118,19 +116,6 @@ def test_speckle_is_the_same_world_from_elsewhere(corner):
         found = burst(CONFIG, finder(moved, AHEAD), Shifted())
         correlation = abs(np.vdot(truth, found)) / np.linalg.norm(truth) / np.linalg.norm(found)
         assert correlation > 0.999
-
-
-def speckle(places):
-    """Amplitudes of many scatterers in a cell, from places so far apart that the field decorrelates; RMS sqrt(2)."""
-    rng = np.random.default_rng(5)
-    place = np.stack([np.full(20000, 3.0), rng.uniform(-3, 3, 20000), rng.uniform(-1.0, 1.0, 20000)], axis=1)
-    scatterers = Scatterers.points(place, np.ones(20000), rng.uniform(0, 2 * np.pi, 20000))
-    finder = PathFinder(None, scatterers, None, CONFIG, range=10.0)
-    fields = []
-    for y in np.arange(places) * 0.2:
-        position = np.array([0.0, (y % 3) - 1.5, (y // 3) * 0.1 - 0.4])
-        fields.append(field(finder(position, AHEAD), position, CONFIG.wavelength))
-    return np.abs(fields) / np.sqrt(np.mean(np.abs(fields) ** 2) / 2)
 
 
 def test_speckle_is_rayleigh():

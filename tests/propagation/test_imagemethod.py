@@ -1,6 +1,5 @@
 """Images of the radar in two and three mirrors: box rooms, dihedral and trihedral corners."""
 
-from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,7 +7,17 @@ import pytest
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
-from radarize.radar.presets import PRESETS
+from benchmarks.references.box_room import CONFIG, images_of_a_room, lattice
+from benchmarks.references.corners import (
+    chains,
+    corner,
+    cross_section,
+    direction,
+    looking,
+    seen_by_all,
+    seen_by_both,
+)
+from benchmarks.references.rigs import isotropic
 from radarsim.propagation import apertures, plates
 from radarsim.propagation.antenna import Antenna, gain_pattern
 from radarsim.propagation.finder import PathFinder
@@ -18,19 +27,7 @@ from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.world.scene import Scene
-from tests.propagation.corners import (
-    both_ways,
-    chains,
-    corner,
-    cross_section,
-    direction,
-    looking,
-    seen_by_all,
-    seen_by_both,
-)
-from tests.propagation.rigs import isotropic
 
-CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
 
 
@@ -122,28 +119,6 @@ def test_what_an_edge_diffracts(seed):
     )  # fmt: skip
     assert apertures.diffracted(s, low, high) == pytest.approx(truth, abs=5e-4)
     assert apertures.diffracted(-s, low, high) == -apertures.diffracted(s, low, high)
-
-
-def images_of_a_room(observation):
-    """Images of a radar in a box room, by walls and chains of them: isometries, amplitudes, orders."""
-    flat = Reflectors.of(Scene.load("physics/room"), CONFIG).flat
-    parts = plates.parts(flat, observation, 0)
-    single = parts.isometry
-    walls = (
-        np.abs(np.linalg.det(single[:, :, :3]) + 1 + np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1)) < 1e-6
-    )
-    chain, isometry, amplitude = both_ways(flat, observation)
-    order = np.concatenate([np.ones(walls.sum(), int), 2 + (chain[:, 1] != chain[:, 2])])
-    return np.concatenate([single[walls], isometry]), np.concatenate([parts.amplitude[walls], amplitude]), order
-
-
-def lattice(p):
-    """The same images by the lattice of rooms: order, by axis whether it is turned, and place."""
-    low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
-    for cell in product(range(-3, 4), repeat=3):
-        order, even = int(np.abs(cell).sum()), np.array(cell) % 2 == 0
-        if 1 <= order <= 3:
-            yield order, ~even, low + cell * (high - low) + np.where(even, p - low, high - p)
 
 
 def test_box_room_has_all_its_images(monkeypatch):

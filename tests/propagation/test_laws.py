@@ -3,23 +3,14 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.bursts import CONFIG, point_echoes, slot_phases, tone_ranges
+from benchmarks.references.rigs import ELEMENT, Rig, burst, locate, polar
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
-from radarize.radar.presets import PRESETS
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import Band, FrontEndConfig
-from tests.propagation.rigs import ELEMENT, Rig, burst, locate, polar
-
-CONFIG = PRESETS["radarize"]
-HERE = np.zeros(3)
-
-
-def point_echoes(place, sigma=1.0):
-    return PathFinder(None, Scatterers.points(place, np.full(len(np.atleast_2d(place)), sigma)), None, CONFIG)(
-        HERE, np.eye(3)
-    )
 
 
 @pytest.mark.parametrize(
@@ -76,30 +67,11 @@ def test_doppler_frequency_in_hertz():
     assert frequency == pytest.approx(-513.69 * CONFIG.center_frequency / 77e9 * speed, rel=2e-3)
 
 
-def slot_phases(speed):
-    """Phase of an echo that closes, by transmitter against TX1: as simulated, and -4 pi v Tc / lambda a slot, rad."""
-    place = polar(3.0)
-    still = burst(CONFIG, point_echoes(place), Rig())
-    moving = burst(CONFIG, point_echoes(place), Rig(velocity=(speed, 0, 0)))
-    middle = CONFIG.samples // 2
-    turn = np.angle(moving[:, :, 0, middle] * still[:, :, 0, middle].conj())
-    per_slot = -4 * np.pi * speed * CONFIG.chirp_time / CONFIG.wavelength
-    return np.angle(np.exp(1j * (turn - turn[:, :1])).mean(axis=0)), per_slot * np.array(CONFIG.slot)
-
-
 @pytest.mark.parametrize("speed", [-1.6, 0.8])
 def test_tdm_slot_phase(speed):
     """TX3 fires one slot and TX2 two slots after TX1."""
     advance, law = slot_phases(speed)
     assert advance == pytest.approx(np.angle(np.exp(1j * law)), abs=0.02)
-
-
-def tone_ranges(signal, near):
-    """Range that the tone of each of TX1-RX1's chirps stands for, by a line through its phase."""
-    n = np.arange(CONFIG.samples) / CONFIG.sample_rate
-    expected = 2 * CONFIG.slope * near / SPEED_OF_LIGHT
-    phase = np.unwrap(np.angle(signal[:, 0, 0] * np.exp(-2j * np.pi * expected * n)), axis=1)
-    return near + np.polyfit(n, phase.T, 1)[0] / (2 * np.pi) * SPEED_OF_LIGHT / (2 * CONFIG.slope)
 
 
 def test_range_walk_within_a_burst():

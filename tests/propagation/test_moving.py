@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.rigs import ELEMENT, Rig, polar
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
@@ -18,7 +19,6 @@ from radarsim.world.movers import Door, Fan, Person
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import rectangle
-from tests.propagation.rigs import ELEMENT, Rig, polar
 
 CONFIG = PRESETS["radarize"]
 NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))

@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from benchmarks.references.brute_force import kirchhoff_mirror, transfer_matrix
+from benchmarks.references.reciprocity import CONFIG, DOOR, LAMBDA, sheet, there_and_back
+from benchmarks.references.rigs import ELEMENT, Rig, burst
 from radarize.heatmaps import Heatmaps
 from radarize.radar.config import SPEED_OF_LIGHT
-from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC as ISOTROPIC_ANTENNA
 from radarsim.propagation.antenna import Antenna, amplitude_gain
 from radarsim.propagation.coefficients import lag, layer, mirror, sweep_share, window
@@ -21,17 +23,9 @@ from radarsim.world.materials import MATERIALS, Material, constant
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import box, rectangle
-from tests.propagation.brute_force import kirchhoff_mirror, transfer_matrix
-from tests.propagation.rigs import ELEMENT, Rig, burst
 
-CONFIG = PRESETS["radarize"]
-LAMBDA = CONFIG.wavelength
 HERE, AHEAD = np.zeros(3), np.eye(3)
 NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-
-
-def sheet(name, material, position, size, facing):
-    return SceneObject(name, rectangle(position, size, facing), MATERIALS.get(material, material))
 
 
 def finder(objects, place, **options):
@@ -45,7 +39,6 @@ def points_of(echoes, bounces):
     return some.points, some.amplitude
 
 
-DOOR = sheet("door", "metal", (2.0, 0, 0), (3.0, 2.4), (-1, 0, 0))
 GLASS = sheet("glass", "glass", (1.5, 1.0, 0), (5.0, 2.4), (0, -1, 0))
 LEFT = sheet("left", "metal", (1.5, 1.2, 0), (5.0, 2.4), (0, -1, 0))
 AT_END = sheet("end", "metal", (3.0, 0, 0), (2.4, 2.4), (-1, 0, 0))
@@ -241,24 +234,6 @@ def office():
     return PathFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 7.5e-9)
 
 
-def there_and_back(echoes, place):
-    """Field of each echo from one antenna beside a place to another, and with TX and RX swapped."""
-
-    def field(tx, rx):
-        lengths = np.empty(len(echoes))
-        points = np.linalg.norm(tx - echoes.points[:, 0], axis=1) + np.linalg.norm(echoes.points[:, 1] - rx, axis=1)
-        lengths[echoes.kind == Kind.POINT] = points
-        images = np.linalg.norm(tx - echoes.images[:, :, :3] @ rx - echoes.images[:, :, 3], axis=1)
-        lengths[echoes.kind == Kind.IMAGE] = images
-        curved = echoes.kind == Kind.CURVED
-        ends = echoes[curved].apparent(place)
-        lengths[curved] = np.linalg.norm(tx - ends[:, 0], axis=1) + np.linalg.norm(ends[:, 1] - rx, axis=1)
-        return echoes.amplitude * np.exp(2j * np.pi * lengths / LAMBDA)
-
-    one, other = place + [0.0, 0.010, 0.002], place - [0.0, 0.012, 0.003]
-    return field(one, other), field(other, one)
-
-
 @pytest.mark.parametrize(("place", "yaw"), [((6.0, 6.0, 1.2), 0.1), ((3.0, 3.0, 1.3), 2.0), ((13.0, 9.0, 1.1), -1.0)])
 def test_reciprocity_of_an_office(office, place, yaw):
     """With the places of TX and RX swapped the field is the same to -60 dB, whatever the cause of the echoes."""
@@ -312,7 +287,7 @@ def test_an_antenna_of_high_gain_has_its_ghosts():
     place, lift = np.array([2.6, 0.3, 0.1]), 19.5
     weak = finder([GLASS], place)(HERE, AHEAD)
     ghosts = weak.where(bounces=2, through=False, moving=False).amplitude
-    antenna = Antenna(peak_dbi=10.5 + lift)
+    antenna = Antenna.of(CONFIG.board).model_copy(update={"peak_dbi": 10.5 + lift})
     strong = finder([GLASS], place, antenna=antenna, threshold=abs(ghosts).max() * 10)(HERE, AHEAD)
     found = strong.where(bounces=2, through=False, moving=False).amplitude
     assert 20 * np.log10(abs(found).max() / abs(ghosts).max()) == pytest.approx(2 * lift, abs=0.01)

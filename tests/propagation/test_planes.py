@@ -5,6 +5,7 @@ import pytest
 import shapely
 import trimesh
 
+from benchmarks.references.rigs import field
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
@@ -13,7 +14,6 @@ from radarsim.world import planes, shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import field
 
 CONFIG = PRESETS["radarize"]
 

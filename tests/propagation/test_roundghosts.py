@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from benchmarks.references.rigs import conductors, isotropic, layer
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.finder import PathFinder
@@ -14,7 +15,6 @@ from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import conductors, isotropic, layer
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength

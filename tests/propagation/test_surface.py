@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from benchmarks.references.rigs import ELEMENT, Rig, burst
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import amplitude_gain
 from radarsim.propagation.clutter import Clutter
@@ -18,7 +19,6 @@ from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.surface_settings import SurfaceSettings
-from tests.propagation.rigs import ELEMENT, Rig, burst
 
 CONFIG = PRESETS["radarize"]
 AHEAD = np.eye(3)

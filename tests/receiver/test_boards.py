@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.references.rigs import polar
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
 from radarize.importers.parameters import Given
@@ -28,7 +29,6 @@ from radarsim.receiver.phasenoise import density
 from radarsim.recording.simulate import simulate
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import polar
 
 PRESET = PRESETS["radarize"]
 MEASURED = tuple((float(k), 0.5) for k in range(12))
@@ -129,6 +129,7 @@ def test_a_board_outside_the_package_in_a_recording(own, tmp_path):
     own.unlink()
     with Recording(tmp_path / "a.h5") as recording:
         assert recording.config == config and str(recording.config.board) == "mine"
+        assert hash(recording.config) == hash(config)  # functions of a radar are cached
         assert found(recording.config, recording.adc(0, 1))[1:] == pytest.approx((20, 12), abs=2)
 
 
@@ -247,6 +248,7 @@ def test_a_front_end_file_changes_fields_of_the_boards(tmp_path):
         ("rx_sign: [-1, 1", "rx_sign: [-2, 1", "rx_sign.0 is -2"),
         ("chip:", "chips: iwr6843\nchip:", "chips"),
         (OWN, "[1, 2]", "holds a list"),
+        ("front_end:", "front_end:\n  2026-01-01: 3", "front_end is {"),
         ("design_frequency: 61.0e+9", "design_frequency: 61", "design_frequency is 61"),
     ],
 )

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.rigs import Rig, polar
 from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
@@ -14,7 +15,6 @@ from radarsim.receiver.frontend_config import Band, FrontEndConfig, Leakage, Mis
 from radarsim.receiver.synthesis import Synthesizer
 from radarsim.recording.simulate import simulate
 from tests.importers import public
-from tests.propagation.rigs import Rig, polar
 
 CONFIG = PRESETS["radarize"]
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.brute_force import beat, direct_sum
+from benchmarks.references.rigs import Rig
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.burst import BurstClock
 from radarsim.propagation.paths import Kind, Paths
 from radarsim.receiver.synthesis import Synthesizer
-from tests.propagation.brute_force import beat, direct_sum
-from tests.propagation.rigs import Rig
 
 CONFIG = PRESETS["radarize"]
 

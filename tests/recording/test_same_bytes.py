@@ -99,12 +99,18 @@ def frame_by_frame(plan, path, monkeypatch):
 
 
 def by_two_processes(plan, path, monkeypatch):
-    """In batches of two; this process makes none, and the others do not outlive the recording."""
+    """In batches of two; this process makes none, however short it is, and the others do not outlive the recording."""
     monkeypatch.setattr(batches, "TOGETHER", 2)
-    monkeypatch.setattr(batches, "_WORTH", 1)
     monkeypatch.setattr(Batches, "made", None)
     simulate(output=path, workers=2, **plan)
     assert not active_children()
+
+
+def by_as_many_processes_as_pay(plan, path, monkeypatch):
+    """None beside this one, for so few frames."""
+    monkeypatch.setattr(batches, "TOGETHER", 1)
+    monkeypatch.setattr(batches, "perform", None)
+    simulate(output=path, workers=None, **plan)
 
 
 def after_a_kill(plan, path, monkeypatch):
@@ -145,7 +151,15 @@ def until_killed(plan: dict, path: Path, frames: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "way", [from_a_scene_at_hand, frame_by_frame, by_two_processes, after_a_kill, with_sensors_added_later]
+    "way",
+    [
+        from_a_scene_at_hand,
+        frame_by_frame,
+        by_two_processes,
+        by_as_many_processes_as_pay,
+        after_a_kill,
+        with_sensors_added_later,
+    ],
 )
 def test_a_recording_made_another_way(way: Way, plan, expected, tmp_path, monkeypatch):
     way(plan, tmp_path / "a.h5", monkeypatch)

@@ -8,11 +8,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
+from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarsim.motion.planner import plan_motion
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig
-from radarsim.recording import batches
 from radarsim.recording.simulate import simulate
 from radarsim.sensors.causes import CAUSES
 from radarsim.world import shapes
@@ -71,7 +71,7 @@ def test_causes_are_counted(walk):
 
 def test_iq_by_cause_adds_up(tmp_path):
     """Without noise, phase noise and clipping, the parts' sum is the recording itself, to rounding."""
-    settings = FrontEndConfig.of(CONFIG.board, noise=False, phase_noise=None)
+    settings = FrontEndConfig.of(PRESETS["radarize"].board, noise=False, phase_noise=None)
     settings.save(tmp_path / "quiet.yaml")
     path = simulate(
         "office", tmp_path / "x.h5", duration=0.05, seed=3, frontend=tmp_path / "quiet.yaml", sensors=["adc-by-cause"]
@@ -118,8 +118,7 @@ def test_bad_input_is_refused_in_a_sentence(tmp_path, arguments, words):
     assert not (tmp_path / "x.h5").exists()
 
 
-def test_what_fails_in_another_process_is_said_here(tmp_path, monkeypatch):
-    monkeypatch.setattr(batches, "_WORTH", 1)
+def test_what_fails_in_another_process_is_said_here(tmp_path):
     (tmp_path / "still.tum").write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(3)))
     far = SceneObject("far", shapes.rectangle((90, 0, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
     with pytest.raises(InputError, match="scene away: no frame has an echo"):

@@ -49,7 +49,10 @@ class Board(Frozen):
     @classmethod
     def _as_json(cls, fields: object) -> object:
         """As it comes back from a recording's JSON: keys are text, and whatever is no plain data is."""
-        return json.loads(json.dumps(fields, default=str))
+        try:
+            return json.loads(json.dumps(fields, default=str))
+        except TypeError as error:
+            raise ValueError("names and numbers as keys") from error
 
     @property
     def nominal_calibration(self) -> tuple[tuple[float, float], ...]:

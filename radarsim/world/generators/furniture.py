@@ -1,5 +1,6 @@
 """Furniture, fittings and small objects as meshes by material, each in its own frame (`furniture.yaml`)."""
 
+import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -14,6 +15,10 @@ from radarsim.world import shapes
 #: What formulas in the file may use beside a piece's variables.
 _NAMES = {name: getattr(np, name) for name in ("arange", "cos", "linspace", "pi", "sin")}
 _NAMES |= {"__builtins__": {}, "max": max, "min": min, "range": range}
+_ARITHMETIC = (
+    ast.Expression, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Tuple, ast.List, ast.Subscript, ast.Slice,
+    ast.Call, ast.expr_context, ast.operator, ast.unaryop,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -88,4 +93,11 @@ def _source(formula: object) -> str:
 
 @cache
 def _compiled(source: str):
-    return compile(source, "furniture.yaml", "eval")
+    """Arithmetic, and calls of what `_NAMES` holds; nothing else can be in a formula."""
+    tree = ast.parse(source, "furniture.yaml", "eval")
+    calls = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    odd = [node for node in ast.walk(tree) if not isinstance(node, _ARITHMETIC)]
+    odd += [node for node in calls if not (isinstance(node, ast.Name) and node.id in _NAMES)]
+    if odd:
+        raise ValueError(f"formula {source!r} holds {ast.unparse(odd[0])!r}, expected arithmetic")
+    return compile(tree, "furniture.yaml", "eval")

@@ -5,6 +5,7 @@ import pytest
 import shapely
 import trimesh
 
+from benchmarks.references.rigs import field
 from radarize.console import run
 from radarize.radar.presets import PRESETS
 from radarsim.cli import app
@@ -16,7 +17,6 @@ from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
 from radarsim.world.importers import Options, import_scene
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import field
 
 CONFIG = PRESETS["radarize"]
 ROOM = shapes.box((3, 2, 1.35), (6, 4, 2.7))

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.special import fresnel
 
+from benchmarks.references.rigs import conductors, isotropic
 from radarize.radar.presets import PRESETS
 from radarsim.propagation import visible_mirrors
 from radarsim.propagation.isometry import inverse
 from radarsim.propagation.mechanisms import image_chains
-from tests.propagation.rigs import conductors, isotropic
 
 LAMBDA = PRESETS["radarize"].wavelength
 

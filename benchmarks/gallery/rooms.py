@@ -24,8 +24,8 @@ from benchmarks.references.reciprocity import DOOR
 from benchmarks.references.rigs import Rig, burst
 from radarize.heatmaps import Heatmaps
 from radarsim.propagation.antenna import ISOTROPIC, gain_pattern
-from radarsim.propagation.coefficients import layer, mirror, sweep_share, window
 from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.media import layer, mirror, sweep_share, window
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers

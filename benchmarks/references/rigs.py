@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.antenna import Antenna, gain_pattern
-from radarsim.propagation.coefficients import LAYER
+from radarsim.propagation.media import LAYER
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
 from radarsim.receiver.synthesis import Synthesizer

@@ -28,10 +28,10 @@ from numba import njit
 from scipy.special import fresnel
 
 from radarsim.propagation.antenna import amplitude_gain
-from radarsim.propagation.coefficients import HEAD_ON, LAYER
 from radarsim.propagation.fields import along as moved
 from radarsim.propagation.fields import cross, dot, length, minus, mirrored, unit
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.media import HEAD_ON, LAYER
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.table import Table
 

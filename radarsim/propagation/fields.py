@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from radarsim.propagation.antenna import amplitude_gain
-from radarsim.propagation.coefficients import mirror
+from radarsim.propagation.media import mirror
 
 
 @njit
@@ -131,7 +131,7 @@ def reflected(field, arriving, leaving, normal, layer):
         field: complex vector.
         arriving, leaving: unit directions of travel.
         normal: of the mirror, on either side.
-        layer: what it is made of (`coefficients.layer`).
+        layer: what it is made of (`media.layer`).
     """
     te, tm = mirror(layer, min(abs(dot(arriving, normal)), 1.0))
     across = cross(arriving, normal)

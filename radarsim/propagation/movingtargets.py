@@ -11,8 +11,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit, prange
 
+from radarsim.propagation.media import LAMBERT, weights
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
-from radarsim.propagation.scatteringpattern import LAMBERT, weights
 from radarsim.world.crossing import crossing
 from radarsim.world.movers import Mover, poses
 

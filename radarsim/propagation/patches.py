@@ -25,10 +25,10 @@ from jaxtyping import Bool, Complex, Float, Int
 from numba import njit
 
 from radarsim.propagation.apertures import FAR, diffracted, side
-from radarsim.propagation.coefficients import HEAD_ON, LAYER
 from radarsim.propagation.curved import QUADRIC, SHAPE, Arcs, stationary
 from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, unit, write
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.media import HEAD_ON, LAYER
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.smooth import Piece
 from radarsim.propagation.table import filled

@@ -27,9 +27,9 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
-from radarsim.propagation.coefficients import HEAD_ON
 from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, write
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.media import HEAD_ON
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table, filled

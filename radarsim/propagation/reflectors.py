@@ -9,9 +9,9 @@ from jaxtyping import Bool, Complex, Float, Int
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.bodies import recognise
 from radarsim.propagation.clutter import uncovered
-from radarsim.propagation.coefficients import LAYER, as_slab, covered, lag, layer
 from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.hashgrid import Grid
+from radarsim.propagation.media import LAYER, as_slab, covered, lag, layer
 from radarsim.propagation.patches import Patches
 from radarsim.propagation.smooth import pieces
 from radarsim.propagation.table import Table
@@ -31,8 +31,8 @@ class Flat(Table):
         half: half the rectangle's side lengths along u and v, m.
         two_sided: sheets without a volume show both sides.
         horizontal: part of a floor or ceiling.
-        layer: what they are made of (`coefficients.layer`), and how much of it small objects leave uncovered.
-        lag: how much later than its face the head-on echo comes, m (`coefficients.lag`).
+        layer: what they are made of (`media.layer`), and how much of it small objects leave uncovered.
+        lag: how much later than its face the head-on echo comes, m (`media.lag`).
         finish: how uneven they are over plaster, see `unevenness.FINISHES`.
         plate, frame: the moving plate that they belong to (`movingplates`), and the frame in which they stand so;
             -1: they stand still, in all frames.

@@ -17,8 +17,8 @@ from numba import njit, prange
 from radarsim.propagation.clutter import Clutter, uncovered
 from radarsim.propagation.hashgrid import Grid
 from radarsim.propagation.level_of_detail import FULL_DETAIL
+from radarsim.propagation.media import weights
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
-from radarsim.propagation.scatteringpattern import weights
 from radarsim.world.scene import Scene
 
 #: Scatterers per square metre at full detail; with level of detail twelve or more are left in a range-azimuth cell of

@@ -6,9 +6,9 @@ from numba import njit
 
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.clutter import uncovered
-from radarsim.propagation.coefficients import LAYER, as_slab, layer, sweep_share, window
 from radarsim.propagation.fields import cross, dot, unit, upright
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.media import LAYER, as_slab, layer, sweep_share, window
 from radarsim.world.scene import Scene
 
 #: A ray is given up behind this many slabs: one stud wall with a board on either side, or two panes.
@@ -16,7 +16,7 @@ MOST_SLABS = 2
 
 
 class Transmission:
-    """The thin objects of a scene (`coefficients`).
+    """The thin objects of a scene (`media`).
 
     Args:
         scene: ray tests run on its geometry.

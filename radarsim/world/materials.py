@@ -11,7 +11,7 @@ scattering, sigma0 = 4 (1 - rho^2) |Gamma|^2: the backscatter coefficient at nor
 dB less for coarse or porous surfaces (carpet, fabric, mineral fibre, asphalt), which absorb part of what they take.
 RMS heights are estimates for common finishes; expect sigma0 within some 5 dB of a given real wall.
 
-Lobes share out the same power (`radarsim.propagation.scatteringpattern`). Plain surfaces, whose roughness is gentle,
+Lobes share out the same power (`radarsim.propagation.media`). Plain surfaces, whose roughness is gentle,
 scatter about the specular direction; the paper's measured walls ask for such a lobe, of exponent 4. Masonry and
 aggregate have joints and pits that face the source and throw more back; cloth, fibre and foam are volumes and follow
 Lambert. The shares are estimates; against Lambert they raise backscatter by 1.5 dB at normal incidence and

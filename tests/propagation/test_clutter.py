@@ -19,12 +19,11 @@ from radarsim.propagation.clutter import (
     UNDER_CEILINGS,
     Clutter,
 )
-from radarsim.propagation.coefficients import mirror
 from radarsim.propagation.fields import facing
 from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.media import mirror, scattering
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
-from radarsim.propagation.scatteringpattern import scattering
 from radarsim.propagation.surface import Cluttered, Surface
 from radarsim.propagation.transmission import Transmission
 from radarsim.world import shapes

@@ -23,8 +23,8 @@ from benchmarks.references.doors import (
 from benchmarks.references.rigs import field
 from radarize.errors import InputError
 from radarize.radar.array import rx_positions, tx_positions
-from radarsim.propagation.coefficients import as_slab, lag
 from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.media import as_slab, lag
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.paths import Kind
 from radarsim.propagation.scatterers import Scatterers

@@ -13,8 +13,8 @@ from radarize.heatmaps import Heatmaps
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarsim.propagation.antenna import ISOTROPIC as ISOTROPIC_ANTENNA
 from radarsim.propagation.antenna import Antenna, amplitude_gain
-from radarsim.propagation.coefficients import lag, layer, mirror, sweep_share, window
 from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.media import lag, layer, mirror, sweep_share, window
 from radarsim.propagation.paths import Kind
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers

@@ -8,7 +8,7 @@ import pytest
 from benchmarks.references.plates import CONFIG, LAMBDA, physical_optics
 from benchmarks.references.rigs import conductors, isotropic
 from radarsim.propagation import plates
-from radarsim.propagation.coefficients import HEAD_ON
+from radarsim.propagation.media import HEAD_ON
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS

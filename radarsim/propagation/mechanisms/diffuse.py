@@ -20,9 +20,9 @@ from radarsim.propagation.fields import dot, facing, length, minus, unit
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.fresnelzone import LEAST_LOSS
 from radarsim.propagation.mechanisms.mirrored_paths import SpecularCandidates
+from radarsim.propagation.media import scattering
 from radarsim.propagation.one_way import OneWay
 from radarsim.propagation.paths import Kind, Paths
-from radarsim.propagation.scatteringpattern import scattering
 
 #: Mirrors over which an echo goes out and back, together.
 MOST_BOUNCES = 2

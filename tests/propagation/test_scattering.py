@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarsim.propagation.scatteringpattern import LAMBERT, concentration, scattering, weights
+from radarsim.propagation.media import LAMBERT, concentration, scattering, weights
 from radarsim.world.materials import MATERIALS
 
 

@@ -1,4 +1,4 @@
-"""How objects reflect and transmit: layers, and their coefficients at an angle of incidence.
+"""What surfaces do with a wave: Fresnel coefficients, slabs, roughness, scattering.
 
 A sheet is a slab of its material's thickness, and so is each face of a thick closed body of such a material (hollow: a
 cabinet of boards, a stud wall); its inner faces lie that much further in. A thin closed body is one slab as thick as
@@ -13,6 +13,18 @@ With p = exp(-j k d root), root = sqrt(eps - sin^2), a slab of half-space coeffi
 Both are worked out anew for every ray: between the faces of a door leaf of 40 mm, fringes follow one another by some
 degrees, too close for a table. And their turn over the sweep needs no unwrapping: that of p is k d Re(root), and the
 brackets have positive real parts.
+
+A rough surface scatters as Lambert has it, in a lobe about the mirror direction, and in one back to the source.
+Effective roughness (Degli-Esposti, Fuschini, Vitucci, Falciasecca, IEEE TAP 55(1), 2007): of the diffuse power one
+share is scattered as Lambert has it, one into a directive lobe ((1 + cos psi_r) / 2)^alpha about the specular
+direction, one into a lobe ((1 + cos psi_i) / 2)^alpha back towards the source. The paper normalises each lobe by its
+integral over the hemisphere, which depends on the angle of incidence and so breaks reciprocity. Here the lobes multiply
+Lambert's cos(in) cos(out) instead, and are normalised at normal incidence, where that integral is largest:
+
+    sigma(in, out) = sigma0 cos(in) cos(out) (w + w_r ((1 + cos psi_r) / 2)^alpha + w_i ((1 + cos psi_i) / 2)^alpha),
+
+so swapping the ways in and out changes nothing, and at no angle does a surface scatter more than the share sigma0 / 4
+of the power that falls on it (at normal incidence, all of that share).
 """
 
 from dataclasses import replace
@@ -31,6 +43,8 @@ from radarsim.world.objects import SceneObject
 LAYER, HEAD_ON, UNCOVERED = 5, 3, 4
 #: Closed bodies up to this mean thickness (m) are one homogeneous slab: door leaves, table tops.
 THICKEST_BODY = 0.05
+#: No lobes: Lambert's law, or an isotropic scatterer.
+LAMBERT = (1.0, 0.0, 0.0, 1.0)
 
 
 def as_slab(item: SceneObject) -> tuple[Material, bool]:
@@ -120,3 +134,40 @@ def lag(material: Material, config: RadarConfig) -> float:
 def sweep_share(config: RadarConfig) -> float:
     """The middle half of the sweep, over which delays are taken, as a share of its centre frequency."""
     return config.bandwidth / 2 / config.center_frequency
+
+
+def concentration(exponent: float) -> float:
+    """Peak of a lobe over the Lambertian of the same power, at normal incidence: pi over the lobe's integral.
+
+    The integral over the hemisphere of cos(theta) ((1 + cos theta) / 2)^alpha is closed with t = (1 + cos theta) / 2.
+    """
+
+    def primitive(t: float) -> float:
+        return 2 * t ** (exponent + 2) / (exponent + 2) - t ** (exponent + 1) / (exponent + 1)
+
+    return 1 / (4 * (primitive(1.0) - primitive(0.5)))
+
+
+def weights(material: Material) -> Float[np.ndarray, "4"]:
+    """Weights of the Lambertian, the directive and the backscatter part and the lobes' exponent of a material."""
+    peak = concentration(material.lobe_exponent)
+    lambert = 1 - material.directive - material.backscatter
+    return np.array([lambert, material.directive * peak, material.backscatter * peak, material.lobe_exponent])
+
+
+@njit(inline="always")
+def scattering(cos_in, cos_out, cos_between, lobe):
+    """Bistatic radar cross section over sigma0 times the area.
+
+    Args:
+        cos_in, cos_out: cosines of both ways with the normal, positive (1 for an isotropic scatterer).
+        cos_between: cosine of the angle between the directions to source and receiver, 1 for backscatter. The angle to
+            the specular direction follows: cos psi_r = 2 cos_in cos_out - cos_between.
+        lobe: as `weights` gives it.
+    """
+    shape = lobe[0]
+    if lobe[1] > 0.0:
+        shape += lobe[1] * max(0.5 + cos_in * cos_out - 0.5 * cos_between, 0.0) ** lobe[3]
+    if lobe[2] > 0.0:
+        shape += lobe[2] * (0.5 + 0.5 * cos_between) ** lobe[3]
+    return cos_in * cos_out * shape

@@ -119,7 +119,7 @@ def test_bad_input_is_refused_in_a_sentence(tmp_path, arguments, words):
 
 
 def test_what_fails_in_another_process_is_said_here(tmp_path):
-    (tmp_path / "still.tum").write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(3)))
+    (tmp_path / "still.tum").write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(5)))
     far = SceneObject("far", shapes.rectangle((90, 0, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
     with pytest.raises(InputError, match="scene away: no frame has an echo"):
         simulate(Scene("away", [far]), tmp_path / "x.h5", trajectory=tmp_path / "still.tum", duration=1.1, workers=2)

@@ -99,4 +99,4 @@ class View:
         """Of each frame, which of `flat` the radar sees, and which see one another."""
         if self.environment.reflectors is None:
             return [Mirrors.none()] * self.observation.frames
-        return visible_mirrors.find(self.observation, self.flat, self.environment.scene)
+        return visible_mirrors.find(self.observation, self.flat, self.obstacles)

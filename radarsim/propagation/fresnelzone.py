@@ -63,7 +63,9 @@ class Stretches(Table):
         frame: index.
         begin, end: m.
         before, after: how far a Fresnel unit along either transverse axis moves begin and end, m.
-        mirrors: in whose outlines begin and end lie; -1: none.
+        mirrors: of the whole path, in order, within whose outlines its rays are reflected; -1: none.
+        stops: where on these, m.
+        apart: how far a Fresnel unit along either transverse axis moves the stops, m.
     """
 
     frame: Int[np.ndarray, "stretch"]
@@ -71,7 +73,9 @@ class Stretches(Table):
     end: Float[np.ndarray, "stretch 3"]
     before: Float[np.ndarray, "stretch 2 3"]
     after: Float[np.ndarray, "stretch 2 3"]
-    mirrors: Int[np.ndarray, "stretch 2"]
+    mirrors: Int[np.ndarray, "stretch 3"]
+    stops: Float[np.ndarray, "stretch 3 3"]
+    apart: Float[np.ndarray, "stretch 3 2 3"]
 
 
 def passage(
@@ -124,24 +128,52 @@ def _rays(flat: Flat, stretches: Stretches, lattice: Lattice):
 
 @njit(cache=True)
 def _spread(corners, normal, stretches, nodes, begin, end, inside):
+    bounds = np.empty((24, 3))
     for i in range(len(begin)):
-        one, two = stretches.mirrors[i]
+        count = _bounds(corners, normal, stretches, i, bounds)
         for k in range(len(nodes)):
             x, y = nodes[k]
             for d in range(3):
                 begin[i, k, d] = stretches.begin[i, d] + x * stretches.before[i, 0, d] + y * stretches.before[i, 1, d]
                 end[i, k, d] = stretches.end[i, d] + x * stretches.after[i, 0, d] + y * stretches.after[i, 1, d]
-            inside[i, k] = (one < 0 or _within(begin[i, k], corners[one], normal[one])) and (
-                two < 0 or _within(end[i, k], corners[two], normal[two])
-            )
+            inside[i, k] = True
+            for c in range(count):
+                if bounds[c, 0] + x * bounds[c, 1] + y * bounds[c, 2] < -1e-9:
+                    inside[i, k] = False
+                    break
 
 
 @njit
-def _within(place, corners, normal):
-    """Whether a point over a convex outline is on the same side of all of its edges."""
-    left, right = True, True
-    for k in range(4):
-        one = vec(corners[k])
-        side = dot(cross(minus(vec(corners[(k + 1) % 4]), one), minus(vec(place), one)), vec(normal))
-        left, right = left and side > -1e-9, right and side < 1e-9
-    return left or right
+def _bounds(corners, normal, stretches, i, out):
+    """Which rays of a path meet all of its mirrors, and each before the next: one that runs on behind another is lit
+    and seen up to where their planes meet. Writes functions of a node, 1, x and y, not negative for these; returns how
+    many."""
+    count = 0
+    for g in range(3):
+        m = stretches.mirrors[i, g]
+        if m < 0:
+            continue
+        stop, n = vec(stretches.stops[i, g]), vec(normal[m])
+        x, y = vec(stretches.apart[i, g, 0]), vec(stretches.apart[i, g, 1])
+        one, two = minus(vec(corners[m, 2]), vec(corners[m, 0])), minus(vec(corners[m, 3]), vec(corners[m, 1]))
+        turn = np.sign(dot(cross(one, two), n))
+        for k in range(4):
+            one = vec(corners[m, k])
+            inward = cross(n, minus(vec(corners[m, (k + 1) % 4]), one))
+            count = _bound((turn, one, inward), (stop, x, y), out, count)
+        for other in range(max(g - 1, 0), min(g + 2, 3)):
+            b = stretches.mirrors[i, other]
+            if b >= 0 and other != g:
+                corner, facing = vec(corners[b, 0]), vec(normal[b])
+                side = np.sign(dot(minus(stop, corner), facing))
+                count = _bound((side, corner, facing), (stop, x, y), out, count)
+    return count
+
+
+@njit
+def _bound(plane, rays, out, count):
+    """Writes on which side of a plane (side, place, direction) rays are (stop, and by a node's x and y)."""
+    side, place, direction = plane
+    stop, x, y = rays
+    out[count] = side * dot(minus(stop, place), direction), side * dot(x, direction), side * dot(y, direction)
+    return count + 1

@@ -152,7 +152,7 @@ class Paths(Table):
         return places
 
     def behind(self, observation: Observation, passed: Passage) -> Self:
-        """What is left of images and curved paths of which this much passes obstacles; delays move them away."""
+        """What is left of paths of which this much passes obstacles; delays move images and curved paths away."""
         amplitude = self.amplitude * passed.factor
         kept = np.abs(amplitude) > observation.threshold
         paths, passed, geometry = self[kept], passed[kept], self.geometry[kept].copy()

@@ -1,6 +1,9 @@
 """What passes through walls, panes and doors: loss, phase and delay of thin slabs on a ray's way."""
 
+from functools import cached_property
+
 import numpy as np
+import trimesh
 from jaxtyping import Complex, Float
 from numba import njit
 
@@ -9,6 +12,7 @@ from radarsim.propagation.clutter import uncovered
 from radarsim.propagation.fields import cross, dot, unit, upright
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.media import LAYER, as_slab, layer, sweep_share, window
+from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 
 #: A ray is given up behind this many slabs: one stud wall with a board on either side, or two panes.
@@ -38,6 +42,15 @@ class Transmission:
         self._share = sweep_share(config)
         #: what small objects on a face leave of the amplitude
         self._left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
+
+    @cached_property
+    def opaque(self) -> Scene | None:
+        """What of the scene nothing passes, as one object; None: nothing."""
+        solid = [item for item, layer in zip(self.scene.objects, self._layer, strict=True) if layer < 0]
+        if not solid or len(solid) == len(self._layer):
+            return self.scene if solid else None
+        mesh = trimesh.util.concatenate([item.mesh for item in solid])
+        return Scene(self.scene.name, [SceneObject("opaque", mesh, solid[0].material)])
 
     def passage(
         self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], up: Float[np.ndarray, "n 3"]

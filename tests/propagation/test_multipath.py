@@ -15,11 +15,13 @@ from radarsim.propagation.antenna import ISOTROPIC as ISOTROPIC_ANTENNA
 from radarsim.propagation.antenna import Antenna, amplitude_gain
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.media import lag, layer, mirror, sweep_share, window
+from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.paths import Kind
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.surface import Surface
 from radarsim.world.materials import MATERIALS, Material, constant
+from radarsim.world.movers import Door
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import box, rectangle
@@ -293,23 +295,37 @@ def test_an_antenna_of_high_gain_has_its_ghosts():
     assert 20 * np.log10(abs(found).max() / abs(ghosts).max()) == pytest.approx(2 * lift, abs=0.01)
 
 
-def test_a_corner_behind_a_pane():
-    """A metal corner seen through 6 mm of glass: the pane's transmission twice over."""
-    plates = [
-        sheet("left", "metal", (3.0, 0.1, 0), (0.2, 0.2), (0, -1, 0)),
-        sheet("end", "metal", (3.1, 0, 0), (0.2, 0.2), (-1, 0, 0)),
-    ]
-    pane = sheet("pane", "glass", (1.5, 0, 0), (2.0, 2.0), (-1, 0, 0))
+def slab(material, cosine, tm=False):
+    """What a sheet leaves of an amplitude, relative to the air that it takes the place of; as in the beat signal."""
+    m, f = MATERIALS[material], CONFIG.center_frequency
+    tau, _ = transfer_matrix([(m.permittivity_at(f), m.thickness)], cosine, f, tm)
+    return np.conj(tau * np.exp(2j * np.pi * f / SPEED_OF_LIGHT * m.thickness * cosine))
 
-    def level(objects):
-        scene = Scene("corner", objects)
-        echoes = PathFinder(scene, NOTHING, Reflectors.of(scene, CONFIG), CONFIG)(HERE, AHEAD)
-        turns = np.abs(np.trace(echoes.images[:, :, :3], axis1=1, axis2=2) + 1) < 1e-9
-        near = turns & (np.abs(echoes.images[:, 0, 3] - 6.2) < 0.05)
-        return echoes.amplitude[near]
 
-    m, f = MATERIALS["glass"], CONFIG.center_frequency
-    tau, _ = transfer_matrix([(m.permittivity_at(f), m.thickness)], 1.0, f, False)
-    clear, behind = level(plates), level([*plates, pane])
-    assert len(clear) and len(behind)
-    assert 20 * np.log10(abs(behind).max() / abs(clear).max() / abs(tau) ** 2) == pytest.approx(0, abs=0.1)
+@pytest.mark.parametrize("angle", [0.0, 25.0])
+@pytest.mark.parametrize("moving", [False, True])
+def test_a_corner_behind_a_pane(moving, angle):
+    """A metal dihedral, wholly behind 6 mm of glass: the image in its edge, lambda / (4 pi 2 R), through the pane there
+    and back; whether the pane stands or is the leaf of a door."""
+    side, turn = 0.6 / np.sqrt(8), np.deg2rad(angle)
+    plates = [sheet(f"plate {k}", "metal", (2.5 - side, k * side, 0), (0.6, 0.6), (-1, -k, 0)) for k in (1, -1)]
+    along = np.array([np.sin(turn), np.cos(turn), 0.0])
+    pane, movers = [sheet("pane", "glass", (1, 0, 0), (3.0, 3.0), (-np.cos(turn), np.sin(turn), 0))], []
+    if moving:
+        leaf = {"width": 3.0, "height": 3.0, "thickness": MATERIALS["glass"].thickness, "material": "glass"}
+        angles = (90.0 - angle, 90.0 - angle)
+        pane, movers = [], [Door(name="pane", hinge=tuple([1, 0, 0] - 1.5 * along), angles=angles, **leaf)]
+    scene = Scene("corner", [*plates, *pane])
+    crowd = MovingTargets(movers, np.random.default_rng(0))
+    crowd.sigma[:] = 1e-30
+    reflectors = Reflectors.of(scene, CONFIG)
+    finder = PathFinder(scene, NOTHING, reflectors, CONFIG, 1e-12, antenna=ISOTROPIC_ANTENNA, moving=crowd)
+    found = finder(HERE, AHEAD)
+    path = np.linalg.norm(found.images[:, :, 3], axis=1)
+    turns = np.abs(found.images[:, :, :3] - np.diag([-1, -1, 1])).max(axis=(1, 2)) < 1e-9
+    some = turns & (np.abs(path - 5.02) < 0.03)
+    echo = np.sum(found.amplitude[found.kind == Kind.IMAGE][some] * np.exp(2j * np.pi * (path[some] - 5.0) / LAMBDA))
+    echo /= LAMBDA / (20 * np.pi) * slab("glass", np.cos(turn)) ** 2
+    assert 20 * np.log10(abs(echo)) == pytest.approx(0, abs=0.3)
+    assert np.rad2deg(np.angle(echo)) == pytest.approx(0, abs=6)
+    assert 0.005 < path[some].min() - 5.0 and path[some].max() - 5.0 < 0.04

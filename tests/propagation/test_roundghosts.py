@@ -9,12 +9,14 @@ from radarize.radar.presets import PRESETS
 from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.mechanisms import curved_ghosts
+from radarsim.propagation.paths import Kind
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
+from tests.propagation.test_multipath import slab
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -123,3 +125,31 @@ def test_a_finder_has_them():
         at_image = np.linalg.norm(echoes.points - [2.5, 1.8, 0.1], axis=2) < 0.11
         found.append(at_image.any(axis=1).sum())
     assert found == [3, 0]
+
+
+@pytest.mark.parametrize("kind", ["sphere", "pole"])
+def test_ghosts_behind_a_pane(kind):
+    """Over a wall on one way and on both, all of it behind 6 mm of glass: as without it, times what the pane leaves on
+    either way at the angle at which that meets it, and later by what it delays."""
+    center = np.array([2.5, 0.2, 0.0])
+    shape = shapes.sphere(center, 0.1, 4) if kind == "sphere" else shapes.cylinder(center, 0.03, 1.2, 24)
+    wall = SceneObject("wall", shapes.rectangle((2.1, 1.0, 0), (1.8, 3.0), (0, -1, 0)), MATERIALS["metal"])
+    pane = SceneObject("pane", shapes.rectangle((1.0, 0, 0), (6.0, 4.0), (-1, 0, 0)), MATERIALS["glass"])
+    objects, levels = [wall, SceneObject("body", shape, MATERIALS["metal"])], []
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    for things in (objects, [*objects, pane]):
+        scene = Scene("pane", things)
+        echoes = PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG, 1e-12)(np.zeros(3), np.eye(3))
+        echoes = echoes.where(kind=Kind.POINT)
+        over = np.linalg.norm(echoes.points - [2.5, 1.8, 0.0], axis=2) < 0.15
+        levels.append({tuple(o): (p, a) for o, p, a in zip(over, echoes.points, echoes.amplitude, strict=True)})
+    clear, behind = levels
+    assert sorted(clear) == sorted(behind) == [(False, True), (True, False), (True, True)]
+    for ways, (points, amplitude) in clear.items():
+        lengths = np.linalg.norm(points, axis=1)
+        truth = amplitude * np.prod([slab("glass", cosine) for cosine in points[:, 0] / lengths])
+        seen, found = behind[ways]
+        late = np.linalg.norm(seen, axis=1).sum() - lengths.sum()
+        assert 20 * np.log10(abs(found / truth)) == pytest.approx(0, abs=0.1)
+        assert np.rad2deg(np.angle(found / truth * np.exp(2j * np.pi * late / LAMBDA))) == pytest.approx(0, abs=4)
+        assert 0.005 < late < 0.03

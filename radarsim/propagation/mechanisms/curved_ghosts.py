@@ -35,6 +35,7 @@ from radarsim.propagation.fields import (
     write,
 )
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fresnelzone import LEAST_LOSS
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.patches import strength
 from radarsim.propagation.paths import Kind, Paths
@@ -70,20 +71,24 @@ class RoundGhosts(Table):
 
 
 def find(view: View) -> Paths:
-    """Ghosts above the threshold that nothing hides; slabs are opaque to them."""
+    """Ghosts above the threshold that nothing hides, weakened and delayed where they pass slabs."""
     observation, flat, reflectors = view.observation, view.flat, view.environment.reflectors
     if reflectors is None:
         return Paths.none()
     found = [ghosts(observation, k, flat, some.seen, reflectors) for k, some in enumerate(view.mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
     n = 2 * len(every)
+    allowed = np.repeat(np.abs(every.amplitude) > LEAST_LOSS * observation.threshold, 2)
     passed = view.obstacles.way(
-        observation, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), np.zeros(n, bool)
-    ).after_one_another(2)
+        observation, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), allowed
+    )  # fmt: skip
+    here = observation.position[frame, None]
+    away = every.points - here  # a delay moves the point away
+    points = here + away * (1 + passed.delay.reshape(-1, 2, 1) / np.linalg.norm(away, axis=2, keepdims=True))
     mirrors = np.full((len(every), 4), -1)
     mirrors[:, [0, 2]] = every.mirrors
-    paths = Paths.of(Kind.POINT, every.points, every.amplitude, frame=frame, bounces=every.bounces, mirrors=mirrors)
-    return paths[passed.factor != 0]
+    paths = Paths.of(Kind.POINT, points, every.amplitude, frame=frame, bounces=every.bounces, mirrors=mirrors)
+    return paths.behind(observation, passed.after_one_another(2))
 
 
 def ghosts(

@@ -7,7 +7,8 @@ each order of the mirrors then holds its own share of the light.
 
 The mirrors are apertures on the unfolded path. One at distance d from an end of a path of length L diffracts as its
 offset x over sqrt(lambda d (L - d) / (2 L)) says (Fresnel), so in these units all apertures of a chain overlap to one
-polygon W, and the amplitude lambda / (4 pi L) of an endless mirror is taken F times,
+polygon W (a mirror that runs on behind the next one ends where their planes meet: no ray gets there), and the amplitude
+lambda / (4 pi L) of an endless mirror is taken F times,
 
     F = (1 / 2j) int_W exp(j pi r^2 / 2) dA = (1 / 2 pi) closed int (1 - exp(j pi r^2 / 2)) dphi,
 
@@ -123,12 +124,12 @@ def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "cha
         axes = np.where(last[:, None, None], axes, axes - 2 * lift * normal[:, None])
         now = np.where(last[:, None], now, now - 2 * slope * normal)
     apart[:, 4] = AT_RADAR * unit[:, 2, None, None] * axes
-    none = np.full((len(frame), 1), -1)
-    mirrors = np.concatenate([none, chains.mirrors, none], axis=1)
+    two = chains.mirrors[:, 1] == chains.mirrors[:, 2]
+    mirrors = np.where(two[:, None] & (np.arange(3) == 2), -1, chains.mirrors)
     return Stretches(
         np.repeat(frame, 4), stops[:, :-1].reshape(-1, 3), stops[:, 1:].reshape(-1, 3),
         apart[:, :-1].reshape(-1, 2, 3), apart[:, 1:].reshape(-1, 2, 3),
-        np.stack([mirrors[:, :-1], mirrors[:, 1:]], axis=2).reshape(-1, 2),
+        *(np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4])),
     )  # fmt: skip
 
 
@@ -142,7 +143,7 @@ class _Orders(NamedTuple):
 class _Room(NamedTuple):
     """Scratch for polygons."""
 
-    planes: Float[np.ndarray, "12 3"]
+    planes: Float[np.ndarray, "14 3"]
     polygon: Float[np.ndarray, "corner 2"]
     spare: Float[np.ndarray, "corner 3"]
 
@@ -168,7 +169,7 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observatio
 def _search(observation, frame, flat, orders, found):
     """Tries all chains whose mirrors can follow one another; returns how many lead back, of which as many as fit."""
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
-    room = _Room(np.empty((12, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 3)))
+    room = _Room(np.empty((14, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 3)))
     edges = outlines(flat)
     way = np.empty(3, np.int64)
     count = 0
@@ -283,8 +284,9 @@ def _chain(way, p, path, ray, observation, frame, flat, room):
     field = sent(up, ray)
     # Instead of unfolding the mirrors, the path and its axes are folded; the start moves to its images.
     start, now, f1, f2 = p, ray, e1, e2
-    count, before = 0, 0.0
-    for m in way:
+    count, before, last = 0, 0.0, ray
+    for k in range(len(way)):
+        m = way[k]
         n, c = vec(normal[m]), vec(flat.center[m])
         slope = dot(now, n)
         if abs(slope) < 0.02 or (slope > 0 and not flat.two_sided[m]):
@@ -292,39 +294,36 @@ def _chain(way, p, path, ray, observation, frame, flat, room):
         t = dot(minus(c, start), n) / slope
         if t <= 0.005 or t >= path - 0.005 or t < before - np.sqrt(wavelength * path):
             return none
+        if k > 0:
+            count = _bounded(planes, count, _junction((now, f1, f2), (before, last), (t, n)), path, wavelength)
+            if count < 0:
+                return none
         before = t
         x, y = 0.0, 0.0  # the middle of the window
-        for k in range(4):
-            one = minus(vec(corners[m, k]), start)
+        for side in range(4):
+            one = minus(vec(corners[m, side]), start)
             x, y = x + dot(one, f1) / 4, y + dot(one, f2) / 4
         middle = (x, y)
-        for k in range(4):
-            one, two = minus(vec(corners[m, k]), start), minus(vec(corners[m, (k + 1) % 4]), start)
+        for side in range(4):
+            one, two = minus(vec(corners[m, side]), start), minus(vec(corners[m, (side + 1) % 4]), start)
             x, y = dot(one, f1), dot(one, f2)
             dx, dy = dot(two, f1) - x, dot(two, f2) - y
             square = dx * dx + dy * dy
             if square < 1e-8:
                 continue
-            side = dx * (middle[1] - y) - dy * (middle[0] - x)
-            sign = (1.0 if side < 0 else -1.0) / np.sqrt(square)
+            turn = dx * (middle[1] - y) - dy * (middle[0] - x)
+            sign = (1.0 if turn < 0 else -1.0) / np.sqrt(square)
             nx, ny = -dy * sign, dx * sign  # outward
-            offset = nx * x + ny * y
             share = min(max(-(x * dx + y * dy) / square, 0.0), 1.0)
-            d = (dot(one, now) + share * (dot(two, now) - dot(one, now))) / path
-            if d < 0.02 or d > 0.98:  # an edge beside or behind the radar
-                if offset < 0:
-                    return none
-                continue
-            offset /= np.sqrt(wavelength * path * d * (1 - d) / 2)
-            if offset < -FAR:
+            at = dot(one, now) + share * (dot(two, now) - dot(one, now))
+            count = _bounded(planes, count, (nx, ny, nx * x + ny * y, at), path, wavelength)
+            if count < 0:
                 return none
-            planes[count, 0], planes[count, 1], planes[count, 2] = nx, ny, offset
-            count += 1
         after = along(now, -2 * slope, n)
         field = reflected(field, now, after, n, flat.layer[m])
         start = mirrored(start, c, n)
         f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
-        now = after
+        now, last = after, n
     taken = upright(up, now)
     value = dot(field, taken)
     corner = overlap(planes, count, room.polygon, room.spare)
@@ -342,6 +341,45 @@ def _chain(way, p, path, ray, observation, frame, flat, room):
         if depth(planes, count, step * mx, step * my) > 0.25:
             break
     return value * share, e1, e2, (toward * mx, toward * my)
+
+
+@njit
+def _junction(axes, last, mirror):
+    """The line where the planes of two mirrors of a chain meet, as `_bounded` takes it: no ray meets the second mirror
+    before the first, however far either runs on behind the other.
+
+    Args:
+        axes: the path's direction between the mirrors, and across it.
+        last, mirror: distance along the path, and normal, of either.
+    """
+    (now, f1, f2), (before, a), (t, b) = axes, last, mirror
+    # at x, y across the path, a mirror is met t - (x f1 + y f2) . n / (now . n) along it
+    x1, y1, x2, y2 = dot(f1, a), dot(f2, a), dot(f1, b), dot(f2, b)
+    away, slope = dot(now, a), dot(now, b)
+    nx, ny = x2 / slope - x1 / away, y2 / slope - y1 / away
+    size = np.hypot(nx, ny) + 1e-9
+    nx, ny, offset = nx / size, ny / size, (t - before) / size
+    return nx, ny, offset, t - offset * (nx * x2 + ny * y2) / slope
+
+
+@njit
+def _bounded(planes, count, line, path, wavelength):
+    """Bounds the polygon by a line across the path; returns the number of bounds, -1 where nothing is left.
+
+    Args:
+        planes, count: bounds so far, outward normals and offsets in Fresnel units.
+        line: outward normal, offset (m), and how far along the path (m) it is nearest to it.
+        path, wavelength: m.
+    """
+    nx, ny, offset, at = line
+    d = at / path
+    if d < 0.02 or d > 0.98:  # beside or behind the radar
+        return -1 if offset < 0 else count
+    offset /= np.sqrt(wavelength * path * d * (1 - d) / 2)
+    if offset < -FAR:
+        return -1
+    planes[count, 0], planes[count, 1], planes[count, 2] = nx, ny, offset
+    return count + 1
 
 
 @njit(cache=True)

@@ -54,9 +54,10 @@ def _to_parts(observation: Observation, frame: int, flat: Flat, parts: plates.Pa
     flash = np.trace(parts.isometry[:, :, :3], axis1=1, axis2=2) > 0  # a reflection, no half turn or inversion
     unit = np.sqrt(observation.wavelength * np.linalg.norm(parts.aim - here, axis=1) / 4) * flash
     after = unit[:, None, None] * np.stack([flat.u[parts.facet], flat.v[parts.facet]], axis=1)
-    mirrors = np.stack([np.full(len(parts), -1), np.where(flash, parts.facet, -1)], axis=1)
-    begin = np.broadcast_to(here, parts.aim.shape)
-    return Stretches(np.full(len(parts), frame), begin, parts.aim, AT_RADAR * after, after, mirrors)
+    mirrors = np.where(np.arange(3) == 0, np.where(flash, parts.facet, -1)[:, None], -1)
+    begin, stops = np.broadcast_to(here, parts.aim.shape), np.repeat(parts.aim[:, None], 3, axis=1)
+    ends = begin, parts.aim, AT_RADAR * after, after
+    return Stretches(np.full(len(parts), frame), *ends, mirrors, stops, np.repeat(after[:, None], 3, axis=1))
 
 
 def _to_bodies(observation: Observation, frame: int, aim: Float[np.ndarray, "part 3"]) -> Stretches:
@@ -69,8 +70,8 @@ def _to_bodies(observation: Observation, frame: int, aim: Float[np.ndarray, "par
     before = np.sqrt(observation.wavelength * size / 8)[:, None] * np.stack(
         [aside, np.cross(way / size, aside)], axis=1
     )
-    none = np.full((len(aim), 2), -1)
-    return Stretches(np.full(len(aim), frame), begin, aim, before, 0 * before, none)
+    none = np.full((len(aim), 3), -1), np.zeros((len(aim), 3, 3)), np.zeros((len(aim), 3, 2, 3))
+    return Stretches(np.full(len(aim), frame), begin, aim, before, 0 * before, *none)
 
 
 def _uneven(

@@ -101,7 +101,7 @@ def _source(formula: object) -> str:
 
 @cache
 def _compiled(source: str) -> CodeType:
-    """Arithmetic, and calls of what `_NAMES` holds; nothing else can be in a formula."""
+    """Arithmetic, comparisons, and calls of what `_NAMES` holds; nothing else can be in a formula."""
     tree = ast.parse(source, "furniture.yaml", "eval")
     calls = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}
     odd = [node for node in ast.walk(tree) if not isinstance(node, _ARITHMETIC)]

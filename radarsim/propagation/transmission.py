@@ -30,15 +30,10 @@ class Transmission:
 
     def __init__(self, scene: Scene, config: RadarConfig, margin: float):
         self.scene, self.margin, self._wavelength = scene, margin, config.wavelength
-        layers, self._layer, self._body = {}, [], []
-        for item in scene.objects:
-            slab, whole = as_slab(item)
-            if slab.thickness is not None and slab not in layers:
-                layers[slab] = len(layers), layer(slab, config)
-            self._layer.append(-1 if slab.thickness is None else layers[slab][0])
-            self._body.append(whole)
-        self._layer, self._body = np.array(self._layer), np.array(self._body)
-        self._layers = np.array([row for _, row in layers.values()]).reshape(-1, LAYER)
+        slabs, whole = zip(*map(as_slab, scene.objects), strict=True)
+        number = {s: k for k, s in enumerate(dict.fromkeys(s for s in slabs if s.thickness is not None))}
+        self._layer, self._body = np.array([number.get(slab, -1) for slab in slabs]), np.array(whole)
+        self._layers = np.array([layer(slab, config) for slab in number]).reshape(-1, LAYER)
         self._share = sweep_share(config)
         #: what small objects on a face leave of the amplitude
         self._left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))

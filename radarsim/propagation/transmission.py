@@ -3,7 +3,6 @@
 from functools import cached_property
 
 import numpy as np
-import trimesh
 from jaxtyping import Complex, Float
 from numba import njit
 
@@ -12,6 +11,7 @@ from radarsim.propagation.clutter import uncovered
 from radarsim.propagation.fields import cross, dot, unit, upright
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.media import LAYER, as_slab, layer, sweep_share, window
+from radarsim.world import shapes
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 
@@ -44,7 +44,7 @@ class Transmission:
         solid = [item for item, layer in zip(self.scene.objects, self._layer, strict=True) if layer < 0]
         if not solid or len(solid) == len(self._layer):
             return self.scene if solid else None
-        mesh = trimesh.util.concatenate([item.mesh for item in solid])
+        mesh = shapes.joined(*(item.mesh for item in solid))
         return Scene(self.scene.name, [SceneObject("opaque", mesh, solid[0].material)])
 
     def passage(

@@ -4,7 +4,6 @@ Faces of a box can be left out where they would touch another surface: a hidden 
 and two coplanar faces would reflect twice.
 """
 
-from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -15,7 +14,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 from shapely.geometry import Polygon
 
-Vector = Sequence[float] | Float[np.ndarray, "3"]
+Vector = ArrayLike  # x, y, z
 
 # Corner signs of each face of a box, counter-clockwise seen from outside.
 _FACES = {

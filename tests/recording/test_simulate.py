@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
+from radarize.radar.presets import PRESETS
 from radarize.recording import Recording
 from radarsim.motion.planner import plan_motion
 from radarsim.propagation.path_types import PathType
@@ -70,7 +71,7 @@ def test_causes_are_counted(walk):
 
 def test_iq_by_cause_adds_up(tmp_path):
     """Without noise, phase noise and clipping, the parts' sum is the recording itself, to rounding."""
-    settings = FrontEndConfig.of(CONFIG.board, noise=False, phase_noise=None)
+    settings = FrontEndConfig.of(PRESETS["radarize"].board, noise=False, phase_noise=None)
     settings.save(tmp_path / "quiet.yaml")
     path = simulate(
         "office", tmp_path / "x.h5", duration=0.05, seed=3, frontend=tmp_path / "quiet.yaml", sensors=["adc-by-cause"]
@@ -118,7 +119,7 @@ def test_bad_input_is_refused_in_a_sentence(tmp_path, arguments, words):
 
 
 def test_what_fails_in_another_process_is_said_here(tmp_path):
-    (tmp_path / "still.tum").write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(3)))
+    (tmp_path / "still.tum").write_text("".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(5)))
     far = SceneObject("far", shapes.rectangle((90, 0, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
     with pytest.raises(InputError, match="scene away: no frame has an echo"):
         simulate(Scene("away", [far]), tmp_path / "x.h5", trajectory=tmp_path / "still.tum", duration=1.1, workers=2)

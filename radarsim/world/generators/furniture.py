@@ -17,7 +17,7 @@ _NAMES = {name: getattr(np, name) for name in ("arange", "cos", "linspace", "pi"
 _NAMES |= {"__builtins__": {}, "max": max, "min": min, "range": range}
 _ARITHMETIC = (
     ast.Expression, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Tuple, ast.List, ast.Subscript, ast.Slice,
-    ast.Call, ast.expr_context, ast.operator, ast.unaryop,
+    ast.Call, ast.Compare, ast.expr_context, ast.operator, ast.unaryop, ast.cmpop,
 )  # fmt: skip
 
 
@@ -93,7 +93,7 @@ def _source(formula: object) -> str:
 
 @cache
 def _compiled(source: str):
-    """Arithmetic, and calls of what `_NAMES` holds; nothing else can be in a formula."""
+    """Arithmetic, comparisons, and calls of what `_NAMES` holds; nothing else can be in a formula."""
     tree = ast.parse(source, "furniture.yaml", "eval")
     calls = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}
     odd = [node for node in ast.walk(tree) if not isinstance(node, _ARITHMETIC)]

@@ -329,3 +329,20 @@ def test_a_corner_behind_a_pane(moving, angle):
     assert 20 * np.log10(abs(echo)) == pytest.approx(0, abs=0.3)
     assert np.rad2deg(np.angle(echo)) == pytest.approx(0, abs=6)
     assert 0.005 < path[some].min() - 5.0 and path[some].max() - 5.0 < 0.04
+
+
+def test_all_phantoms_behind_a_pane():
+    """A target in a corner of two walls, all behind 6 mm of glass: every pair of ways, by one mirror, by two, straight,
+    as without the pane, times what that leaves of either."""
+    walls = [sheet("left", "metal", (2.7, 1.2, 0), (3.0, 2.4), (0, -1, 0)), AT_END]
+    pane = sheet("pane", "glass", (0.8, 0, 0), (6.0, 4.0), (-1, 0, 0))
+    place = np.array([2.4, 0.5, 0.0])
+    clear, behind = (finder(objects, place, range=8.0)(HERE, AHEAD) for objects in (walls, [*walls, pane]))
+    clear, behind = (each.where(kind=Kind.POINT) for each in (clear, behind))
+    assert len(clear.where(bounces=2)) >= 6
+    for points, amplitude in zip(clear.points, clear.amplitude, strict=True):
+        truth = abs(amplitude * np.prod([slab("glass", c) for c in points[:, 0] / np.linalg.norm(points, axis=1)]))
+        same = (np.linalg.norm(behind.points - points, axis=2) < 0.03).all(axis=1)
+        assert same.any()
+        error = 20 * np.log10(np.abs(behind.amplitude[same]) / truth)
+        assert np.abs(error).min() == pytest.approx(0, abs=0.2)

@@ -59,10 +59,12 @@ def _over_mirrors(view: View, straight: OneWay) -> OneWay:
     rows = np.flatnonzero(np.where(free, once, twice))
     distance = candidates.distance[rows]
     # No longer than leaves room for the way back, nor so weak that the way back cannot make up for it.
-    longest = np.where(free[rows], 2 * observation.range - distance, observation.range)
+    reached = np.zeros(len(candidates), bool)
+    reached[straight.candidate] = True
+    longest = np.where(reached[rows], 2 * observation.range - distance, observation.range)
     weakest = observation.threshold * distance / (observation.peak_gain * candidates.most[rows])
     # Tracks of virtual points are those of one mirror either way: moving targets have no paths over two.
-    double = (free & twice & (candidates.scatterer < targets.still))[rows]
+    double = (reached & twice & (candidates.scatterer < targets.still))[rows]
     edges = np.searchsorted(candidates.frame[rows], np.arange(observation.frames + 1))
     for frame, (seen, pairs) in enumerate(view.mirrors):
         one = np.arange(edges[frame], edges[frame + 1])
@@ -74,7 +76,7 @@ def _over_mirrors(view: View, straight: OneWay) -> OneWay:
     strength = _strongest_echoes(candidates, straight, paths)
     worth = strength > observation.threshold
     paths, stops, strength = paths[worth], stops[worth], strength[worth]
-    allowed = twice[paths.candidate] & (paths.bounces == 1) & (strength > LEAST_LOSS * observation.threshold)
+    allowed = twice[paths.candidate] & (strength > LEAST_LOSS * observation.threshold)
     return _unhindered(view, paths, stops, allowed)
 
 

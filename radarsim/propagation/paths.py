@@ -123,13 +123,6 @@ class Paths(Table):
             rows &= getattr(self, name) == value
         return self[rows]
 
-    def where(self, **columns: object) -> Self:
-        """Rows that have some values: ``paths.where(bounces=1, moving=False)``."""
-        rows = np.ones(len(self), bool)
-        for name, value in columns.items():
-            rows &= getattr(self, name) == value
-        return self[rows]
-
     @property
     def points(self) -> Float[np.ndarray, "point 2 3"]:
         """a and b of those that are points, m."""

@@ -172,6 +172,17 @@ def test_a_mover(installed):
         assert -lengths[rows, 0, 1].mean() / half / 2 == pytest.approx(speed, abs=0.02)
 
 
+def test_a_mover_without_a_cross_section(installed):
+    """It hides the wall behind it, whose specular echo the radar gets on its axis, and does not echo itself."""
+    installed("curtain", PENDULUM.replace("    cross_section: Length = 0.5\n", "").replace("pendulum", "curtain"))
+    ball = {"kind": "curtain", "name": "ball", "center": [2, 0, 0], "swing": 0.001}
+    wall = {"objects": [WALL | {"material": "metal"}]}
+    (free,), (hidden,) = (scenario(wall | some).frames(np.zeros(1)).paths for some in ({}, {"moving": [ball]}))
+    assert not hidden.moving.any()
+    strongest = [20 * np.log10(np.abs(paths.amplitude).max()) for paths in (free, hidden)]
+    assert strongest[1] < strongest[0] - 20
+
+
 def test_what_cannot_be_imported_is_named(installed):
     installed("broken", "import nothing_of_this_name")
     with pytest.raises(InputError, match="plug-in broken .*nothing_of_this_name"):

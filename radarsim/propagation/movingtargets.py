@@ -48,12 +48,12 @@ class MovingTargets:
                     per_area = 4 * getattr(mover, "cross_section", 0.0) / area
                 else:
                     per_area = each.material.sigma0
-                count = max(int(round(density * each.area)), 4)
+                count = max(int(round(density * each.area)), 4) if per_area else 0
                 points, normals = each.sample(count, rng)
                 place.append(points)
                 normal.append(normals)
                 part.append(np.full(count, number))
-                sigma.append(np.full(count, per_area * each.area / count))
+                sigma.append(np.full(count, per_area * each.area / max(count, 1)))
                 lobe.append(np.tile(LAMBERT if each.material is None else weights(each.material), (count, 1)))
                 number += 1
         self._place, self._normal = np.concatenate(place), np.concatenate(normal)

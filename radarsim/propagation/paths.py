@@ -85,12 +85,9 @@ class Paths(Table):
 
     @classmethod
     def of(
-        cls,
-        kind: Kind,
-        geometry: Float[np.ndarray, "path *shape"],
-        amplitude: Complex[np.ndarray, "path"],
+        cls, kind: Kind, geometry: Float[np.ndarray, "path *shape"], amplitude: Complex[np.ndarray, "path"],
         **columns: ArrayLike,
-    ) -> Self:
+    ) -> Self:  # fmt: skip
         """Paths of one kind; columns that are not given are zero, indices -1.
 
         Args:

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int, UInt8
 
 from radarsim.propagation import fresnelzone, patches, plates
-from radarsim.propagation.curved import SHAPE, Arcs
+from radarsim.propagation.curved import LINE, SHAPE, Arcs
 from radarsim.propagation.echoes import Provenance
 from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
 from radarsim.propagation.isometry import inverse
@@ -66,42 +66,73 @@ def flashes(observation: Observation, flat: Flat, reflectors: Reflectors, obstac
         if reflectors.heights is not None:
             uneven = _uneven(observation, frame, flat[parts.facet], parts.aim, reflectors.heights)
             parts = replace(parts, amplitude=parts.amplitude * uneven)
-        ways += [_to_parts(observation, frame, flat, parts), _to_bodies(observation, frame, arcs.aim)]
+        ways += [_to_parts(observation, frame, flat, parts), _to_bodies(observation, frame, arcs)]
         isometry = np.concatenate([parts.isometry, arcs.isometry])
         mirrors, shape = np.full((len(cause), 3), -1), np.zeros((len(cause), SHAPE + 1))
         mirrors[: len(parts), 0], shape[len(parts) :, :SHAPE] = parts.facet, arcs.shape
         amplitude = np.append(parts.amplitude, arcs.amplitude)
         found.append(Images(np.full(len(cause), frame), isometry, amplitude, cause, mirrors, shape))
     images, ways = Images.joined(found), Stretches.joined(ways)
+    ways = replace(ways, path=np.arange(len(ways)))
     factor, delay = fresnelzone.passage(observation, flat, obstacles, ways, np.abs(images.amplitude))
     lag = np.append(flat.lag, 0.0)[images.mirrors[:, 0]]  # at the centre of the sweep, amplitudes know it
     images = replace(images, amplitude=images.amplitude * np.exp(-2j * np.pi * lag / observation.wavelength))
-    return _passed(observation, images, factor**2, 2 * delay + lag)  # there and back
+    return _passed(observation, images, factor, delay + lag)
 
 
 def _to_parts(observation: Observation, frame: int, flat: Flat, parts: plates.Parts) -> Stretches:
-    """The ways to parts of plates; edges and corners are seen by one ray."""
-    here = observation.position[frame]
-    flash = np.trace(parts.isometry[:, :, :3], axis1=1, axis2=2) > 0  # a reflection, no half turn or inversion
-    unit = np.sqrt(observation.wavelength * np.linalg.norm(parts.aim - here, axis=1) / 4) * flash
-    after = unit[:, None, None] * np.stack([flat.u[parts.facet], flat.v[parts.facet]], axis=1)
-    mirrors = np.stack([np.full(len(parts), -1), np.where(flash, parts.facet, -1)], axis=1)
+    """The ways to parts of plates: a flash mirrors, an edge mirrors along its line, a corner echoes like a point.
+
+    Across an edge that is near the flash, in Fresnel units, it is a part of the same zone and goes over into it.
+    """
+    here, n = observation.position[frame], len(parts)
+    way = parts.aim - here
+    turn = parts.isometry[:, :, :3]
+    kind = np.trace(turn, axis1=1, axis2=2).round().astype(int)  # 1: reflection, -1: half turn, -3: inversion
+    unit = np.sqrt(observation.wavelength * np.linalg.norm(way, axis=1) / 4)
+    u, normal = flat.u[parts.facet], flat.normal[parts.facet]
+    # (M + 1) / 2 of a half turn projects on its axis
+    line = np.einsum("pii->pi", turn).argmax(axis=1)
+    u = np.where((kind == -1)[:, None], (turn + np.eye(3))[np.arange(n), line], u)
+    u = u / np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(normal, u)
+    beside = np.abs(np.einsum("pd,pd->p", way, v)) / unit
+    mirroring = np.ones((n, 2))
+    mirroring[:, 1] = np.where(kind == -1, 1 / (1 + beside**2), 1)
+    mirroring[kind == -3] = 0
+    axes = unit[:, None, None] * np.stack([u, v], axis=1)
+    before, after = _spread(mirroring, axes)
+    mirrors = np.stack([np.full(n, -1), np.where(kind == -3, -1, parts.facet)], axis=1)
+    span = np.tile([0.0, 0.5], (n, 1))
     begin = np.broadcast_to(here, parts.aim.shape)
-    return Stretches(np.full(len(parts), frame), begin, parts.aim, AT_RADAR * after, after, mirrors)
+    return Stretches(
+        np.zeros(n, int), np.full(n, frame), begin, parts.aim, before, after, mirrors, span, mirroring
+    )  # fmt: skip
 
 
-def _to_bodies(observation: Observation, frame: int, aim: Float[np.ndarray, "part 3"]) -> Stretches:
-    """The ways to round bodies, whose zones end in a point, or nearly so: a cone, as wide as they are half way."""
-    begin = np.broadcast_to(observation.position[frame], aim.shape)
-    way = aim - begin
+def _spread(mirroring, axes):
+    """How far a Fresnel unit moves both ends of ways: to a mirror, and to a point, which is the tip of a cone."""
+    mirroring = mirroring[..., None]
+    return (1 - (1 - AT_RADAR) * mirroring) * axes, mirroring * axes
+
+
+def _to_bodies(observation: Observation, frame: int, arcs: Arcs) -> Stretches:
+    """The ways to round bodies, which echo like points, and cylinders along their axis like mirrors."""
+    begin, n = np.broadcast_to(observation.position[frame], arcs.aim.shape), len(arcs)
+    way = arcs.aim - begin
     size = np.linalg.norm(way, axis=1, keepdims=True)
-    aside = np.cross(way / size, observation.rotation[frame, :, 2])
+    line = arcs.shape[:, :1] == LINE
+    aside = np.where(line, arcs.shape[:, 4:7], np.cross(way / size, observation.rotation[frame, :, 2]))
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
-    before = np.sqrt(observation.wavelength * size / 8)[:, None] * np.stack(
+    axes = np.sqrt(observation.wavelength * size / 4)[..., None] * np.stack(
         [aside, np.cross(way / size, aside)], axis=1
     )
-    none = np.full((len(aim), 2), -1)
-    return Stretches(np.full(len(aim), frame), begin, aim, before, 0 * before, none)
+    mirroring = np.column_stack([line, np.zeros(n)]).astype(float)
+    before, after = _spread(mirroring, axes)
+    none, span = np.full((n, 2), -1), np.tile([0.0, 0.5], (n, 1))
+    return Stretches(
+        np.zeros(n, int), np.full(n, frame), begin, arcs.aim, before, after, none, span, mirroring
+    )  # fmt: skip
 
 
 def _uneven(
@@ -165,10 +196,13 @@ def _along(
     apart[:, 4] = AT_RADAR * unit[:, 2, None, None] * axes
     none = np.full((len(frame), 1), -1)
     mirrors = np.concatenate([none, chains.mirrors, none], axis=1)
+    along = np.concatenate([np.zeros_like(whole), there, whole], axis=1) / whole
     return Stretches(
-        np.repeat(frame, 4), stops[:, :-1].reshape(-1, 3), stops[:, 1:].reshape(-1, 3),
+        np.repeat(np.arange(len(frame)), 4), np.repeat(frame, 4),
+        stops[:, :-1].reshape(-1, 3), stops[:, 1:].reshape(-1, 3),
         apart[:, :-1].reshape(-1, 2, 3), apart[:, 1:].reshape(-1, 2, 3),
         np.stack([mirrors[:, :-1], mirrors[:, 1:]], axis=2).reshape(-1, 2),
+        np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2), np.ones((4 * len(frame), 2)),
     )  # fmt: skip
 
 
@@ -191,8 +225,7 @@ def by_chains(observation: Observation, flat: Flat, mirrors: list[Mirrors], obst
     order = np.where(two[:, None], chains.mirrors * [1, 1, 0] - [0, 0, 1], chains.mirrors)
     there = Images(frame, chains.isometry, chains.amplitude, cause, order, np.zeros((len(frame), SHAPE + 1)))
     ways = _along(observation, flat, frame, chains)
-    factor, delay = fresnelzone.passage(observation, flat, obstacles, ways, np.abs(chains.amplitude).repeat(4))
-    factor, delay = factor.reshape(-1, 4).prod(axis=1), delay.reshape(-1, 4).sum(axis=1)
+    factor, delay = fresnelzone.passage(observation, flat, obstacles, ways, np.abs(chains.amplitude))
     order = np.where(two[:, None], order[:, [1, 0, 2]], order[:, ::-1])
     back = replace(there, isometry=inverse(chains.isometry), mirrors=order)
     two_ways = chains.mirrors[:, 0] != chains.mirrors[:, 2]

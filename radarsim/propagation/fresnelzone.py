@@ -44,8 +44,8 @@ AT_RADAR = 0.5
 _FEWEST = 4
 #: No slit passes more than this of an amplitude.
 _MOST = 1.17
-#: Correlations of two screens in steps of 1 / `_RHOS`; from `_FINE` steps on the kernel is averaged over cells.
-_RHOS, _FINE = 10, 4
+#: Correlations of two screens in steps of 1 / `_RHOS`.
+_RHOS = 10
 #: Where an obstacle stands is known to this many halvings of a stretch.
 _HALVINGS = 4
 #: Rays to a point spread no wider than for an obstacle at this share of the way to it.
@@ -53,7 +53,9 @@ _BESIDE = 0.7
 #: Half the side of the lattice's square, Fresnel units.
 _HALF = 1.5
 #: What changes of the nodes' weights cost in the fit of these, beside errors of half planes.
-_STIFF = 0.1
+_STIFF = 0.4
+#: How much more errors of upright and level half planes count in it.
+_SQUARE = 8.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,10 +76,11 @@ class Lattice:
         nodes = _HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
         weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.cos(np.pi * nodes / (2 * _HALF)).prod(axis=1)
         weight /= weight.sum()
-        angle, edge = (x.ravel() for x in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(-1.3, 1.3, 20)))
+        angle, edge = (x.ravel() for x in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(-1.3, 1.3, 27)))
         clear = np.cos(angle)[:, None] * nodes[:, 0] + np.sin(angle)[:, None] * nodes[:, 1] < edge[:, None]
         truth = erfc(-edge * np.sqrt(np.pi / 2) * np.exp(-0.25j * np.pi)) / 2
-        share = 1 / np.maximum(np.abs(truth), 0.1)  # as exact in the shadow as in the light
+        # As exact in the shadow as in the light, and more so for upright and level edges.
+        share = np.where(np.abs(np.sin(2 * angle)) < 1e-9, _SQUARE, 1) / np.maximum(np.abs(truth), 0.1)
         off, keep = (truth - clear @ weight) * share, _STIFF * count * np.eye(count)
         rows = np.concatenate([clear * share[:, None], keep])
         weight += np.linalg.lstsq(rows, np.append(off, np.zeros(count)), rcond=None)[0]
@@ -91,20 +94,24 @@ class Lattice:
         out = np.empty((2, _RHOS + 1, count, count), complex)
         out[:, 0], out[0, -1] = np.outer(self.weight, self.weight), np.diag(self.weight)
         taper = self.weight * np.exp(-0.5j * np.pi * np.sum(self.nodes**2, axis=1))
+        # The kernel is averaged over cells, which it varies within where rho is near 1.
         cell = 2 * _HALF / np.sqrt(count) * np.array([-0.25, 0.25])
-        cells = np.stack(np.meshgrid(cell, cell), axis=-1).reshape(-1, 2)
+        place = self.nodes[:, None] + np.stack(np.meshgrid(cell, cell), axis=-1).reshape(-1, 2)
         for kind, step in [(0, k) for k in range(1, _RHOS)] + [(1, k) for k in range(1, _RHOS + 1)]:
-            shifts = cells if step >= _FINE else np.zeros((1, 2))
             rho = min(step / _RHOS, 0.95) * np.array([1, 1 - kind])
-            scaled = (self.nodes[:, None] + shifts).reshape(-1, 2) / np.sqrt(1 - rho**2)
-            own = np.exp(0.5j * np.pi * np.sum(scaled**2, axis=1)) * np.repeat(taper, len(shifts))
+            scaled = place.reshape(-1, 2) / np.sqrt(1 - rho**2)
+            own = np.exp(0.5j * np.pi * np.sum(scaled**2, axis=1)) * np.repeat(taper, 4)
             pair = np.exp(-1j * np.pi * (scaled * rho) @ scaled.T) * own[:, None] * own
-            pair = pair.reshape(count, len(shifts), count, len(shifts)).sum(axis=(1, 3))
+            pair = pair.reshape(count, 4, count, 4).sum(axis=(1, 3))
+            pair /= pair.sum()
+            for _ in range(3):  # where the second screen is clear, the first one alone counts
+                scale = np.sqrt(self.weight / pair.sum(axis=1))
+                pair *= scale[:, None] * scale
             out[kind, step] = pair / pair.sum()
         return out
 
 
-_FEW, _MANY = Lattice.fibonacci(21, 13), Lattice.fibonacci(55, 34)
+_FEW, _MANY = Lattice.fibonacci(21, 13), Lattice.fibonacci(89, 55)
 
 
 @dataclass(frozen=True)

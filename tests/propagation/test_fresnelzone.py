@@ -13,6 +13,7 @@ from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from tests.propagation.brute_force import past_edge, past_pole
+from tests.propagation.rigs import field
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -91,7 +92,8 @@ def test_half_a_plane_by_closed_forms():
     """The reference itself: at grazing 1 / 4 + asin(rho) / (2 pi), where rho is 1 / 3 half way to the mirror."""
     grazing = past_edge(0.0, (1.0, 3.0), 4.0, LAMBDA)
     assert grazing == pytest.approx(0.25 + np.arcsin(1 / 3) / (2 * np.pi), abs=1e-6)
-    assert past_edge(1.0, (1.0, 3.0), 4.0, LAMBDA) == pytest.approx(1, abs=0.03)
+    wide = past_pole(0.22, 0.4, (1.0, 3.0), 4.0, LAMBDA, nodes=2000)  # a strip whose other edge is far
+    assert past_edge(0.02, (1.0, 3.0), 4.0, LAMBDA) == pytest.approx(wide, abs=0.05)
 
 
 @pytest.mark.parametrize("distance", [0.5, 1.0, 1.5, 1.8])
@@ -101,20 +103,35 @@ def test_the_shadow_of_an_edge(distance):
     offsets = np.array([-0.8, -0.5, -0.25, 0.0, 0.25, 0.5, 0.8]) * zone
     truth = [20 * np.log10(abs(past_edge(y, (distance, 4 - distance), 4.0, LAMBDA))) for y in offsets]
     found = [left([WALL], [board(distance, y)], 4.0) for y in offsets]
-    assert found == pytest.approx(np.array(truth), abs=2.0)
-    assert np.sqrt(np.mean((found - np.array(truth)) ** 2)) < 1.2
+    assert found == pytest.approx(np.array(truth), abs=3.0)
+    assert np.sqrt(np.mean(np.square(np.subtract(found, truth)))) < 1.3
 
 
 @pytest.mark.parametrize("offset, level", [(0.0, -10.3), (-0.01, -14.1), (-0.03, -21.0)])
 def test_an_edge_half_way(offset, level):
     """At the way, 10 and 30 mm into the shadow: 1.7 to 3.8 dB more than two edges of which each is alone."""
     assert 20 * np.log10(abs(past_edge(offset, (1.0, 3.0), 4.0, LAMBDA))) == pytest.approx(level, abs=0.1)
-    assert left([WALL], [board(1.0, offset)], 4.0) == pytest.approx(level, abs=1.2)
+    assert left([WALL], [board(1.0, offset)], 4.0) == pytest.approx(level, abs=1.5)
 
 
 def test_an_edge_that_covers_the_flash_bit_by_bit():
     """Half a plane at 1 m, from 50 mm beside the way to 50 mm over it: no step on either side."""
     steps = np.arange(-10, 11) * 0.005
     found = np.array([left([WALL], [board(1.0, -y)], 4.0) for y in steps])
-    assert abs(found[0]) < 1.5 and -30 < found[-1] < -21
+    assert np.interp(0.0, steps, found) == pytest.approx(-10.3, abs=1.5)
+    assert abs(found[0]) < 1 and found[-1] < -25
     assert np.abs(np.diff(10 ** (found / 20))).max() < 0.25
+
+
+def test_an_edge_that_goes_behind_a_pillar_bit_by_bit():
+    """The edge of a plate beside which the radar passes, in steps of 3 mm; one ray took all of it in one step."""
+    plate = SceneObject("plate", shapes.rectangle((2, -0.5, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    reflectors, scene = Reflectors.of(Scene("plate", [plate]), CONFIG), Scene("all", [plate, board(1.0, 0.15)])
+    finder = EchoFinder(scene, nothing, reflectors, CONFIG, antenna=ISOTROPIC)
+    places = np.stack([np.zeros(81), np.arange(81) * 0.003 + 0.18, np.zeros(81)], axis=1)
+    found = finder.batch(places, np.tile(np.eye(3), (81, 1, 1)), np.zeros(81))
+    before = np.array([field(e, p, LAMBDA) for e, p in zip(found[:-1], places[1:], strict=True)])
+    now = np.array([field(e, p, LAMBDA) for e, p in zip(found[1:], places[1:], strict=True)])
+    assert abs(now[-1]) < 0.1 * abs(now[0])
+    assert np.abs(now - before).max() < 0.2 * np.abs(now).max()

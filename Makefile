@@ -47,7 +47,7 @@ lowest:
 	@build/lowest/bin/uv pip install -q --python build/lowest --resolution lowest-direct '.[test]'
 	@NUMBA_CACHE_DIR=build/kernels build/lowest/bin/python -m pytest $(or $(TESTS),tests/radar tests/importers tests/exporters \
 		tests/world tests/slam tests/nets tests/evaluation tests/report tests/test_recording.py tests/test_hdf5.py tests/test_cli.py \
-		tests/test_foxglove.py tests/test_viewer.py tests/test_pipeline.py tests/test_simulate.py)
+		tests/test_foxglove.py tests/test_viewer.py tests/test_pipeline.py tests/recording/test_simulate.py)
 
 lint: setup
 	@.venv/bin/ruff check .

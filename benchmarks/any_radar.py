@@ -7,13 +7,14 @@
 The former networks had learned from the preset alone.
 """
 
+import argparse
+from itertools import product
 from pathlib import Path
 
 import torch
 
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import Data, Page, script, tracked
 from radarize.benchmark.networks import Networks
-from radarize.console import progress
 from radarize.methods.registry import find_task
 from radarize.methods.task import Task
 from radarize.nets.weights import load
@@ -41,27 +42,19 @@ def judged(task: Task, weights: Path, path: Path) -> dict[str, float]:
     return task.metrics(torch.cat(parts).double().mean(dim=0))
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "What networks gained by learning from many radars",
     data=(Path, "data set any-radar"),
     former=(Path, "folder of the networks that had not learned from it"),
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     paths, rows = recordings(options.data, "random-0", "validation"), []
     former, shipped = Networks("former", options.former), Networks()
-    with progress("any radar") as report:
-        for kind, (name, title, factor) in TOLD.items():
-            task = find_task(kind)
-            for path in paths:
-                before, after = (factor * judged(task, each.weights.of(kind), path)[name] for each in (former, shipped))
-                rows.append({"recording": path.stem, "what": title, "former": before, "shipped": after})
-                report(len(rows), len(TOLD) * len(paths))
-    publish(
-        "any_radar",
-        "What networks gained by learning from many radars",
+    for kind, path in tracked([*product(TOLD, paths)], "any radar"):
+        task, (name, title, factor) = find_task(kind), TOLD[kind]
+        before, after = (factor * judged(task, one.weights.of(kind), path)[name] for one in (former, shipped))
+        rows.append({"recording": path.stem, "what": title, "former": before, "shipped": after})
+    return Page(
         rows,
         data=Data.of("any-radar, split random-0, validation", paths, 600),
         networks=(*former.used(TOLD), *shipped.used(TOLD)),
@@ -71,7 +64,3 @@ def main() -> None:
             "former networks learned.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

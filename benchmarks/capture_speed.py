@@ -1,5 +1,6 @@
 """`radarize capture` against `radarsim emulate`, each a process of its own: frames lost, and what each side costs."""
 
+import argparse
 import os
 import re
 import subprocess
@@ -12,7 +13,7 @@ import numpy as np
 import psutil
 from jaxtyping import Bool, Int16
 
-from benchmarks.results import Data, command_line, publish, surroundings
+from benchmarks.results import Data, Page, script, surroundings
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import MAX_PAYLOAD
 from radarize.radar.presets import load_config
@@ -103,19 +104,16 @@ def run(
     return row, warnings
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "Capture at the virtual radar",
     seconds=(300.0, "length of the capture"),
     config=("radarize", "preset or .cfg"),
     bad_seconds=(60.0, "length of another one over a bad network; 0: none"),
     seed=(0, "of noise and network"),
 )
-
-
-def main() -> None:
+def main(options: argparse.Namespace) -> Page:
     """The table."""
-    arguments = PARSER.parse_args()
-    config, _ = load_config(arguments.config)
+    config, _ = load_config(options.config)
     rows: list[dict[str, object]] = []
     notes = [
         f"Noise of {NOISE} counts RMS, {LOOP} frames played again and again; every sample compared with the one sent, "
@@ -124,16 +122,12 @@ def main() -> None:
         surroundings(),
     ]
     bad = {"loss": 0.01, "duplicate": 0.01, "reorder": 0.01}
-    for seconds, shares in ((arguments.seconds, {}), (arguments.bad_seconds, bad)):
+    for seconds, shares in ((options.seconds, {}), (options.bad_seconds, bad)):
         if not seconds:
             continue
         with tempfile.TemporaryDirectory() as folder:
-            row, warnings = run(config, arguments.config, seconds, Path(folder), arguments.seed, shares)
+            row, warnings = run(config, options.config, seconds, Path(folder), options.seed, shares)
         rows.append(row)
         notes += [f"{row['configuration']}: {warnings}."] if warnings else []
-    data = Data("simulated noise, played by `radarsim emulate`", (), arguments.seed)
-    publish("capture_speed", "Capture at the virtual radar", rows, data=data, networks=(), notes=notes)
-
-
-if __name__ == "__main__":
-    main()
+    data = Data("simulated noise, played by `radarsim emulate`", (), options.seed)
+    return Page(rows, data=data, notes=notes)

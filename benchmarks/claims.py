@@ -3,15 +3,15 @@
 `radarize benchmark uncertainty` says the same of odometry, which is made of them.
 """
 
+import argparse
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import command_line, publish
+from benchmarks.results import Page, script, tracked
 from radarize.batch import Intake
 from radarize.benchmark.dataset import Case, DataSet, groups
 from radarize.benchmark.networks import Networks
-from radarize.console import progress
 from radarize.effort import BATCH
 from radarize.evaluation.scans import true_ranges
 from radarize.mapping import echoes
@@ -77,25 +77,16 @@ def row(name: str, found: list[tuple[dict[str, float], np.ndarray]]) -> dict[str
     }
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "What networks claim against what they err",
     weights=(Path, "folder of the networks; by default the shipped ones"),
+    data=(Path, "folder of recordings", {"required": True}),
 )
-PARSER.add_argument("--data", type=Path, required=True, help="folder of recordings")
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     data = DataSet.load(options.data)
     networks = Networks("given", options.weights) if options.weights else Networks()
-    judged = {}
-    with progress("recordings") as report:
-        for case in data.cases:
-            report(len(judged), len(data.cases))
-            judged[case] = judge(case, networks)
-    publish(
-        "claims",
-        "What networks claim against what they err",
+    judged = {case: judge(case, networks) for case in tracked(data.cases, "recordings")}
+    return Page(
         [row(name, [judged[case] for case in members]) for name, members in groups(data.cases).items()],
         data=data.data(data.cases),
         networks=networks.used(KINDS),
@@ -105,7 +96,3 @@ def main() -> None:
             f"Ranges, by the probability claimed: its mean, %: share within {NEAR} cells of the true surface, %.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -4,17 +4,16 @@ Clocks are told by how alike pictures are (`radarize.walkclock`). A second witne
 shifting the radar's pictures against each other, compared with those of the lidar's poses, by number and by instant.
 """
 
+import argparse
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from benchmarks.results import CLONE, POSES, Data, command_line, publish
-from benchmarks.results import Walk as Facts
+from benchmarks.results import CLONE, POSES, Page, radarhd, script, tracked
 from radarize.benchmark.real import clocked_turn_errors
 from radarize.benchmark.realmotion import shifted_turns, smoothed
-from radarize.console import progress
 from radarize.walkclock import APART, Alike, Clock, alike
 from radarize.walkposes import poses_of
 from radarize.walks import PERIOD, TRAINING, Walk
@@ -43,39 +42,24 @@ def draw(shown: list[tuple[Walk, Clock, Alike]]) -> None:
     figure.savefig(PICTURE, dpi=90)
 
 
-PARSER = command_line(
-    __doc__,
-    data=CLONE,
-    poses=POSES,
-)
-
-
-def main() -> None:
+@script("Clocks of real walks", data=CLONE, poses=POSES)
+def main(options: argparse.Namespace) -> Page:
     """All walks, training and test."""
-    options = PARSER.parse_args()
     walks = [Walk.find(options.data, number) for number in TRAINING] + Walk.tests(options.data)
     rows, shown = [], []
-    with progress("walks") as report:
-        for done, walk in enumerate(walks):
-            poses = poses_of(walk, options.poses)
-            known = alike(walk)
-            clock = Clock.along(known)
-            if walk.number in SHOWN:
-                shown.append((walk, clock, known))
-            turns = smoothed(shifted_turns(np.stack([walk.radar(frame) for frame in range(walk.frames)])))
-            errors = clocked_turn_errors(turns, poses, clock)
-            rows.append({
-                "walk": walk.number, "part": walk.folder.name, **clock.row(walk.frames),
-                "yaw_rmse_deg": errors["yaw_rmse_deg"], "instant_yaw_rmse_deg": errors["instant_yaw_rmse_deg"],
-            })  # fmt: skip
-            report(done + 1, len(walks))
+    for walk in tracked(walks, "walks"):
+        known = alike(walk)
+        clock = Clock.along(known)
+        if walk.number in SHOWN:
+            shown.append((walk, clock, known))
+        turns = smoothed(shifted_turns(np.stack([walk.radar(frame) for frame in range(walk.frames)])))
+        errors = clocked_turn_errors(turns, poses_of(walk, options.poses), clock)
+        yaw = {name: errors[name] for name in ("yaw_rmse_deg", "instant_yaw_rmse_deg")}
+        rows.append({"walk": walk.number, "part": walk.folder.name, **clock.row(walk.frames), **yaw})
     draw(shown)
-    publish(
-        "clocks",
-        "Clocks of real walks",
+    return Page(
         rows,
-        data=Data("RadarHD's walks", tuple(Facts.radarhd(walk.number) for walk in walks)),
-        networks=(),
+        data=radarhd("RadarHD's walks", walks),
         notes=[
             "By how many seconds the lidar's picture is later than the radar's of the same number, at a walk's start "
             "and end; mean correlation of pictures of one number, and of one instant; by how much two halves of the "
@@ -84,7 +68,3 @@ def main() -> None:
             "the lidar's poses, by number and by instant. The clocks do not know it.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,5 +1,6 @@
 """Hard conditions (`benchmarks.hardships`): the same walks plain, and under each."""
 
+import argparse
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +11,7 @@ import pandas as pd
 import yaml
 
 from benchmarks.hardships import CONDITIONS, Samples
-from benchmarks.results import Data, command_line, performed, publish
+from benchmarks.results import Data, Page, performed, script
 from radarize.batch import Intake
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
@@ -105,16 +106,13 @@ def row(name: str, found: Sequence[Outcome], plain: Sequence[Outcome]) -> dict[s
     }
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "Hard conditions",
     folder=(Path("conditions"), "of the recordings, which are made if they are not there"),
     only=("", "conditions, comma-separated; all if none"),
     workers=(2, "processes"),
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     walks, wanted = yaml.safe_load(WALKS.read_text()), options.only.split(",") if options.only else CONDITIONS
     names = [name for name in CONDITIONS if name == "plain" or name in wanted]
     trials = [Trial(walk, name, options.folder) for name in names for walk in walks]
@@ -124,9 +122,7 @@ def main() -> None:
     runs = {f"{trial.condition}, {trial.walk['seed']}": trial.outcome for trial in trials}
     found = performed(runs, options.workers, "runs")
     outcomes = {name: found[k * len(walks) : (k + 1) * len(walks)] for k, name in enumerate(names)}
-    publish(
-        "conditions",
-        "Hard conditions",
+    return Page(
         [row(name, each, outcomes["plain"]) for name, each in outcomes.items()],
         data=Data.of("walks of benchmarks/conditions.yaml and their hard versions", sorted(map(Path, recordings))),
         networks=Networks().used(Pair(**BEST).networks),
@@ -139,7 +135,3 @@ def main() -> None:
             "says so.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,12 +1,13 @@
 """What each correction of the published pipeline is worth: the default one, and the same with one correction undone."""
 
+import argparse
 import tempfile
 from pathlib import Path
 
 import numpy as np
 import torch
 
-from benchmarks.results import Data, command_line, publish
+from benchmarks.results import Data, Page, script
 from radarize.batch import Intake, Signal
 from radarize.features.maps import MapMaker, maps_of
 from radarize.features.occupancy import SURFACE
@@ -281,17 +282,14 @@ def row(correction: str, measure: str, unit: str, without, with_=0.0) -> dict:
     return {"correction": correction, "measured": measure, "without": without, "with": with_, "unit": unit}
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "What each correction of the published pipeline is worth",
     duration=(15.0, "of the simulated walk, s"),
     steps=(60, "of the small segmentation trainings"),
     seed=(0, "of everything"),
+    recording=(Path, "a handheld walk with occupancy; else one is simulated", {"nargs": "?"}),
 )
-PARSER.add_argument("recording", nargs="?", type=Path, help="a handheld walk with occupancy; else one is simulated")
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     rng = np.random.default_rng(options.seed)
     with tempfile.TemporaryDirectory() as folder:
         path = options.recording or simulate(
@@ -304,12 +302,9 @@ def main() -> None:
             rows.append(balanced(source, options.steps, options.seed))
         rows.append(levelled(Scene.load(SCENE), options.duration, options.seed))
         data = Data.of(f"point targets, {path.stem}", [path], options.seed)
-    publish(
-        "corrections",
-        "What each correction of the published pipeline is worth",
+    return Page(
         rows,
         data=data,
-        networks=(),
         notes=[
             "Each line is the default pipeline without and with one correction. Errors are root mean squares unless "
             "said otherwise; point targets are at 2.5 m, 20 counts of noise under 1000 of signal.",
@@ -320,7 +315,3 @@ def main() -> None:
             "a training says how fast, not how far, each learns.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,6 +1,7 @@
 """Data sets end to end: what sensors and writing cost beside the simulation, how workers share the cores, and what the
 paper's data set would take on this machine, from a sample of one in ten of its recordings."""
 
+import argparse
 import os
 import tempfile
 import time
@@ -12,7 +13,7 @@ import numpy as np
 import pandas as pd
 import psutil
 
-from benchmarks.results import Data, command_line, publish, timed
+from benchmarks.results import Data, Page, script, timed
 from radarize.jobs import perform
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
@@ -103,18 +104,15 @@ def row(what: str, seconds: float) -> dict[str, object]:
     return pace | dict.fromkeys(("of simulation", "kB per frame", "MB per worker"), "")
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "Data sets: speed and size",
     every=(10, f"one in so many recordings of {BIG} is made"),
     seconds=(60.0, "of each at most"),
     frames=(240, "of the comparison with the simulation alone"),
     few=(4, "recordings by which workers and storage are compared"),
     seed=(0, "of the walk in that comparison"),
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     cores = len(os.sched_getaffinity(0))
     tasks = Specification.load(BIG).tasks
     sample = tasks[:: options.every]
@@ -141,12 +139,9 @@ def main() -> None:
     total = sum(task.frames for task in tasks)
     hours = (total * measured.frame + len(tasks) * measured.overhead) / cores / 3600
     extra = (share["all truth sensors"] + share["writing all"]) / share["simulation"]
-    publish(
-        "dataset_speed",
-        "Data sets: speed and size",
+    return Page(
         rows,
         data=data,
-        networks=(),
         notes=[
             f"All truth sensors and writing cost {extra:.2f} of the simulation (target: at most 0.33).",
             f"{BIG} on this machine, projected from {len(sample)} of its {len(tasks)} recordings, "
@@ -157,7 +152,3 @@ def main() -> None:
             "Rates count from a recording's first batch to its last. Kilobytes are of whole files, truth included.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

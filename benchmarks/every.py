@@ -1,6 +1,7 @@
 """What is lost where only every second frame is used, as `radarize live` does with networks of turns: the same walks
 with all frames and with every second one, with networks and without."""
 
+import argparse
 import itertools
 import tempfile
 from dataclasses import asdict
@@ -9,7 +10,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from benchmarks.results import Data, command_line, performed, publish
+from benchmarks.results import Data, Page, performed, script
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
@@ -62,19 +63,14 @@ def row(pair: Pair, every: int, found: pd.DataFrame, whole: pd.DataFrame) -> dic
     }
 
 
-PARSER = command_line(__doc__, data=(Path, "data set, such as `evaluation`"), workers=(2, "processes"))
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+@script("Every frame, or every second one", data=(Path, "data set, such as `evaluation`"), workers=(2, "processes"))
+def main(options: argparse.Namespace) -> Page:
     paths = [case.path for case in DataSet.load(options.data).cases]
     trials = [Trial(*each) for each in itertools.product(paths, PAIRS, EVERY)]
     found = performed({str(trial): trial.figures for trial in trials}, options.workers, "every")
     kinds = list(itertools.product(PAIRS, EVERY))
     of = {kind: pd.DataFrame(found[k :: len(kinds)]) for k, kind in enumerate(kinds)}
-    publish(
-        "every",
-        "Every frame, or every second one",
+    return Page(
         [row(pair, every, each, of[pair, 1]) for (pair, every), each in of.items()],
         data=Data.of(options.data.name, paths),
         networks=Networks().used(PAIRS[0].networks),
@@ -83,7 +79,3 @@ def main() -> None:
             "`radarize live` follows every second frame of a radar of 30 Hz with networks, and all frames without.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -9,7 +9,7 @@ made again. Made for a GPU; `--steps 10` tries it on two cores.
 import argparse
 import math
 from collections.abc import Callable
-from itertools import count
+from itertools import count, product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,8 +19,7 @@ import torch
 from jaxtyping import UInt8
 from torch import Generator, Tensor
 
-from benchmarks.results import CLONE, Data, Network, command_line, publish
-from benchmarks.results import Walk as Facts
+from benchmarks.results import CLONE, Network, Page, radarhd, script, tracked
 from radarize.clouds import Apart
 from radarize.console import progress
 from radarize.features.maps import Maps
@@ -131,16 +130,6 @@ def dense(net: PictureNet, seen: Seen, window: int, every: int = 12) -> float:
     return min(apart, key=lambda value: np.nanmedian(apart[value]))
 
 
-PARSER = command_line(
-    __doc__,
-    data=CLONE,
-    start=(Weights().of("pictures"), "weights that were trained in simulation"),
-    steps=(0, "of each training; as many as it is worth if 0"),
-    out=(Path("tuned"), "folder of the weights"),
-    every=(6, "of so many frames of the test walks one is judged"),
-)
-
-
 def train(options: argparse.Namespace) -> None:
     """Make the weights that are not there yet."""
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
@@ -194,32 +183,30 @@ def draw(rows: list[dict]) -> None:
     figure.savefig(PICTURE, dpi=90)
 
 
-def main() -> None:
-    options = PARSER.parse_args()
+@script(
+    "What simulation saves of reality",
+    data=CLONE,
+    start=(Weights().of("pictures"), "weights that were trained in simulation"),
+    steps=(0, "of each training; as many as it is worth if 0"),
+    out=(Path("tuned"), "folder of the weights"),
+    every=(6, "of so many frames of the test walks one is judged"),
+)
+def main(options: argparse.Namespace) -> Page:
     train(options)
     walks = Walk.tests(options.data)
     paths = {(0, "simulation"): options.start} | {key: _path(options.out, *key) for key in STEPS}
-    rows, done = [], count(1)
-    with progress("judging") as report:
-        for (shown, how), path in paths.items():
-            found, header = judged(walks, path, options.every)
-            report(next(done), len(paths))
-            groups = {
-                place if by == "instant" else f"{place}, by number": np.mean(
-                    [getattr(found[walk], by) for walk in some if walk in found]
-                )
-                for place, some in GROUPS.items()
-                for by in reversed(Distances._fields)
-            }
-            minutes = header.metrics.get("minutes", 0.0)
-            rows.append({"how": how, "real walks": shown, "minutes": minutes, **groups})
+    rows = []
+    for (shown, how), path in tracked([*paths.items()], "judging"):
+        found, header = judged(walks, path, options.every)
+        row = {"how": how, "real walks": shown, "minutes": header.metrics.get("minutes", 0.0)}
+        for (place, some), by in product(GROUPS.items(), reversed(Distances._fields)):
+            mean = np.mean([getattr(found[walk], by) for walk in some if walk in found])
+            row[place if by == "instant" else f"{place}, by number"] = mean
+        rows.append(row)
     draw(rows)
-    facts = tuple(Facts.radarhd(walk.number) for walk in walks)
-    publish(
-        "finetuning",
-        "What simulation saves of reality",
+    return Page(
         rows,
-        data=Data("RadarHD's test walks", facts),
+        data=radarhd("RadarHD's test walks", walks),
         networks=tuple(Network.of(path) for path in paths.values()),
         notes=[
             "Median Chamfer distance of a walk's points from the lidar's of the same instant, and of the same number, "
@@ -233,7 +220,3 @@ def main() -> None:
 
 def _path(folder: Path, shown: int, how: str) -> Path:
     return folder / f"{how}-{shown}.safetensors"
-
-
-if __name__ == "__main__":
-    main()

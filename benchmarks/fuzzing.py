@@ -4,6 +4,7 @@ Inputs and what a reader may take are those of `tests/fuzzing`. Each reader runs
 a crash in a library, of a hang, or of memory without end; its input then lies where the message says.
 """
 
+import argparse
 import ast
 import json
 import os
@@ -22,7 +23,7 @@ from rich.progress import track
 
 import radarize
 import radarsim
-from benchmarks.results import Data, command_line, publish, same, surroundings
+from benchmarks.results import Data, Page, same, script, surroundings
 from radarize.benchmark.results import commit
 from radarize.replacing import replacing
 from tests.fuzzing.reader import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, Attempt, Reader, attempt
@@ -127,19 +128,16 @@ def _row(name: str, count: int, first: int, source: str) -> Path:
     return Path("build/fuzzing") / f"{source}-{count}-{first}" / f"{list(READERS).index(name)}.json"
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "Damaged and hostile input",
     inputs=(5000, f"for each reader; for slow ones, {', '.join(sorted(_SLOW))}, {_LESS} times fewer"),
     seed=(0, "of hypothesis"),
     workers=(len(os.sched_getaffinity(0)), "readers at a time"),
+    reader=(str, "this one alone, without a table", {"choices": list(READERS)}),
+    earlier=(str, "rows of a run at this commit count, too, which another reader's fault has ended"),
 )
-PARSER.add_argument("--reader", choices=list(READERS), help="this one alone, without a table")
-PARSER.add_argument("--earlier", help="rows of a run at this commit count, too, which another reader's fault has ended")
-
-
-def main() -> None:
+def main(options: argparse.Namespace) -> Page:
     """The table, if no reader fails."""
-    options = PARSER.parse_args()
     if options.reader:
         row = judged(options.reader, options.inputs, options.seed)
         if isinstance(row, str):
@@ -153,12 +151,9 @@ def main() -> None:
         raise SystemExit("\n".join(failed))
     total = {key: sum(row[key] for row in rows) for key in ("inputs", "read", "refused", "s")}
     most = {key: max(row[key] for row in rows) for key in ("longest, ms", "most memory, MB")}
-    publish(
-        "fuzzing",
-        "Damaged and hostile input",
+    return Page(
         same([*rows, {"reader": "all", **total, **most}]),
         data=Data(f"{total['inputs']} damaged inputs", (), options.seed),
-        networks=(),
         notes=[
             "Valid files after bit flips, cuts, splices and edits of fields, or random bytes, drawn by hypothesis. "
             "None raised anything but a refusal in one sentence, crashed or hung.",
@@ -172,7 +167,3 @@ def main() -> None:
             surroundings(),
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

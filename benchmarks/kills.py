@@ -1,5 +1,6 @@
 """Kills at random moments: what is begun again ends as if nothing had been, and a capture loses what was on its way."""
 
+import argparse
 import hashlib
 import json
 import os
@@ -15,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import yaml
 
-from benchmarks.results import Data, command_line, publish, same, surroundings, timed
+from benchmarks.results import Data, Page, same, script, surroundings, timed
 from radarize.radar.presets import load_config
 from radarize.recording import Recording, recover
 from tests.virtual import emulator, record
@@ -28,6 +29,8 @@ SPECIFICATION = {
     "recordings": [{"building": "office", "platform": "cart", "count": 2, "duration": 0.5}],
 }
 EPOCHS = 4
+#: s that a capture lives once its file is there.
+LIVES = 1.5, 6.0
 
 
 @dataclass(frozen=True)
@@ -116,7 +119,7 @@ def captures(kills: int, folder: Path, rng: np.random.Generator) -> dict[str, ob
             while not part.exists() and process.poll() is None:
                 time.sleep(0.005)
             first = time.time()
-            time.sleep(float(rng.uniform(1.5, 6.0)))
+            time.sleep(float(rng.uniform(*LIVES)))
             os.killpg(process.pid, signal.SIGKILL)
             end = time.time()
             process.wait()
@@ -151,14 +154,6 @@ def cases(folder: Path) -> dict[str, Case]:
     }  # fmt: skip
 
 
-PARSER = command_line(
-    __doc__,
-    kills=(50, "of each command"),
-    seed=(0, "of their moments"),
-)
-PARSER.add_argument("--only", help="this one alone, and what it takes, without a table")
-
-
 def rows(kills: int, seed: int, folder: Path, wanted: Callable[[str], bool] = lambda name: True) -> list[dict]:
     """Of the table, those that are wanted."""
     rng, found = np.random.default_rng(seed), []
@@ -170,31 +165,30 @@ def rows(kills: int, seed: int, folder: Path, wanted: Callable[[str], bool] = la
     return found
 
 
-def main() -> None:
+@script(
+    "Kills at random moments",
+    kills=(50, "of each command"),
+    seed=(0, "of their moments"),
+    only=(str, "this one alone, and what it takes, without a table"),
+)
+def main(options: argparse.Namespace) -> Page:
     """The table."""
-    options = PARSER.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = rows(options.kills, options.seed, Path(folder), lambda name: options.only in (None, name))
     if options.only:
         print(json.dumps(found, indent=2))
-        return
-    publish(
-        "kills",
-        "Kills at random moments",
+        return None
+    return Page(
         same(found),
         data=Data("two walks of half a second in a simulated office, and noise", (), options.seed),
-        networks=(),
         notes=[
             "SIGKILL to the command and all that it has started, at moments drawn evenly from the time that it takes "
             "with warm kernels; then it is begun again. Where it comes to its end first, it begins anew in another "
-            "folder; after the last kill it is let through. A capture is killed 1.5-6 s after its file is there; "
+            "folder; after the last kill it is let through. A capture is killed "
+            f"{LIVES[0]:g}-{LIVES[1]:g} s after its file is there; "
             "frames lost are those from then on that the rescued recording lacks.",
             "Compared are bytes: of all recordings, of trajectories and map, of the trained network; and the figures "
             "of the benchmark's table.",
             surroundings(),
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

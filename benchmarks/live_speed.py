@@ -4,6 +4,7 @@ virtual radar, while it records, with a browser on its page, all of this on one 
 Wall time says whether this machine keeps up with whatever else it does; processor time what it takes of a free one.
 """
 
+import argparse
 import re
 import subprocess
 import sys
@@ -16,11 +17,11 @@ from pathlib import Path
 
 import psutil
 
-from benchmarks.results import Data, command_line, publish, same, surroundings
+from benchmarks.results import Data, Page, same, script, surroundings
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.capture.live import Live, prepare
-from radarize.capture.page import Page
+from radarize.capture.page import Page as LivePage
 from radarize.capture.replay import Replay
 from radarize.methods.registry import CLASSICAL, Inputs, best_methods, pace
 from radarize.recording import Losses, Recording
@@ -42,7 +43,7 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
     stream = Replay(path)
     every = pace(methods["odometry"], stream.config)
     inputs, watch = prepare(Inputs(stream.config, every=every), methods), Stopwatch()
-    with Page("127.0.0.1:0") as page, stream:
+    with LivePage("127.0.0.1:0") as page, stream:
         viewer = threading.Thread(target=look_on, args=(page.url,), daemon=True)
         viewer.start()
         (reader,) = [p for p in psutil.Process().children() if "spawn_main" in " ".join(p.cmdline())]
@@ -109,17 +110,14 @@ def _follows(every: int) -> str:
     return "all frames" if every == 1 else f"one of {every}"
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "radarize live in real time, preset radarize",
     duration=(20.0, "of the simulated recording, s"),
     frames=(9000, "of the session at the virtual radar; 0: none"),
     seed=(0, "of it"),
+    recording=(Path, "a recording; by default one is simulated", {"nargs": "?"}),
 )
-PARSER.add_argument("recording", nargs="?", type=Path, help="a recording; by default one is simulated")
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     with tempfile.TemporaryDirectory() as folder:
         path = options.recording or simulate(
             "office", Path(folder) / "office.h5", duration=options.duration, seed=options.seed
@@ -129,9 +127,7 @@ def main() -> None:
         data = Data.of(path.stem, [path], options.seed)
         if options.frames:
             rows.append(together(path, options.frames, Path(folder)))
-    publish(
-        "live_speed",
-        "radarize live in real time, preset radarize",
+    return Page(
         same(rows),
         data=data,
         networks=Networks().used([kind for pair in chosen for kind in pair.networks]),
@@ -143,7 +139,3 @@ def main() -> None:
             surroundings(),
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

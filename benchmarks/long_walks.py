@@ -1,13 +1,11 @@
 """Walks of five minutes that come back to where they were: `long_walks.yaml`. Nothing was chosen on them."""
 
-from benchmarks.unseen import judge, parser
+import argparse
 
-PARSER = parser(__doc__, "long_walks")
-
-
-def main() -> None:
-    judge("long_walks", "Walks of five minutes", "To reach: SLAM 0.15 m.", PARSER.parse_args())
+from benchmarks.results import script
+from benchmarks.unseen import judge, options_of
 
 
-if __name__ == "__main__":
-    main()
+@script("Walks of five minutes", **options_of("long_walks"))
+def main(options: argparse.Namespace) -> None:
+    judge("To reach: SLAM 0.15 m.", "Walks of five minutes", "long_walks", options)

@@ -1,12 +1,13 @@
 """How the platforms move, beside the figures of the paper's data set, over buildings of all styles."""
 
+import argparse
 import time
 
 import numpy as np
 import pandas as pd
 from rich.progress import track
 
-from benchmarks.results import Data, command_line, publish, walked
+from benchmarks.results import Data, Page, script, walked
 from radarize.benchmark.table import PAPER
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.platforms import PLATFORMS
@@ -58,24 +59,18 @@ def row(platform: str, walks: pd.DataFrame) -> dict[str, object]:
     }
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    f"How the platforms move in {DURATION:.0f} s, and in the paper's data set",
     buildings=(20, "walked through"),
     seed=(0, "that they are drawn from"),
 )
-
-
-def main() -> None:
+def main(options: argparse.Namespace) -> Page:
     """Walk and publish."""
-    arguments = PARSER.parse_args()
-    found = walks(arguments.buildings, arguments.seed)
+    found = walks(options.buildings, options.seed)
     took = found["took"]
-    publish(
-        "motion_statistics",
-        f"How the platforms move in {DURATION:.0f} s, and in the paper's data set",
+    return Page(
         [row(platform, found[found["platform"] == platform]) for platform in PLATFORMS],
-        data=Data("planned walks", tuple(found["walk"]), arguments.seed),
-        networks=(),
+        data=Data("planned walks", tuple(found["walk"]), options.seed),
         beside=[PAPER],
         notes=[
             "One walk per platform through each building of styles A to D; distance is the sensor's, over the ground.",
@@ -85,7 +80,3 @@ def main() -> None:
             f"Planning a walk takes {took.median():.2f} s of CPU time (median, at most {took.max():.2f} s).",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -5,6 +5,7 @@ cells of RadarHD's training pictures are followed from frame to frame, and their
 poses, are fitted by their parallax: the slope is the share of it by which they move.
 """
 
+import argparse
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -13,9 +14,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from scipy.ndimage import convolve1d, maximum_filter
 
-from benchmarks.results import CLONE, POSES, Data, command_line, publish
-from benchmarks.results import Walk as Facts
-from radarize.console import progress
+from benchmarks.results import CLONE, POSES, Page, radarhd, script, tracked
 from radarize.polar import AZIMUTHS, LEAKAGE, RANGES
 from radarize.pose import wrap
 from radarize.walkclock import Clock
@@ -108,35 +107,19 @@ def row(name: str, found: list[Followed]) -> dict[str, object]:
     }
 
 
-PARSER = command_line(
-    __doc__,
-    data=CLONE,
-    poses=POSES,
-)
-
-
-def main() -> None:
+@script("How strong echoes of real walks move", data=CLONE, poses=POSES)
+def main(options: argparse.Namespace) -> Page:
     """Of the training walks."""
-    options = PARSER.parse_args()
     walks, found = [Walk.find(options.data, number) for number in TRAINING], []
-    with progress("walks") as report:
-        for done, walk in enumerate(walks):
-            poses = by_instant(poses_of(walk, options.poses), Clock.of(walk))
-            found += followed(map(walk.radar, range(walk.frames)), poses)
-            report(done + 1, len(walks))
-    publish(
-        "parallax",
-        "How strong echoes of real walks move",
+    for walk in tracked(walks, "walks"):
+        poses = by_instant(poses_of(walk, options.poses), Clock.of(walk))
+        found += followed(map(walk.radar, range(walk.frames)), poses)
+    return Page(
         [row("RadarHD, train", found)],
-        data=Data("RadarHD's walks", tuple(Facts.radarhd(walk.number) for walk in walks)),
-        networks=(),
+        data=radarhd("RadarHD's walks", walks),
         notes=[
             "Share of its parallax by which an echo's bearing in the world moves, of echoes that are followed over "
             f"{np.degrees(_PARALLAX):.0f} deg of parallax: 1 for posts, 0 for walls' flashes; % of their frames. The "
             "pictures have the beam of four antennas, 25 deg wide.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

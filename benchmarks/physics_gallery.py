@@ -2,7 +2,7 @@
 
     python -m benchmarks.physics_gallery
 
-Laws stand in `benchmarks.gallery`; most of them measure by functions of `tests/propagation`. To add one, write it there
+Laws stand in `benchmarks.gallery`; references that tests use too in `benchmarks.references`. To add one, write it there
 and enter it in `LAWS`.
 """
 

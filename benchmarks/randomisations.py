@@ -5,6 +5,7 @@ Real walks are training walks, so that nothing is chosen on test walks; points a
 (`radarize.walkclock`). The networks are smaller, and trained for less, than the shipped one.
 """
 
+import argparse
 from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import replace
@@ -18,13 +19,10 @@ import torch
 from jaxtyping import Bool, UInt8
 
 from benchmarks.finetuning import window
-from benchmarks.results import CLONE, Data, command_line, publish
-from benchmarks.results import Walk as Facts
+from benchmarks.results import CLONE, Page, performed, radarhd, script
 from radarize.clouds import Apart
-from radarize.console import progress
-from radarize.errors import InputError
 from radarize.features.table import Table
-from radarize.jobs import Report, perform
+from radarize.jobs import Report
 from radarize.methods.pictures import roughening, training
 from radarize.methods.pictures.network import PictureNet
 from radarize.methods.pictures.points import points
@@ -170,48 +168,32 @@ def tried(
         return judged(trained(table(paths), replace(settings, seed=variant.seed), steps, report), windows)
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "What simulated walks must vary",
     data=CLONE,
     simulated=(Path("radarhd"), "what `radarsim dataset radarhd` made"),
     steps=(500, "of each training"),
     every=(40, "of so many frames of the real walks one is judged"),
 )
-
-
-def main() -> None:
+def main(options: argparse.Namespace) -> Page:
     """Train and judge all, beside each other."""
-    options = PARSER.parse_args()
     walks = [Walk.find(options.data, number) for number in TRAINING]
     windows, settings = real(walks, options.every), Settings(width=8, frames=WINDOW, batch=16, rate=2e-3)
     paths = {name: chosen(options.simulated, variant) for name, variant in VARIANTS.items()}
     jobs = {
-        name: partial(tried, variant, paths[name], windows, settings, options.steps)
-        for name, variant in VARIANTS.items()
+        name: partial(tried, each, paths[name], windows, settings, options.steps) for name, each in VARIANTS.items()
     }
-    found, done = {}, dict.fromkeys(jobs, 0.0)
-    with progress("steps") as report:
-        for news in perform(jobs):
-            if news.error is not None:
-                raise InputError(news.error)
-            done[news.name] = options.steps if news.ended else news.done
-            report(int(sum(done.values())), options.steps * len(jobs))
-            if news.ended:
-                found[news.name] = news.result
-    rows = []
-    for name, apart in ((name, found[name]) for name in VARIANTS):
+    found, rows = dict(zip(jobs, performed(jobs, None, "trainings"), strict=True)), []
+    for name, apart in found.items():
         beside = found[QUARTER if name in SUBSETS else EVERYTHING]
         worse = np.array([apart[walk] - beside[walk] for walk in apart])
         rows.append({
             "training": name, "simulated walks": len(paths[name]), "chamfer_m": float(np.mean(list(apart.values()))),
             "worse by_m": float(worse.mean()), "+-": float(worse.std(ddof=1) / np.sqrt(len(worse))),
         })  # fmt: skip
-    publish(
-        "randomisations",
-        "What simulated walks must vary",
+    return Page(
         rows,
-        data=Data("RadarHD's training walks", tuple(Facts.radarhd(w.number) for w in walks)),
-        networks=(),
+        data=radarhd("RadarHD's training walks", walks),
         notes=[
             "Median Chamfer distance of a real walk's points from the lidar's of the same instant, m, mean over walks. "
             f"Worse by: than `{EVERYTHING}`, walk by walk, or than `{QUARTER}` where walks are left out; +-: standard "
@@ -220,7 +202,3 @@ def main() -> None:
             f"of {settings.batch} windows; the density of points is the best for these walks.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -7,17 +7,18 @@ is told from training walks alone: what a row of four or of eight antennas makes
 each frame's strongest cell.
 """
 
+import argparse
 import io
 import lzma
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Bool, UInt8
 
-from benchmarks.results import SHARED, Data, Walk, command_line, publish, walked
+from benchmarks.results import SHARED, Data, Page, Walk, script, tracked, walked
 from radarize import polar
-from radarize.console import progress
 from radarize.radar.presets import PRESETS
 from radarize.yamlfile import read_yaml
 from radarsim.motion.trajectory import Motion
@@ -25,8 +26,8 @@ from radarsim.motion.walk import Walk as WayThrough
 from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
 from radarsim.world.description import find
-from radarsim.world.life import DRAWN, Life
 from radarsim.world.scene import Scene
+from radarsim.world.surface_settings import IDEAL, SurfaceSettings
 
 SCENES = "office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"
 #: dB, that a picture shows below its largest.
@@ -70,19 +71,24 @@ def beam_misfit(pictures: UInt8[np.ndarray, "frame range azimuth"], antennas: in
 
 
 def simulated(
-    name: str, life: tuple[Life, Life], transmitters: tuple[int, ...], every: int, duration: float, seed: int
+    name: str,
+    surfaces: tuple[SurfaceSettings, SurfaceSettings],
+    transmitters: tuple[int, ...],
+    every: int,
+    duration: float,
+    seed: int,
 ) -> tuple[tuple, Motion]:
     """Shares of a walk by cart, of every few frames, and the walk.
 
     Args:
         name: scene.
-        life: how lived-in it is: its geometry (things), and what physics adds (points, unevenness).
+        surfaces: settings of its geometry (small objects), and of what physics adds (points, unevenness).
         transmitters: of the pictures.
         every: of so many frames one is simulated.
         duration: s.
         seed: of walk and world.
     """
-    drawn, added = life
+    drawn, added = surfaces
     scene = Scene.of(read_yaml(find(name)) | asdict(drawn), name)
     scene = Scene(name, scene.objects, scene.movers, added)
     scenario = Scenario(scene, WayThrough("cart", duration).through(scene, seed), CONFIG, seed=seed)
@@ -103,47 +109,40 @@ def row(about: str, found: list[tuple[float, float, float]]) -> dict[str, object
 
 #: What is added to the rooms, step by step, and the transmitters of the pictures.
 STEPS = {
-    "bare rooms, eight antennas as published": ((DRAWN, DRAWN), polar.PUBLISHED),
-    "bare rooms, four antennas as measured": ((DRAWN, DRAWN), polar.MEASURED),
-    "uneven walls": ((DRAWN, Life(unevenness=1.0)), polar.MEASURED),
-    "things": ((Life(clutter=1.0), DRAWN), polar.MEASURED),
-    "points": ((DRAWN, Life(clutter=1.0)), polar.MEASURED),
-    "clutter: things and points": ((Life(clutter=1.0), Life(clutter=1.0)), polar.MEASURED),
-    "clutter and uneven walls": ((Life(1.0, 1.0), Life(1.0, 1.0)), polar.MEASURED),
+    "bare rooms, eight antennas as published": ((IDEAL, IDEAL), polar.PUBLISHED),
+    "bare rooms, four antennas as measured": ((IDEAL, IDEAL), polar.MEASURED),
+    "uneven walls": ((IDEAL, SurfaceSettings(unevenness=1.0)), polar.MEASURED),
+    "small objects": ((SurfaceSettings(clutter=1.0), IDEAL), polar.MEASURED),
+    "points": ((IDEAL, SurfaceSettings(clutter=1.0)), polar.MEASURED),
+    "clutter: small objects and points": ((SurfaceSettings(clutter=1.0), SurfaceSettings(clutter=1.0)), polar.MEASURED),
+    "clutter and uneven walls": ((SurfaceSettings(1.0, 1.0), SurfaceSettings(1.0, 1.0)), polar.MEASURED),
 }
-PARSER = command_line(
-    __doc__,
+
+
+@script(
+    "How much of a radar's picture is filled, in simulated rooms and real ones",
     recordings=(SHARED / "radarhd", "folder of the real walks"),
     every=(10, "of so many frames one is looked at"),
     duration=(15.0, "of simulated walks, s"),
     seed=(0, "of walks and worlds"),
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     rows, walks = [], []
-    with progress("walks") as report:
-        for part in ("train", "test"):
-            found, misfits = real(options.recordings, part, options.every)
-            rows.append(row(f"real, {part}", found))
-            if part == "train":
-                beams = {antennas: float(np.median(each)) for antennas, each in misfits.items()}
-            walks += [Walk(f"RadarHD, {part}", None, None, simulated=False)] * len(found)
-        for number, (about, (life, transmitters)) in enumerate(STEPS.items()):
-            found = []
-            for k, name in enumerate(SCENES):
-                report(number * len(SCENES) + k, len(STEPS) * len(SCENES))
-                kept, motion = simulated(name, life, transmitters, options.every, options.duration, options.seed)
-                found.append(kept)
-                walks.append(walked(name, options.seed, motion))
-            rows.append(row(about, found))
-    publish(
-        "realism",
-        "How much of a radar's picture is filled, in simulated rooms and real ones",
+    for part in ("train", "test"):
+        found, misfits = real(options.recordings, part, options.every)
+        rows.append(row(f"real, {part}", found))
+        if part == "train":
+            beams = {antennas: float(np.median(misfit)) for antennas, misfit in misfits.items()}
+        walks += [Walk(f"RadarHD, {part}", None, None, simulated=False)] * len(found)
+    kept = []
+    for (surfaces, transmitters), name in tracked([*product(STEPS.values(), SCENES)], "walks"):
+        found, motion = simulated(name, surfaces, transmitters, options.every, options.duration, options.seed)
+        kept.append(found)
+        walks.append(walked(name, options.seed, motion))
+    rows += [row(about, kept[k * len(SCENES) : (k + 1) * len(SCENES)]) for k, about in enumerate(STEPS)]
+    return Page(
         rows,
         data=Data("RadarHD's walks and walks by cart with their chirps", tuple(walks), options.seed),
-        networks=(),
         notes=[
             f"Cells of at least {100 * polar.THRESHOLD:g} % of the frame's largest magnitude, in RadarHD's picture "
             "chain (one loop, no windows, 256 ranges by 64 azimuths); means over walks, and the least and the "
@@ -154,7 +153,3 @@ def main() -> None:
             "are only reported.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

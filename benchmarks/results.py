@@ -2,12 +2,13 @@
 `radarize.benchmark.results` wants it to say."""
 
 import argparse
+import inspect
 import os
 import resource
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 from radarize.benchmark.results import Data, Network, Results, Walk, command, machine
 from radarize.benchmark.table import Beside, Table
@@ -27,44 +28,65 @@ T = TypeVar("T")
 machine()  # as things are now: sources may change while a script runs
 
 
-def command_line(about: str | None, **options: tuple[object, str]) -> argparse.ArgumentParser:
-    """A script's parser.
+class Page(NamedTuple):
+    """What a script publishes.
 
-    Args:
-        about: what it does.
-        options: by name a default, or the type of one that has none, and what it is; False stands for a flag.
-    """
-    parser = argparse.ArgumentParser(description=about)
-    for name, (default, words) in options.items():
-        kind, value = (default, None) if isinstance(default, type) else (type(default), default)
-        how = {"action": "store_true"} if default is False else {"type": kind, "default": value}
-        parser.add_argument("--" + name.replace("_", "-"), help=words, **how)
-    return parser
-
-
-def publish(
-    name: str,
-    title: str,
-    rows: Sequence[Mapping[str, object]],
-    *,
-    data: Data,
-    networks: tuple[Network, ...],
-    notes: Sequence[str],
-    beside: Sequence[Beside] = (),
-) -> None:
-    """Write and print a table.
-
-    Args:
-        name: of the script, and of the files in ``benchmarks/results``.
-        title: heading.
+    Attributes:
         rows: a mapping a row, same keys.
-        data, networks: that the figures are of.
+        data: that the figures are of.
         notes: sentences below the table.
+        networks: that the figures are of.
         beside: whose figures stand beside ours.
     """
-    table = Table(title, list(rows), list(notes), tuple(beside))
-    results = Results(title, [table], data, networks, command(f"python -m benchmarks.{name}"))
-    print(results.write(FOLDER, name).read_text())
+
+    rows: Sequence[Mapping[str, object]]
+    data: Data
+    notes: Sequence[str]
+    networks: tuple[Network, ...] = ()
+    beside: Sequence[Beside] = ()
+
+
+def script(title: str, **options: tuple) -> Callable[[Callable], Callable[[], None]]:
+    """Make a script of the function below, the last one of its file, from options to what is published.
+
+    The table is written into ``benchmarks/results`` under the file's name, and printed. `main.parser` has the options.
+
+    Args:
+        title: heading.
+        options: by name a default, or the type of one that has none; what it is; and more for `add_argument`. False
+            stands for a flag, and ``{"nargs": "?"}`` makes a positional argument.
+    """
+
+    def of(work: Callable[[argparse.Namespace], Page | None]) -> Callable[[], None]:
+        name = Path(inspect.getfile(work)).stem
+
+        def main() -> None:
+            if (page := work(main.parser.parse_args())) is not None:
+                table = Table(title, list(page.rows), list(page.notes), tuple(page.beside))
+                results = Results(title, [table], page.data, page.networks, command(f"python -m benchmarks.{name}"))
+                print(results.write(FOLDER, name).read_text())
+
+        main.parser = argparse.ArgumentParser(description=inspect.getmodule(work).__doc__)
+        for option, (default, words, *more) in options.items():
+            kind, value = (default, None) if isinstance(default, type) else (type(default), default)
+            how = {"action": "store_true"} if default is False else {"type": kind, "default": value}
+            how |= more[0] if more else {}
+            flag = option if how.get("nargs") == "?" else "--" + option.replace("_", "-")
+            main.parser.add_argument(flag, help=words, **how)
+        if work.__module__ == "__main__":
+            main()
+        return main
+
+    return of
+
+
+def tracked(items: Sequence[T], title: str) -> Iterator[T]:
+    """Go through items and show how many are done."""
+    with progress(title) as report:
+        for done, item in enumerate(items):
+            report(done, len(items))
+            yield item
+        report(len(items), len(items))
 
 
 def same(rows: Sequence[Mapping[str, object]]) -> list[dict[str, object]]:
@@ -73,7 +95,7 @@ def same(rows: Sequence[Mapping[str, object]]) -> list[dict[str, object]]:
     return [{column: row.get(column) for column in columns} for row in rows]
 
 
-def performed(jobs: Mapping[str, Job], workers: int, title: str) -> list:
+def performed(jobs: Mapping[str, Job], workers: int | None, title: str) -> list:
     """Of all jobs, in their order.
 
     Raises:
@@ -88,6 +110,11 @@ def performed(jobs: Mapping[str, Job], workers: int, title: str) -> list:
                 found[news.name] = news.result
                 report(len(found), len(jobs))
     return [found[name] for name in jobs]
+
+
+def radarhd(title: str, walks: Sequence) -> Data:
+    """Data of RadarHD's walks (`radarize.walks.Walk`)."""
+    return Data(title, tuple(Walk.radarhd(walk.number) for walk in walks))
 
 
 def walked(scene: str, seed: int, motion: Motion) -> Walk:

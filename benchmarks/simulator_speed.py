@@ -1,30 +1,31 @@
 """How fast the simulator is, and how exact, on three scenes with the `radarize` preset.
 
 Three ways to the frames of the first scene in one run: this simulator; the same echoes as a direct sum in float64; and
-`--engine sionna`, the paths of Sionna RT's own solver at the same poses.
+the paths of Sionna RT's own solver at the same poses (`benchmarks.sionna`).
 """
 
+import argparse
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import Data, command_line, memory_mb, peak_memory_mb, publish, timed, walked
+from benchmarks.references.brute_force import direct_sum
+from benchmarks.results import Data, Page, memory_mb, peak_memory_mb, script, timed, walked
+from benchmarks.sionna import DEPTH, RAYS, SionnaScenario
 from radarize.radar.presets import PRESETS
 from radarsim.machine.threads import default_workers
-from radarsim.propagation.pathsolver import DEPTH, RAYS
 from radarsim.recording.batches import TOGETHER, Batches
 from radarsim.recording.simulate import planned, record
 from radarsim.scenario import Scenario
-from tests.propagation.brute_force import direct_sum
 
 CONFIG = PRESETS["radarize"]
 
 
-def walk(name: str, times: np.ndarray, seed: int, **options: object) -> Scenario:
+def walk(name: str, times: np.ndarray, seed: int) -> Scenario:
     """A handheld walk, its first frames made."""
-    scenario, *_ = planned(name, seed=seed, duration=len(times) * CONFIG.frame_period + 1, **options)
+    scenario, *_ = planned(name, seed=seed, duration=len(times) * CONFIG.frame_period + 1)
     assert scenario.frames(times[:TOGETHER]).samples.any()
     return scenario
 
@@ -34,7 +35,7 @@ def pace(scenario: Scenario, times: np.ndarray) -> tuple[float, float, float]:
     spent, counts = [], []
     for batch in np.split(times, range(TOGETHER, len(times), TOGETHER)):
         frames = scenario.frames(batch)
-        echoes, finding = timed(getattr, frames, "echoes")
+        echoes, finding = timed(getattr, frames, "paths")
         _, rest = timed(getattr, frames, "samples")
         spent.append(((finding + rest) / len(batch), finding / len(batch)))
         counts += map(len, echoes)
@@ -58,7 +59,7 @@ def summed(scenario: Scenario, times: np.ndarray) -> tuple[float, float]:
     """The direct sum of the same echoes: median s per frame, and the fast synthesis' worst error power, dB."""
     seconds, errors = [], []
     for t in times:
-        (present,) = scenario.frames([t]).echoes
+        (present,) = scenario.frames([t]).paths
         beat = present.lengths(CONFIG, scenario.motion, t), present.amplitude
         truth, spent = timed(direct_sum, CONFIG, *beat)
         seconds.append(spent)
@@ -79,20 +80,17 @@ def memory_growth(scenario: Scenario, frames: int) -> str:
     return f"{early:.0f} MB early, {late:.0f} MB late, over {frames} frames"
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "Simulator speed, preset radarize",
     frames=(240, "of a walk"),
     recorded_frames=(1800, "of a recording by several processes"),
     direct_frames=(2, "summed directly"),
     sionna_frames=(20, "by Sionna's paths"),
     memory_frames=(0, "frames of a long run that watches memory"),
     seed=(0, "of walks and worlds"),
+    scenes=(["office", "corridor", "floor"], "the first in detail", {"nargs": "+", "type": str}),
 )
-PARSER.add_argument("--scenes", nargs="+", default=["office", "corridor", "floor"], help="the first in detail")
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     times, first = np.arange(options.frames) * CONFIG.frame_period, options.scenes[0]
     ways, notes, scenarios = [], [], {}  # ways: words, s per frame, echoes or paths, and what they give
     for name in options.scenes:
@@ -115,13 +113,14 @@ def main() -> None:
     seconds, error = summed(scenarios[first], times[few])
     ways.append((f"{first}: direct sum, float64", seconds, echoes, "the same echoes, samples"))
 
-    other, counts, spent = walk(first, times, options.seed, engine="sionna"), [], []  # its kernels are compiled now
+    other, counts, spent = SionnaScenario.of(scenarios[first]), [], []
+    assert other.frames(times[:1]).samples.any()  # its kernels are compiled now
     for t in np.linspace(0, times[-1], options.sionna_frames):
-        frames = other.frames([t])
+        frames = other.frames(np.array([t]))
         _, took = timed(getattr, frames, "samples")
         spent.append(took)
-        counts.append(len(frames.echoes[0]))
-    ways.append((f"{first}: --engine sionna", np.median(spent), np.mean(counts), "int16 I/Q with noise"))
+        counts.append(len(frames.paths[0]))
+    ways.append((f"{first}: paths of Sionna RT", np.median(spent), np.mean(counts), "int16 I/Q with noise"))
 
     notes += [
         f"Fast synthesis against the direct sum of the same echoes: error power {error:.1f} dB (worst frame).",
@@ -133,12 +132,16 @@ def main() -> None:
     ]
     if options.memory_frames:
         notes.append(f"{first}: memory {memory_growth(scenarios[first], options.memory_frames)}.")
-    publish(
-        "simulator_speed",
-        "Simulator speed, preset radarize",
+    return Page(
         [
-            {"way": way, "ms per frame": 1e3 * float(s), "frames/s": 1 / float(s), "times slower": float(s / fastest),
-             "echoes or paths": int(count), "gives": gives}
+            {
+                "way": way,
+                "ms per frame": 1e3 * float(s),
+                "frames/s": 1 / float(s),
+                "times slower": float(s / fastest),
+                "echoes or paths": int(count),
+                "gives": gives,
+            }
             for way, s, count, gives in ways
         ],
         data=Data(
@@ -146,10 +149,5 @@ def main() -> None:
             tuple(walked(name, options.seed, scenario.motion) for name, scenario in scenarios.items()),
             options.seed,
         ),
-        networks=(),
         notes=notes,
-    )  # fmt: skip
-
-
-if __name__ == "__main__":
-    main()
+    )

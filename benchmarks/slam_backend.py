@@ -1,5 +1,6 @@
 """The SLAM back end: real lidar logs, graphs with false loops, simulated radar walks, time and memory."""
 
+import argparse
 import time
 from dataclasses import replace
 from operator import itemgetter
@@ -9,7 +10,7 @@ import numpy as np
 import pandas as pd
 from rich.progress import track
 
-from benchmarks.results import SHARED, Data, Walk, command_line, memory_mb, publish, timed
+from benchmarks.results import SHARED, Data, Page, Walk, memory_mb, script, timed
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
 from radarize.benchmark.table import Beside
@@ -165,16 +166,13 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
     return summary, walks
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "SLAM back end",
     data=(Path, "folder of runs that `benchmarks.unseen` keeps; lidar and graphs alone if none"),
     seeds=(3, "of disturbances, for each log"),
     seed=(7, "the first of them"),
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     lidar_preset, rows, walks, notes = SlamConfig.preset("lidar"), [], [], []
     warm, _ = lidar("orebro")
     play(replace(warm, times=warm.times[:60], ranges=warm.ranges[:60]), lidar_preset)
@@ -204,9 +202,7 @@ def main() -> None:
     if options.data:
         found, simulations = radar_rows(options.data)
         rows, walks = rows + found, walks + simulations
-    publish(
-        "slam_backend",
-        "SLAM back end",
+    return Page(
         rows,
         data=Data("lidar logs of Radish and radar walks", tuple(walks), options.seed),
         networks=Networks().used(Pair(**BEST).networks) if options.data else (),
@@ -221,7 +217,3 @@ def main() -> None:
             *notes,
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

@@ -1,5 +1,6 @@
 """Sessions that go on and on: `radarize live` at the virtual radar over a bad network, and a day of SLAM at a blow."""
 
+import argparse
 import re
 import socket
 import subprocess
@@ -14,7 +15,7 @@ import numpy as np
 import psutil
 
 from benchmarks.capture_speed import chirps_that_arrive, compared
-from benchmarks.results import Data, command_line, memory_mb, publish, same, surroundings
+from benchmarks.results import Data, Page, memory_mb, same, script, surroundings
 from radarize.mapping.scans import BEARINGS
 from radarize.pose import between, compose
 from radarize.radar.dca1000 import MAX_PAYLOAD
@@ -162,17 +163,15 @@ def day(hours: float, seed: int) -> dict[str, object]:
     }
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "Sessions that go on and on",
     minutes=(60.0, "of the live session; 0: none"),
     hours=(24.0, "of the day; 0: none"),
     seed=(0, "of walk, network and noise"),
 )
-
-
-def main() -> None:
+def main(options: argparse.Namespace) -> Page:
     """The table."""
-    options, rows = PARSER.parse_args(), []
+    rows = []
     notes = [
         f"Live: {WALK:g} s of a simulated office again and again, its jump back included; every sample compared with "
         "the one sent, and every chirp's mark with what the network's seed says was lost. Forged packets come from the "
@@ -191,8 +190,4 @@ def main() -> None:
     if options.hours:
         rows.append(day(options.hours, options.seed))
     data = Data("a simulated office, played by `radarsim emulate`, and a room of walls", (), options.seed)
-    publish("soak", "Sessions that go on and on", same(rows), data=data, networks=(), notes=notes)
-
-
-if __name__ == "__main__":
-    main()
+    return Page(same(rows), data=data, notes=notes)

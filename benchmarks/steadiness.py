@@ -6,20 +6,20 @@ frame's field differs by is what motion does not explain: flashes that come into
 rays. The first the dense reference shows, too.
 """
 
+import argparse
 from unittest.mock import patch
 
 import numpy as np
 from jaxtyping import Complex, Float
 
 from benchmarks.realism import SCENES
-from benchmarks.results import Data, command_line, publish, walked
-from radarize.console import progress
+from benchmarks.results import Data, Page, script, tracked, walked
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.motion.walk import Walk
 from radarsim.propagation import fresnelzone
-from radarsim.propagation.echoes import Echoes
 from radarsim.propagation.fresnelzone import Lattice
+from radarsim.propagation.paths import Paths
 from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
@@ -37,7 +37,7 @@ DENSE = {
 TONES = CONFIG.center_frequency + CONFIG.bandwidth * np.linspace(-0.5, 0.5, 9)
 
 
-def field(echoes: Echoes, scenario: Scenario, time: float) -> Complex[np.ndarray, "virtual tone"]:
+def field(echoes: Paths, scenario: Scenario, time: float) -> Complex[np.ndarray, "virtual tone"]:
     """What is left of echoes behind the IF filters at the middle of the frame that starts then, over the sweep.
 
     The filters close where echoes are no longer looked for: one that leaves that range is no step for the radar.
@@ -53,7 +53,7 @@ def changes(scenario: Scenario, times: Float[np.ndarray, "frame"]) -> Float[np.n
     found: list[float] = []
     for first in range(0, len(times) - 1, TOGETHER - 1):
         some = times[first : first + TOGETHER]
-        frames = scenario.frames(some).echoes
+        frames = scenario.frames(some).paths
         for before, after, time in zip(frames, frames[1:], some[1:], strict=False):
             expected, there = field(before, scenario, time), field(after, scenario, time)
             power = np.sum(np.abs(there - expected) ** 2) / np.sum(np.abs(expected) ** 2)
@@ -61,44 +61,36 @@ def changes(scenario: Scenario, times: Float[np.ndarray, "frame"]) -> Float[np.n
     return np.array(found)
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "How steady echoes are from frame to frame",
     frames=(60, "of each walk"),
     start=(5.0, "of them, s after the walk's"),
     seed=(3, "of walks and worlds"),
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     rows, walks = [], []
-    with progress("scenes") as report:
-        for done, name in enumerate(SCENES):
-            scene = Scene.load(name)
-            scenario = Scenario(scene, Walk("cart", 30.0).through(scene, options.seed), CONFIG, seed=options.seed)
-            times = options.start + np.arange(options.frames) * CONFIG.frame_period
-            speed = np.linalg.norm(np.diff(scenario.motion.position(times), axis=0), axis=1) / CONFIG.frame_period
-            own = changes(scenario, times)
-            with patch.multiple(fresnelzone, **DENSE):
-                dense = changes(scenario, times)
-            walks.append(walked(name, options.seed, scenario.motion))
-            rows.append({
-                "scene": name, "m/s": f"{speed.min():.1f} to {speed.max():.1f}", "frames": len(own),
-                "median dB": np.median(own), f"above {LIMIT:g} dB": int(np.sum(own > LIMIT)),
-                "so by dense rays": int(np.sum(dense > LIMIT)),
-                "not so by dense rays": int(np.sum((own > LIMIT) & (dense <= LIMIT))),
-                "most beside dense rays dB": np.max(np.maximum(own, LIMIT) - np.maximum(dense, LIMIT)),
-            })  # fmt: skip
-            report(done + 1, len(SCENES))
+    for name in tracked(SCENES, "scenes"):
+        scene = Scene.load(name)
+        scenario = Scenario(scene, Walk("cart", 30.0).through(scene, options.seed), CONFIG, seed=options.seed)
+        times = options.start + np.arange(options.frames) * CONFIG.frame_period
+        speed = np.linalg.norm(np.diff(scenario.motion.position(times), axis=0), axis=1) / CONFIG.frame_period
+        own = changes(scenario, times)
+        with patch.multiple(fresnelzone, **DENSE):
+            dense = changes(scenario, times)
+        walks.append(walked(name, options.seed, scenario.motion))
+        rows.append({
+            "scene": name, "m/s": f"{speed.min():.1f} to {speed.max():.1f}", "frames": len(own),
+            "median dB": np.median(own), f"above {LIMIT:g} dB": int(np.sum(own > LIMIT)),
+            "so by dense rays": int(np.sum(dense > LIMIT)),
+            "not so by dense rays": int(np.sum((own > LIMIT) & (dense <= LIMIT))),
+            "most beside dense rays dB": np.max(np.maximum(own, LIMIT) - np.maximum(dense, LIMIT)),
+        })  # fmt: skip
     few, many = (
         f"{len(DENSE[name].nodes)} instead of {len(getattr(fresnelzone, name).nodes)}" for name in ("_FEW", "_MANY")
     )
-    publish(
-        "steadiness",
-        "How steady echoes are from frame to frame",
+    return Page(
         rows,
         data=Data("walks by cart", tuple(walks), options.seed),
-        networks=(),
         notes=(
             "Power of what a frame's field differs by from the echoes of the frame before, carried on to its instant, "
             "over the power of the field; all antennas, nine tones over the sweep. Most beside dense rays: by how much "
@@ -107,7 +99,3 @@ def main() -> None:
             "echoes of a tenth of the amplitude.",
         ),
     )
-
-
-if __name__ == "__main__":
-    main()

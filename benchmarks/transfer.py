@@ -5,13 +5,14 @@ that stands at many places, first with the default board's front end, then with 
 are about each map's mean, as the networks see them.
 """
 
+import argparse
 import tempfile
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import FOLDER, SHARED, Data, Walk, command_line, publish
+from benchmarks.results import FOLDER, SHARED, Data, Page, Walk, script
 from radarize.console import progress
 from radarize.features.maps import MapMaker, maps_of
 from radarize.methods.registry import best_methods
@@ -46,7 +47,7 @@ def simulated(
     maker, parts = MapMaker(config), []
     for number, (scene, stays) in enumerate(scenes.values()):
         for second, motion in enumerate(stays):  # people move on meanwhile
-            scenario = Scenario(scene, motion, config, board or FrontEndConfig(), seed + number)
+            scenario = Scenario(scene, motion, config, board, seed + number)
             parts.append(maker(scenario.frames([second + 0.25]).samples))
     return {name: np.concatenate([part[name] for part in parts]) for name in maker.names}
 
@@ -102,17 +103,14 @@ def draw(shown: dict[str, dict[str, dict[str, np.ndarray]]], path: Path) -> None
     figure.savefig(path, dpi=80)
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "Real captures beside simulated frames, as the networks see them",
     captures=(SHARED, "folder of the public captures"),
     data=(Path, "a data set that networks were trained on, to compare with as well"),
     places=(8, "in each scene"),
     seed=(0, "of places and worlds"),
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     rows, notes, shown = [], [], {}
     with tempfile.TemporaryDirectory() as temporary, progress("captures") as report:
         found = captures(options.captures, Path(temporary))
@@ -146,12 +144,9 @@ def main() -> None:
         real = Data.of("public captures and simulated frames", list(found.values()), options.seed)
         stands = [Walk(name, options.seed, 0.0, simulated=True) for name in SCENES]
     draw(shown, FOLDER / "transfer.png")
-    publish(
-        "transfer",
-        "Real captures beside simulated frames, as the networks see them",
+    return Page(
         rows,
         data=replace(real, walks=(*real.walks, *stands)),
-        networks=(),
         notes=[
             "Fréchet distance of patch statistics (8 x 8 cells: quantiles of levels about the map's mean, steps "
             f"along rows and columns) of the real frame from {len(SCENES) * options.places} simulated ones of the same "
@@ -164,7 +159,3 @@ def main() -> None:
             "![Histograms](transfer.png)",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

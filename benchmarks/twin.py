@@ -1,13 +1,13 @@
 """Twins of a walk that plays the real one, each with one error: what the figures of `radarsim twin` make of it."""
 
+import argparse
 from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from benchmarks.results import Data, command_line, publish
-from radarize.console import progress
+from benchmarks.results import Data, Page, script, tracked
 from radarsim.recording.simulate import simulate
 from radarsim.twin.comparison import FIGURES, Comparison, compare
 from radarsim.twin.twin import Options, make_twin
@@ -27,21 +27,14 @@ def row(name: str, found: Comparison) -> dict[str, object]:
     return {"twin": name, **medians, "Fréchet distance, dB": found.frechet["range_azimuth"][0]}
 
 
-PARSER = command_line(
-    __doc__,
-    duration=(20.0, "of the walk, s"),
-    seed=(3, "of walk and twins"),
+@script(
+    "Twins of a simulated walk, each with one error", duration=(20.0, "of the walk, s"), seed=(3, "of walk and twins")
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     office, other, rows = Scene.load("office"), options.seed + 6, []
 
     def all_of(material: str) -> Scene:
-        return Scene(
-            "office", [replace(thing, material=MATERIALS[material]) for thing in office.objects], life=office.life
-        )
+        return Scene("office", [replace(each, material=MATERIALS[material]) for each in office.objects])
 
     twins: list[tuple[str, Scene, Change | None, int]] = [
         ("the same again", office, None, options.seed),
@@ -53,28 +46,20 @@ def main() -> None:
         *((f"all of {name}", all_of(name), None, other) for name in ("brick", "metal")),
         ("another building", Scene.load("floor"), None, other),
     ]
-    with TemporaryDirectory() as temporary, progress("twins") as report:
+    with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         real = simulate("office", folder / "real.h5", platform="cart", duration=options.duration, seed=options.seed)
-        for k, (name, scene, change, seed) in enumerate(twins):
+        for k, (name, scene, change, seed) in enumerate(tracked(twins, "twins")):
             source = altered(real, folder / f"poses{k}.h5", change) if change else real
             made = make_twin(source, scene, folder / f"twin{k}.h5", Options(every=3, seed=seed))
             rows.append(row(name, compare(real, made)))
-            report(k + 1, len(twins))
         data = Data.of("a walk in the place of the real one, and twins", [real, *folder.glob("twin*.h5")], options.seed)
-    publish(
-        "twin",
-        "Twins of a simulated walk, each with one error",
+    return Page(
         rows,
         data=data,
-        networks=(),
         notes=[
             f"A cart in the office for {options.duration:g} s plays the real recording. Every third frame, medians "
             "over frames; MS-SSIM and correlations are 1 for equal maps; Fréchet's distance is of patch statistics of "
             "range-azimuth maps. Errors of poses are smooth over two frames, 67 ms; standard deviations of each axis.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

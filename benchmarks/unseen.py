@@ -15,7 +15,7 @@ import pandas as pd
 from jaxtyping import Float
 from matplotlib.figure import Figure
 
-from benchmarks.results import FOLDER, SHARED, command_line
+from benchmarks.results import FOLDER, SHARED, script
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.followed import Followed, joined, true_poses
 from radarize.benchmark.results import command
@@ -173,7 +173,7 @@ def draw(study: Study) -> Figure:
     return figure
 
 
-def judge(name: str, title: str, goals: str, options: argparse.Namespace) -> None:
+def judge(goals: str, title: str, name: str, options: argparse.Namespace) -> None:
     """Make the recordings of the specification of a script's name, run the pipeline on them, and write the page."""
     data = recorded(Path(__file__).with_name(f"{name}.yaml"), options.folder, options.workers)
     benchmark = Benchmark(title, goals, Chosen.by_odometry, tables)
@@ -187,22 +187,15 @@ def judge(name: str, title: str, goals: str, options: argparse.Namespace) -> Non
     print(results.write(FOLDER, name).read_text())
 
 
-def parser(about: str | None, name: str) -> argparse.ArgumentParser:
+def options_of(name: str) -> dict[str, tuple]:
     """Options of a script of that name."""
-    return command_line(
-        about,
-        folder=(Path(name), "of the recordings, which are made if they are not there"),
-        output=(Path(f"{name}-runs"), "folder of the runs"),
-        workers=(2, "processes"),
-    )
+    return {
+        "folder": (Path(name), "of the recordings, which are made if they are not there"),
+        "output": (Path(f"{name}-runs"), "folder of the runs"),
+        "workers": (2, "processes"),
+    }
 
 
-PARSER = parser(__doc__, "unseen")
-
-
-def main() -> None:
-    judge("unseen", "Walks never looked at", GOALS, PARSER.parse_args())
-
-
-if __name__ == "__main__":
-    main()
+@script("Walks never looked at", **options_of("unseen"))
+def main(options: argparse.Namespace) -> None:
+    judge(GOALS, "Walks never looked at", "unseen", options)

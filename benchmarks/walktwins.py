@@ -6,7 +6,9 @@ in them is assumed, an assumption a row. What each is worth is told by how alike
 same instants, compared with those of other instants and of another walk.
 """
 
+import argparse
 import tempfile
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,10 +17,8 @@ import yaml
 from jaxtyping import Float, UInt8
 
 from benchmarks.realism import CONFIG, shares
-from benchmarks.results import CLONE, POSES, Data, command_line, publish
-from benchmarks.results import Walk as Facts
+from benchmarks.results import CLONE, POSES, Page, radarhd, script, tracked
 from radarize import polar
-from radarize.console import progress
 from radarize.tum import planar_poses, write_tum
 from radarize.walkclock import Clock
 from radarize.walkposes import BEARINGS, poses_of, scan, stamps
@@ -36,22 +36,22 @@ class Assumed(NamedTuple):
     """What the lidar does not tell.
 
     Attributes:
-        life: see `radarsim.world.scene.Life`.
+        surfaces: see `radarsim.world.surface_settings.SurfaceSettings`.
         walls: their material.
         room: floor to ceiling, m.
         sensor: its height, m.
     """
 
-    life: dict[str, float] = {"clutter": 1.0, "unevenness": 1.0}  # noqa: RUF012
+    surfaces: dict[str, float] = {"clutter": 1.0, "unevenness": 1.0}  # noqa: RUF012
     walls: str = "plasterboard"
     room: float = 2.7
     sensor: float = 1.0
 
 
 ASSUMED = {
-    "walls alone": Assumed(life={}),
+    "walls alone": Assumed(surfaces={}),
     "clutter and unevenness": Assumed(),
-    "clutter x 3": Assumed(life={"clutter": 3.0, "unevenness": 1.0}),
+    "clutter x 3": Assumed(surfaces={"clutter": 3.0, "unevenness": 1.0}),
     "walls of concrete": Assumed(walls="concrete"),
     "rooms of 4 m": Assumed(room=4.0),
     "sensor at 0.5 m": Assumed(sensor=0.5),
@@ -80,7 +80,7 @@ def scene(log: Path, assumed: Assumed) -> Path:
     found = read_yaml(path)
     for part in found["objects"]:
         part["material"] = assumed.walls if part["name"] == "walls" else part["material"]
-    path.write_text(yaml.safe_dump(found | assumed.life, sort_keys=False))
+    path.write_text(yaml.safe_dump(found | assumed.surfaces, sort_keys=False))
     return path
 
 
@@ -135,40 +135,30 @@ def compared(twin: Pictures, own: Pictures, other: Pictures) -> dict[str, float]
     }  # fmt: skip
 
 
-PARSER = command_line(
-    __doc__,
+@script(
+    "Twins of real walks",
     data=CLONE,
     walks=("112,113,120", "training walks, each beside the next one"),
     poses=POSES,
     every=(15, "of so many frames one is simulated"),
     seed=(0, "of clutter, unevenness and noise"),
 )
-
-
-def main() -> None:
-    options = PARSER.parse_args()
+def main(options: argparse.Namespace) -> Page:
     walks = [Walk.find(options.data, int(number)) for number in options.walks.split(",")]
     shown = [np.arange(_MARGIN, walk.frames - _MARGIN, options.every) for walk in walks]
     real = [np.stack([walk.radar(k) for k in some]) for walk, some in zip(walks, shown, strict=True)]
     # Poses are of the lidar's frames, and its clock is another.
     frames = [Clock.of(walk).lidar(some) for walk, some in zip(walks, shown, strict=True)]
     rows = []
-    with progress("twins") as report, tempfile.TemporaryDirectory() as folder:
-        for number, walk in enumerate(walks):
-            poses = poses_of(walk, options.poses)
-            log = lidar_log(walk, poses, Path(folder))
-            for done, (about, assumed) in enumerate(ASSUMED.items()):
-                report(number * len(ASSUMED) + done, len(walks) * len(ASSUMED))
-                path = scene(log, assumed)
-                twin = simulated(path, poses, assumed.sensor, frames[number], options.seed)
-                other = real[(number + 1) % len(walks)]
-                rows.append({"walk": walk.number, "assumed": about, **compared(twin, real[number], other)})
-    publish(
-        "walktwins",
-        "Twins of real walks",
+    with tempfile.TemporaryDirectory() as folder:
+        for number, (about, assumed) in tracked([*product(range(len(walks)), ASSUMED.items())], "twins"):
+            poses, other = poses_of(walks[number], options.poses), real[(number + 1) % len(walks)]
+            path = scene(lidar_log(walks[number], poses, Path(folder)), assumed)
+            twin = simulated(path, poses, assumed.sensor, frames[number], options.seed)
+            rows.append({"walk": walks[number].number, "assumed": about, **compared(twin, real[number], other)})
+    return Page(
         rows,
-        data=Data("RadarHD's training walks", tuple(Facts.radarhd(w.number) for w in walks)),
-        networks=(),
+        data=radarhd("RadarHD's training walks", walks),
         notes=[
             "Correlation of the twin's pictures (`radarize.polar`, four antennas) with real ones of the same instants, "
             "of the same walk backwards, and of another walk; the twin's are moved by as much as fits best (bias). "
@@ -178,7 +168,3 @@ def main() -> None:
             "The lidar's plane is all that is known of a room: nothing above or below it, no glass, no material.",
         ],
     )
-
-
-if __name__ == "__main__":
-    main()

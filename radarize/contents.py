@@ -92,8 +92,9 @@ def show(found: dict) -> None:
     if found["effort"]:
         print(found["effort"])
     config = dict(found["config"])
-    if all(tuple(pair) == (1.0, 0.0) for pair in config.get("channel_calibration") or ()):
-        config["channel_calibration"] = "none"
+    config["channel_calibration"] = config["channel_calibration"] or "nominal"
+    if isinstance(config["board"], dict):
+        config["board"] = config["board"]["name"]
     print_table(("configuration", "value"), config.items())
     derived = [(name, *_readable(value, DERIVED[name])) for name, value in found["derived"].items()]
     print_table(("derived", "value", "unit"), derived, numbers=(1,))

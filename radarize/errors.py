@@ -1,5 +1,7 @@
 """The one exception that users meet."""
 
+import errno
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -39,10 +41,27 @@ def first_line(error: BaseException) -> str:
     return str(error).strip().split("\n", 1)[0] or type(error).__name__
 
 
+def disk_full(error: BaseException | None) -> bool:
+    """Whether an error, or one that it comes from, is that of a full disk."""
+    while error is not None:
+        if isinstance(error, DiskFull) or _no_space(error):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+def _no_space(error: BaseException) -> bool:
+    """Whether the system found no space; libraries in C, as HDF5, give its number in their text alone."""
+    if isinstance(error, OSError) and error.errno is not None:
+        return error.errno == errno.ENOSPC
+    words = rf"no space left on device|errno = {errno.ENOSPC}\b"
+    return not isinstance(error, InputError) and re.search(words, str(error), re.IGNORECASE) is not None
+
+
 def reason(error: Exception) -> str:
     """What a library or the system says went wrong with a file, in a few printable words."""
     text = str(error)
-    if "no space left" in text.lower() or "errno = 28" in text:
+    if _no_space(error):
         return FULL
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
@@ -52,12 +71,13 @@ def reason(error: Exception) -> str:
 
 @contextmanager
 def explained(message: str, *kinds: type[Exception]) -> Iterator[None]:
-    """Turn errors, of any kind if none is named, into an InputError of `message` and the reason: of damaged files,
-    libraries raise whatever their parsers meet."""
+    """Turn errors, of any kind if none is named, into an InputError of `message` and the reason (DiskFull if that is
+    it): of damaged files, libraries raise whatever their parsers meet."""
     expected = kinds or (Exception,)
     try:
         yield
     except InputError:
         raise
     except expected as error:
-        raise InputError(f"{message} ({reason(error)})") from error
+        kind = DiskFull if disk_full(error) else InputError
+        raise kind(f"{message} ({reason(error)})") from error

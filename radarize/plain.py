@@ -28,4 +28,7 @@ def setting(default: object, about: str, **limits: object) -> Any:
 def complaint(error: ValidationError) -> str:
     """The first thing that is wrong: field, value, and what is expected."""
     first = error.errors()[0]
-    return f"{'.'.join(map(str, first['loc'])) or 'file'} is {shortened(first['input'])}, expected: {first['msg']}"
+    field = ".".join(map(str, first["loc"])) or "file"
+    if first["type"] == "missing":
+        return f"has no {field}"
+    return f"{field} is {shortened(first['input'])}, expected: {first['msg']}"

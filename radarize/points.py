@@ -215,7 +215,8 @@ class PointClouds:
         self, x: Complex[np.ndarray, "detection antenna"]
     ) -> tuple[Int[np.ndarray, "point"], Float[np.ndarray, "point"], Float[np.ndarray, "point"]]:
         """Direction cosines to the left and up of one or two peaks per detection, and whose they are."""
-        beams = x[:, self._row] @ self._steering
+        # One product a detection: those of all at once are rounded by how many there are, and so by a batch's size.
+        beams = (x[:, None, self._row] @ self._steering)[:, 0]
         power = np.abs(beams) ** 2
         peak = (power >= np.roll(power, 1, axis=1)) & (power > np.roll(power, -1, axis=1))
         order = np.argsort(np.where(peak, -power, 0.0), axis=1, kind="stable")[:, :2]
@@ -227,9 +228,17 @@ class PointClouds:
         cell = order[which, rank]
         u_z = np.zeros(len(which))
         if self._other is not None:
-            other = (x[:, self._other] @ self._other_steering)[which, cell]
+            other = (x[:, None, self._other] @ self._other_steering)[which, 0, cell]
             u_z = -np.angle(other * beams[which, cell].conj()) / (2 * np.pi * self._rise)
         return which, self.u_y[cell], u_z
+
+
+def _formed(
+    x: Complex[np.ndarray, "detection antenna"], steering: Complex[np.ndarray, "antenna direction"]
+) -> Complex[np.ndarray, "detection direction"]:
+    """Beams of each detection, in the same order of sums whatever stands beside it: BLAS takes another one, and differs
+    in the last digits, for other numbers of rows."""
+    return (np.ascontiguousarray(x)[:, None] @ steering)[:, 0]
 
 
 def level_around(level: np.ndarray, cfar: Cfar, axis: int, cyclic: bool) -> np.ndarray:

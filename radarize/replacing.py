@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from radarize.errors import FULL, InputError, explained, reason
+from radarize.errors import FULL, DiskFull, InputError, disk_full, explained
 from radarize.locks import hold
 
 
@@ -28,8 +28,8 @@ def replacing(path: str | Path) -> Iterator[Path]:
     except BaseException as error:
         with contextlib.suppress(OSError):
             part.unlink()
-        if isinstance(error, Exception) and not isinstance(error, InputError) and reason(error) == FULL:
-            raise InputError(f"{path}: cannot be written ({FULL})") from error  # libraries have errors of their own
+        if isinstance(error, Exception) and not isinstance(error, InputError) and disk_full(error):
+            raise DiskFull(f"{path}: cannot be written ({FULL})") from error  # libraries have errors of their own
         raise
 
 

@@ -36,27 +36,21 @@ def simulate(
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
     frontend: Annotated[
-        Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else an IWR1843BOOST.")
+        Path | None, typer.Option(help="A front-end file (.yaml), as `calibrate` writes it; else the board's.")
     ] = None,
-    engine: Annotated[
-        Literal["radarsim", "sionna"],
-        typer.Option(
-            help="sionna: paths of Sionna RT's own solver, to compare with. It misses corners and half of the ghosts, "
-            "makes every facet an infinite mirror, and draws speckle anew in every frame: do not train on it."
-        ),
-    ] = "radarsim",
     sensors: Annotated[
         str,
         typer.Option(
             help="Also record, comma-separated: depth, occupancy, tracking, imu, points, ghosts, or all; and "
-            "adc-by-cause, I/Q split by cause, before noise (a much larger file)."
+            "paths, every path above the noise; adc-by-cause, I/Q split by path type, before noise (much larger files)."
         ),
     ] = "",
-    workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes; by default one per core, fewer for short recordings.")
+    ] = None,
 ):
     """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
     from radarize.recording import Recording, keeping
-    from radarsim.machine.threads import default_workers
     from radarsim.motion.statistics import Statistics
     from radarsim.motion.trajectory import Mounting
     from radarsim.recording.simulate import simulate
@@ -65,9 +59,8 @@ def simulate(
         written = simulate(
             scene, output, platform=platform, trajectory=trajectory, waypoints=waypoints, duration=duration, seed=seed,
             people=people, mounting=Mounting.parse(mounting) if mounting else None, radar=radar, frontend=frontend,
-            engine=engine,
             sensors=[name.strip() for name in sensors.split(",") if name.strip()],
-            workers=workers or default_workers(), progress=report,
+            workers=workers, progress=report,
         )  # fmt: skip
     with Recording(written) as recording:
         print(Statistics.from_json(recording.attributes["motion"]))
@@ -129,7 +122,7 @@ def twin(
     at: Annotated[
         str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="Place of a radar at rest, instead of poses.")
     ] = "",
-    frontend: Annotated[Path | None, typer.Option(help="A front-end file (.yaml); else an IWR1843BOOST.")] = None,
+    frontend: Annotated[Path | None, typer.Option(help="A front-end file (.yaml); else the board's own.")] = None,
     calibrate: Annotated[
         bool, typer.Option("--calibrate", help="Fit the front end to the recording first; kept beside, as .yaml.")
     ] = False,

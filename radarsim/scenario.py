@@ -8,20 +8,21 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Complex, Float, Int, Int16
+from jaxtyping import Complex, Float, Int, Int16, UInt8
 
 from radarize.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.machine.threads import one_blas_thread
 from radarsim.motion.trajectory import Motion
-from radarsim.propagation.clutter import Clutter, Cluttered
-from radarsim.propagation.echoes import Echoes
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.antenna import gain_pattern
+from radarsim.propagation.clutter import Clutter
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.obstacles import Obstacles
-from radarsim.propagation.pathsolver import PathSolverFinder
+from radarsim.propagation.path_types import PathTypes
+from radarsim.propagation.paths import Paths
 from radarsim.propagation.reflectors import Reflectors
-from radarsim.propagation.surface import Surface
+from radarsim.propagation.surface import Cluttered, Surface
 from radarsim.propagation.unevenness import Heights
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import FrontEndConfig
@@ -40,26 +41,21 @@ class Scenario:
         scene: the world.
         motion: of the radar.
         config: of the radar.
-        front_end: what its board is made of; default: an IWR1843BOOST.
+        front_end: what its board is made of; default: what the board's file says.
         seed: of scatterers, noise, sensors' errors, and what differs from board to board.
         sensors: beside the radar, names from `radarsim.sensors.suite.SENSORS`; none changes the radar's samples.
-        engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver (see `physics.pathsolver`).
-
-    Raises:
-        InputError: no such engine.
     """
 
     scene: Scene
     motion: Motion
     config: RadarConfig
-    front_end: FrontEndConfig = FrontEndConfig()
+    front_end: FrontEndConfig | None = None
     seed: int = 0
     sensors: tuple[str, ...] = ()
-    engine: str = "radarsim"
 
     def __post_init__(self):
-        if self.engine not in ("radarsim", "sionna"):
-            raise InputError(f"engine is {self.engine!r}, expected radarsim or sionna")
+        if self.front_end is None:
+            object.__setattr__(self, "front_end", FrontEndConfig.of(self.config.board))
 
     def frames(self, times: Float[np.ndarray, "frame"], end: float | None = None) -> "Frames":
         """The frames that start at `times`, ascending, s; nothing is computed before it is asked for.
@@ -100,16 +96,18 @@ class Scenario:
         return FrontEnd(self.config, self.front_end, self.rng("board"))
 
     @cached_property
-    def finder(self) -> EchoFinder | PathSolverFinder:
+    def finder(self) -> PathFinder:
         """Finds the echoes of a pose."""
         weakest, antenna = self.board.weakest, self.front_end.pattern
-        if self.engine == "sionna":
-            seed = int(self.rng("sionna").integers(2**31))
-            return PathSolverFinder(self.scene, self.config, weakest, antenna, seed)
         reach = SPEED_OF_LIGHT * self.board.passband[1] / (2 * self.config.slope)
         scatterers = Cluttered(Surface(self.scene, self.rng("surface")), Clutter(self.scene, self.rng("clutter")))
         reflectors = Reflectors.of(self.scene, self.config, Heights.of(self.scene, self.rng("unevenness")))
-        return EchoFinder(self.scene, scatterers, reflectors, self.config, weakest, reach, antenna, self._moving)
+        return PathFinder(self.scene, scatterers, reflectors, self.config, weakest, reach, antenna, self._moving)
+
+    @cached_property
+    def path_types(self) -> PathTypes:
+        """Tells ghosts from echoes of what is really there."""
+        return PathTypes(self.scene, self.config, gain_pattern(self.front_end.pattern))
 
     @cached_property
     def _moving(self) -> MovingTargets:
@@ -134,7 +132,7 @@ class Scenario:
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """Some frames of a scenario, each step from the echoes to the samples made when it is first asked for.
+    """Some frames of a scenario, each step from the paths to the samples made when it is first asked for.
 
     Attributes:
         scenario: that they are of.
@@ -156,26 +154,35 @@ class Frames:
 
     @cached_property
     @one_blas_thread
-    def echoes(self) -> list[Echoes]:
-        """Echoes of each frame, found at the middle of the burst."""
+    def paths(self) -> list[Paths]:
+        """Propagation paths of each frame, found at the middle of the burst."""
         motion, middles = self.scenario.motion, self.middles
         return self.scenario.finder.batch(motion.position(middles), motion.rotation(middles).as_matrix(), middles)
 
     @cached_property
-    def lengths(self) -> list[Float[np.ndarray, "echo virtual 3"]]:
-        """Path lengths of each frame's echoes, see `Echoes.lengths`."""
+    def lengths(self) -> list[Float[np.ndarray, "path virtual 3"]]:
+        """Path lengths of each frame's paths, see `Paths.lengths`."""
         config, motion = self.scenario.config, self.scenario.motion
-        found = [e.lengths(config, motion, t) for t, e in zip(self.times, self.echoes, strict=True)]
+        found = [p.lengths(config, motion, t) for t, p in zip(self.times, self.paths, strict=True)]
         for each in found:
             each[..., 0] += 2 * config.range_bias  # a board's own delay, which the pipeline takes off again
         return found
 
     @cached_property
-    def received(self) -> list[Complex[np.ndarray, "echo"]]:
-        """Amplitudes of each frame's echoes behind the IF filters."""
+    def received(self) -> list[Complex[np.ndarray, "path"]]:
+        """Amplitudes of each frame's paths behind the IF filters."""
         response = self.scenario.board.if_response
-        pairs = zip(self.lengths, self.echoes, strict=True)
-        return [e.amplitude * response(length[:, 0, 0]) for length, e in pairs]
+        pairs = zip(self.lengths, self.paths, strict=True)
+        return [p.amplitude * response(length[:, 0, 0]) for length, p in pairs]
+
+    @cached_property
+    @one_blas_thread
+    def types(self) -> list[UInt8[np.ndarray, "path"]]:
+        """Type of each frame's paths."""
+        motion, middles = self.scenario.motion, self.middles
+        lengths = [each[..., 0] - 2 * self.scenario.config.range_bias for each in self.lengths]
+        poses = motion.position(middles), motion.rotation(middles).as_matrix()
+        return self.scenario.path_types(self.paths, lengths, *poses)
 
     @cached_property
     @one_blas_thread

@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
-from jaxtyping import Float
+from jaxtyping import Float, UInt8
 
 from radarize.radar.presets import PRESETS
 from radarize.report.page import COLORS, INK, Page
 from radarsim.motion.walk import Walk
-from radarsim.propagation.echoes import Echoes, Provenance
+from radarsim.propagation.path_types import PathType
+from radarsim.propagation.paths import Paths
 from radarsim.scenario import Scenario
 from radarsim.world.preview.rendering import CAP, cut_open
 from radarsim.world.scene import Scene
@@ -17,7 +18,7 @@ from radarsim.world.scene import Scene
 #: Rays of each cause that are drawn, the strongest.
 RAYS = 80
 #: By cause, as in the viewer.
-_CAUSES = ("#39d0d8", "#8b949e", "#e4572e", "#f2703a", "#f2a33a", "#9a6fd0", "#2e9e6b")
+_CAUSES = ("#39d0d8", "#8b949e", "#9a6fd0", "#e4572e", "#2e9e6b")
 _STEP = 0.1  # s between points of the tour
 _GLASS = 0.25
 
@@ -38,10 +39,10 @@ def web_preview(scene: Scene, output: Path, walk: Walk | None = None, time: floa
     motion = (walk or Walk()).through(scene, seed)
     scenario = Scenario(scene, motion, PRESETS["radarize"], seed=seed)
     frame = scenario.frames(np.array([time]))
-    (echoes,), (place,) = frame.echoes, motion.position(frame.middles)
+    (paths,), (types,), (place,) = frame.paths, frame.types, motion.position(frame.middles)
     page = Page(scene.name, f"echoes {time:g} s into a tour of {motion.duration:g} s")
     figure = go.Figure([*_building(scene), _tour(motion.position(np.arange(0, motion.duration, _STEP)), place)])
-    figure.add_traces(_rays(echoes, place))
+    figure.add_traces(_rays(paths, types, place))
     hidden = {"visible": False}
     figure.update_layout(scene={"aspectmode": "data", "xaxis": hidden, "yaxis": hidden, "zaxis": hidden})
     page.plot(figure, height=720)
@@ -49,16 +50,16 @@ def web_preview(scene: Scene, output: Path, walk: Walk | None = None, time: floa
         f"Of each cause the {RAYS} strongest echoes. Rays over mirrors are drawn unfolded: straight to where the thing "
         "seems to be for the transmitter, and from where it seems to be for the receiver. A click on a cause hides it."
     )
-    counts = np.bincount(echoes.provenance, minlength=len(Provenance))
-    powers = np.bincount(echoes.provenance, np.abs(echoes.amplitude) ** 2, minlength=len(Provenance))
+    counts = np.bincount(types, minlength=len(PathType))
+    powers = np.bincount(types, np.abs(paths.amplitude) ** 2, minlength=len(PathType))
     rows = [
-        (_words(cause), counts[cause], f"{10 * np.log10(powers[cause]):.1f}") for cause in Provenance if counts[cause]
+        (_words(cause), counts[cause], f"{10 * np.log10(powers[cause]):.1f}") for cause in PathType if counts[cause]
     ]
     page.table(("cause", "echoes", "received over transmitted power, dB"), rows, numbers=(1, 2))
     return page.write(output)
 
 
-def _words(cause: Provenance) -> str:
+def _words(cause: PathType) -> str:
     return cause.name.lower().replace("_", " ")
 
 
@@ -83,15 +84,13 @@ def _tour(points: Float[np.ndarray, "step 3"], place: Float[np.ndarray, "3"]) ->
     return go.Scatter3d(x=x, y=y, z=z, mode="lines+markers", name="tour", line={"color": INK, "width": 4}, marker=style)
 
 
-def _rays(echoes: Echoes, place: Float[np.ndarray, "3"]) -> list[go.Scatter3d]:
+def _rays(paths: Paths, types: UInt8[np.ndarray, "path"], place: Float[np.ndarray, "3"]) -> list[go.Scatter3d]:
     # A mirror of flat parts seems to hold the receiver's image: half-way to it the ray meets the mirror.
-    images = echoes.images[:, :, :3] @ place + echoes.images[:, :, 3]
-    half = (images + place) / 2
-    ends = np.concatenate([echoes.points, np.stack([half, half], axis=1)])
+    ends = paths.apparent(place)
     found = []
-    for cause in Provenance:
-        members = np.flatnonzero(echoes.provenance == cause)
-        members = members[np.argsort(-np.abs(echoes.amplitude[members]), kind="stable")][:RAYS]
+    for cause in PathType:
+        members = np.flatnonzero(types == cause)
+        members = members[np.argsort(-np.abs(paths.amplitude[members]), kind="stable")][:RAYS]
         if not len(members):
             continue
         here, gap = np.broadcast_to(place, (len(members), 3)), np.full((len(members), 3), np.nan)

@@ -53,12 +53,12 @@ def one_thread():
 
 
 @pytest.fixture(scope="module")
-def cluster(request):
+def cluster():
     """Address of a Ray cluster: two nodes of one core each on this machine, which can import what the test can."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
         patch.setenv("RAY_worker_niceness", "0")  # 15 by default: other tests would not let them work
-        patch.setenv("PYTHONPATH", os.pathsep.join([str(request.path.parent), *sys.path]))
+        patch.setenv("PYTHONPATH", os.pathsep.join(sys.path))
         yield from _two_nodes()
 
 

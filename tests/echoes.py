@@ -5,6 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from radarize.radar.array import rx_positions, tx_positions
+from radarize.radar.boards import load_board
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 
 
@@ -22,8 +23,8 @@ def record(
     """int16 frames (frame, loop, tx, rx, sample, 2) of static points (n, 3) with complex amplitudes in ADC counts.
 
     `pose` maps times to positions (..., 3) and yaws (...). Phases are exact for every chirp and antenna; the beat
-    frequency is held for `block` loops (1: exact as well). `gain` maps points in the sensor frame at the burst's middle
-    (n, 3) to factors on their amplitudes.
+    frequency is held for `block` loops (1: exact as well). Receivers have the board's signs. `gain` maps points in the
+    sensor frame at the burst's middle (n, 3) to factors on their amplitudes.
     """
     n = np.arange(config.samples)
     beat = 2 * np.pi * config.slope / SPEED_OF_LIGHT * (n - (config.samples - 1) / 2) / config.sample_rate
@@ -54,6 +55,7 @@ def record(
         path = out[:, :, None] + back
         phase = ((wavenumber * path) % (2 * np.pi)).astype(np.float32)
         phasor = strength.astype(np.complex64) * np.exp(np.complex64(1j) * phase)
+        phasor *= np.float32(load_board(config.board).rx_sign)[list(config.rx), None]
         signal = np.empty((*path.shape[:3], config.samples), np.complex64)
         for start in range(0, config.loops, block):
             part = slice(start, start + block)

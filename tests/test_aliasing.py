@@ -5,7 +5,7 @@ import pytest
 
 from radarize.aliasing import Aliases
 from radarize.heatmaps import Heatmaps
-from radarize.radar.array import BOARDS
+from radarize.radar.boards import BOARDS
 from radarize.radar.presets import PRESETS
 from tests.echoes import record
 

@@ -37,7 +37,7 @@ LAYERS = (
 )
 #: The same of `radarsim`.
 SIMULATOR = (
-    "rng machine",
+    "rng machine plugins",
     "world",
     "motion",
     "propagation",

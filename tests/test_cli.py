@@ -85,7 +85,6 @@ def test_every_command_explains_itself(capsys, command):
         ("radarsim simulate", ["office", "-o", "out.h5", "--duration", "0"], "duration is 0"),
         ("radarsim simulate", ["office", "-o", "out.h5", "--platform", "drone"], "drone"),
         ("radarsim simulate", ["office", "-o", "out.h5", "--frontend", "no.yaml"], "no.yaml: no such file"),
-        ("radarsim simulate", ["office", "-o", "out.h5", "--engine", "unreal"], "unreal"),
         ("radarsim dataset", ["missing.yaml", "-o", "out"], "no specification 'missing.yaml', expected"),
         ("radarsim calibrate", ["missing.h5", "-o", "board.yaml"], "missing.h5: no such file"),
         ("radarsim twin", ["missing.h5", "--scene", "office", "-o", "twin.h5"], "missing.h5: no such file"),

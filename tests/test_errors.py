@@ -1,4 +1,10 @@
-from radarize.errors import InputError, reason
+import errno
+import pickle
+
+import pytest
+
+from radarize.errors import DiskFull, InputError, disk_full, explained, reason
+from radarize.jobs import attempt
 
 
 def test_a_sentence_is_one_printable_line_of_bounded_length():
@@ -13,3 +19,29 @@ def test_reasons_of_libraries():
     assert reason(RuntimeError("Can't read\n  (errno = 28)")) == "no space left on the device"
     assert reason(ValueError("bad\x07 magic\n" + "x" * 500)) == ("bad magic " + "x" * 500)[:120]
     assert reason(StopIteration()) == "StopIteration"
+
+
+def fails(error: Exception):
+    """A job that meets an error while it writes, and says so in its own words."""
+
+    def job(report):
+        with explained("x.h5: schade", type(error)):
+            raise error
+
+    return job
+
+
+@pytest.mark.parametrize(
+    ("error", "full"),
+    [
+        (OSError(errno.ENOSPC, "Auf dem Gerät ist kein Speicherplatz mehr verfügbar"), True),
+        (RuntimeError("file write failed: errno = 28, error message = 'x', total write size = 2"), True),
+        (OSError(errno.EACCES, "no space left on device for you"), False),
+        (RuntimeError("errno = 281"), False),
+    ],
+)
+def test_a_full_disk_is_known_by_its_number(error, full):
+    """From the system's error, in any language, through the sentence and the job that it ends, to another process."""
+    news = pickle.loads(pickle.dumps(attempt("a", fails(error), print)))
+    assert news.full == full and isinstance(news.failure, DiskFull) == full
+    assert news.error.startswith("x.h5: schade") and disk_full(error) == full

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from echoes import record
 
 from radarize.errors import InputError
 from radarize.points import COLUMNS, Cfar, PointCloudConfig, PointClouds
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
+from tests.echoes import record
 
 CONFIG = PRESETS["radarize"]
 RECORDINGS = Path(__file__).parents[2] / "shared" / "recordings"
@@ -50,6 +50,21 @@ def test_a_target_is_found_where_it_is(azimuth, elevation):
     assert found["x"] == pytest.approx(place[0], abs=0.12)
     assert found["velocity"] == 0
     assert found["snr"] > 20
+
+
+def test_a_frame_has_the_same_points_in_any_batch():
+    """To the bit: a matrix product over the detections of all frames is rounded by how many there are."""
+    places = np.array([polar(*each) for each in ((1.7, 33, 4), (2.3, -25, 12), (3.1, 8, -9), (3.6, -47, 2))])
+    adc = record(
+        CONFIG, lambda t: (t[..., None] * [0.3, 0.1, 0], 0.2 * t), places, np.full(4, 400 + 0j),
+        np.arange(7) * CONFIG.frame_period, np.random.default_rng(0), noise=5.0,
+    )  # fmt: skip
+    make = PointClouds(CONFIG)
+    whole = make(adc)[0]
+    assert len(whole) > 14
+    for size in (1, 2, 3):
+        parts = [make(adc[k : k + size])[0] for k in range(0, 7, size)]
+        assert np.array_equal(np.concatenate(parts), whole)
 
 
 @pytest.mark.parametrize("speed", [-1.5, -0.4, 0.4, 1.5])

@@ -120,9 +120,9 @@ def test_an_interrupt_ends_a_recording_without_spoiling_it(tmp_path):
 
 WRITER = """
 import sys, time
-sys.path.insert(0, {tests!r})
+sys.path.insert(0, {root!r})
 import numpy as np
-from test_recording import CONFIG, frames
+from tests.test_recording import CONFIG, frames
 from radarize.recording import RecordingWriter
 with RecordingWriter({path!r}, CONFIG) as writer:
     writer.append(frames(0, 3), np.arange(3.0))
@@ -136,7 +136,7 @@ with RecordingWriter({path!r}, CONFIG) as writer:
 @pytest.fixture
 def process(tmp_path):
     """A writer in another process with three frames flushed and one not, waiting."""
-    code = WRITER.format(tests=str(Path(__file__).parent), path=str(tmp_path / "a.h5"))
+    code = WRITER.format(root=str(Path(__file__).parents[1]), path=str(tmp_path / "a.h5"))
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert process.stdout.readline() == "ready\n", process.stderr.read()

@@ -21,7 +21,7 @@ def test_it_shows_building_tour_and_echoes(tmp_path):
     motion = WALK.through(scene, 0)
     scenario = Scenario(scene, motion, PRESETS["radarize"], seed=0)
     frame = scenario.frames(np.array([1.0]))
-    causes = set(frame.echoes[0].provenance.tolist())
+    causes = set(frame.types[0].tolist())
     page = web_preview(scene, tmp_path / "room.html", WALK, time=1.0)
     with Browser(page.as_uri(), tmp_path / "profile") as browser:
         browser.wait("document.querySelectorAll('.js-plotly-plot').length === 1")

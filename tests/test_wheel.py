@@ -12,6 +12,8 @@ import pytest
 
 from radarize import __version__
 from radarize.extras import EXTRAS
+from radarize.radar.boards import BOARDS
+from radarsim.dataset import physics
 
 ROOT = Path(__file__).parents[1]
 #: What the locked packages bring along in any case: numba's and matplotlib's.
@@ -50,8 +52,9 @@ def _take_kernels(packages: Path) -> None:
     for name in ("radarize", "radarsim"):
         for source in (ROOT / name).rglob("*.py"):
             shutil.copystat(source, packages / source.relative_to(ROOT))
-        for kernel in (ROOT / name).rglob("__pycache__/*.nb[ic]"):
-            shutil.copy2(kernel, packages / kernel.relative_to(ROOT))
+        for pattern in ("*.nb[ic]", "*.sources"):
+            for kernel in (ROOT / name).rglob(f"__pycache__/{pattern}"):
+                shutil.copy2(kernel, packages / kernel.relative_to(ROOT))
 
 
 @pytest.fixture(scope="module")
@@ -85,8 +88,9 @@ def test_the_wheel_holds_what_the_repository_does(wheel):
     found = set(zipfile.ZipFile(wheel).namelist())
     scenes = {f"radarsim/scenes/{path.relative_to(ROOT / 'scenes')}" for path in (ROOT / "scenes").rglob("*.*")}
     weights = {f"radarize/weights/{path.name}" for path in (ROOT / "radarize" / "weights").iterdir()}
+    boards = {f"radarize/radar/boards/{name}.yaml" for name in BOARDS}
     pages = {"radarize/capture/live.html", "radarize/report/templates/page.html"}
-    assert found >= scenes | weights | pages
+    assert found >= scenes | weights | boards | pages
     assert {name.split("/")[0] for name in found} == {"radarize", "radarsim", f"radarize-{__version__}.dist-info"}
     assert wheel.stat().st_size < 20e6
 
@@ -110,6 +114,12 @@ def test_simulate_run_and_report_anywhere(walked, installed):
     assert listed.returncode == 2 and "office" in listed.stderr and "stress/corner" in listed.stderr
     unknown = installed("radarsim dataset nothing -o data")
     assert unknown.returncode == 2 and "evaluation" in unknown.stderr
+
+
+def test_its_physics_are_the_checkouts(installed):
+    """Data sets go on with either."""
+    done = installed("python -c print(__import__('radarsim.dataset.physics').dataset.physics.digest())")
+    assert done.stdout.strip() == physics.digest(), done.stderr
 
 
 def test_the_pipeline_needs_nothing_of_the_simulator(walked, installed):

@@ -5,7 +5,7 @@ from matplotlib.axes import Axes
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world.scene import Scene
@@ -26,11 +26,11 @@ def compare(axis: Axes, x, theory, found) -> float:
     return np.abs(np.asarray(found) - theory).max()
 
 
-def target(*place: float) -> EchoFinder:
+def target(*place: float) -> PathFinder:
     """Finds a scatterer of 1 m^2 there."""
-    return EchoFinder(None, Scatterers.points(np.array(place), np.ones(1)), None, CONFIG, antenna=ISOTROPIC)
+    return PathFinder(None, Scatterers.points(np.array(place), np.ones(1)), None, CONFIG, antenna=ISOTROPIC)
 
 
-def walls_of(scene: Scene) -> EchoFinder:
+def walls_of(scene: Scene) -> PathFinder:
     """Finds the surfaces of a scene alone."""
-    return EchoFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)
+    return PathFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)

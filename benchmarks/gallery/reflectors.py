@@ -3,18 +3,8 @@
 import numpy as np
 
 from benchmarks.gallery.drawing import AHEAD, CONFIG, HERE, LAMBDA, THEORY, compare, target, walls_of
-from radarize.radar.array import virtual_positions
-from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
-from radarsim.propagation.reflectors import Reflectors
-from radarsim.propagation.scatterers import Scatterers
-from radarsim.world import shapes
-from radarsim.world.materials import MATERIALS, material
-from radarsim.world.objects import SceneObject
-from radarsim.world.scene import Scene
-from tests.propagation.brute_force import kirchhoff_mirror
-from tests.propagation.corners import (
+from benchmarks.references.brute_force import kirchhoff_mirror
+from benchmarks.references.corners import (
     both_ways,
     corner,
     cross_section,
@@ -24,14 +14,23 @@ from tests.propagation.corners import (
     seen_by_all,
     seen_by_both,
 )
-from tests.propagation.corners import out_of_square as wedge
-from tests.propagation.rigs import Rig, burst, field, isotropic, locate, polar
-from tests.propagation.test_patches import capsule, ellipsoid, half_cylinder, rounded, stretched, tube
-from tests.propagation.test_patches import field as smooth_field
-from tests.propagation.test_patches import physical_optics as surface_optics
-from tests.propagation.test_patches import reflectors as smooth_reflectors
-from tests.propagation.test_plates import physical_optics
-from tests.receiver.test_frontend import db
+from benchmarks.references.corners import out_of_square as wedge
+from benchmarks.references.front_end import db
+from benchmarks.references.plates import physical_optics
+from benchmarks.references.rigs import Rig, burst, field, isotropic, locate, polar
+from benchmarks.references.smooth_bodies import capsule, ellipsoid, half_cylinder, rounded, stretched, tube
+from benchmarks.references.smooth_bodies import field as smooth_field
+from benchmarks.references.smooth_bodies import physical_optics as surface_optics
+from benchmarks.references.smooth_bodies import reflectors as smooth_reflectors
+from radarize.radar.array import virtual_positions
+from radarsim.propagation.antenna import ISOTROPIC
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.world import shapes
+from radarsim.world.materials import MATERIALS, material
+from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
 
 
 def point_target(axis) -> str:
@@ -95,10 +94,10 @@ def small_mirrors(axis) -> str:
     for side in sides:
         board = SceneObject("board", shapes.rectangle((1.5, 1.0, 0), (side, side), (0, -1, 0)), MATERIALS["metal"])
         scene = Scene("mirror", [board])
-        finder = EchoFinder(
+        finder = PathFinder(
             scene, Scatterers.points(place, np.ones(1)), Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC
         )
-        found.append(2 * db(abs(finder(HERE, AHEAD).of(Provenance.GHOST_1).amplitude[0])))
+        found.append(2 * db(abs(finder(HERE, AHEAD).where(bounces=1, through=False, moving=False).amplitude[0])))
         theory.append(2 * db(straight * abs(kirchhoff_mirror((side / 2, side / 2), place, LAMBDA))))
     worst = compare(axis, sides, np.array(theory), np.array(found))
     return (

@@ -13,24 +13,24 @@ from benchmarks.gallery.drawing import (
     THEORY,
     compare,
 )
+from benchmarks.references.box_room import images_of_a_room, lattice
+from benchmarks.references.brute_force import transfer_matrix
+from benchmarks.references.doors import HALF, MIDDLE, foot_speed, lengths, swinging
+from benchmarks.references.doors import finder as finder_of
+from benchmarks.references.front_end import db
+from benchmarks.references.hollow_walls import NEAR, PANES, RANGES, pane, peak, stud_wall
+from benchmarks.references.poles import wall_past_pole
+from benchmarks.references.reciprocity import DOOR
+from benchmarks.references.rigs import Rig, burst
 from radarize.heatmaps import Heatmaps
 from radarsim.propagation.antenna import ISOTROPIC, gain_pattern
-from radarsim.propagation.coefficients import TABLE, reflection, transmission
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.media import layer, mirror, sweep_share, window
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world.materials import material
 from radarsim.world.scene import Scene
-from tests.propagation.brute_force import transfer_matrix
-from tests.propagation.rigs import Rig, burst
-from tests.propagation.test_doors import HALF, MIDDLE, foot_speed, lengths, swinging
-from tests.propagation.test_doors import finder as finder_of
-from tests.propagation.test_fresnelzone import wall_past_pole
-from tests.propagation.test_hollow import NEAR, PANES, RANGES, pane, peak, stud_wall
-from tests.propagation.test_imagemethod import images_of_a_room, lattice
-from tests.propagation.test_multipath import DOOR
-from tests.receiver.test_frontend import db
 
 
 def box_room(axis) -> str:
@@ -70,20 +70,20 @@ def slab(axis) -> str:
     """What a pane reflects and lets through. Theory: ITU-R P.2040, computed by the transfer matrices of its layers."""
     angles, worst = np.linspace(0, 80, 81), 0.0
     cosine = np.cos(np.deg2rad(angles))
-    table = np.linspace(0, 1, TABLE)
     for name, color in (("glass", "tab:blue"), ("plasterboard", "tab:orange")):
         what = material(name)
-        layer = [(what.permittivity_at(CONFIG.center_frequency), what.thickness)]
-        truth = np.abs([transfer_matrix(layer, c, CONFIG.center_frequency, False) for c in cosine])
-        tables = transmission(what, CONFIG)[0][0], reflection(replace(what, roughness=0.0), CONFIG)[0]
-        for k, (values, mark) in enumerate(zip(tables, ("o", "^"), strict=True)):
-            found = np.abs(np.interp(cosine, table, values))
+        layers = [(what.permittivity_at(CONFIG.center_frequency), what.thickness)]
+        truth = np.abs([transfer_matrix(layers, c, CONFIG.center_frequency, False) for c in cosine])
+        smooth = layer(replace(what, roughness=0.0), CONFIG)
+        both = [window(smooth, c, sweep_share(CONFIG))[0] for c in cosine], [mirror(smooth, c)[0] for c in cosine]
+        for k, (values, mark) in enumerate(zip(both, ("o", "^"), strict=True)):
+            found = np.abs(values)
             axis.plot(angles, 2 * db(truth[:, k]), color="black", lw=1)
             label = f"{name}, {'reflected' if k else 'through'}"
             axis.plot(angles[::4], 2 * db(found[::4]), mark, ms=3.5, color=color, label=label)
             worst = max(worst, np.abs(found - truth[:, k]).max())
     axis.set(ylim=(-35, 2))
-    return f"Coefficients are off by {worst:.4f} at most. The simulator interpolates them in a table."
+    return f"The largest error of a coefficient is {worst:.1e}."
 
 
 def panes(axis) -> str:
@@ -117,7 +117,7 @@ def hollow_wall(axis) -> str:
 def phantom(axis) -> str:
     """A metal door mirrors a target, so it appears a second time behind the door. Range-azimuth map of all echoes."""
     scene, place = Scene("door", [DOOR]), np.array([0.6, 0.55, 0.0])
-    finder = EchoFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Reflectors.of(scene, CONFIG), CONFIG)
+    finder = PathFinder(scene, Scatterers.points(place, np.full(1, 10.0)), Reflectors.of(scene, CONFIG), CONFIG)
     maps, signal = Heatmaps(CONFIG), burst(CONFIG, finder(HERE, AHEAD), Rig())
     signal *= 20000 / np.abs(signal).max()
     power = maps.range_azimuth(np.rint(np.stack([signal.real, signal.imag], axis=-1)).astype(np.int16)[None])[0].numpy()

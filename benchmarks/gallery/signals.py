@@ -3,13 +3,13 @@
 import numpy as np
 
 from benchmarks.gallery.drawing import AHEAD, CONFIG, HERE, compare, target
+from benchmarks.references.bursts import slot_phases, tone_ranges
+from benchmarks.references.front_end import db, law, noise_factor, skirt
+from benchmarks.references.interferers import CASES, brute_force, scenario
+from benchmarks.references.rigs import Rig, burst
+from benchmarks.references.signature import ridge
 from radarsim.receiver.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
 from radarsim.receiver.frontend_config import FrontEndConfig
-from tests.propagation.rigs import Rig, burst
-from tests.propagation.test_laws import slot_phases, tone_ranges
-from tests.receiver.test_frontend import db, law, noise_factor, skirt
-from tests.receiver.test_interference import CASES, brute_force, scenario
-from tests.receiver.test_signature import ridge
 
 
 def doppler(axis) -> str:

@@ -81,7 +81,7 @@ def import_(
             help="Of a .bin's words: pairs (I and Q), interleaved (receivers by turns, four lanes), or real samples.",
         ),
     ] = "pairs",
-    board: Annotated[str | None, typer.Option(help="Antenna layout, e.g. iwr1843boost.")] = None,
+    board: Annotated[str | None, typer.Option(help="The board: iwr1843boost, ..., or its YAML file.")] = None,
     start_frequency: Annotated[float | None, typer.Option(help="Hz.")] = None,
     slope: Annotated[float | None, typer.Option(help="Hz/s (80 MHz/us is 80e12).")] = None,
     sample_rate: Annotated[float | None, typer.Option(help="Hz.")] = None,

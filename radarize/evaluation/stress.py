@@ -18,7 +18,7 @@ from radarize.recording import Recording
 
 #: What wrong returns come from, by labels of /truth/cause.
 SOURCES = {
-    "ghosts": ("ghost_1", "ghost_2", "ghost_3"),
+    "ghosts": ("ghost", "ghost_1", "ghost_2", "ghost_3"),  # the numbered ones: recordings of release 1.0
     "behind": ("through_slab",),
     "moving": ("moving",),
     "clutter": ("direct", "floor_ceiling"),
@@ -72,4 +72,4 @@ def sources(scans: Mapping[str, np.ndarray], true: Float[np.ndarray, "scan beam"
         axes = source.read("truth/cause_ranges"), source.read("truth/cause_azimuths")
         cause, names = source.read("truth/cause")[frames], source.labels("truth/cause")
     wrong = wrong_by_cause(scans["ranges"], true, scans["azimuths"], cause, *axes, names)
-    return {source: sum(wrong[name] for name in names) for source, names in SOURCES.items()}
+    return {source: sum(wrong.get(name, 0.0) for name in names) for source, names in SOURCES.items()}

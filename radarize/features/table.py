@@ -127,7 +127,7 @@ class Table:
         others: dict[str, dict[str, np.ndarray]] = {}
         for news in heard:
             if news.error is not None:
-                raise InputError(news.error)
+                raise news.failure
             made, others[news.name] = news.result
             for name in maps:
                 joined[name][places[news.name]] = made[name]

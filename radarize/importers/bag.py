@@ -140,14 +140,14 @@ def _calibrated(config: RadarConfig, frame: object, name: str, warnings: list[st
     with explained(f"{name}: has frames without usable range_bias and rx_phase_bias"):
         pairs = np.asarray(getattr(frame, "rx_phase_bias", ()), float).reshape(-1)
         bias = float(getattr(frame, "range_bias", 0.0))
-    untouched = config.range_bias == 0 and set(config.channel_calibration) == {(1.0, 0.0)}
+    untouched = config.range_bias == 0 and config.channel_calibration is None
     if not untouched or not pairs.any():
         return config
     if pairs.size != 24 or not np.isfinite([*pairs, bias]).all():
         warnings.append(f"rx_phase_bias has {pairs.size} numbers, expected 12 pairs; no calibration is taken from it")
         return config
     factors = tuple((float(re), float(im)) for re, im in pairs.reshape(12, 2))
-    return config.model_copy(update={"range_bias": bias, "channel_calibration": factors})
+    return config.changed(name, range_bias=bias, channel_calibration=factors)
 
 
 def _intrinsics(bag: Bag, companions: dict[str, Companion]) -> None:

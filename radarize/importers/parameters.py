@@ -85,7 +85,7 @@ class Given:
         if (tx := given.pop("tx", None)) is not None:
             given.setdefault("tx_order", tuple(range(tx)) if isinstance(tx, int) else tuple(tx))
         if self.config is not None:
-            return (RadarConfig.build(name, **{**self.config.model_dump(), **given}) if given else self.config), ()
+            return (self.config.changed(name, **given) if given else self.config), ()
 
         if missing := [key for key in REQUIRED if key not in given]:
             raise InputError(

@@ -5,7 +5,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from radarize.errors import DEBUG, InputError, first_line, of_system
+from radarize.errors import DEBUG, DiskFull, InputError, disk_full, first_line, of_system
 
 #: Takes how far a job is, in units of its own.
 Report = Callable[[float], None]
@@ -22,6 +22,7 @@ class News:
         ended: no more is heard of it.
         result: of a job that ended well.
         error: why it failed, one sentence.
+        full: whether it failed for want of space on the disk.
     """
 
     name: str
@@ -29,6 +30,12 @@ class News:
     ended: bool = False
     result: object = None
     error: str | None = None
+    full: bool = False
+
+    @property
+    def failure(self) -> InputError:
+        """Why it failed, to raise."""
+        return (DiskFull if self.full else InputError)(self.error)
 
 
 def attempt(name: str, job: Job, report: Report) -> News:
@@ -36,10 +43,11 @@ def attempt(name: str, job: Job, report: Report) -> News:
     try:
         return News(name, ended=True, result=job(report))
     except InputError as error:
-        return News(name, ended=True, error=str(error))
+        return News(name, ended=True, error=str(error), full=disk_full(error))
     except OSError as error:
-        return News(name, ended=True, error=f"{name}: {of_system(error)}")
+        return News(name, ended=True, error=f"{name}: {of_system(error)}", full=disk_full(error))
     except Exception as error:  # one broken job must not end the others
         if DEBUG in os.environ:
             traceback.print_exc()
-        return News(name, ended=True, error=f"{name}: internal error, {type(error).__name__}: {first_line(error)}")
+        sentence = f"{name}: internal error, {type(error).__name__}: {first_line(error)}"
+        return News(name, ended=True, error=sentence, full=disk_full(error))

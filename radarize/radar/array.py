@@ -1,81 +1,27 @@
 """Antenna positions of the evaluation boards and the virtual array that they span.
 
 Sensor frame: x forward (boresight), y left, z up, origin at the (0, 0) of the board's layout (RX1; RX4 on the AOP).
-The data sheets draw the board's front, where the radar's left is on the viewer's right, so the drawings' rightward
-axis is +y here.
+The layouts stand in the boards' files (`radarize.radar.boards`).
 """
-
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
+from radarize.radar.boards import load_board
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 
 #: Antennas of a row that is not short; what velocities claim was fitted to rows of these.
 ROW = 8
 
 
-@dataclass(frozen=True)
-class Board:
-    """Antenna layout of a board.
-
-    Attributes:
-        design_frequency: Hz.
-        tx, rx: antenna positions as (left, up) in half wavelengths at the design frequency.
-        rx_sign: -1 for receivers fed from the opposite side of the patch, whose signal is turned by 180 deg. A
-            configuration without a measured calibration takes it as `channel_calibration`.
-    """
-
-    design_frequency: float
-    tx: tuple[tuple[float, float], ...]
-    rx: tuple[tuple[float, float], ...]
-    rx_sign: tuple[int, ...] = (1, 1, 1, 1)
-
-    @property
-    def channel_calibration(self) -> tuple[tuple[float, float], ...]:
-        """Nominal factor per physical (tx, rx) as (re, im) pairs, as `RadarConfig.channel_calibration` has them."""
-        return tuple((float(sign), 0.0) for sign in self.rx_sign) * 3
-
-
-_ROW_RX = ((0, 0), (1, 0), (2, 0), (3, 0))
-
-BOARDS: dict[str, Board] = {
-    # SPRUIM4 (IWR1843BOOST): RX half a wavelength apart, TX a wavelength apart, TX2 half a wavelength higher.
-    "iwr1843boost": Board(77e9, tx=((0, 0), (2, 1), (4, 0)), rx=_ROW_RX),
-    # SWRU546 (IWR6843ISK): the same pattern at 60 GHz.
-    "iwr6843isk": Board(60e9, tx=((0, 0), (2, 1), (4, 0)), rx=_ROW_RX),
-    # SWRU546 (IWR6843ISK-ODS): four receivers in a square, transmitters in an L. TI's people-counting configurations
-    # give it per virtual antenna in units of half a wavelength: antGeometry0 (right) 0 0 -1 -1 | -2 -2 -3 -3 | -2 -2
-    # -3 -3, antGeometry1 (up) 0 -1 -1 0 | 0 -1 -1 0 | -2 -3 -3 -2, antPhaseRot 1 -1 -1 1; spacing 2.426 mm.
-    "iwr6843ods": Board(
-        61.8e9, tx=((0, 0), (2, 0), (2, -2)), rx=((0, 0), (0, -1), (1, -1), (1, 0)), rx_sign=(1, -1, -1, 1)
-    ),
-    # SWRS237 (IWR6843AOP): antennas on the package. antGeometry0 -1 -1 0 0 | -3 -3 -2 -2 | -1 -1 0 0, antGeometry1
-    # -1 0 -1 0 | -3 -2 -3 -2 | -3 -2 -3 -2, antPhaseRot 1 -1 1 -1; spacing 2.5 mm.
-    "iwr6843aop": Board(
-        60e9, tx=((0, 0), (2, -2), (0, -2)), rx=((1, -1), (1, 0), (0, -1), (0, 0)), rx_sign=(1, -1, 1, -1)
-    ),
-}
-
-
-def board_of(device: str, start_frequency: float) -> str:
-    """The evaluation board of a device name and band (Hz); plain iwr6843 is taken for the ISK, the commonest of its
-    three boards."""
-    if start_frequency > 70e9:
-        return "iwr1843boost"
-    name = device.lower()
-    return "iwr6843aop" if "aop" in name else "iwr6843ods" if "ods" in name else "iwr6843isk"
-
-
 def tx_positions(config: RadarConfig) -> Float[np.ndarray, "tx 3"]:
     """Positions of the enabled transmitters in the sensor frame, m, physical order."""
-    return _positions(config, BOARDS[config.board].tx, config.tx)
+    return _positions(config, load_board(config.board).tx, config.tx)
 
 
 def rx_positions(config: RadarConfig) -> Float[np.ndarray, "rx 3"]:
     """Positions of the enabled receivers in the sensor frame, m, physical order."""
-    return _positions(config, BOARDS[config.board].rx, config.rx)
+    return _positions(config, load_board(config.board).rx, config.rx)
 
 
 def _positions(config: RadarConfig, layout: tuple, enabled: tuple[int, ...]) -> Float[np.ndarray, "antenna 3"]:
@@ -94,7 +40,7 @@ def virtual_positions(config: RadarConfig) -> Float[np.ndarray, "tx rx 3"]:
 
 def _half(config: RadarConfig) -> float:
     """Half a wavelength at the board's design frequency, m."""
-    return SPEED_OF_LIGHT / BOARDS[config.board].design_frequency / 2
+    return SPEED_OF_LIGHT / load_board(config.board).design_frequency / 2
 
 
 def _lattice(config: RadarConfig) -> Int[np.ndarray, "antenna 2"]:

@@ -13,7 +13,8 @@ from pathlib import Path
 
 from radarize.errors import InputError
 from radarize.files import read_bytes
-from radarize.radar.array import BOARDS, board_of
+from radarize.jsonfile import parse_json
+from radarize.radar.boards import BOARDS, Board, board_of
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
 
 #: Fields of the commands read here, in order.
@@ -232,12 +233,14 @@ def distinct_order(order: tuple[int, ...], where: str) -> tuple[tuple[int, ...],
     return order[:length], len(order) // length
 
 
-def _board(text: str, start_frequency: float, name: str) -> str:
-    """The board that a comment names (``% Board:`` of ours, ``% Platform:`` of TI's visualizer), else by the band."""
-    if found := re.search(r"^%\s*Board:\s*(\S+)", text, re.MULTILINE):
-        if found[1] not in BOARDS:
-            raise InputError(f"{name}: Board is {found[1]}, expected one of {', '.join(BOARDS)}")
-        return found[1]
+def _board(text: str, start_frequency: float, name: str) -> object:
+    """The board that a comment names (``% Board:`` of ours, ``% Platform:`` of TI's visualizer), else by the band. Ours
+    is a name, the path of a board's file, or what that holds, as `write_cfg` has it."""
+    if found := re.search(r"^%\s*Board:[ \t]*(\S.*?)\s*$", text, re.MULTILINE):
+        if found[1].startswith("{"):
+            return parse_json(found[1], f"{name}: Board")
+        beside = Path(name).parent / found[1]
+        return beside if found[1] not in BOARDS and beside.is_file() else found[1]
     platform = re.search(r"^%\s*Platform:\s*(\S+)", text, re.MULTILINE)
     return board_of(platform[1] if platform else "", start_frequency)
 
@@ -251,7 +254,7 @@ def _backoff(profile: Command, tx_order: tuple[int, ...]) -> float:
 
 
 def _calibration(last: dict[str, Command]) -> tuple[float, tuple[tuple[float, float], ...]]:
-    factors = [1 + 0j] * 12
+    factors = [1 + 0j] * 12  # not measured
     bias = 0.0
     if command := last.get("compRangeBiasAndRxChanPhase"):
         bias = command.decimal("rangeBias")
@@ -280,10 +283,11 @@ def write_cfg(config: RadarConfig) -> str:
         f"{_text(config.ramp_end_time, 6)} {sum(backoff << 8 * t for t in config.tx)} 0 {_text(config.slope, -12)} 1 "
         f"{config.samples} {_text(config.sample_rate, -3)} {hpf1} {hpf2} {gain}"
     )
-    factors = " ".join(f"{_text(re)} {_text(im)}" for re, im in config.channel_calibration)
+    factors = " ".join(f"{_text(factor.real)} {_text(factor.imag)}" for factor in config.channel_factors.ravel())
+    board = config.board.model_dump_json() if isinstance(config.board, Board) else config.board
     swap = int(config.iq_order == "qqii")
     lines = [
-        f"% Board:{config.board}",
+        f"% Board:{board}",
         "sensorStop",
         "flushCfg",
         "dfeDataOutputMode 1",

@@ -1,12 +1,14 @@
 """The radar's configuration: what is transmitted, when, on which antennas, and how it is sampled."""
 
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from jaxtyping import Float
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from jaxtyping import Complex, Float
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
 from radarize.errors import InputError
+from radarize.radar.boards import BOARDS, SUFFIXES, Board, expected, load_board
 
 SPEED_OF_LIGHT = 299_792_458.0
 
@@ -25,7 +27,8 @@ class RadarConfig(BaseModel):
     ``idle_time + adc_start_time`` on. All chirps of a frame use one profile; they differ in their transmitter only.
 
     Attributes:
-        board: antenna layout, a key of `radarize.radar.array.BOARDS`.
+        board: a name of `radarize.radar.boards.BOARDS`, or any other board. The path of a board's file stands for the
+            board that it holds, which a recording keeps.
         start_frequency: carrier at the start of the ramp, Hz.
         slope: chirp slope, Hz/s.
         idle_time, adc_start_time, ramp_end_time: s; the last two count from the ramp's start.
@@ -40,12 +43,14 @@ class RadarConfig(BaseModel):
         high_pass: corner frequencies of the two high-pass stages, Hz.
         iq_order: order within a DCA1000 group of four words: ``"iiqq"`` (mmWave Studio) or ``"qqii"`` (SDK demo).
         range_bias: m, subtracted from measured ranges (first field of ``compRangeBiasAndRxChanPhase``).
-        channel_calibration: complex factor per *physical* (tx, rx) as (re, im) pairs: TX1 x RX1..4, then TX2, TX3.
+        channel_calibration: measured complex factor per *physical* (tx, rx) as (re, im) pairs: TX1 x RX1..4, then TX2,
+            TX3. None: not measured, and the board's nominal one applies, which takes its receivers' signs off. Twelve
+            ones, which TI's files hold before anybody has measured, count as None.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    board: Literal["iwr1843boost", "iwr6843isk", "iwr6843ods", "iwr6843aop"] = "iwr1843boost"
+    board: str | Board = "iwr1843boost"
     # Limits are those of any radar, so that whatever is computed from a file stays finite; `limits` has the chips'.
     start_frequency: float = Field(ge=1e9, le=1e12)
     slope: float = Field(ge=1e9, le=1e17)
@@ -63,7 +68,23 @@ class RadarConfig(BaseModel):
     high_pass: tuple[float, float] = (HIGH_PASS_1[0], HIGH_PASS_2[0])
     iq_order: Literal["iiqq", "qqii"] = "qqii"
     range_bias: float = Field(0.0, ge=-1000, le=1000)
-    channel_calibration: tuple[tuple[Factor, Factor], ...] = ((1.0, 0.0),) * 12
+    channel_calibration: tuple[tuple[Factor, Factor], ...] | None = None
+
+    @field_validator("board", mode="before")
+    @classmethod
+    def _read_board(cls, board: object, info: ValidationInfo) -> object:
+        if not isinstance(board, str | Path) or str(board) in BOARDS:
+            return board
+        if info.mode == "json" or not str(board).endswith(SUFFIXES):  # a recording names no files
+            raise ValueError(f"expected {expected()}")
+        return load_board(board)
+
+    @field_validator("channel_calibration")
+    @classmethod
+    def _measured(cls, pairs: tuple[tuple[float, float], ...] | None, info: ValidationInfo) -> object:
+        if pairs == ((1.0, 0.0),) * 12:
+            return None
+        return None if "board" in info.data and pairs == load_board(info.data["board"]).nominal_calibration else pairs
 
     @model_validator(mode="after")
     def _consistent(self) -> "RadarConfig":
@@ -71,7 +92,7 @@ class RadarConfig(BaseModel):
             raise ValueError(f"tx_order is {self.tx_order}, expected distinct numbers of 0, 1, 2")
         if tuple(sorted(set(self.rx))) != self.rx or not set(self.rx) <= {0, 1, 2, 3}:
             raise ValueError(f"rx is {self.rx}, expected ascending distinct numbers of 0, 1, 2, 3")
-        if len(self.channel_calibration) != 12:
+        if self.channel_calibration is not None and len(self.channel_calibration) != 12:
             raise ValueError(f"channel_calibration has {len(self.channel_calibration)} pairs, expected 12")
         if self.frame_bytes > _LARGEST:
             raise ValueError(
@@ -109,6 +130,19 @@ class RadarConfig(BaseModel):
             elif field:
                 message = f"{field} is {first['input']!r}, {message[0].lower()}{message[1:]}"
             raise InputError(f"{source}: {message}") from error
+
+    def changed(self, source: str, **fields: Any) -> "RadarConfig":
+        """The radar with some fields changed; `source` is what errors name as their origin.
+
+        A calibration was measured on one board: on another, the other's nominal one applies unless one is given.
+
+        Raises:
+            InputError: as `build`.
+        """
+        found = RadarConfig.build(source, **{**self.model_dump(), **fields})
+        if "channel_calibration" in fields or load_board(found.board) == load_board(self.board):
+            return found
+        return found.model_copy(update={"channel_calibration": None})
 
     # --- array -----------------------------------------------------------------------------------------------------
     @property
@@ -226,5 +260,10 @@ class RadarConfig(BaseModel):
     @property
     def calibration(self) -> np.ndarray:
         """Complex factor per enabled (tx, rx), to be multiplied onto decoded samples."""
-        pairs = np.asarray(self.channel_calibration).reshape(3, 4, 2)[np.ix_(self.tx, self.rx)]
-        return pairs[..., 0] + 1j * pairs[..., 1]
+        return self.channel_factors[np.ix_(self.tx, self.rx)]
+
+    @property
+    def channel_factors(self) -> Complex[np.ndarray, "3 4"]:
+        """The same of all physical (tx, rx): measured, or the board's nominal ones."""
+        pairs = self.channel_calibration or load_board(self.board).nominal_calibration
+        return np.array([complex(*pair) for pair in pairs]).reshape(3, 4)

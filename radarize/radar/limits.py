@@ -7,6 +7,7 @@ mmWaveLink ICD; memory: SDK demo with its radar cube in 1 MiB of L3. Finished re
 from collections.abc import Iterator
 
 from radarize.errors import InputError
+from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
 
 #: Bands that a sweep must stay within wholly, Hz.
@@ -43,7 +44,7 @@ def check_limits(config: RadarConfig, demo: bool = False) -> None:
 
 
 def _violations(config: RadarConfig, largest: float) -> Iterator[str]:
-    chip = config.board[:7]
+    chip = load_board(config.board).chip
     start, sweep = config.start_frequency, config.slope * config.ramp_end_time
     slack = _SWEEP_TOLERANCE
     if not any(low - slack <= start and start + sweep <= high + slack for low, high in BANDS[chip]):

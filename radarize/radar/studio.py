@@ -8,7 +8,7 @@ from pathlib import Path
 
 from radarize.errors import InputError
 from radarize.jsonfile import parse_json
-from radarize.radar.array import BOARDS, board_of
+from radarize.radar.boards import board_of
 from radarize.radar.cfg import distinct_order, read_text
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
 
@@ -71,10 +71,9 @@ def parse_studio(text: str, name: str = "mmwave.json", device: str = "") -> Rada
     order, profile = _firing(rf, frame)
     tx_order, repeats = distinct_order(order, f"{name}: rlFrameCfg_t")
     start_frequency = profile.decimal("startFreqConst_GHz", 9)
-    board = board_of(device, start_frequency)
     return RadarConfig.build(
         name,
-        board=board,
+        board=board_of(device, start_frequency),
         start_frequency=start_frequency,
         slope=profile.decimal("freqSlopeConst_MHz_usec", 12),
         idle_time=profile.decimal("idleTimeConst_usec", -6),
@@ -93,7 +92,6 @@ def parse_studio(text: str, name: str = "mmwave.json", device: str = "") -> Rada
             HIGH_PASS_2[profile.require("hpfCornerFreq2", (0, 1, 2, 3), "a corner code")],
         ),
         iq_order="qqii" if swap else "iiqq",
-        channel_calibration=BOARDS[board].channel_calibration,
     )
 
 

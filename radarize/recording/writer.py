@@ -19,7 +19,7 @@ from isal import isal_zlib
 from jaxtyping import Bool, Float, Int16
 
 from radarize import __version__
-from radarize.errors import FULL, DiskFull, InputError, explained, reason
+from radarize.errors import FULL, DiskFull, InputError, disk_full, explained, reason
 from radarize.hdf5 import FORMAT, open_hdf5
 from radarize.locks import hold
 from radarize.radar.config import RadarConfig
@@ -252,7 +252,7 @@ class RecordingWriter:
 
 
 def _failed(what: str, part: Path, error: Exception) -> InputError:
-    kind = DiskFull if reason(error) == FULL else InputError
+    kind = DiskFull if disk_full(error) else InputError
     return kind(f"cannot {what} {part}: {reason(error)}")
 
 

@@ -68,6 +68,7 @@ def report_recording(path: Path, output: Path | None = None) -> Path:
     page.section("What is in it")
     page.table(*data_sets(found))
     config = {name: value for name, value in found["config"].items() if name != "channel_calibration"}
+    config["board"] = str(recording.config.board)
     page.columns({"configuration (SI units)": config, "derived": found["derived"], "attributes": found["attributes"]})
     return page.write(output)
 

@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from radarize import __version__
-from radarize.errors import InputError, explained
+from radarize.errors import FULL, DiskFull, InputError, explained
 from radarize.jobs import Job, Report, perform
 from radarize.locks import hold
 from radarize.replacing import replacing
@@ -82,8 +82,8 @@ def make(
                     outcome.failed[name] = news.error
                     done.pop(name, None)
                     todo[name].clear(folder)
-                    if "no space left" in news.error:
-                        raise InputError(f"no space left on the device; {_finished(outcome, tasks, folder)}")
+                    if news.full:
+                        raise DiskFull(f"{FULL}; {_finished(outcome, tasks, folder)}")
                     say(f"failed: {news.error}")
                 elif news.ended:
                     outcome.made.append(name)

@@ -10,7 +10,7 @@
       - {building: A, floors: [0, 1], platform: handheld, count: 15, duration: 60}
       - {building: shop, platform: [cart, robot], count: 2, duration: 20, people: 3, variants: [plain]}
     radar: radarize                    # preset or .cfg file
-    frontend: board.yaml               # as `radarsim calibrate` writes it; an IWR1843BOOST's by default
+    frontend: board.yaml               # as `radarsim calibrate` writes it; the board's own by default
     sensors: [depth, imu]              # or all, or none
     storage: raw                       # or heatmaps: no samples, about a tenth of the size, for training
     variants:                          # every recording once for each, with the same seed and walk
@@ -46,11 +46,11 @@ from radarize.yamlfile import read_yaml
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task, content
 from radarsim.dataset.variant import Attributes, Strict, Variant
-from radarsim.world.description import Description, described, find, shipped, split_level
+from radarsim.world.description import described, description_model, find, shipped, split_level
 from radarsim.world.validation import format_validation_error
 
 #: What a building here may say of itself that stands beside `building` in a scene file.
-LIFE = "clutter", "unevenness", "interferers"
+OF_SCENE = "clutter", "unevenness", "interferers"
 #: Recordings that a data set may stand for: a count with a digit too many takes all memory.
 MOST = 20_000
 Platform = Literal["handheld", "cart", "robot"]
@@ -164,7 +164,7 @@ class Specification(Strict):
         radar = self._beside(self.radar)
         frontend = None if self.frontend is None else self._beside(self.frontend)
         fixed = {"radar": radar, "frontend": frontend, "sensors": self._sensors(), "storage": self.storage}
-        variants = {f"_{key}": variant for key, variant in self.variants.items()} or {"": Variant()}
+        variants = {f"_{key}": each.with_board(self._beside) for key, each in self.variants.items()} or {"": Variant()}
         made_in = [[f"_{key}" for key in group.variants] or list(variants) for group in self.recordings]
         total = sum(g.count * len(g.platforms) * len(keys) for g, keys in zip(self.recordings, made_in, strict=True))
         if total > MOST:
@@ -222,7 +222,7 @@ class Specification(Strict):
         try:
             config, _ = load_config(variant.radar_of(radar))
             check_limits(config)
-            settings = variant.frontend_of(frontend)
+            settings = variant.frontend_of(frontend, config.board)
         except InputError as error:
             raise InputError(f"variants.{key[1:]}: {error}" if key else str(error)) from error
         return config, hashlib.sha256((config.model_dump_json() + settings.model_dump_json()).encode()).hexdigest()
@@ -247,11 +247,11 @@ class Specification(Strict):
             return f"{file}@{level}" if level else str(file)
         if level:
             raise InputError(f"buildings.{building}: is generated and has no levels, expected a scene file")
-        life = {key: given[key] for key in LIFE if key in given}
+        settings = {key: given[key] for key in OF_SCENE if key in given}
         place = {} if floor is None else {"floor": floor}
-        description = {"building": {key: given[key] for key in given if key not in LIFE} | place} | life
+        description = {"building": {key: given[key] for key in given if key not in OF_SCENE} | place} | settings
         try:
-            Description.model_validate(description)
+            description_model().model_validate(description)
         except ValidationError as error:
             raise InputError(
                 f"buildings.{building}: {format_validation_error(error, description).removeprefix('building.')}"

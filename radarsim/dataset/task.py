@@ -12,6 +12,7 @@ from radarize import __version__
 from radarize.errors import InputError
 from radarize.radar.presets import load_config
 from radarize.recording import Recording
+from radarsim.dataset import physics
 from radarsim.dataset.variant import Attributes, Variant
 from radarsim.world.description import meshes, split_level
 
@@ -70,8 +71,11 @@ class Task:
 
     @property
     def parameters(self) -> dict[str, object]:
-        """Everything that decides the recording's bytes; files by their content, so that they may move."""
-        found = asdict(self) | {"sensors": list(self.sensors), "version": __version__}
+        """Everything that decides the recording's bytes; files by their content, so that they may move.
+
+        The version is there beside the sources of the physics for what else makes a recording: heat maps, compression.
+        """
+        found = asdict(self) | {"sensors": list(self.sensors), "version": __version__, "physics": physics.digest()}
         for file in ("radar", "frontend"):
             found[file] = found[file] and Path(found[file]).name
         found["attributes"] = self.attributes or None  # older recordings know no such fields
@@ -170,7 +174,7 @@ class Task:
         places = None if self.waypoints is None else np.array(self.waypoints)
         walk = Walk(self.platform, self.duration, waypoints=places, mounting=self.variant.mounted)
         config, cfg_text = load_config(self.variant.radar_of(self.radar))
-        front_end = self.variant.frontend_of(self.frontend)
+        front_end = self.variant.frontend_of(self.frontend, config.board)
         motion = walk.through(mild, self.seed)
         scene = crowded(scene, motion, self.people, self.seed)
         return Scenario(scene, motion, config, front_end, self.seed, self.sensors), cfg_text

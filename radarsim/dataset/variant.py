@@ -1,9 +1,11 @@
 """What differs between recordings that have everything else in common: scatterers, noise and the walk included."""
 
+from collections.abc import Callable
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from radarize.radar.boards import BOARDS, Board, load_board
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS, load_config
 from radarize.yamlfile import changed
@@ -46,6 +48,17 @@ class Variant(Strict):
             raise ValueError(f"{min(unknown)}: unknown key, expected some of {', '.join(RadarConfig.model_fields)}")
         return fields
 
+    def with_board(self, beside: Callable[[str], str]) -> "Variant":
+        """The same, with what a board's file holds in place of its name, which `beside` turns into a path.
+
+        Raises:
+            InputError: there is no such file, or it cannot be used.
+        """
+        board = self.radar.get("board") if isinstance(self.radar, dict) else None
+        if not isinstance(board, str) or board in BOARDS:
+            return self
+        return self.model_copy(update={"radar": {**self.radar, "board": load_board(beside(board))}})
+
     def radar_of(self, name: str) -> str | RadarConfig:
         """The radar of that name (preset or file) with the changes; the name itself where there are none.
 
@@ -54,15 +67,15 @@ class Variant(Strict):
         """
         if not self.radar or isinstance(self.radar, str):
             return self.radar or name
-        return RadarConfig.build("radar", **changed(load_config(name)[0], self.radar))
+        return load_config(name)[0].changed("radar", **self.radar)
 
-    def frontend_of(self, file: str | None) -> FrontEndConfig:
-        """The front end of that file, by default an IWR1843BOOST's, with the changes.
+    def frontend_of(self, file: str | None, board: str | Board) -> FrontEndConfig:
+        """The front end of that file, by default the board's, with the changes.
 
         Raises:
             InputError: unreadable file, or an unknown or impossible value.
         """
-        settings = FrontEndConfig.load(file) if file else FrontEndConfig()
+        settings = FrontEndConfig.load(file, board) if file else FrontEndConfig.of(board)
         return FrontEndConfig.build("frontend", changed(settings, self.frontend))
 
     @property

@@ -23,23 +23,11 @@ BANNER = (
 RF = {name: len(FIELDS[name]) for name in ("dfeDataOutputMode", "channelCfg", "adcCfg", "profileCfg", "chirpCfg")}
 RF |= {"frameCfg": len(FIELDS["frameCfg"]), "lowPower": 2, "advFrameCfg": 5, "subFrameCfg": 10, "contModeCfg": 9}
 DEMO = {
-    "adcbufCfg": 5,
-    "guiMonitor": 7,
-    "cfarCfg": 9,
-    "multiObjBeamForming": 3,
-    "calibDcRangeSig": 5,
-    "clutterRemoval": 2,
-    "compRangeBiasAndRxChanPhase": 25,
-    "measureRangeBiasAndRxChanPhase": 3,
-    "aoaFovCfg": 5,
-    "cfarFovCfg": 4,
-    "extendedMaxVelocity": 2,
-    "CQRxSatMonitor": 5,
-    "CQSigImgMonitor": 3,
-    "analogMonitor": 2,
-    "lvdsStreamCfg": 4,
+    "adcbufCfg": 5, "guiMonitor": 7, "cfarCfg": 9, "multiObjBeamForming": 3, "calibDcRangeSig": 5, "clutterRemoval": 2,
+    "compRangeBiasAndRxChanPhase": 25, "measureRangeBiasAndRxChanPhase": 3, "aoaFovCfg": 5, "cfarFovCfg": 4,
+    "extendedMaxVelocity": 2, "CQRxSatMonitor": 5, "CQSigImgMonitor": 3, "analogMonitor": 2, "lvdsStreamCfg": 4,
     "calibData": 3,
-}
+}  # fmt: skip
 OPTIONAL = {"bpmCfg": 4, "configDataPort": 2}
 _COUNTS = RF | DEMO | OPTIONAL
 #: Read once, at the first sensorStart; other values need a reboot.
@@ -194,15 +182,10 @@ class CommandLine:
         return f"Sensor State: {state}\nData port baud rate: 921600\n", 0
 
     def _help(self, values: list[str]) -> tuple[str, int]:
-        return "Help: This will display the usage of the CLI commands\n" + "\n".join(
-            sorted(self._OWN | _COUNTS)
-        ) + "\n", 0
+        names = "\n".join(sorted(self._OWN | _COUNTS))
+        return f"Help: This will display the usage of the CLI commands\n{names}\n", 0
 
     _OWN: dict[str, Callable[["CommandLine", list[str]], tuple[str, int]]] = {
-        "sensorStart": _start,
-        "sensorStop": _stop,
-        "flushCfg": _flush,
-        "version": _version,
-        "queryDemoStatus": _status,
-        "help": _help,
-    }
+        "sensorStart": _start, "sensorStop": _stop, "flushCfg": _flush, "version": _version,
+        "queryDemoStatus": _status, "help": _help,
+    }  # fmt: skip

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from radarize.errors import InputError
+from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config
 from radarsim.emulator.source import packed
@@ -50,6 +51,10 @@ class Simulation:
 
     def frames(self, config: RadarConfig) -> Iterator[bytes]:
         """Simulated some at a time, as `simulate` does."""
+        # Commands name no board, only a band: of its chip, the board is the one that was asked for.
+        board = self.expected().board
+        if load_board(board).chip == load_board(config.board).chip:
+            config = config.changed("radar", board=board)
         world = Scene.load(self.scene)
         scenario = Scenario(world, self.walk.through(world, self.seed), config, seed=self.seed)
         while True:

@@ -50,7 +50,7 @@ def crowded(scene: Scene, motion: Motion, count: int, seed: int) -> Scene:
         raise InputError(
             f"scene {scene.name}: has room for {len(people)} people beside the radar's way, expected {count}"
         )
-    return Scene(scene.name, scene.objects, [*scene.movers, *people], scene.life, scene.interferers)
+    return Scene(scene.name, scene.objects, [*scene.movers, *people], scene.surface_settings, scene.interferers)
 
 
 def _way(ground: Ground, place: np.ndarray, rng: np.random.Generator) -> tuple[tuple[float, float], ...] | None:

@@ -1,14 +1,11 @@
-"""The three carriers of the sensor: a hand, a cart, a small robot.
-
-Figures after A. Sie et al., "Radarize" (MobiSys 2024), section on data collection: hand and cart up to 1.6 m/s and
-over 50 m in about a minute, the hand also backward, sideways and with fast turns, the cart constant and slow in turns;
-the robot (an iRobot Create 3, 0.34 m across) up to 0.5 m/s and some 20 m, close to the ground.
-"""
+"""The carriers of the sensor (`platforms.yaml`): a hand, a cart, a small robot."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from radarize.yamlfile import read_yaml
 from radarsim.world.clearance import LOWEST
 
 
@@ -60,21 +57,9 @@ class Platform:
         return LOWEST, self.top
 
 
-PLATFORMS: dict[str, Platform] = {
-    "handheld": Platform(
-        height=1.2, top=1.8, radius=0.40, footprint=0.25, speed=1.1, unsteadiness=0.15, top_speed=1.6,
-        acceleration=1.3, turn_rate=np.deg2rad(85), smoothing=0.12, reversing=0.2, lever_arm=0.12,
-        tilt=np.deg2rad(2), bob=0.02, sway=(np.deg2rad(2), np.deg2rad(1.5), np.deg2rad(2)), tremor=np.deg2rad(1.2),
-        free_heading=True,
-    ),
-    "cart": Platform(
-        height=0.95, top=1.2, radius=0.38, footprint=0.25, speed=1.4, unsteadiness=0.07, top_speed=1.6,
-        acceleration=0.8, turn_rate=np.deg2rad(45), smoothing=0.25, reversing=0.35, lever_arm=0.20,
-        tilt=np.deg2rad(0.5), tremor=np.deg2rad(0.15),
-    ),
-    "robot": Platform(
-        height=0.20, top=0.45, radius=0.36, footprint=0.17, speed=0.41, unsteadiness=0.12, top_speed=0.5,
-        acceleration=0.4, turn_rate=np.deg2rad(45), smoothing=0.15, reversing=0.35, lever_arm=0.10,
-        tilt=np.deg2rad(0.5), tremor=np.deg2rad(0.1),
-    ),
-}  # fmt: skip
+def _platform(about: dict) -> Platform:
+    angles = {name: np.deg2rad(about[name]) for name in ("turn_rate", "tilt", "tremor")}
+    return Platform(**about | angles | {"sway": tuple(np.deg2rad(about.get("sway", (0.0, 0.0, 0.0))))})
+
+
+PLATFORMS = {name: _platform(about) for name, about in read_yaml(Path(__file__).with_suffix(".yaml")).items()}

@@ -7,6 +7,8 @@ from jaxtyping import Float
 from numba import njit
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from radarize.radar.boards import Board, load_board
+
 
 class Cut(BaseModel):
     """Gain below the peak along one axis, linear between its points.
@@ -32,22 +34,19 @@ class Cut(BaseModel):
 
 
 class Antenna(BaseModel):
-    """An element's pattern: the product of an azimuth and an elevation cut.
-
-    The defaults are the IWR1843BOOST's (SPRUIM4, figures of the radiation pattern): 10.5 dBi, -3 dB at 28 deg azimuth
-    and 14 deg elevation, -6 dB at 50 and 20 deg. Beyond the published points the fall continues at the same pace: an
-    estimate.
-    """
+    """An element's pattern: the product of an azimuth and an elevation cut."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    peak_dbi: float = Field(10.5, ge=-30, le=40)
-    azimuth: Cut = Cut(
-        degrees=(0, 10, 20, 28, 40, 50, 60, 75, 90), loss_db=(0, 0.4, 1.55, 3.0, 4.7, 6.0, 8.2, 13.0, 20.0)
-    )
-    elevation: Cut = Cut(
-        degrees=(0, 5, 10, 14, 20, 30, 45, 60, 90), loss_db=(0, 0.4, 1.55, 3.0, 6.0, 11.0, 17.0, 22.0, 27.0)
-    )
+    peak_dbi: float = Field(ge=-30, le=40)
+    azimuth: Cut
+    elevation: Cut
+
+    @classmethod
+    def of(cls, board: str | Board) -> "Antenna":
+        """The pattern in a board's file; isotropic where there is none."""
+        given = load_board(board).front_end.get("antenna")
+        return cls.model_validate(given) if given else ISOTROPIC
 
 
 #: Equal gain in all directions in front of the board.
@@ -70,9 +69,8 @@ class GainPattern(NamedTuple):
     peak_gain: float
 
 
-def gain_pattern(antenna: Antenna | None = None) -> GainPattern:
-    """Tables of an antenna's gain; default: the IWR1843BOOST's."""
-    antenna = antenna or Antenna()
+def gain_pattern(antenna: Antenna) -> GainPattern:
+    """Tables of an antenna's gain."""
     degrees = np.linspace(0, 90, 181)
     azimuth, elevation = (
         10 ** ((level - np.interp(degrees, cut.degrees, cut.loss_db)) / 20)

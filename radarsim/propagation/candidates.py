@@ -9,8 +9,8 @@ from numba import njit, prange
 from radarsim.propagation.fields import dot, facing, gain_towards, minus
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.level_of_detail import FULL_DETAIL, detail, share
+from radarsim.propagation.media import scattering
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.scatteringpattern import scattering
 from radarsim.propagation.table import Table
 from radarsim.propagation.targets import Targets
 

@@ -1,6 +1,6 @@
 """The small things that a room is full of, as points: on desks and shelves, on walls and under ceilings.
 
-Objects down to 2 cm are drawn (`radarsim.world.generators.things`). What is smaller, and the parts of larger ones
+Objects down to 2 cm are drawn (`radarsim.world.generators.small_objects`). What is smaller, and parts of larger ones
 (handles, edges, screws, plugs), is a Poisson process with a density per square metre of the surface that they stand or
 hang on, and their radar cross sections follow Weibull's law: so Ram, Singh and Ghatak (IEEE Open J. Signal Process. 2,
 2021) model the discrete clutter of rooms. The exponent of a cross section (1: Swerling's, the smaller the spikier)
@@ -8,11 +8,19 @@ is that of strong indoor scatterers; log-normal laws that fit measured targets i
 have tails of that length. Densities and the mean were chosen beside the pictures of RadarHD's 25 training walks
 (`benchmarks.realism`), never its test walks: no measurement of rooms at 77 GHz is published.
 
+Energy is conserved. A point and the surface behind it scatter as Lambert has it, sigma cos(in) cos(out) with sigma the
+radar cross section head-on: it takes sigma / 4 of what falls on the surface from anywhere, while an isotropic point
+takes the same from grazing waves, of which hardly anything falls on the surface. Cross sections a square metre, over 4,
+add up to the share s that would be scattered if no point were in another's shadow. A Poisson field of things covers
+1 - exp(-s) (Chiu, Stoyan, Kendall, Mecke, Stochastic Geometry and its Applications, 3rd ed., section 3.1), so each has
+(1 - exp(-s)) / s of its cross section, and the surface reflects, scatters and lets through exp(-s) of the power that it
+would without them (`uncovered`).
+
 A point keeps its place, cross section and phase for good, so it is coherent under motion; it is hidden, mirrored and
-seen through panes as any other scatterer is.
+seen through panes as any other scatterer is, but not from behind its own surface.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from math import gamma, log
 
 import numpy as np
@@ -22,7 +30,6 @@ from scipy.special import gammaincc
 from radarize.errors import InputError
 from radarsim.propagation.hashgrid import Grid
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
-from radarsim.propagation.surface import Surface
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import scattered
 
@@ -30,8 +37,9 @@ from radarsim.world.shapes import scattered
 #: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
 #: drawn it was 4, 16 and 3; of those there are some 0.2, 3 and 0.1.
 ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
-#: Mean radar cross section, m^2, and exponent of its distribution P(sigma > s) = exp(-(s / scale)^exponent).
-CROSS_SECTION, EXPONENT = 0.1, 0.7
+#: Mean radar cross section of a lone thing head-on, m^2 (half of it at 45 deg), and exponent of its distribution
+#: P(sigma > s) = exp(-(s / scale)^exponent).
+CROSS_SECTION, EXPONENT = 0.2, 0.7
 #: Points of a scene, some 200 bytes each: a floor of the largest buildings has ten thousand.
 MOST = 5_000_000
 #: Mean distance from the surface, m, over the least: half the depth of what hangs or stands there.
@@ -55,10 +63,11 @@ class Clutter:
         corners, normals = scene.triangles, scene.normals
         sides = corners[:, 1:] - corners[:, :1]
         area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
-        mean = scene.life.clutter * densities(scene) * area
+        middles, level = corners.mean(axis=1), scene.surface_settings.clutter
+        mean = level * densities(scene, middles, normals) * area
         if mean.sum() > MOST:
             raise InputError(
-                f"scene {scene.name}: clutter is {scene.life.clutter:g}, which makes {mean.sum():.2g} points, expected "
+                f"scene {scene.name}: clutter is {level:g}, which makes {mean.sum():.2g} points, expected "
                 f"at most {MOST:g}"
             )
         count = rng.poisson(mean)
@@ -66,8 +75,10 @@ class Clutter:
         place = scattered(corners[on], rng)
         place += (NEAREST + rng.exponential(STANDOFF, len(on)))[:, None] * normals[on]
         size = rng.exponential(1.0, len(on))
+        sigma = cross_section(size) * in_the_open(crowding(scene, middles, normals))[on]
         self._points = replace(
-            Scatterers.points(place, cross_section(size), rng.uniform(0, 2 * np.pi, len(on))),
+            Scatterers.points(place, sigma, rng.uniform(0, 2 * np.pi, len(on))),
+            normal=normals[on],
             horizontal=scene.floors_and_ceilings[on],
             bounces=_strongest(size, BOUNCE_STRIDE),
             bounces_twice=_strongest(size, BOUNCE_STRIDE**2),
@@ -83,27 +94,14 @@ class Clutter:
         return self._points[index]
 
 
-@dataclass(frozen=True)
-class Cluttered:
-    """A surface and the small things on it, as one set of scatterers."""
-
-    surface: Surface
-    clutter: Clutter
-
-    def __len__(self) -> int:
-        return len(self.surface) + len(self.clutter)
-
-    def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> Scatterers:
-        """Those within `reach` (m) of any of the positions, see `Surface.near`."""
-        return Scatterers.joined([part.near(positions, reach) for part in (self.surface, self.clutter)])
-
-
-def densities(scene: Scene) -> Float[np.ndarray, "triangle"]:
-    """Things a square metre of each triangle at level 1, told by where it faces and how high it is.
+def densities(
+    scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n"]:
+    """Things a square metre of surface at level 1, by where it faces and how high its place (m) is.
 
     Undersides below a ceiling have none, and sheets have theirs on the side of their normal.
     """
-    up, height = scene.normals[:, 2], scene.triangles[:, :, 2].mean(axis=1) - scene.bounds[0, 2]
+    up, height = normal[:, 2], place[:, 2] - scene.bounds[0, 2]
     kinds = {
         "wall": np.abs(up) < 0.5,
         "floor": (up >= 0.5) & (height < LOW),
@@ -111,6 +109,24 @@ def densities(scene: Scene) -> Float[np.ndarray, "triangle"]:
         "ceiling": (up <= -0.5) & (height >= HIGH),
     }
     return np.select(list(kinds.values()), [ON_WALLS, ON_FLOORS, ON_TOPS, UNDER_CEILINGS], 0.0)
+
+
+def crowding(scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
+    """Share of what falls on surfaces that their things would scatter if none were in another's shadow: above 1 where
+    they are many."""
+    return scene.surface_settings.clutter * densities(scene, place, normal) * CROSS_SECTION / 4
+
+
+def uncovered(
+    scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n"]:
+    """Share of the power that falls on surfaces, at places (m) on them, that things leave for the surface itself."""
+    return np.exp(-crowding(scene, place, normal))
+
+
+def in_the_open(crowding: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+    """What is left of each thing's cross section on average, with the shadows of the others."""
+    return -np.expm1(-crowding) / np.maximum(crowding, 1e-12)
 
 
 def cross_section(size: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:

@@ -28,10 +28,10 @@ from numba import njit
 from scipy.special import fresnel
 
 from radarsim.propagation.antenna import amplitude_gain
-from radarsim.propagation.coefficients import TABLE
 from radarsim.propagation.fields import along as moved
 from radarsim.propagation.fields import cross, dot, length, minus, mirrored, unit
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.media import HEAD_ON, LAYER
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.table import Table
 
@@ -50,21 +50,21 @@ class RoundBodies(Table):
         axis: unit vector along a cylinder; zero for a sphere.
         radius: m.
         half: half the length of a cylinder, m; zero for a sphere.
-        reflection: as of flat reflectors (`reflectors.Flat`).
+        layer: as of flat reflectors (`reflectors.Flat`).
     """
 
     center: Float[np.ndarray, "body 3"]
     axis: Float[np.ndarray, "body 3"]
     radius: Float[np.ndarray, "body"]
     half: Float[np.ndarray, "body"]
-    reflection: Complex[np.ndarray, "body 2 cosine"]
+    layer: Complex[np.ndarray, "body 5"]
 
     @classmethod
     def of(cls, rows: list[tuple]) -> "RoundBodies":
         """A table of rows."""
         if not rows:
             none = np.zeros((0, 3))
-            return cls(none, none, np.zeros(0), np.zeros(0), np.zeros((0, 2, TABLE), complex))
+            return cls(none, none, np.zeros(0), np.zeros(0), np.zeros((0, LAYER), complex))
         return cls(*(np.array(column) for column in zip(*rows, strict=True)))
 
     def arcs(self, body: Int[np.ndarray, "part"], part: Int[np.ndarray, "part"]) -> Float[np.ndarray, "part 13"]:
@@ -93,7 +93,7 @@ class RoundBodies(Table):
         size[sphere] = [1.0, 0.0, 0.0]
         spread = radius / (radius + h)
         size *= (wavelength / (8 * np.pi * h) * np.where(sphere, spread, np.sqrt(spread)))[:, None]
-        size *= self.reflection[near, 0, -1, None]
+        size *= self.layer[near, HEAD_ON, None]
         b, part = np.nonzero((np.abs(size) * observation.peak_gain**2 > observation.threshold) & (slant < reach))
         along = np.stack([np.where(sphere, 0, z), -half, half], axis=1)[b, part]
         point = line[b] + along[:, None] * axis[b]
@@ -142,6 +142,18 @@ def path_over(shape, one, two):
     if shape[0] == LINE:
         return length(minus(one, mirrored(two, place, n)))
     return length(minus(one, place)) + length(minus(two, place))
+
+
+@njit
+def facing_point(shape, place):
+    """The point of a curved surface that faces a place, m."""
+    pivot, axis, radius = vec(shape[1:4]), vec(shape[4:7]), shape[7]
+    if shape[0] == QUADRIC:
+        return stationary((pivot, axis, vec(shape[8:11]), shape[11], shape[12]), place, place)[0]
+    a = minus(place, pivot)
+    height = dot(a, axis)
+    foot = moved(pivot, height, axis) if shape[0] == LINE else pivot
+    return moved(foot, radius, unit(moved(a, -height, axis)))
 
 
 @njit

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from radarsim.propagation.antenna import amplitude_gain
-from radarsim.propagation.coefficients import TABLE
+from radarsim.propagation.media import mirror
 
 
 @njit
@@ -104,8 +104,16 @@ def upright(up, direction):
 
 @njit
 def upwards(rotation):
-    """Where the board's upper edge points, of a sensor that is turned so to the world."""
-    return rotation[0, 2], rotation[1, 2], rotation[2, 2]
+    """Where the board's upper edge points, of a sensor that is turned so to the world.
+
+    It leans forward by nothing that matters, so that straight up and down have a field, too: along boresight, as the
+    directions before them have.
+    """
+    lean = 1e-6
+    return (
+        rotation[0, 2] + lean * rotation[0, 0], rotation[1, 2] + lean * rotation[1, 0],
+        rotation[2, 2] + lean * rotation[2, 0],
+    )  # fmt: skip
 
 
 @njit
@@ -116,20 +124,16 @@ def sent(up, direction):
 
 
 @njit
-def reflected(field, arriving, leaving, normal, reflection):
+def reflected(field, arriving, leaving, normal, layer):
     """A transverse field after a mirror: TE and TM parts times their Fresnel coefficients.
 
     Args:
         field: complex vector.
         arriving, leaving: unit directions of travel.
         normal: of the mirror, on either side.
-        reflection: its table, (TE / TM, cosine).
+        layer: what it is made of (`media.layer`).
     """
-    cosine = min(abs(dot(arriving, normal)), 1.0)
-    at = cosine * (TABLE - 1)
-    j = min(int(at), TABLE - 2)
-    te = reflection[0, j] + (at - j) * (reflection[0, j + 1] - reflection[0, j])
-    tm = reflection[1, j] + (at - j) * (reflection[1, j + 1] - reflection[1, j])
+    te, tm = mirror(layer, min(abs(dot(arriving, normal)), 1.0))
     across = cross(arriving, normal)
     size = length(across)
     if size < 1e-6:

@@ -30,7 +30,7 @@ from scipy.special import erfc
 from radarsim.propagation.fields import cross, dot, minus
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.obstacles import Obstacles
+from radarsim.propagation.obstacles import Obstacles, Passage
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table
 
@@ -70,15 +70,19 @@ class Lattice:
         """So many nodes, a Fibonacci number, and the one before.
 
         Weights are those of a square that ends smoothly, corrected (least squares) so that half planes, however they
-        stand, leave what Fresnel's integral says; else the square's borders would diffract.
+        stand, leave what Fresnel's integral says; else the square's borders would diffract. Near these what half planes
+        do fades, so that it does not begin with a step.
         """
         k = np.arange(count)
         nodes = _HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
         weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.cos(np.pi * nodes / (2 * _HALF)).prod(axis=1)
         weight /= weight.sum()
-        angle, edge = (x.ravel() for x in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(-1.3, 1.3, 27)))
+        angle, edge = (x.ravel() for x in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(-1.5, 1.5, 31)))
         clear = np.cos(angle)[:, None] * nodes[:, 0] + np.sin(angle)[:, None] * nodes[:, 1] < edge[:, None]
+        lit = edge > 0
+        inner = np.clip((_HALF - np.abs(edge)) / 0.45, 0, 1)
         truth = erfc(-edge * np.sqrt(np.pi / 2) * np.exp(-0.25j * np.pi)) / 2
+        truth = lit + (truth - lit) * inner**2 * (3 - 2 * inner)
         # As exact in the shadow as in the light, and more so for upright and level edges.
         share = np.where(np.abs(np.sin(2 * angle)) < 1e-9, _SQUARE, 1) / np.maximum(np.abs(truth), 0.1)
         off, keep = (truth - clear @ weight) * share, _STIFF * count * np.eye(count)
@@ -123,7 +127,9 @@ class Stretches(Table):
         frame: index.
         begin, end: m.
         before, after: how far a Fresnel unit along either transverse axis moves begin and end, m.
-        mirrors: in whose outlines begin and end lie; -1: none.
+        mirrors: of the whole path, in order, within whose outlines its rays are reflected; -1: none.
+        stops: where on these, m.
+        apart: how far a Fresnel unit along either transverse axis moves the stops, m.
         span: where on the whole path they begin and end, as shares of its length; the path comes back on the same
             stretch if it ends in its middle.
         mirroring: along either axis, whether its end mirrors, 1, or echoes like a point, 0.
@@ -135,15 +141,17 @@ class Stretches(Table):
     end: Float[np.ndarray, "stretch 3"]
     before: Float[np.ndarray, "stretch 2 3"]
     after: Float[np.ndarray, "stretch 2 3"]
-    mirrors: Int[np.ndarray, "stretch 2"]
+    mirrors: Int[np.ndarray, "stretch 3"]
+    stops: Float[np.ndarray, "stretch 3 3"]
+    apart: Float[np.ndarray, "stretch 3 2 3"]
     span: Float[np.ndarray, "stretch 2"]
     mirroring: Float[np.ndarray, "stretch 2"]
 
 
 def passage(
     observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, size: Float[np.ndarray, "path"]
-) -> tuple[Complex[np.ndarray, "path"], Float[np.ndarray, "path"]]:
-    """What is left of waves along whole paths, out and back, as an amplitude, and their delay (m).
+) -> Passage:
+    """What is left of waves along whole paths, out and back.
 
     Args:
         observation, flat, obstacles: the frames, the mirrors, and what is in the way.
@@ -153,12 +161,12 @@ def passage(
     """
     path, strength = stretches.path, size[stretches.path]
     worth = strength > LEAST_LOSS * observation.threshold
-    factor, delay = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
-    rows, place = _partly(observation, flat, obstacles, stretches, strength, factor)
-    fans, delay[rows] = _fans(observation, flat, obstacles, stretches[rows], place)
-    factor[rows] = _bounded(fans[:, 0] @ _MANY.weight / (fans[:, 1] @ _MANY.weight), _MOST)
+    found = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
+    rows, place = _partly(observation, flat, obstacles, stretches, strength, found.factor)
+    fans, some = _fans(observation, flat, obstacles, stretches[rows], place)
+    for column, new in zip(found.columns, some.columns, strict=True):
+        column[rows] = new
     returns = np.bincount(path, minlength=len(size)) == 1
-    late = _sums(path, delay, len(size)) * (1 + returns)
     # Two screens: one that is met again on the way back, or on several stretches the first and the last one.
     owner, first, count = np.unique(path[rows], return_index=True, return_counts=True)
     last = first + count - 1
@@ -167,13 +175,16 @@ def passage(
     near, far = place[first], np.where(returns[owner], 1 - place[last], place[last])
     rho = np.sqrt(near * (1 - far) / (far * (1 - near)))
     both = _coupled(fans[first], fans[last], rho, stretches.mirroring[rows[first]], _MANY.couplings)
-    single = factor[rows[first]] * factor[rows[last]]
+    single = some.factor[first] * some.factor[last]
     both = np.where(np.isnan(both), single, _bounded(both, _MOST**2))
-    factor[rows[last]], factor[rows[first]] = 1, both
-    factor[np.setdiff1d(np.flatnonzero(returns[path]), rows[first])] **= 2
-    whole = np.ones(len(size), complex)
+    factor = found.factor ** (1 + returns[path])
+    factor[rows[last]] = 1
+    factor[rows[first]] = both
+    whole, clear = np.ones(len(size), complex), np.ones(len(size))
     np.multiply.at(whole, path, factor)
-    return whole, late
+    np.multiply.at(clear, path, 1 - found.blocked)
+    delay = _sums(path, found.delay, len(size)) * (1 + returns)
+    return Passage(whole, delay, _sums(path, found.through, len(size)) > 0, 1 - clear)
 
 
 def _partly(observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, strength, factor):
@@ -215,20 +226,21 @@ def _fans(observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, p
     point = np.sqrt(2 * share / (1 - np.minimum(share, _BESIDE)))
     spread = mirror[:, None] + (point - mirror)[:, None] * (1 - stretches.mirroring)
     spread = np.maximum(spread, 0.25)[..., None]
-    inside = _rays(flat, stretches, _MANY)[3]
-    shown = replace(stretches, before=stretches.before * spread, after=stretches.after * spread,
-                    mirrors=np.full_like(stretches.mirrors, -1))  # fmt: skip
-    _, begin, end, _ = _rays(flat, shown, _MANY)
-    shape = inside.shape
-    begin, end, many = begin.reshape(*shape, 3)[inside], end.reshape(*shape, 3)[inside], np.nonzero(inside)[0]
-    passed, late = obstacles.passage(observation, stretches.frame[many], begin, end, np.ones(len(many), bool))
-    wavenumber = 2j * np.pi / observation.wavelength
-    power = np.abs(passed) ** 2
-    later = _sums(many, power * late, len(share)) / np.maximum(_sums(many, power, len(share)), 1e-30)
-    fans = np.zeros((len(share), 2, shape[1]), complex)
-    fans[:, 0][inside] = passed * np.exp(wavenumber * (late - later[many]))
+    shown = replace(stretches, before=stretches.before * spread, after=stretches.after * spread)
+    many, begin, end, inside = _rays(flat, shown, _MANY)
+    passed = obstacles.passage(observation, stretches.frame[many], begin, end, np.ones(len(many), bool))
+    wavenumber, count = 2j * np.pi / observation.wavelength, len(share)
+    power = np.abs(passed.factor) ** 2
+    total = np.maximum(_sums(many, power, count), 1e-30)
+    later = _sums(many, power * passed.delay, count) / total
+    fans, clear = np.zeros((count, 2, inside.shape[1]), complex), np.zeros(inside.shape)
+    fans[:, 0][inside] = passed.factor * np.exp(wavenumber * (passed.delay - later[many]))
     fans[:, 1][inside] = 1
-    return fans, later
+    clear[inside] = passed.blocked == 0
+    whole = fans[:, 1] @ _MANY.weight
+    factor = _bounded(fans[:, 0] @ _MANY.weight / whole, _MOST)
+    through = _sums(many, power * passed.through, count) > total / 2
+    return fans, Passage(factor, later, through, 1 - np.minimum(np.abs(clear @ _MANY.weight / whole), 1))
 
 
 def _sums(index: Int[np.ndarray, "n"], values: np.ndarray, count: int) -> Float[np.ndarray, "count"]:
@@ -280,24 +292,52 @@ def _rays(flat: Flat, stretches: Stretches, lattice: Lattice):
 
 @njit(cache=True)
 def _spread(corners, normal, stretches, nodes, begin, end, inside):
+    bounds = np.empty((24, 3))
     for i in range(len(begin)):
-        one, two = stretches.mirrors[i]
+        count = _bounds(corners, normal, stretches, i, bounds)
         for k in range(len(nodes)):
             x, y = nodes[k]
             for d in range(3):
                 begin[i, k, d] = stretches.begin[i, d] + x * stretches.before[i, 0, d] + y * stretches.before[i, 1, d]
                 end[i, k, d] = stretches.end[i, d] + x * stretches.after[i, 0, d] + y * stretches.after[i, 1, d]
-            inside[i, k] = (one < 0 or _within(begin[i, k], corners[one], normal[one])) and (
-                two < 0 or _within(end[i, k], corners[two], normal[two])
-            )
+            inside[i, k] = True
+            for c in range(count):
+                if bounds[c, 0] + x * bounds[c, 1] + y * bounds[c, 2] < -1e-9:
+                    inside[i, k] = False
+                    break
 
 
 @njit
-def _within(place, corners, normal):
-    """Whether a point over a convex outline is on the same side of all of its edges."""
-    left, right = True, True
-    for k in range(4):
-        one = vec(corners[k])
-        side = dot(cross(minus(vec(corners[(k + 1) % 4]), one), minus(vec(place), one)), vec(normal))
-        left, right = left and side > -1e-9, right and side < 1e-9
-    return left or right
+def _bounds(corners, normal, stretches, i, out):
+    """Which rays of a path meet all of its mirrors, and each before the next: one that runs on behind another is lit
+    and seen up to where their planes meet. Writes functions of a node, 1, x and y, not negative for these; returns how
+    many."""
+    count = 0
+    for g in range(3):
+        m = stretches.mirrors[i, g]
+        if m < 0:
+            continue
+        stop, n = vec(stretches.stops[i, g]), vec(normal[m])
+        x, y = vec(stretches.apart[i, g, 0]), vec(stretches.apart[i, g, 1])
+        one, two = minus(vec(corners[m, 2]), vec(corners[m, 0])), minus(vec(corners[m, 3]), vec(corners[m, 1]))
+        turn = np.sign(dot(cross(one, two), n))
+        for k in range(4):
+            one = vec(corners[m, k])
+            inward = cross(n, minus(vec(corners[m, (k + 1) % 4]), one))
+            count = _bound((turn, one, inward), (stop, x, y), out, count)
+        for other in range(max(g - 1, 0), min(g + 2, 3)):
+            b = stretches.mirrors[i, other]
+            if b >= 0 and other != g:
+                corner, facing = vec(corners[b, 0]), vec(normal[b])
+                side = np.sign(dot(minus(stop, corner), facing))
+                count = _bound((side, corner, facing), (stop, x, y), out, count)
+    return count
+
+
+@njit
+def _bound(plane, rays, out, count):
+    """Writes on which side of a plane (side, place, direction) rays are (stop, and by a node's x and y)."""
+    side, place, direction = plane
+    stop, x, y = rays
+    out[count] = side * dot(minus(stop, place), direction), side * dot(x, direction), side * dot(y, direction)
+    return count + 1

@@ -11,10 +11,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit, prange
 
+from radarsim.propagation.media import LAMBERT, weights
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
-from radarsim.propagation.scatteringpattern import LAMBERT, weights
 from radarsim.world.crossing import crossing
-from radarsim.world.movers import MovingThing, poses
+from radarsim.world.movers import Mover, poses
 
 
 class MovingTargets:
@@ -32,7 +32,7 @@ class MovingTargets:
         sigma, phase: (scatterer,) m^2, rad.
     """
 
-    def __init__(self, movers: list[MovingThing], rng: np.random.Generator, density: float = 150.0):
+    def __init__(self, movers: list[Mover], rng: np.random.Generator, density: float = 150.0):
         self.movers = movers
         own = [mover.parts() for mover in movers]
         self.parts = [part for parts in own for part in parts]

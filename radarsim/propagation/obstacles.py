@@ -1,5 +1,7 @@
 """What stands in the way of rays: opaque objects and movers stop them, slabs and doors weaken and delay them."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 
@@ -7,11 +9,35 @@ from radarize.radar.config import RadarConfig
 from radarsim.propagation.movingplates import MovingPlates
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
+from radarsim.propagation.table import Table
 from radarsim.propagation.transmission import Transmission
 from radarsim.world.scene import Scene
 
 #: Visibility rays stop this far from both ends, m: surfaces are not obstacles to themselves.
 CLEARANCE = 5e-3
+
+
+@dataclass(frozen=True)
+class Passage(Table):
+    """What is left of waves on their way.
+
+    Attributes:
+        factor: on the amplitude; 0 where something opaque stands in the way.
+        delay: by slabs, m.
+        through: whether slabs are passed.
+        blocked: share of the amplitude that opaque objects keep out.
+    """
+
+    factor: Complex[np.ndarray, "way"]
+    delay: Float[np.ndarray, "way"]
+    through: Bool[np.ndarray, "way"]
+    blocked: Float[np.ndarray, "way"]
+
+    def after_one_another(self, stretches: int) -> "Passage":
+        """Of ways of so many stretches each, which follow one another."""
+        rows = (column.reshape(-1, stretches) for column in self.columns)
+        factor, delay, through, blocked = rows
+        return Passage(factor.prod(axis=1), delay.sum(axis=1), through.any(axis=1), 1 - (1 - blocked).prod(axis=1))
 
 
 class Obstacles:
@@ -57,8 +83,8 @@ class Obstacles:
     def passage(
         self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
         end: Float[np.ndarray, "ray 3"], allowed: Bool[np.ndarray, "ray"],
-    ) -> tuple[Complex[np.ndarray, "ray"], Float[np.ndarray, "ray"]]:  # fmt: skip
-        """What is left of waves between points, as an amplitude, and their delay (m).
+    ) -> Passage:  # fmt: skip
+        """What is left of waves between points.
 
         Args:
             observation, frame: which rays are for which frame.
@@ -69,7 +95,9 @@ class Obstacles:
         if self.scene is not None and len(frame):
             blocked = self.scene.occluded(begin, end, margin=CLEARANCE)
             factor[blocked] = 0
-            through = np.flatnonzero(blocked & allowed)
+            through, opaque = np.flatnonzero(blocked & allowed), self.transmission.opaque
+            if opaque is not None:  # one test costs a tenth of counting slabs
+                through = through[~opaque.occluded(begin[through], end[through], margin=CLEARANCE)]
             if len(through):
                 up = observation.rotation[frame[through], :, 2]
                 factor[through], delay[through] = self.transmission.passage(begin[through], end[through], up)
@@ -77,12 +105,13 @@ class Obstacles:
         if len(self.plates):
             passed, late = self.plates.passage(observation, frame, begin, end, allowed & (factor != 0))
             factor, delay = factor * passed, delay + late
-        return factor, delay
+        opaque = factor == 0
+        return Passage(factor, delay, ~opaque & (factor != 1), opaque.astype(float))
 
     def way(
         self, observation: Observation, frame: Int[np.ndarray, "way"], stops: Float[np.ndarray, "way stop 3"],
         stretches: Int[np.ndarray, "way"], allowed: Bool[np.ndarray, "way"],
-    ) -> tuple[Complex[np.ndarray, "way"], Float[np.ndarray, "way"]]:  # fmt: skip
+    ) -> Passage:  # fmt: skip
         """The same for ways of several stretches from the sensor over stops.
 
         Args:
@@ -91,7 +120,9 @@ class Obstacles:
         """
         begins = np.concatenate([observation.position[frame, None], stops[:, :-1]], axis=1)
         way, stop = np.nonzero(np.arange(stops.shape[1]) < stretches[:, None])
-        passed, extra = self.passage(observation, frame[way], begins[way, stop], stops[way, stop], allowed[way])
-        factor, delay = np.ones(begins.shape[:2], complex), np.zeros(begins.shape[:2])
-        factor[way, stop], delay[way, stop] = passed, extra
-        return factor.prod(axis=1), delay.sum(axis=1)
+        passed = self.passage(observation, frame[way], begins[way, stop], stops[way, stop], allowed[way])
+        size = stops.shape[0] * stops.shape[1]
+        every = Passage(np.ones(size, complex), np.zeros(size), np.zeros(size, bool), np.zeros(size))
+        for column, found in zip(every.columns, passed.columns, strict=True):
+            column[way * stops.shape[1] + stop] = found
+        return every.after_one_another(stops.shape[1])

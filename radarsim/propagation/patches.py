@@ -25,10 +25,10 @@ from jaxtyping import Bool, Complex, Float, Int
 from numba import njit
 
 from radarsim.propagation.apertures import FAR, diffracted, side
-from radarsim.propagation.coefficients import TABLE
 from radarsim.propagation.curved import QUADRIC, SHAPE, Arcs, stationary
 from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, unit, write
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.media import HEAD_ON, LAYER
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.smooth import Piece
 from radarsim.propagation.table import filled
@@ -50,7 +50,7 @@ class Patches(NamedTuple):
         begin: first corner, triangle and side of each piece, and of none.
         ball: centre and radius of a sphere around each, m.
         two_sided: sheets show both sides.
-        reflection: at normal incidence, as of flat reflectors (`reflectors.Flat`).
+        layer: as of flat reflectors (`reflectors.Flat`).
     """
 
     place: Float[np.ndarray, "corner 3"]
@@ -63,10 +63,10 @@ class Patches(NamedTuple):
     begin: Int[np.ndarray, "piece+1 3"]
     ball: Float[np.ndarray, "piece 4"]
     two_sided: Bool[np.ndarray, "piece"]
-    reflection: Complex[np.ndarray, "piece 2 cosine"]
+    layer: Complex[np.ndarray, "piece 5"]
 
     @classmethod
-    def of(cls, rows: list[tuple[Piece, bool, Complex[np.ndarray, "2 cosine"]]]) -> "Patches":
+    def of(cls, rows: list[tuple[Piece, bool, Complex[np.ndarray, "5"]]]) -> "Patches":
         """All of some pieces, each with whether it shows both sides and how it reflects."""
         pieces = [row[0] for row in rows]
         sizes = [(len(p.place), len(p.faces), len(p.border)) for p in pieces]
@@ -86,7 +86,7 @@ class Patches(NamedTuple):
         return cls(
             place, normal, curvature, home, faces, across, border, begin, np.reshape(ball, (-1, 4)),
             np.array([row[1] for row in rows], bool),
-            np.reshape([row[2] for row in rows], (-1, 2, TABLE)).astype(complex),
+            np.reshape([row[2] for row in rows], (-1, LAYER)).astype(complex),
         )  # fmt: skip
 
 
@@ -110,7 +110,7 @@ def _flashes(observation, frame, patches, found):
             aim, quadric, place, value = strength(observation, patches, (k, 1.0 - 2.0 * turn), p, p)
             if abs(value) * observation.peak_gain**2 <= observation.threshold:
                 continue
-            value *= patches.reflection[k, 0, -1] * gain_towards(minus(place, p), rotation, observation) ** 2
+            value *= patches.layer[k, HEAD_ON] * gain_towards(minus(place, p), rotation, observation) ** 2
             if abs(value) <= observation.threshold:
                 continue
             write(aim, found.aim[count])

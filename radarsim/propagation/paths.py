@@ -1,169 +1,214 @@
-"""One-way paths between sensor and scatterer, straight and over one or two mirrors, and the two-way paths they make.
+"""The table of propagation paths: geometry, amplitude, and what each path met on its way.
 
-A one-way path over mirrors is a straight line to the scatterer's virtual point, its image in the mirrors. A two-way
-path, an echo, goes out on one and back on another to the same scatterer. The amplitude of a one-way path holds the
-antenna's gain, the mirrors' reflection coefficients with polarisation and apertures, the slabs it passes, and
-1 / length; that of an echo
+A path's length is known for every antenna and instant; its amplitude and visibility are taken once per frame, in the
+middle of the burst. Three kinds of geometry give the length from a transmit antenna at tx to a receive antenna at rx:
 
-    a = lambda sqrt(sigma) / (4 pi)^(3/2) sqrt(cos_1 cos_2) path_1 path_2,
+    POINT    |tx - a| + |b - rx|: the target as seen through the mirrors of the way out (a) and of the way back (b)
+    IMAGE    |tx - M rx|: an isometry M of the receiver: the reflection in a plate, a half turn about its edge, an
+             inversion in its corner (together the physical-optics integral over a plate), or a chain of mirrors
+    CURVED   the shortest path over a curved surface (`curved.path_over`), and a delay by slabs
 
-the radar equation |a|^2 = G^2 lambda^2 sigma / ((4 pi)^3 R^4) for a straight pair, with Lambert's cosine either way.
+What moves has its geometry at the three nodes of the burst (`burst.NODES`) as well: its track.
 """
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+from typing import Self
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int, UInt8
-from numba import njit
+from jaxtyping import Bool, Complex, Float, Float32, Int, UInt8
+from numba import njit, prange
 
-from radarsim.propagation.candidates import Candidates
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.fields import dot, facing, length, minus, unit
+from radarize.radar.array import rx_positions, tx_positions
+from radarize.radar.config import RadarConfig
+from radarsim.propagation.burst import BurstClock, parabola
+from radarsim.propagation.curved import SHAPE, facing_point, path_over
+from radarsim.propagation.fields import dot, length, minus
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.isometry import inverse
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.scatteringpattern import scattering
+from radarsim.propagation.obstacles import Passage
 from radarsim.propagation.table import Table
-from radarsim.propagation.targets import Targets
 
-#: Mirrors over which an echo goes out and back, together.
-MOST_BOUNCES = 2
+#: Numbers that describe a path's geometry: a and b; matrix | offset by rows; or `curved.Arcs.shape` and a delay, m.
+GEOMETRY = SHAPE + 1
+#: Mirrors on a path at most: two out and two back, or a chain of three.
+MIRRORS = 4
+
+
+class Kind(IntEnum):
+    """How a path's length follows from its geometry."""
+
+    POINT = 0
+    IMAGE = 1
+    CURVED = 2
 
 
 @dataclass(frozen=True)
-class OneWay(Table):
-    """One-way paths of a observation.
+class Paths(Table):
+    """Propagation paths of one frame or of several.
 
     Attributes:
-        candidate: row in the table of candidates: which scatterer in which frame.
-        mirrors: in order from the sensor on, as indices of flat reflectors; -1: none.
-        amplitude: see above, 1/m; phase as in the beat signal.
-        virtual: the scatterer as seen through the mirrors, m.
-        last: the last point before the scatterer: the sensor's, or a place of reflection, m.
-        slab: whether it passes a slab.
+        frame: index within the batch.
+        kind: a `Kind` each.
+        geometry: of that kind, world, m, in the middle of the burst.
+        amplitude: square root of received over transmitted power, with phase, as in the beat signal.
+        bounces: mirrors on the way; the surface, body or plate that echoes is none.
+        through: whether it passes a slab: a wall, a pane, a door.
+        blocked: share of the amplitude that opaque objects keep out.
+        level: whether a floor or ceiling echoes.
+        moving: whether anything on the way moves.
+        mirrors: on the way, in order, as indices of the batch's flat reflectors: of a `POINT` two out and two back, of
+            an `IMAGE` the plate that it is a part of, or the chain; -1: none.
+        scatterer: index in the batch; -1: none.
+        track: row of `tracks`; -1: it stands still.
+        tracks: geometry at the burst's nodes of what moves.
     """
 
-    candidate: Int[np.ndarray, "path"]
-    mirrors: Int[np.ndarray, "path 2"]
+    frame: Int[np.ndarray, "path"]
+    kind: UInt8[np.ndarray, "path"]
+    geometry: Float[np.ndarray, "path 14"]
     amplitude: Complex[np.ndarray, "path"]
-    virtual: Float[np.ndarray, "path 3"]
-    last: Float[np.ndarray, "path 3"]
-    slab: Bool[np.ndarray, "path"]
+    bounces: UInt8[np.ndarray, "path"]
+    through: Bool[np.ndarray, "path"]
+    blocked: Float32[np.ndarray, "path"]
+    level: Bool[np.ndarray, "path"]
+    moving: Bool[np.ndarray, "path"]
+    mirrors: Int[np.ndarray, "path 4"]
+    scatterer: Int[np.ndarray, "path"]
+    track: Int[np.ndarray, "path"]
+    tracks: Float[np.ndarray, "moving 3 14"] = field(default_factory=lambda: np.zeros((0, 3, GEOMETRY)))
+
+    SHARED = ("tracks",)
+
+    @classmethod
+    def of(
+        cls, kind: Kind, geometry: Float[np.ndarray, "path *shape"], amplitude: Complex[np.ndarray, "path"], **columns
+    ) -> Self:
+        """Paths of one kind; columns that are not given are zero, indices -1.
+
+        Args:
+            kind: of all of them.
+            geometry: (path, 2, 3) of points, (path, 3, 4) of images, (path, 14) of curved surfaces.
+            amplitude: with phase.
+            columns: others, arrays or one value for all.
+        """
+        n = len(amplitude)
+        numbers = np.zeros((n, GEOMETRY))
+        size = int(np.prod(geometry.shape[1:]))
+        numbers[:, :size] = geometry.reshape(n, size)
+        none = {
+            "frame": np.zeros(n, int), "bounces": np.zeros(n, np.uint8), "through": np.zeros(n, bool),
+            "blocked": np.zeros(n, np.float32), "level": np.zeros(n, bool), "moving": np.zeros(n, bool),
+            "mirrors": np.full((n, MIRRORS), -1), "scatterer": np.full(n, -1), "track": np.full(n, -1),
+        }  # fmt: skip
+        given = {k: np.broadcast_to(v, none[k].shape).astype(none[k].dtype) for k, v in columns.items()}
+        return cls(kind=np.full(n, kind, np.uint8), geometry=numbers, amplitude=amplitude, **(none | given))
+
+    @classmethod
+    def none(cls) -> Self:
+        """No path."""
+        return cls.of(Kind.POINT, np.zeros((0, 2, 3)), np.zeros(0, complex))
+
+    def where(self, **columns: object) -> Self:
+        """Rows that have some values: ``paths.where(bounces=1, moving=False)``."""
+        rows = np.ones(len(self), bool)
+        for name, value in columns.items():
+            rows &= getattr(self, name) == value
+        return self[rows]
 
     @property
-    def bounces(self) -> Int[np.ndarray, "path"]:
-        """Number of mirrors, 0 to 2."""
-        return (self.mirrors >= 0).sum(axis=1)
+    def points(self) -> Float[np.ndarray, "point 2 3"]:
+        """a and b of those that are points, m."""
+        return self.geometry[self.kind == Kind.POINT, :6].reshape(-1, 2, 3)
 
-    @classmethod
-    def straight(
-        cls, observation: Observation, targets: Targets, candidates: Candidates, rows: Int[np.ndarray, "path"]
-    ) -> "OneWay":
-        """Straight paths to some candidates, not yet tested for what is in the way."""
-        n = len(rows)
-        return cls(
-            rows, np.full((n, 2), -1), candidates.straight[rows].astype(complex),
-            np.take(targets.scatterers.position, candidates.scatterer[rows], axis=0),
-            np.take(observation.position, candidates.frame[rows], axis=0), np.zeros(n, bool),
-        )  # fmt: skip
+    @property
+    def images(self) -> Float[np.ndarray, "image 3 4"]:
+        """Isometries of those that are images."""
+        return self.geometry[self.kind == Kind.IMAGE, :12].reshape(-1, 3, 4)
 
+    def apparent(self, position: Float[np.ndarray, "3"]) -> Float[np.ndarray, "path 2 3"]:
+        """Where the target seems to be, for the wave that leaves and for the wave that returns.
 
-@dataclass(frozen=True)
-class TwoWay(Table):
-    """Echoes as pairs of one-way paths to the same scatterer, in either order, sorted by candidate.
+        Args:
+            position: of the sensor, m.
 
-    Attributes:
-        ways: out and back.
-        amplitude: square root of received over transmitted power, with phase.
-        cause: a `Provenance` each.
-    """
+        Returns:
+            places, m; the mean of both distances from the sensor is half the path's length.
+        """
+        places = self.geometry[:, :6].reshape(-1, 2, 3).copy()
+        rows = self.kind == Kind.IMAGE
+        there = self.images
+        for end, isometry in enumerate((there, inverse(there))):
+            places[rows, end] = (position + isometry[..., :3] @ position + isometry[..., 3]) / 2
+        for row in np.flatnonzero(self.kind == Kind.CURVED):
+            places[row] = facing_point(self.geometry[row], tuple(position))
+        return places
 
-    ways: Int[np.ndarray, "echo 2"]
-    amplitude: Complex[np.ndarray, "echo"]
-    cause: UInt8[np.ndarray, "echo"]
+    def behind(self, observation: Observation, passed: Passage) -> Self:
+        """What is left of paths of which this much passes obstacles; delays move images and curved paths away."""
+        amplitude = self.amplitude * passed.factor
+        kept = np.abs(amplitude) > observation.threshold
+        paths, passed, geometry = self[kept], passed[kept], self.geometry[kept].copy()
+        rows, begin = paths.kind == Kind.IMAGE, observation.position[paths.frame]
+        isometry = geometry[rows, :12].reshape(-1, 3, 4)
+        away = np.einsum("pij,pj->pi", isometry[:, :, :3], begin[rows]) + isometry[:, :, 3] - begin[rows]
+        isometry[:, :, 3] += (passed.delay[rows] / np.linalg.norm(away, axis=1))[:, None] * away
+        geometry[rows, :12] = isometry.reshape(-1, 12)
+        geometry[paths.kind == Kind.CURVED, SHAPE] = passed.delay[paths.kind == Kind.CURVED]
+        blocked = passed.blocked.astype(np.float32)
+        return replace(paths, geometry=geometry, amplitude=amplitude[kept], through=passed.through, blocked=blocked)
 
-    @classmethod
-    def of(cls, observation: Observation, targets: Targets, candidates: Candidates, one_way: OneWay) -> "TwoWay":
-        """All pairs that make an echo within range and above the threshold."""
-        first, order = _grouped(one_way.candidate, len(candidates))
-        most = int(np.sum(np.diff(first) ** 2))
-        found = cls(np.empty((most, 2), np.int64), np.empty(most, complex), np.empty(most, np.uint8))
-        echoing = _Echoing(first, order, candidates.frame, candidates.scatterer, candidates.size, targets.cause,
-                           targets.weights, one_way.bounces)  # fmt: skip
-        return found[: _join(observation, echoing, targets.scatterers.columns, one_way.columns, found.columns)]
+    def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "path virtual 3"]:
+        """Length of each path and virtual antenna over the burst of the frame that starts at `time`.
 
+        Args:
+            config: radar configuration.
+            motion: has position(t) and rotation(t) of the sensor.
+            time: the frame's stamp, s.
 
-class _Echoing(NamedTuple):
-    """Candidates, and the paths to each as a counting sort: order[first[c] : first[c + 1]]."""
-
-    first: Int[np.ndarray, "candidate+1"]
-    order: Int[np.ndarray, "path"]
-    frame: Int[np.ndarray, "candidate"]
-    scatterer: Int[np.ndarray, "candidate"]
-    size: Float[np.ndarray, "candidate"]
-    cause: UInt8[np.ndarray, "scatterer"]
-    weights: Float[np.ndarray, "scatterer 3"]
-    bounces: Int[np.ndarray, "path"]
-
-
-@njit(cache=True)
-def _grouped(group, groups):
-    first = np.zeros(groups + 1, np.int64)
-    for g in group:
-        first[g + 1] += 1
-    for g in range(groups):
-        first[g + 1] += first[g]
-    order, at = np.empty(len(group), np.int64), first[:-1].copy()
-    for i in range(len(group)):
-        order[at[group[i]]] = i
-        at[group[i]] += 1
-    return first, order
+        Returns:
+            parabolas in the burst's normalised time (`burst`), m.
+        """
+        times = time + BurstClock.of(config).nodes
+        position, rotation = motion.position(times), motion.rotation(times).as_matrix()
+        tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1)
+        rx = position[:, None] + rx_positions(config) @ rotation.transpose(0, 2, 1)
+        out = np.empty((len(self), tx.shape[1] * rx.shape[1], 3))
+        _lengths((self.kind, self.geometry, self.track, self.tracks), tx, rx, out)
+        return out
 
 
-_GHOST, _SLAB, _MOVING = int(Provenance.GHOST_1), int(Provenance.THROUGH_SLAB), int(Provenance.MOVING)
+_POINT, _IMAGE = int(Kind.POINT), int(Kind.IMAGE)
 
 
-@njit(cache=True)
-def _join(observation, echoing, scatterers, path, found):
-    """Fills `found`; returns how many there are."""
-    n = 0
-    for c in range(len(echoing.first) - 1):
-        some = echoing.order[echoing.first[c] : echoing.first[c + 1]]
-        if len(some) == 0:
-            continue
-        s, sensor = echoing.scatterer[c], vec(observation.position[echoing.frame[c]])
-        p, face, two_sided = vec(scatterers.position[s]), scatterers.normal[s], scatterers.two_sided[s]
-        turn = complex(np.cos(scatterers.phase[s]), np.sin(scatterers.phase[s]))
-        for i in some:
-            to_i = unit(minus(vec(path.last[i]), p))
-            there = facing(face, to_i, two_sided)
-            if there <= 0:
-                continue
-            way = length(minus(vec(path.virtual[i]), sensor))
-            for j in some:
-                mirrors, passes = echoing.bounces[i] + echoing.bounces[j], path.slab[i] or path.slab[j]
-                if mirrors > MOST_BOUNCES:
-                    continue
-                to_j, back, way_back = to_i, there, way
-                if j != i:
-                    to_j = unit(minus(vec(path.last[j]), p))
-                    back = facing(face, to_j, two_sided)
-                    way_back = length(minus(vec(path.virtual[j]), sensor))
-                weight = echoing.weights[s, min(mirrors + passes, 2)]
-                if back <= 0 or way + way_back > 2 * observation.range or weight == 0:
-                    continue
-                strength = echoing.size[c] * np.sqrt(scattering(there, back, dot(to_i, to_j), scatterers.lobe[s]))
-                value = strength * (path.amplitude[i] * path.amplitude[j])
-                # what the weight adds stands for scatterers left out: it makes no echo worth keeping
-                if abs(value) <= observation.threshold:
-                    continue
-                found.ways[n, 0], found.ways[n, 1] = i, j
-                found.amplitude[n] = value * np.sqrt(weight) * turn
-                found.cause[n] = echoing.cause[s]
-                if echoing.cause[s] != _MOVING:
-                    if passes:
-                        found.cause[n] = _SLAB
-                    elif mirrors > 0:
-                        found.cause[n] = _GHOST - 1 + mirrors
-                n += 1
-    return n
+@njit(parallel=True, cache=True)
+def _lengths(paths, tx, rx, out):
+    kind, geometry, track, tracks = paths
+    nodes, n_tx, _ = tx.shape
+    n_rx = rx.shape[1]
+    for e in prange(len(kind)):
+        way = np.empty((nodes, n_tx, n_rx))
+        there, back = np.empty(n_tx), np.empty(n_rx)
+        for i in range(nodes):
+            g = geometry[e] if track[e] < 0 else tracks[track[e], i]
+            if kind[e] == _POINT:
+                for k in range(n_tx):
+                    there[k] = length(minus(vec(g), vec(tx[i, k])))
+                for r in range(n_rx):
+                    back[r] = length(minus(vec(g[3:]), vec(rx[i, r])))
+            for r in range(n_rx):
+                q = vec(rx[i, r])
+                if kind[e] == _IMAGE:
+                    q = dot(vec(g), q) + g[3], dot(vec(g[4:]), q) + g[7], dot(vec(g[8:]), q) + g[11]
+                for k in range(n_tx):
+                    if kind[e] == _POINT:
+                        way[i, k, r] = there[k] + back[r]
+                    elif kind[e] == _IMAGE:
+                        way[i, k, r] = length(minus(vec(tx[i, k]), q))
+                    else:
+                        way[i, k, r] = path_over(g, vec(tx[i, k]), q) + g[SHAPE]
+        for k in range(n_tx):
+            for r in range(n_rx):
+                fit = out[e, k * n_rx + r]
+                fit[0], fit[1], fit[2] = parabola(way[0, k, r], way[1, k, r], way[2, k, r])

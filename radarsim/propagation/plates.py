@@ -29,6 +29,7 @@ from numba import njit
 
 from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, write
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.media import HEAD_ON
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table, filled
@@ -86,7 +87,7 @@ def _parts(flat, observation, frame, found):
         foot = along(p, -h, n)
         inwards = minus(middle, foot)
         foot = along(foot, NUDGE / (length(inwards) + NUDGE), inwards)
-        mirror = wavelength / (8 * np.pi * h) * abs(flat.reflection[f, 0, -1])
+        mirror = wavelength / (8 * np.pi * h) * abs(flat.layer[f, HEAD_ON])
         inside = True
         value[:] = 0
         for k in range(sides):
@@ -149,7 +150,7 @@ def _parts(flat, observation, frame, found):
                     write(along(foot, 0.002, n), aim[count])
                 count += 1
     for i in range(min(count, len(facet))):
-        head_on = flat.reflection[facet[i], 0, -1]
+        head_on = flat.layer[facet[i], HEAD_ON]
         amplitude[i] *= head_on / abs(head_on)
     return count
 

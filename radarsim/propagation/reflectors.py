@@ -1,6 +1,6 @@
 """What reflects like a mirror: the flat parts of a scene, each with its aperture, and its round bodies."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,9 +8,10 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.bodies import recognise
-from radarsim.propagation.coefficients import TABLE, as_slab, lag, reflection
+from radarsim.propagation.clutter import uncovered
 from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.hashgrid import Grid
+from radarsim.propagation.media import LAYER, as_slab, covered, lag, layer
 from radarsim.propagation.patches import Patches
 from radarsim.propagation.smooth import pieces
 from radarsim.propagation.table import Table
@@ -30,9 +31,8 @@ class Flat(Table):
         half: half the rectangle's side lengths along u and v, m.
         two_sided: sheets without a volume show both sides.
         horizontal: part of a floor or ceiling.
-        reflection: complex reflection coefficient by (facet, polarisation TE / TM, cosine of incidence), roughness
-            included, as it appears in the beat signal (conjugate of the field's).
-        lag: how much later than its face the head-on echo comes, m (`coefficients.lag`).
+        layer: what they are made of (`media.layer`), and how much of it small objects leave uncovered.
+        lag: how much later than its face the head-on echo comes, m (`media.lag`).
         finish: how uneven they are over plaster, see `unevenness.FINISHES`.
         plate, frame: the moving plate that they belong to (`movingplates`), and the frame in which they stand so;
             -1: they stand still, in all frames.
@@ -46,7 +46,7 @@ class Flat(Table):
     half: Float[np.ndarray, "facet 2"]
     two_sided: Bool[np.ndarray, "facet"]
     horizontal: Bool[np.ndarray, "facet"]
-    reflection: Complex[np.ndarray, "facet 2 cosine"]
+    layer: Complex[np.ndarray, "facet 5"]
     lag: Float[np.ndarray, "facet"]
     finish: Float[np.ndarray, "facet"]
     plate: Int[np.ndarray, "facet"]
@@ -60,7 +60,7 @@ class Flat(Table):
     def none(cls) -> "Flat":
         """No facet."""
         no, empty, still = np.zeros(0, bool), np.zeros((0, 3)), np.zeros(0, int)
-        table = np.zeros((0, 2, TABLE), complex)
+        table = np.zeros((0, LAYER), complex)
         shape = np.zeros((0, 4, 3)), empty, empty, empty, empty, np.zeros((0, 2))
         return cls(*shape, no, no, table, np.zeros(0), np.zeros(0), still, still)
 
@@ -101,29 +101,37 @@ class Reflectors:
         """The reflectors of a scene."""
         flat, inner, bodies, smooth = [], [], [], []
         tables: dict[Material, tuple[np.ndarray, float]] = {}
-        for item in scene.objects:
+        left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
+        for number, item in enumerate(scene.objects):
             slab, whole = as_slab(item)
             if slab not in tables:
-                tables[slab] = reflection(slab, config), lag(slab, config)
-            gamma, late = tables[slab]
+                tables[slab] = layer(slab, config), lag(slab, config)
+            made_of, late = tables[slab]
             round_, is_round = recognise(item.mesh)
             finish = FINISHES.get(item.material.name, 0.0)
-            bodies += [(b.center, b.axis, b.radius, b.half, gamma) for b in round_]
             # physical optics holds down to about a wavelength
             curved, is_curved = pieces(item.mesh, ~is_round, config.wavelength**2)
-            smooth += [(piece, item.two_sided, gamma) for piece in curved]
+            # a body has one table, and nowhere more energy than falls on it
+            bent = covered(
+                made_of, float(left[scene.triangle_object == number].min(where=is_round | is_curved, initial=1.0))
+            )
+            bodies += [(b.center, b.axis, b.radius, b.half, bent) for b in round_]
+            smooth += [(piece, item.two_sided, bent) for piece in curved]
             found = plates(item.mesh, ~(is_round | is_curved), config.wavelength**2)
             hollow = slab.thickness is not None and not (whole or item.two_sided)
             middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
             lying = item.floors_and_ceilings(middles, np.reshape([p.normal for p in found], (-1, 3)))
             for p, horizontal in zip(found, lying, strict=True):
-                rest = (item.two_sided, horizontal, gamma, late, finish, -1, -1)
+                rest = (item.two_sided, horizontal, made_of, late, finish, -1, -1)
                 flat.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *rest))
                 if hollow:
                     inwards = -slab.thickness * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
-        return cls(_table(flat), RoundBodies.of(bodies), _table(inner), Patches.of(smooth), heights)
+        outer = _table(flat)
+        seen = np.sqrt(uncovered(scene, outer.corners.mean(axis=1), outer.normal))
+        outer = replace(outer, layer=covered(outer.layer, seen))
+        return cls(outer, RoundBodies.of(bodies), _table(inner), Patches.of(smooth), heights)
 
 
 def _table(rows: list[tuple]) -> Flat:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from numpy.typing import ArrayLike
 
-from radarsim.propagation.scatteringpattern import LAMBERT
+from radarsim.propagation.media import LAMBERT
 from radarsim.propagation.table import Table
 
 #: Of a sampled surface every n-th scatterer is seen over mirrors, and of those every n-th over two of them.
@@ -31,7 +31,7 @@ class Scatterers(Table):
         bounces: weight of its power in paths over one mirror. Ghosts are many and weak, so of a sampled surface only
             every fourth scatterer has them, with four times the power.
         bounces_twice: the same for paths over two mirrors or more: every sixteenth, with sixteen times the power.
-        lobe: its scattering pattern, see `scatteringpattern.weights`.
+        lobe: its scattering pattern, see `media.weights`.
         rank: 0...1, which decides from how far it is used, see `detail`; negative: from everywhere.
     """
 

@@ -7,17 +7,18 @@ and speckle is still a property of the world. Within a tile, scatterers follow a
 2018) in the order of their ranks, so that any first few of them cover it evenly: see `detail`.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
 from numba import njit, prange
 
+from radarsim.propagation.clutter import Clutter, uncovered
 from radarsim.propagation.hashgrid import Grid
 from radarsim.propagation.level_of_detail import FULL_DETAIL
+from radarsim.propagation.media import weights
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
-from radarsim.propagation.scatteringpattern import weights
 from radarsim.world.scene import Scene
 
 #: Scatterers per square metre at full detail; with level of detail twelve or more are left in a range-azimuth cell of
@@ -65,7 +66,8 @@ class Surface:
         starts = 3 * self._first[:-1]
         self._grid = Grid(*(f.reduceat(corners, starts) if len(tile) else corners for f in (np.minimum, np.maximum)))
         self._owner = owner[self._first[:-1]]
-        self._sigma = np.array([o.material.sigma0 for o in used]) / density
+        left = uncovered(scene, self._triangles.mean(axis=1), self._normals)
+        self._sigma = (np.array([o.material.sigma0 for o in used]) / density)[owner] * left
         self._two_sided = np.array([o.two_sided for o in used], bool)
         self._lobe = np.array([weights(o.material) for o in used]).reshape(-1, 4)
 
@@ -95,9 +97,24 @@ class Surface:
         position, triangle, phase, rank, bounces = drawn
         owner = np.repeat(self._owner[tiles], counts)
         return Scatterers(
-            position, self._normals[triangle], self._sigma[owner], phase, self._two_sided[owner],
+            position, self._normals[triangle], self._sigma[triangle], phase, self._two_sided[owner],
             self._horizontal[triangle], *bounces, self._lobe[owner], rank,
         )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Cluttered:
+    """A surface and the small things on it, as one set of scatterers."""
+
+    surface: Surface
+    clutter: Clutter
+
+    def __len__(self) -> int:
+        return len(self.surface) + len(self.clutter)
+
+    def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> Scatterers:
+        """Those within `reach` (m) of any of the positions, see `Surface.near`."""
+        return Scatterers.joined([part.near(positions, reach) for part in (self.surface, self.clutter)])
 
 
 def _split(triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "m 3 3"]:

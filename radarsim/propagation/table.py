@@ -10,13 +10,19 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Table:
-    """Arrays of the same length; `rows[index]` takes some of them, `columns` is what compiled kernels take."""
+    """Arrays of the same length; `rows[index]` takes some of them, `columns` is what compiled kernels take.
+
+    Attributes:
+        SHARED: fields that belong to all rows together.
+    """
 
     Columns: ClassVar[type]
+    SHARED: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls):
         # numba tells named tuples by their names alone
-        cls.Columns = namedtuple(f"{cls.__name__}Columns", cls.__annotations__)
+        columns = [name for name in cls.__annotations__ if name not in cls.SHARED]
+        cls.Columns = namedtuple(f"{cls.__name__}Columns", columns)
         cls.Columns.__module__, cls.Columns.__qualname__ = cls.__module__, f"{cls.__qualname__}.Columns"
 
     @property
@@ -28,11 +34,12 @@ class Table:
         return len(self.columns[0])
 
     def __getitem__(self, index) -> Self:
-        return type(self)(*(column[index] for column in self.columns))
+        shared = (getattr(self, name) for name in self.SHARED)
+        return type(self)(*(column[index] for column in self.columns), *shared)
 
     @classmethod
     def joined(cls, parts: list[Self]) -> Self:
-        """All rows of several tables."""
+        """All rows of several tables; nothing is shared."""
         return cls(*(np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True)))
 
 

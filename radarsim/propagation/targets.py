@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Int
 
-from radarsim.propagation.echoes import Provenance
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.scatterers import Scatterers
@@ -14,7 +13,7 @@ from radarsim.propagation.surface import Surface
 
 @dataclass(frozen=True)
 class Targets:
-    """Scatterers of a observation.
+    """Scatterers of a batch.
 
     Attributes:
         scatterers: the surface's, then those of moving targets where they are in the first frame, in the second, and so
@@ -23,14 +22,12 @@ class Targets:
         owner: the frame that a scatterer is for; -1: all.
         weights: of a scatterer's power in echoes with 0, 1, and 2 or more mirrors on the way; slabs, however many, are
             one more.
-        cause: `Provenance` of the straight echo.
     """
 
     scatterers: Scatterers
     still: int
     owner: Int[np.ndarray, "scatterer"]
     weights: Float[np.ndarray, "scatterer 3"]
-    cause: UInt8[np.ndarray, "scatterer"]
 
     @classmethod
     def of(cls, observation: Observation, surface: Surface | Scatterers, moving: MovingTargets | None) -> "Targets":
@@ -41,7 +38,5 @@ class Targets:
         if moving is not None and len(moving):
             owner = np.concatenate([owner, np.repeat(np.arange(observation.frames), len(moving))])
             found = Scatterers.joined([found, *(moving.scatterers(t) for t in observation.time)])
-        cause = np.where(found.horizontal, Provenance.FLOOR_CEILING, Provenance.DIRECT).astype(np.uint8)
-        cause[still:] = Provenance.MOVING
         weights = np.stack([np.ones(len(found)), found.bounces, found.bounces_twice], axis=1)
-        return cls(found, still, owner, weights, cause)
+        return cls(found, still, owner, weights)

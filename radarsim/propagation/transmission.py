@@ -1,10 +1,18 @@
 """What passes through walls, panes and doors: loss, phase and delay of thin slabs on a ray's way."""
 
+from functools import cached_property
+
 import numpy as np
+import trimesh
 from jaxtyping import Complex, Float
+from numba import njit
 
 from radarize.radar.config import RadarConfig
-from radarsim.propagation.coefficients import TABLE, as_slab, transmission
+from radarsim.propagation.clutter import uncovered
+from radarsim.propagation.fields import cross, dot, unit, upright
+from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.media import LAYER, as_slab, layer, sweep_share, window
+from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 
 #: A ray is given up behind this many slabs: one stud wall with a board on either side, or two panes.
@@ -12,7 +20,7 @@ MOST_SLABS = 2
 
 
 class Transmission:
-    """The thin objects of a scene (`coefficients`).
+    """The thin objects of a scene (`media`).
 
     Args:
         scene: ray tests run on its geometry.
@@ -22,16 +30,27 @@ class Transmission:
 
     def __init__(self, scene: Scene, config: RadarConfig, margin: float):
         self.scene, self.margin, self._wavelength = scene, margin, config.wavelength
-        tables, self._table, self._body = {}, [], []
+        layers, self._layer, self._body = {}, [], []
         for item in scene.objects:
             slab, whole = as_slab(item)
-            if slab.thickness is not None and slab not in tables:
-                tables[slab] = (len(tables), transmission(slab, config))
-            self._table.append(-1 if slab.thickness is None else tables[slab][0])
+            if slab.thickness is not None and slab not in layers:
+                layers[slab] = len(layers), layer(slab, config)
+            self._layer.append(-1 if slab.thickness is None else layers[slab][0])
             self._body.append(whole)
-        self._table, self._body = np.array(self._table), np.array(self._body)
-        self._factor = np.array([t for _, (t, _) in tables.values()]).reshape(-1, 2, TABLE)
-        self._delay = np.array([d for _, (_, d) in tables.values()]).reshape(-1, TABLE)
+        self._layer, self._body = np.array(self._layer), np.array(self._body)
+        self._layers = np.array([row for _, row in layers.values()]).reshape(-1, LAYER)
+        self._share = sweep_share(config)
+        #: what small objects on a face leave of the amplitude
+        self._left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
+
+    @cached_property
+    def opaque(self) -> Scene | None:
+        """What of the scene nothing passes, as one object; None: nothing."""
+        solid = [item for item, layer in zip(self.scene.objects, self._layer, strict=True) if layer < 0]
+        if not solid or len(solid) == len(self._layer):
+            return self.scene if solid else None
+        mesh = trimesh.util.concatenate([item.mesh for item in solid])
+        return Scene(self.scene.name, [SceneObject("opaque", mesh, solid[0].material)])
 
     def passage(
         self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], up: Float[np.ndarray, "n 3"]
@@ -58,28 +77,29 @@ class Transmission:
             item = self.scene.triangle_object[triangle]
             leaving = inside[w] == item  # the far face of a body whose slab has been counted
             slabs[w] += ~leaving
-            passes = leaving | ((self._table[item] >= 0) & (slabs[w] <= MOST_SLABS))
+            passes = leaving | ((self._layer[item] >= 0) & (slabs[w] <= MOST_SLABS))
             factor[w[~passes]] = 0
             w, at, triangle, item, leaving = (x[passes] for x in (w, at, triangle, item, leaving))
+            factor[w] *= self._left[triangle]
             n = ~leaving
-            gain, extra = self._through(self._table[item[n]], way[w[n]], self.scene.normals[triangle[n]], up[w[n]])
+            slab = self._layers[self._layer[item[n]]]
+            gain, extra = _through(slab, way[w[n]], self.scene.normals[triangle[n]], up[w[n]], self._share)
             factor[w[n]] *= gain
-            delay[w[n]] += extra
+            delay[w[n]] += extra * self._wavelength / (2 * np.pi)
             inside[w] = np.where(leaving | ~self._body[item], -1, item)
             start[w] = at + 1e-4
             under_way = w
         delay[factor == 0] = 0
         return factor * np.exp(-2j * np.pi * delay / self._wavelength), delay
 
-    def _through(self, table, way, normal, up):
-        """Factor and delay of one slab each: TE and TM parts of the upright field."""
-        at = np.minimum(np.abs(np.einsum("nd,nd->n", way, normal)), 1) * (TABLE - 1)
-        j = np.minimum(at.astype(int), TABLE - 2)
-        t = at - j
-        te, tm = ((1 - t) * self._factor[table, p, j] + t * self._factor[table, p, j + 1] for p in (0, 1))
-        across = np.cross(way, normal)
-        across /= np.linalg.norm(across, axis=1, keepdims=True) + 1e-9
-        field = up - np.einsum("nd,nd->n", up, way)[:, None] * way
-        field /= np.linalg.norm(field, axis=1, keepdims=True) + 1e-9
-        share = np.einsum("nd,nd->n", field, across) ** 2
-        return te * share + tm * (1 - share), (1 - t) * self._delay[table, j] + t * self._delay[table, j + 1]
+
+@njit(cache=True)
+def _through(layers, ways, normals, ups, share):
+    """Factor and delay (in 1 / k) of one slab each: TE and TM parts of the upright field."""
+    factor, delay = np.empty(len(ways), np.complex128), np.empty(len(ways))
+    for i in range(len(ways)):
+        way, normal, up = vec(ways[i]), vec(normals[i]), vec(ups[i])
+        te, tm, delay[i] = window(layers[i], min(abs(dot(way, normal)), 1.0), share)
+        part = dot(upright(up, way), unit(cross(way, normal))) ** 2
+        factor[i] = te * part + tm * (1 - part)
+    return factor, delay

@@ -62,10 +62,10 @@ class Heights:
     @classmethod
     def of(cls, scene: Scene, rng: np.random.Generator) -> "Heights | None":
         """The scene's; None where all is flat."""
-        if scene.life.unevenness == 0:
+        if scene.surface_settings.unevenness == 0:
             return None
         wave = [np.sqrt(2) / length * rng.standard_normal((WAVES, 3)) for _, length in SCALES]
-        size = [np.full(WAVES, scene.life.unevenness * rms * np.sqrt(2 / WAVES)) for rms, _ in SCALES]
+        size = [np.full(WAVES, scene.surface_settings.unevenness * rms * np.sqrt(2 / WAVES)) for rms, _ in SCALES]
         return cls(np.concatenate(wave), rng.uniform(0, 2 * np.pi, WAVES * len(SCALES)), np.concatenate(size))
 
     def __call__(self, place: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:

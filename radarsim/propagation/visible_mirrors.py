@@ -10,9 +10,8 @@ from radarsim.propagation.apertures import outlines
 from radarsim.propagation.fields import along, dot, length, minus
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.obstacles import CLEARANCE
+from radarsim.propagation.obstacles import CLEARANCE, Obstacles
 from radarsim.propagation.reflectors import Flat
-from radarsim.world.scene import Scene
 
 #: A reflector is looked at in points, one to this area and at least `FEWEST`; one of which none is seen is left out.
 SPACING, FEWEST, MOST = 0.02, 4, 240
@@ -41,11 +40,11 @@ class Mirrors(NamedTuple):
         return cls(np.zeros(0, int), np.zeros((0, 2), int))
 
 
-def find(observation: Observation, flat: Flat, scene: Scene | None) -> list[Mirrors]:
+def find(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[Mirrors]:
     """Those of each frame."""
     return [
         Mirrors(some, couples(observation, frame, flat, some))
-        for frame, some in enumerate(_seen(observation, flat, scene))
+        for frame, some in enumerate(_seen(observation, flat, obstacles))
     ]
 
 
@@ -60,17 +59,19 @@ def couples(
     return np.stack([firsts[first], second], axis=1)
 
 
-def _seen(observation: Observation, flat: Flat, scene: Scene | None) -> list[Int[np.ndarray, "n"]]:
-    """Per frame, the reflectors in range that turn a face to the radar and of which something can be seen."""
+def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[Int[np.ndarray, "n"]]:
+    """Per frame, the reflectors in range that turn a face to the radar and of which something can be seen: slabs are
+    clear, here, what stands behind too many of them costs less than rays that count them."""
     index = [_turned(flat, observation, frame) for frame in range(observation.frames)]
-    if scene is None:
+    opaque = None if obstacles.transmission is None else obstacles.transmission.opaque
+    if opaque is None:
         return index
     frame, every = np.repeat(np.arange(len(index)), [len(i) for i in index]), np.concatenate(index)
     points, owner = _spread(flat, every, observation.position[frame], observation.range)
     found, number = np.zeros(len(every), bool), np.arange(len(owner)) - np.searchsorted(owner, owner)
     for some in (number < FEWEST, number >= FEWEST):  # most show themselves in a few points
         rows = np.flatnonzero(some & ~found[owner])
-        clear = ~scene.occluded(observation.position[frame[owner[rows]]], points[rows], margin=CLEARANCE)
+        clear = ~opaque.occluded(observation.position[frame[owner[rows]]], points[rows], margin=CLEARANCE)
         found[owner[rows[clear]]] = True
     return [every[(frame == k) & found] for k in range(observation.frames)]
 

@@ -14,7 +14,8 @@ from jaxtyping import Complex, Float
 from scipy.optimize import minimize
 
 from radarize.errors import InputError
-from radarize.radar.array import BOARDS, virtual_positions
+from radarize.radar.array import virtual_positions
+from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
 from radarize.radar.windows import periodic
@@ -82,10 +83,11 @@ def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarCon
     if floor <= 2 / 12:
         raise InputError(f"{source}: a noise power of {floor:.3g} counts^2, expected more than the rounding to counts")
     band, fall = band_edge(profile / floor)
-    front_end = FrontEnd(config, FrontEndConfig(band=band))
+    front_end = FrontEnd(config, FrontEndConfig.of(config.board, band=band))
     leak = find_leakage(signal, front_end, floor)
     # Thermal noise is what rounding of I and Q and the leakage's phase noise leave of it.
-    thermal = floor - 2 / 12 - (np.median(leak.skirt(config)[flat]) if leak else 0.0)
+    mask = front_end.settings.phase_noise
+    thermal = floor - 2 / 12 - (np.median(leak.skirt(config, mask)[flat]) if leak and mask else 0.0)
     thermal = max(thermal, 0.1 * floor)  # a board with less phase noise than the mask's
     gain, factor = config.rx_gain_db, front_end.settings.noise_factor(config.rx_gain_db)
     dbm = 10 * np.log10(BOLTZMANN * ROOM_TEMPERATURE * config.sample_rate * factor / 1e-3) + gain
@@ -95,7 +97,7 @@ def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarCon
         f"figure is the data sheet's {10 * np.log10(factor):.1f} dB",
         f"band flat to {band.flat:.3f} of the sample rate, noise {fall:.1f} dB down in its last sixteenth",
     ]
-    settings = FrontEndConfig(full_scale_dbm=full_scale, band=band, leakage=None)
+    settings = FrontEndConfig.of(config.board, full_scale_dbm=full_scale, band=band, leakage=None)
     leakage = None
     if leak:
         leakage = leak.relative(FrontEnd(config, settings).scale, config)
@@ -120,10 +122,10 @@ def band_edge(profile: Float[np.ndarray, "sample"]) -> tuple[Band, float]:
     best, least = Band(), np.inf
     for flat in np.arange(0.8, 1.0, 0.005):
         for high in np.arange(max(flat, 0.98) + 0.02, 1.5, 0.02):
-            model = 20 * np.log10(np.interp(x[upper], [flat, high], [1.0, 0.0]))
-            misfit = np.mean(np.abs(model - measured))
+            band = Band(flat=round(float(flat), 3), high=round(float(high), 3))
+            misfit = np.mean(np.abs(10 * np.log10(band.noise(x[upper])) - measured))
             if misfit < least:
-                best, least = Band(flat=round(float(flat), 3), high=round(float(high), 3)), misfit
+                best, least = band, misfit
     return best, fall
 
 
@@ -141,10 +143,10 @@ class _Leak:
     counts: Complex[np.ndarray, "tx rx"]
     heard: float
 
-    def skirt(self, config: RadarConfig) -> Float[np.ndarray, "sample"]:
+    def skirt(self, config: RadarConfig, mask: PhaseNoise) -> Float[np.ndarray, "sample"]:
         """Power per sample that its phase noise looks like in each range bin, counts^2."""
         f = np.arange(config.samples) * config.sample_rate / config.samples
-        noise = density(PhaseNoise(), config.center_frequency, f) * 4 * np.sin(np.pi * f * self.delay) ** 2
+        noise = density(mask, config.center_frequency, f) * 4 * np.sin(np.pi * f * self.delay) ** 2
         return np.mean(np.abs(self.counts) ** 2) * noise * config.sample_rate
 
     def relative(self, scale: float, config: RadarConfig) -> Leakage:
@@ -227,7 +229,7 @@ def _snapshots(signal, config: RadarConfig, floor: float) -> list[Complex[np.nda
     cube = np.fft.fft(np.fft.fft(signal * fast, axis=-1) * slow[:, None, None, None], axis=1)
     cycles = np.fft.fftfreq(loops)[:, None] * np.array(config.slot) / len(config.slot)  # a slot's share of a loop
     cube = cube * np.exp(-2j * np.pi * cycles)[:, :, None, None]
-    cube = cube * np.asarray(BOARDS[config.board].rx_sign)[list(config.rx)][:, None]
+    cube = cube * np.asarray(load_board(config.board).rx_sign)[list(config.rx)][:, None]
     power = np.sum(np.abs(cube) ** 2, axis=(2, 3))
     far = config.ranges > 0.3  # nearer is leakage, or no plane wave
     noise = floor * cube.shape[2] * cube.shape[3] * np.sum(slow**2) * np.sum(fast**2)

@@ -16,15 +16,13 @@ import numpy as np
 import scipy.fft
 from jaxtyping import Complex, Float, Int16
 
-from radarize.radar.array import BOARDS
+from radarize.radar.boards import load_board
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.receiver.phasenoise import Skirts
 
 BOLTZMANN = 1.380649e-23
 ROOM_TEMPERATURE = 290.0
-#: Hz, of the IF amplifier (SWRS228): as far as the receiver hears where no decimation filter closes before.
-_IF_BANDWIDTH = 10e6
 
 
 class FrontEnd:
@@ -32,7 +30,7 @@ class FrontEnd:
 
     Args:
         config: radar configuration; gives receive gain, transmit back-off, filter corners, sample rate.
-        settings: what the front end is made of; default: an IWR1843BOOST's.
+        settings: what the front end is made of; default: what the board's file says.
         rng: draws what stays the same for a board: mismatch, phases of the leakage. Default: board number 0.
 
     Attributes:
@@ -49,11 +47,11 @@ class FrontEnd:
         settings: FrontEndConfig | None = None,
         rng: np.random.Generator | None = None,
     ):
-        self.config, self.settings = config, settings or FrontEndConfig()
+        self.config, self.settings = config, settings or FrontEndConfig.of(config.board)
         rng = np.random.default_rng(0) if rng is None else rng
         enabled = np.ix_(config.tx, config.rx)
         # Some boards feed receivers from the far side of the patch.
-        self.channel = (self._draw_channel(rng) * BOARDS[config.board].rx_sign)[enabled]
+        self.channel = (self._draw_channel(rng) * load_board(config.board).rx_sign)[enabled]
         self.leakage = self._draw_leakage(rng)[enabled]
         self._bins = np.arange(config.samples) * config.sample_rate / config.samples
         self._skirts = None
@@ -112,8 +110,8 @@ class FrontEnd:
     @property
     def passband(self) -> tuple[float, float]:
         """Beat frequencies between which anything passes, Hz."""
-        band, rate = self.settings.band, self.config.sample_rate
-        return (-_IF_BANDWIDTH, _IF_BANDWIDTH) if band is None else (band.low * rate, band.high * rate)
+        band, rate, edge = self.settings.band, self.config.sample_rate, self.settings.if_bandwidth_hz
+        return (-edge, edge) if band is None else (band.low * rate, band.high * rate)
 
     def if_response(self, path_length: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"] | complex:
         """Response of the IF chain to an echo of a path length (out and back, m)."""
@@ -129,9 +127,7 @@ class FrontEnd:
 
     def _decimation(self, beat: np.ndarray) -> np.ndarray:
         band = self.settings.band
-        if band is None:
-            return np.ones(np.shape(beat))
-        return np.interp(beat / self.config.sample_rate, [band.low, 0.0, band.flat, band.high], [0.0, 1.0, 1.0, 0.0])
+        return np.ones(np.shape(beat)) if band is None else band.response(beat / self.config.sample_rate)
 
     # --- the chain ---------------------------------------------------------------------------------------------------
     def digitize(
@@ -204,12 +200,13 @@ class FrontEnd:
         return (amplitude[:, :, None] * tone).astype(np.complex64)
 
     def _thermal(self, shape: tuple[int, ...], rng: np.random.Generator) -> Complex[np.ndarray, "loop tx rx sample"]:
-        """Thermal noise by bin, coloured by the decimation filter."""
+        """Thermal noise by bin, coloured by the decimation filter; without one, that of a sample rate's width."""
         if not self.settings.noise:
             return np.zeros(shape, np.complex64)
-        level = np.sqrt(self._bin_noise / 2) * self._decimation(self._bins)
+        band, x = self.settings.band, self._bins / self.config.sample_rate
+        level = np.sqrt(self._bin_noise / 2 * (1.0 if band is None else band.noise(x)))
         draw = rng.standard_normal((*shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
-        return draw * level.astype(np.float32)
+        return draw * np.float32(level)
 
     def _image(self, bins: Complex[np.ndarray, "*trace sample"]) -> Complex[np.ndarray, "*trace sample"]:
         """Image of bin b at -b, as far as the decimation filter lets it through; bin -b is bin N - b."""

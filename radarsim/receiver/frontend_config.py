@@ -1,4 +1,4 @@
-"""Settings of the front end, with the IWR1843BOOST's as defaults; a YAML file may hold any of them.
+"""Settings of the front end. Each board's file has its own (`radarize.radar.boards`); a front-end file changes some.
 
 Every effect can be switched off by itself (`null`, `false`), and `FrontEndConfig.ideal()` has none.
 """
@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import yaml
+from jaxtyping import Float
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from radarize.errors import InputError
+from radarize.radar.boards import Board, load_board
 from radarize.replacing import replacing
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import changed, read_yaml
 from radarsim.propagation.antenna import ISOTROPIC, Antenna
 from radarsim.world.validation import format_validation_error
 
@@ -84,15 +86,13 @@ class PhaseNoise(_Strict):
     """Single-sideband phase noise of the transmitted signal.
 
     Attributes:
-        offset_hz, dbc_hz: mask for sweeps in 77-81 GHz, straight lines over the logarithm of the offset. The data
-            sheet gives one point (SWRS228: -93 dBc/Hz at 1 MHz); the fall of 20 dB a decade around it and the floor
-            towards the carrier are what a phase-locked loop does. Range correlation takes away what lies nearer.
-        lower_band_db: added where the sweep is in 76-77 GHz (SWRS228: -95 dBc/Hz).
+        offset_hz, dbc_hz: mask, straight lines over the logarithm of the offset.
+        lower_band_db: added where the sweep is below 77 GHz.
     """
 
-    offset_hz: tuple[float, ...] = (1e5, 316e3, 1e6, 1e7)
-    dbc_hz: tuple[float, ...] = (-83.0, -83.0, -93.0, -113.0)
-    lower_band_db: float = -2.0
+    offset_hz: tuple[float, ...]
+    dbc_hz: tuple[float, ...]
+    lower_band_db: float = 0.0
 
     @model_validator(mode="after")
     def _consistent(self) -> "PhaseNoise":
@@ -120,46 +120,68 @@ class Band(_Strict):
             raise ValueError(f"high is {self.high}, expected above flat = {self.flat}")
         return self
 
+    def response(self, x: Float[np.ndarray, "*n"] | float) -> Float[np.ndarray, "*n"] | float:
+        """Amplitude response at beat frequencies as fractions of the sample rate."""
+        return np.interp(x, [self.low, 0.0, self.flat, self.high], [0.0, 1.0, 1.0, 0.0])
+
+    def noise(self, x: Float[np.ndarray, "*n"]) -> Float[np.ndarray, "*n"]:
+        """Power of white noise that is sampled behind the filter, over what it is before: all aliases add up."""
+        aliases = np.arange(np.floor(self.low) - 1, np.ceil(self.high) + 1)
+        return np.sum(self.response(np.add.outer(aliases, x)) ** 2, axis=0)
+
 
 class FrontEndConfig(_Strict):
     """Everything between the field at the antennas and the samples in the file.
 
     Attributes:
         antenna: pattern of each element; null: isotropic.
-        tx_power_dbm: per transmitter at no back-off (SWRS228: 12 dBm).
+        tx_power_dbm: per transmitter at no back-off.
         noise: thermal noise.
-        noise_figure_db: by receive gain in dB (SWRS228: 15 dB at the highest gain in 77-81 GHz, 15.6 dB at 30 dB).
-            Between two points and beyond them by Friis's formula: the noise factor is linear in 1 / gain.
+        noise_figure_db: by receive gain in dB. Between two points and beyond them by Friis's formula: the noise factor
+            is linear in 1 / gain.
         full_scale_dbm: power of a complex tone of 32767 counts after the receive gain. Not in the data sheet; 5 dBm
             puts the noise floor at 10.6 counts in the `radarize` preset, as against 14 counts (4 to 5 Msps) in real
             captures, and clips 1 dB below the in-band compression point (-24 dBm at 30 dB).
         adc_bits: resolution. 16: all bits of the file carry signal, as in real captures, where the decimation filter
             has averaged a faster converter. 12: steps of 16 counts.
         leakage, mismatch, phase_noise: null: none.
+        if_bandwidth_hz: of the IF amplifier, as far as the receiver hears where no decimation filter closes before.
         high_pass: the two first-order stages of the radar configuration.
-        band: null: flat up to the 10 MHz of the IF amplifier (echoes beyond the maximum range fold).
+        band: null: flat up to `if_bandwidth_hz` (echoes beyond the maximum range fold).
         image_rejection_db: of the I/Q mixer (data sheet: 30 dB); null: perfect. The image of beat frequency f is at
             -f, outside the band of complex-1x sampling, so only images of near echoes pass `band`.
     """
 
-    antenna: Antenna | None = Antenna()
-    tx_power_dbm: float = Field(12.0, ge=-60, le=60)
+    antenna: Antenna | None
+    tx_power_dbm: float = Field(ge=-60, le=60)
     noise: bool = True
-    noise_figure_db: dict[float, float] = Field({30.0: 15.6, 48.0: 15.0}, min_length=1)
+    noise_figure_db: dict[float, float] = Field(min_length=1)
     full_scale_dbm: float = Field(5.0, ge=-100, le=100)
     adc_bits: int = Field(16, ge=2, le=16)
     leakage: Leakage | None = Leakage()
     mismatch: Mismatch | None = Mismatch()
-    phase_noise: PhaseNoise | None = PhaseNoise()
+    phase_noise: PhaseNoise | None
+    if_bandwidth_hz: float = Field(ge=1e5, le=1e9)
     high_pass: bool = True
     band: Band | None = Band()
     image_rejection_db: float | None = Field(30.0, ge=0, le=120)
 
     @classmethod
-    def ideal(cls, **changes: object) -> "FrontEndConfig":
-        """Nothing but power and a 16-bit converter, with `changes`."""
+    def of(cls, board: str | Board, **changes: object) -> "FrontEndConfig":
+        """The front end in a board's file, with changes; of its parts (`leakage={"delay": 1e-9}`), those given.
+
+        Raises:
+            InputError: unknown or impossible value, in the file or the changes; with the field.
+        """
+        board = load_board(board)
+        settings = cls.build(f"{board.name}.yaml: front_end", board.front_end)
+        return cls.build("front end", changed(settings, changes)) if changes else settings
+
+    @classmethod
+    def ideal(cls, board: str | Board = "iwr1843boost", **changes: object) -> "FrontEndConfig":
+        """Nothing but a board's power and a 16-bit converter, with `changes`."""
         off = {"noise": False, "leakage": None, "mismatch": None, "phase_noise": None, "high_pass": False}
-        return cls(**{"antenna": None, "band": None, "image_rejection_db": None, **off, **changes})
+        return cls.of(board, **{"antenna": None, "band": None, "image_rejection_db": None, **off, **changes})
 
     @property
     def pattern(self) -> Antenna:
@@ -174,8 +196,8 @@ class FrontEndConfig(_Strict):
         return max(float(np.polyval(line, 10 ** (-gain_db / 10))), 1.0)
 
     @classmethod
-    def load(cls, path: str | Path) -> "FrontEndConfig":
-        """Read a front-end file; what it does not name keeps its default.
+    def load(cls, path: str | Path, board: str | Board) -> "FrontEndConfig":
+        """Read a front-end file; what it does not name is the board's.
 
         Raises:
             InputError: unreadable, malformed YAML, unknown or impossible value; with file and field.
@@ -183,7 +205,7 @@ class FrontEndConfig(_Strict):
         data = read_yaml(path)
         if not isinstance(data, dict | None):
             raise InputError(f"{path}: holds {type(data).__name__}, expected keys such as tx_power_dbm and leakage")
-        return cls.build(str(path), data or {})
+        return cls.build(str(path), changed(cls.of(board), data or {}))
 
     @classmethod
     def build(cls, source: str, fields: dict[str, object]) -> "FrontEndConfig":

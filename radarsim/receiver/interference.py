@@ -137,11 +137,11 @@ class Interference:
         observation = Observation(here, rotation, middle, np.inf, self.config.wavelength, 0.0, *self._pattern)
         n = len(there)
         # Slabs' delays, some ps, do not matter: nobody knows the phases of another radar.
-        passed, _ = self.obstacles.passage(
+        passed = self.obstacles.passage(
             observation, np.zeros(n, int), np.repeat(here, n, axis=0), there, np.ones(n, bool)
         )
         found = []
-        for other, place, factor in zip(self.interferers, there, passed, strict=True):
+        for other, place, factor in zip(self.interferers, there, passed.factor, strict=True):
             power = 10 ** ((self.config.tx_backoff_db - other.radar.tx_backoff_db) / 20)
             link = _link(place - here[0], rotation[0], other.rotation, self._pattern)
             found.append(complex(factor * power * link * other.radar.wavelength / (4 * np.pi)))

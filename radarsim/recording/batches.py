@@ -12,13 +12,13 @@ from jaxtyping import Bool, Float, Int16
 
 from radarize.errors import InputError
 from radarize.jobs import Report, perform
-from radarsim.machine.threads import share_with_drjit
+from radarsim.machine.threads import default_workers, share_with_drjit
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.suite import Suite
 
 #: Frames that are made together, which is quicker: ray tests and loops over scatterers go well in large numbers.
 TOGETHER = 16
-#: Batches that a process has to make for its start, some seconds, to pay.
+#: Batches that a process has to make for its start, some seconds, to pay where nobody has asked for it.
 _WORTH = 8
 
 
@@ -70,7 +70,7 @@ class Batches:
             InputError: the recording is to begin with them, and none of its frames has an echo.
         """
         frames = self.frames(first, last)
-        if first == 0 and not any(map(len, frames.echoes)):
+        if first == 0 and not any(map(len, frames.paths)):
             self._require_echoes()
         arrived = np.True_ if self.valid is None else self.valid[first:last, ..., None, None, None]
         return Batch(frames.samples * arrived, self.suite.observe(frames, first, self.start))
@@ -80,14 +80,19 @@ class Batches:
         frames = len(self.times)
         return [(first, min(first + TOGETHER, frames)) for first in range(0, frames, TOGETHER)]
 
-    def each(self, spans: list[tuple[int, int]], workers: int = 1) -> Iterator[Batch]:
-        """Batches in the order of their spans, made by so many processes if there is enough for each to do.
+    def each(self, spans: list[tuple[int, int]], workers: int | None = 1) -> Iterator[Batch]:
+        """Batches in the order of their spans.
+
+        Args:
+            spans: first frames, and those after the last.
+            workers: processes that make them, no more than there are batches; 1: this one does; None: one per core,
+                as far as there is enough for each to do.
 
         Raises:
             InputError: as `made`, or a process died.
         """
-        workers = min(workers, len(spans) // _WORTH)
-        if workers < 2:
+        workers = min(default_workers(), len(spans) // _WORTH) if workers is None else workers
+        if min(workers, len(spans)) < 2:
             yield from (self.made(*span) for span in spans)
             return
         order = pickle.dumps(replace(self))  # without what was computed here
@@ -95,7 +100,7 @@ class Batches:
         made, awaited = {}, deque(jobs)
         for news in perform(jobs, workers):
             if news.error is not None:
-                raise InputError(news.error)
+                raise news.failure
             if news.ended:
                 made[news.name] = news.result
             while awaited and awaited[0] in made:
@@ -104,7 +109,7 @@ class Batches:
     def _require_echoes(self) -> None:
         """Refuse a recording of nothing, as a look at some frames all over it tells."""
         some = np.unique(np.linspace(0, len(self.times) - 1, TOGETHER).astype(int))
-        if not any(map(len, self.scenario.frames(self.times[some]).echoes)):
+        if not any(map(len, self.scenario.frames(self.times[some]).paths)):
             raise InputError(
                 f"scene {self.scenario.scene.name}: no frame has an echo, expected surfaces that face the radar within "
                 f"{self.scenario.config.max_range:.1f} m of it"

@@ -29,7 +29,7 @@ def simulate(
     scene: str | Path | Scene,
     output: Path,
     *,
-    workers: int = 1,
+    workers: int | None = 1,
     progress: Callable[[int, int], None] | None = None,
     **plan: object,
 ) -> Path:
@@ -38,11 +38,12 @@ def simulate(
     Args:
         scene: a scene, its YAML file, or the name of one that comes with the project.
         output: recording to write.
-        workers: processes beside this one that make frames; 1: this one does. A script that asks for more needs an
+        workers: processes beside this one that make frames, 16 at a time; 1: this one does; None: one per core, fewer
+            where starting them would take longer than they save. A script that asks for more than 1 needs an
             ``if __name__ == "__main__"``, as whatever starts processes does.
         progress: called with (frames done, frames in all).
-        plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, engine, sensors, platform,
-            duration, trajectory, waypoints, mounting, people.
+        plan: what is simulated, by the arguments of `planned`: seed, radar, frontend, sensors, platform, duration,
+            trajectory, waypoints, mounting, people.
 
     Returns:
         the path written.
@@ -60,7 +61,6 @@ def planned(
     seed: int = 0,
     radar: str | RadarConfig = "radarize",
     frontend: Path | FrontEndConfig | None = None,
-    engine: str = "radarsim",
     sensors: Sequence[str] = (),
     people: int = 0,
     **walk: object,
@@ -71,10 +71,7 @@ def planned(
         scene: as there.
         seed: of the tour, the scatterers and the noise.
         radar: preset, configuration file or configuration.
-        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: an IWR1843BOOST's.
-        engine: ``radarsim``, or ``sionna``: the paths of Sionna RT's own solver, for comparison. Its known defects
-            stand at the head of `physics.pathsolver`: corners, small facets and half of the ghosts are wrong, and
-            speckle is drawn anew for every frame.
+        frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: the board's own.
         sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
             are the same whatever is chosen.
         people: who walk about near the radar's way (see `crowd`).
@@ -89,11 +86,11 @@ def planned(
     config, cfg_text = load_config(radar)
     check_limits(config)
     way, names = Walk(**walk), tuple(chosen(sensors))
-    settings = FrontEndConfig.load(frontend) if isinstance(frontend, (str, Path)) else frontend or FrontEndConfig()
+    settings = FrontEndConfig.load(frontend, config.board) if isinstance(frontend, (str, Path)) else frontend
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
     motion = way.through(world, seed)
     world = crowded(world, motion, people, seed)
-    scenario = Scenario(world, motion, config, settings, seed, names, engine)
+    scenario = Scenario(world, motion, config, settings, seed, names)
     about = {"platform": "trajectory" if way.trajectory is not None else way.platform}
     return scenario, cfg_text, about | ({"people": people} if people else {})
 
@@ -104,7 +101,7 @@ def record(
     *,
     cfg_text: str = "",
     attributes: Mapping[str, object] | None = None,
-    workers: int = 1,
+    workers: int | None = 1,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
     """Write a recording of a scenario; what a killed run has left of the very same one is taken over.
@@ -156,7 +153,7 @@ def facts(scenario: Scenario) -> dict[str, object]:
         "scene": scenario.scene.name,
         "seed": scenario.seed,
         "radarsim_version": __version__,
-        "engine": scenario.engine,
+        "engine": "radarsim",
         "front_end": scenario.front_end.model_dump_json(),
         "motion": Statistics.of(scenario.motion, scenario.scene).json(),
         "warnings": crossings(scenario.motion, scenario.scene),

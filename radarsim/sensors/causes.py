@@ -1,57 +1,59 @@
 """How many echoes there are and how strong, by cause, and the I/Q split by cause."""
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, UInt8
 
 from radarize.recording import Stream
 from radarsim.machine.threads import one_blas_thread
-from radarsim.propagation.echoes import Echoes, Provenance
+from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 
-_NAMES = ", ".join(p.name.lower() for p in Provenance)
+_NAMES = ", ".join(p.name.lower() for p in PathType)
 #: Parts of /truth/adc_by_cause, in this order; where other radars send, interference comes before the leakage.
-CAUSES = (*(p.name.lower() for p in Provenance), "leakage")
+CAUSES = (*(p.name.lower() for p in PathType), "leakage")
 
 
 class CauseCounts(Sensor):
     """Number and total power of the echoes of each cause."""
 
     streams = {
-        "truth/echoes": Stream((len(Provenance),), "i4", "", f"echoes per cause: {_NAMES}"),
-        "truth/echo_power": Stream((len(Provenance),), "f4", "1", f"received over transmitted power: {_NAMES}"),
+        "truth/echoes": Stream((len(PathType),), "i4", "", f"echoes per cause: {_NAMES}"),
+        "truth/echo_power": Stream((len(PathType),), "f4", "1", f"received over transmitted power: {_NAMES}"),
     }
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Counts and powers."""
-        count = [np.bincount(e.provenance, minlength=len(Provenance)) for e in frames.echoes]
-        power = [np.bincount(e.provenance, np.abs(e.amplitude) ** 2, minlength=len(Provenance)) for e in frames.echoes]
+        count = [np.bincount(types, minlength=len(PathType)) for types in frames.types]
+        each = zip(frames.types, frames.paths, strict=True)
+        power = [np.bincount(types, np.abs(p.amplitude) ** 2, minlength=len(PathType)) for types, p in each]
         return {"truth/echoes": np.array(count), "truth/echo_power": np.array(power)}
 
 
 class AdcByCause(Sensor):
-    """I/Q of each cause before noise and converter."""
+    """I/Q of each cause before noise and converter, of which a part may exceed what either that or a float16 holds."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
         names = CAUSES if not scenario.scene.interferers else (*CAUSES[:-1], "interference", CAUSES[-1])
         about = "I/Q before noise and converter, by cause, which add up: " + ", ".join(names)
         shape = (len(names), *scenario.config.frame_shape)
-        self.streams = {"truth/adc_by_cause": Stream(shape, "f2", "ADC counts", about)}
+        self.streams = {"truth/adc_by_cause": Stream(shape, "f4", "ADC counts", about)}
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The parts."""
         others = [frames.interference] if self.scenario.scene.interferers else []
-        each = zip(frames.lengths, frames.received, frames.echoes, *others, strict=True)
+        each = zip(frames.lengths, frames.received, frames.types, *others, strict=True)
         parts = np.stack([self._split(*one) for one in each])
-        return {"truth/adc_by_cause": np.stack([parts.real, parts.imag], axis=-1).astype(np.float16)}
+        return {"truth/adc_by_cause": np.stack([parts.real, parts.imag], axis=-1).astype(np.float32)}
 
     @one_blas_thread
     def _split(
-        self, lengths: Float[np.ndarray, "echo virtual 3"], amplitudes: Complex[np.ndarray, "echo"], echoes: Echoes,
+        self, lengths: Float[np.ndarray, "path virtual 3"], amplitudes: Complex[np.ndarray, "path"],
+        types: UInt8[np.ndarray, "path"],
         *others: Complex[np.ndarray, "loop tx rx sample"],
     ) -> Complex[np.ndarray, "cause loop tx rx sample"]:  # fmt: skip
         """Counts of each cause in a frame, and of signals that are no echoes."""
-        masks = [echoes.provenance == cause for cause in Provenance]
+        masks = [types == each for each in PathType]
         signals = [self.scenario.synthesize(lengths[mask], amplitudes[mask]) for mask in masks]
         return np.stack(self.scenario.board.by_cause([*signals, *others]))

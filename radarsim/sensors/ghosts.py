@@ -19,7 +19,7 @@ from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.radar.windows import taylor
 from radarize.recording import Product, Stream
 from radarsim.propagation.burst import BurstClock
-from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.path_types import PathType
 from radarsim.receiver.synthesis import _sincos_cycles
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import CAUSES
@@ -49,11 +49,11 @@ class Ghosts(Sensor):
         leakage = np.fft.fft(front_end.by_cause([])[0][0] * window, axis=-1).reshape(-1, config.samples)
         self._leakage = self._maps.beams(leakage[self._maps.row].T[None])
         shape = (config.samples, len(AZIMUTHS))
-        names = ", ".join(p.name.lower() for p in Provenance)
+        names = ", ".join(p.name.lower() for p in PathType)
         labels = ", ".join(f"{i} {name}" for i, name in enumerate(CAUSES))
         self.streams = {
             "truth/cause_power": Stream(
-                (len(Provenance), *shape), "f2", "dB of ADC counts^2",
+                (len(PathType), *shape), "f2", "dB of ADC counts^2",
                 f"range-azimuth power by cause ({names}), not below {DEPTH:g} dB under the noise",
             ),
             "truth/cause": Stream(
@@ -69,8 +69,8 @@ class Ghosts(Sensor):
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Maps and labels."""
         power, cause = [], []
-        for lengths, amplitudes, echoes in zip(frames.lengths, frames.received, frames.echoes, strict=True):
-            maps = self._maps(lengths, self.scenario.board.scale * amplitudes, echoes.provenance)
+        for lengths, amplitudes, types in zip(frames.lengths, frames.received, frames.types, strict=True):
+            maps = self._maps(lengths, self.scenario.board.scale * amplitudes, types)
             power.append(maps)
             cause.append(self.label(maps))
         level = 10 * np.log10(np.maximum(np.stack(power), 10 ** ((self._floor - DEPTH) / 10)))
@@ -139,13 +139,13 @@ class CauseMaps:
         self,
         lengths: Float[np.ndarray, "echo virtual 3"],
         amplitudes: Complex[np.ndarray, "echo"],
-        provenance: UInt8[np.ndarray, "echo"],
+        types: UInt8[np.ndarray, "echo"],
     ) -> Float[np.ndarray, "cause range azimuth"]:
         """Power of each cause in the square of the amplitudes' unit."""
         n = self.config.samples
-        spectra = np.zeros((_INSTANTS, len(Provenance), n, 2, len(self.row)), np.float32)
+        spectra = np.zeros((_INSTANTS, len(PathType), n, 2, len(self.row)), np.float32)
         polar = np.abs(amplitudes).astype(np.float32), np.angle(amplitudes) / (2 * np.pi)
-        _spread(spectra, lengths, polar, provenance, self._tones)
+        _spread(spectra, lengths, polar, types, self._tones)
         return self.beams(spectra[..., 0, :] + 1j * spectra[..., 1, :])
 
     def beams(self, spectra: Complex[np.ndarray, "instant *cell antenna"]) -> Float[np.ndarray, "*cell azimuth"]:
@@ -155,7 +155,7 @@ class CauseMaps:
 
 
 @njit(parallel=True, fastmath=True, cache=True)
-def _spread(spectra, lengths, polar, provenance, tones):
+def _spread(spectra, lengths, polar, types, tones):
     """spectra[instant, cause, bin, (re, im), antenna] += A exp(j phase) K(tone - bin); `polar`: A's sizes and turns.
 
     Phase and tone are those of `synthesis`. The tone is taken to be the same for all antennas: across the array it
@@ -183,7 +183,7 @@ def _spread(spectra, lengths, polar, provenance, tones):
                 x = (below - _WIDTH + 1 + k - tone + _WIDTH) * _FINE
                 at = min(max(int(x), 0), 2 * _WIDTH * _FINE - 1)
                 weight = kernel[at] + np.float32(x - at) * (kernel[at + 1] - kernel[at])
-                cell = spectra[i, provenance[e], (below - _WIDTH + 1 + k) % n]
+                cell = spectra[i, types[e], (below - _WIDTH + 1 + k) % n]
                 for part in range(2):
                     for a in range(antennas):
                         cell[part, a] += weight * wave[part, a]

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from radarize.errors import InputError
+from radarsim import plugins
 from radarsim.machine.threads import one_blas_thread
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import AdcByCause, CauseCounts
@@ -12,6 +13,7 @@ from radarsim.sensors.depth import DepthCamera, DepthStrip
 from radarsim.sensors.ghosts import Ghosts
 from radarsim.sensors.imu import Imu
 from radarsim.sensors.lidar import Lidar
+from radarsim.sensors.paths import TruePaths
 from radarsim.sensors.points import ChipPoints
 from radarsim.sensors.pose import TruePose
 from radarsim.sensors.scan import Occupancy, PlanarScan
@@ -20,7 +22,7 @@ from radarsim.sensors.tracking import TrackingCamera
 
 #: Sensors that cost next to nothing and are always there.
 ALWAYS = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}
-#: Sensors to choose from.
+#: Sensors to choose from; plug-ins enter theirs.
 SENSORS = {
     "depth": DepthCamera,
     "depth-strip": DepthStrip,
@@ -31,9 +33,10 @@ SENSORS = {
     "ghosts": Ghosts,
     "lidar": Lidar,
     "adc-by-cause": AdcByCause,
+    "paths": TruePaths,
 }
-#: Not part of ``all``: either depth camera writes the same stream, and the other is several times the recording.
-_APART = {"depth-strip", "adc-by-cause"}
+#: Not part of ``all``: either depth camera writes the same stream, the others are as large as the recording or larger.
+_APART = {"depth-strip", "adc-by-cause", "paths"}
 
 
 def chosen(names: Sequence[str]) -> list[str]:
@@ -43,6 +46,7 @@ def chosen(names: Sequence[str]) -> list[str]:
     Raises:
         InputError: there is no such sensor, or two exclude each other.
     """
+    plugins.load()
     for name in names:
         if name not in SENSORS and name != "all":
             raise InputError(f"sensors: {name!r} is unknown, expected all or some of {', '.join(SENSORS)}")

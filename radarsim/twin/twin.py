@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
-from radarize.radar.array import BOARDS
+from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarsim.motion.statistics import crossings
@@ -39,7 +39,7 @@ class Options:
         origin: where the poses' origin is in the scene; default: they are the scene's own coordinates.
         mounting: of the radar on the body that the poses are of; default: they are the radar's own.
         at: the place of a radar at rest, instead of poses.
-        frontend: front-end file (see `FrontEndConfig`); default: an IWR1843BOOST's, with channels that the recording's
+        frontend: front-end file (see `FrontEndConfig`); default: the board's, with channels that the recording's
             channel calibration makes equal.
         fit: fit the front end to the recording instead (`calibrate`), and keep it beside the output as ``.yaml``.
         every: simulate every so manieth frame.
@@ -97,7 +97,7 @@ def make_twin(
         frontend = Path(output).with_suffix(".yaml")
         calibrate(recording, frontend)
     config = walk.config
-    settings = FrontEndConfig.load(frontend) if frontend else _calibrated(config)
+    settings = FrontEndConfig.load(frontend, config.board) if frontend else _calibrated(config)
     scenario = Scenario(world, walk.motion, config, settings, options.seed, tuple(chosen(options.sensors)))
     crossed = crossings(walk.motion, world)
     about = {
@@ -228,10 +228,8 @@ def _require_inside(places: Float[np.ndarray, "frame 3"], world: Scene, path: Pa
 
 def _calibrated(config: RadarConfig) -> FrontEndConfig:
     """The default board; where the recording has a channel calibration, a board of which that is the right one."""
-    nominal = np.array(BOARDS[config.board].channel_calibration)
-    factors = np.array(config.channel_calibration)
-    if np.array_equal(factors, nominal):
-        return FrontEndConfig()
+    if config.channel_calibration is None:
+        return FrontEndConfig.of(config.board)
     # The simulated board turns the receivers' signs by itself.
-    channels = nominal[:, 0] / (factors[:, 0] + 1j * factors[:, 1])
-    return FrontEndConfig(mismatch=Mismatch(channels=tuple(Channel.of(c) for c in channels)))
+    channels = load_board(config.board).rx_sign / config.channel_factors
+    return FrontEndConfig.of(config.board, mismatch=Mismatch(channels=tuple(map(Channel.of, channels.ravel()))))

@@ -22,40 +22,41 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
-``clutter`` and ``unevenness`` say how far the place is from its drawing (see `life.Life`): 1 as in rooms that are
-lived in; left out, 0: not at all. With clutter the scene has more objects (see `things`). ``interferers`` are other
-radars that send there (see `interferers`); levels change and add them, too.
+``clutter`` and ``unevenness`` are the clutter and roughness settings (`SurfaceSettings`): 1 as in furnished rooms that
+are in use; default 0. With clutter the scene has more objects (`small_objects`). ``interferers`` are other radars that
+send there (`interferers`); levels change and add them, too.
 """
 
 import re
 from fnmatch import fnmatchcase
+from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Union
 
 import numpy as np
 import trimesh
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 
 from radarize.errors import InputError
 from radarize.files import within
 from radarize.yamlfile import read_yaml
+from radarsim import plugins
 from radarsim.world import shapes
-from radarsim.world.generators.buildings import Building
-from radarsim.world.generators.office import Office
-from radarsim.world.generators.things import things
+from radarsim.world.generators.buildings import Building, Office
+from radarsim.world.generators.small_objects import small_objects
 from radarsim.world.interferers import Interferer
-from radarsim.world.life import Life
 from radarsim.world.materials import Material, constant, decibel, material
 from radarsim.world.movers import Mover
 from radarsim.world.objects import SceneObject
 from radarsim.world.squareness import out_of_square
+from radarsim.world.surface_settings import SurfaceSettings
 from radarsim.world.validation import format_validation_error
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=10)]
 Vector = tuple[Number, Number, Number]
-Parts = tuple[str, list[SceneObject], list[Mover], Life, list[Interferer]]
+Parts = tuple[str, list[SceneObject], list[Mover], SurfaceSettings, list[Interferer]]
 
 
 class _Strict(BaseModel):
@@ -86,21 +87,23 @@ class CustomMaterial(_Strict):
     custom: Custom
 
 
-class _Item(_Strict):
+class Shape(_Strict):
+    """An object of a scene file. A subclass with a `shape` of its own and `mesh(folder)` can be named there."""
+
     name: Annotated[str, Field(min_length=1)]
     material: str | CustomMaterial
     position: Vector = (0.0, 0.0, 0.0)
     solid: bool = False  # part of the surface of a body, though open: seen from its outside only
 
 
-class _Turned(_Item):
+class TurnedShape(Shape):
     rotation: Vector = (0.0, 0.0, 0.0)  # roll, pitch, yaw in degrees
 
     def _placed(self, shape: trimesh.Trimesh) -> trimesh.Trimesh:
         return shapes.placed(shape, self.position, np.deg2rad(self.rotation))
 
 
-class Box(_Turned):
+class Box(TurnedShape):
     shape: Literal["box"]
     size: tuple[Length, Length, Length]
 
@@ -108,7 +111,7 @@ class Box(_Turned):
         return self._placed(shapes.box((0, 0, 0), self.size))
 
 
-class Rectangle(_Item):
+class Rectangle(Shape):
     shape: Literal["rectangle"]
     size: tuple[Length, Length]  # width, height
     facing: Vector
@@ -119,7 +122,7 @@ class Rectangle(_Item):
         return shapes.rectangle(self.position, self.size, self.facing)
 
 
-class Cylinder(_Turned):
+class Cylinder(TurnedShape):
     shape: Literal["cylinder"]
     radius: Length
     height: Length
@@ -129,7 +132,7 @@ class Cylinder(_Turned):
         return self._placed(shapes.cylinder((0, 0, 0), self.radius, self.height, self.sides))
 
 
-class Sphere(_Item):
+class Sphere(Shape):
     shape: Literal["sphere"]
     radius: Length
     subdivisions: Annotated[int, Field(ge=0, le=6)] = 3
@@ -138,7 +141,7 @@ class Sphere(_Item):
         return shapes.sphere(self.position, self.radius, self.subdivisions)
 
 
-class Mesh(_Turned):
+class Mesh(TurnedShape):
     shape: Literal["mesh"]
     file: str
     scale: Length = 1.0
@@ -175,7 +178,7 @@ class Description(_Strict):
     """A scene file. Needs objects, a building, or both."""
 
     name: str = ""
-    objects: list[Annotated[Box | Rectangle | Cylinder | Sphere | Mesh, Field(discriminator="shape")]] = []
+    objects: list[Shape] = []
     building: Annotated[Office | Building, Field(discriminator="kind")] | None = None
     moving: list[Mover] = []
     levels: list[Level] = []
@@ -184,9 +187,32 @@ class Description(_Strict):
     interferers: list[Interferer] = []
 
     @property
-    def life(self) -> Life:
-        """What tells the place from its drawing."""
-        return Life(self.clutter, self.unevenness)
+    def surface_settings(self) -> SurfaceSettings:
+        """Clutter and roughness."""
+        return SurfaceSettings(self.clutter, self.unevenness)
+
+
+def description_model() -> type[Description]:
+    """The description with all shapes and movers that there are, those of plug-ins included."""
+    plugins.load()
+    return _model_of(_kinds(Shape, "shape"), _kinds(Mover, "kind"))
+
+
+@lru_cache
+def _model_of(shapes: tuple[type, ...], movers: tuple[type, ...]) -> type[Description]:
+    objects, moving = (
+        list[Annotated[Union[classes], Field(discriminator=tag)]]  # noqa: UP007
+        for classes, tag in ((shapes, "shape"), (movers, "kind"))
+    )
+    return create_model("Description", __base__=Description, objects=(objects, []), moving=(moving, []))
+
+
+def _kinds(base: type[BaseModel], tag: str) -> tuple[type, ...]:
+    """All subclasses that a scene file can name, in the order in which they were defined."""
+    found = []
+    for each in base.__subclasses__():
+        found += ([each] if tag in each.__annotations__ else []) + list(_kinds(each, tag))
+    return tuple(found)
 
 
 def split_level(name: str | Path) -> tuple[str, int]:
@@ -242,7 +268,7 @@ def meshes(path: Path) -> list[Path]:
 
 
 def read(path: Path, level: int = 0) -> Parts:
-    """Name, objects, movers, life and interferers of a scene file at one of its levels.
+    """Name, objects, movers, surface settings and interferers of a scene file at one of its levels.
 
     Raises:
         InputError: unreadable, malformed YAML, unknown key, value, material, mesh file or level.
@@ -253,7 +279,7 @@ def read(path: Path, level: int = 0) -> Parts:
 
 
 def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
-    """Name ("" where it has none), objects, movers, life and interferers of a description as read from YAML.
+    """Name (or ""), objects, movers, surface settings and interferers of a description as read from YAML.
 
     Args:
         data: the description.
@@ -269,14 +295,14 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
         objects = [SceneObject(o.name, o.mesh(folder), _material(o), o.solid) for o in description.objects]
         if description.building:
             objects += description.building.build()
-        objects += things(objects, description.clutter)
+        objects += small_objects(objects, description.clutter)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
     if description.building:
         objects = out_of_square(objects, description.unevenness, description.building.seed)
-    return description.name, objects, description.moving, description.life, description.interferers
+    return description.name, objects, description.moving, description.surface_settings, description.interferers
 
 
 def described(data: object, source: str, level: int = 0) -> Description:
@@ -288,17 +314,18 @@ def described(data: object, source: str, level: int = 0) -> Description:
     if not isinstance(data, dict):
         raise InputError(f"{source}: holds {type(data).__name__}, expected keys such as objects and building")
     try:
-        plain = Description.model_validate(data)
+        model = description_model()
+        plain = model.model_validate(data)
         if not 0 <= level <= len(plain.levels):
             raise InputError(f"{source}: level is {level}, expected 0 to {len(plain.levels)}")
         for changes in plain.levels[:level]:
-            data = _laid_upon(data, changes)
-        return Description.model_validate(data)
+            data = apply_level(data, changes)
+        return model.model_validate(data)
     except ValidationError as error:
         raise InputError(f"{source}: {format_validation_error(error, data)}") from error
 
 
-def _laid_upon(data: dict, changes: Level) -> dict:
+def apply_level(data: dict, changes: Level) -> dict:
     """A description with the changes of a level."""
     parts = {}
     for part in ("objects", "moving", "interferers"):
@@ -312,7 +339,7 @@ def _laid_upon(data: dict, changes: Level) -> dict:
     return data | parts
 
 
-def _material(item: _Item) -> Material:
+def _material(item: Shape) -> Material:
     if isinstance(item.material, CustomMaterial):
         return item.material.custom.material(f"custom {item.name}")
     try:

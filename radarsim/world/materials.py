@@ -7,26 +7,28 @@ lies outside every band (brick, plywood, marble, vinyl, carpet, asphalt, acrylic
 Reflection and the diffuse floor share one energy budget. Roughness takes the factor
 rho = exp(-8 (pi sigma_h cos(theta) / lambda)^2) from the coherent amplitude, and what it takes comes back as diffuse
 scattering, sigma0 = 4 (1 - rho^2) |Gamma|^2: the backscatter coefficient at normal incidence were it all Lambertian
-(effective roughness, Degli-Esposti et al., IEEE TAP 55(1), 2007). The table's `sigma0` are these values rounded, and a
-few dB less for coarse or porous surfaces (carpet, fabric, mineral fibre, asphalt), which absorb part of what they take.
+(effective roughness, Degli-Esposti et al., IEEE TAP 55(1), 2007). `materials.yaml` has these values rounded, and a few
+dB less for coarse or porous surfaces (carpet, fabric, mineral fibre, asphalt), which absorb part of what they take.
 RMS heights are estimates for common finishes; expect sigma0 within some 5 dB of a given real wall.
 
-Lobes share out the same power (`radarsim.propagation.scatteringpattern`). Plain surfaces, whose roughness is gentle,
+Lobes share out the same power (`radarsim.propagation.media`). Plain surfaces, whose roughness is gentle,
 scatter about the specular direction; the paper's measured walls ask for such a lobe, of exponent 4. Masonry and
 aggregate have joints and pits that face the source and throw more back; cloth, fibre and foam are volumes and follow
-Lambert. The shares (`_LOBES`) are estimates; against Lambert they raise backscatter by 1.5 dB at normal incidence and
+Lambert. The shares are estimates; against Lambert they raise backscatter by 1.5 dB at normal incidence and
 lower it by as much at grazing.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Complex, Float
 
 from radarize.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.yamlfile import read_yaml
 
 EPS0 = 8.8541878128e-12
 
@@ -192,46 +194,14 @@ def decibel(value: float) -> float:
     return 10.0 ** (value / 10.0)
 
 
-_ITU = "ITU-R P.2040-4"
-_ITU_GAP = "ITU-R P.2040-4, interpolated between or carried beyond its bands"
-# name: permittivity, RMS height m, sigma0 dB, thickness m, colour, source
-_TABLE = {
-    "concrete": ("concrete", 0.10e-3, -12, None, (0.62, 0.62, 0.60), _ITU),
-    "brick": ("brick", 0.20e-3, -8, None, (0.64, 0.33, 0.25), _ITU_GAP),
-    "plasterboard": ("plasterboard", 0.05e-3, -22, 12.5e-3, (0.90, 0.89, 0.85), _ITU),
-    "wood": ("wood", 0.05e-3, -24, None, (0.60, 0.42, 0.24), _ITU),
-    "plywood": ("plywood", 0.06e-3, -22, 18e-3, (0.74, 0.58, 0.38), _ITU_GAP),
-    "chipboard": ("chipboard", 0.04e-3, -24, 25e-3, (0.82, 0.72, 0.55), _ITU),
-    "floorboard": ("floorboard", 0.05e-3, -20, None, (0.68, 0.50, 0.30), _ITU),
-    "glass": ("glass", 0.001e-3, -40, 6e-3, (0.55, 0.76, 0.88), _ITU),
-    "ceiling board": ("ceiling_board", 0.40e-3, -17, 15e-3, (0.95, 0.95, 0.93), _ITU + "; porous: volume scattering"),
-    "marble": ("marble", 0.01e-3, -32, None, (0.80, 0.78, 0.74), _ITU_GAP),
-    "vinyl": ("vinyl_tile", 0.03e-3, -25, None, (0.70, 0.72, 0.70), _ITU_GAP),
-    "carpet": ("carpet_tile", 0.80e-3, -14, None, (0.36, 0.42, 0.52), _ITU_GAP + "; fibres: volume scattering"),
-    "asphalt": ("asphalt_concrete", 0.60e-3, -7, None, (0.25, 0.25, 0.25), _ITU_GAP + "; aggregate of several mm"),
-    "acrylic": ("clear_acrylic", 0.005e-3, -38, 3e-3, (0.18, 0.19, 0.21), _ITU_GAP + "; Lamb 1996 at 90 GHz"),
-    # Cotton and foam at 60-100 GHz: eps' 1.3 to 1.7 by packing, loss tangent about 0.03; an estimate.
-    "fabric": (constant(1.5, 0.19), 0.50e-3, -17, None, (0.22, 0.30, 0.45), "estimate for woven cloth on foam"),
-    "skin": (skin, 0.10e-3, -9, None, (0.85, 0.65, 0.55), "Gabriel et al. 1996"),
-    # Painted sheet steel: reflects as a conductor; the diffuse part stands for seams, screws and paint.
-    "metal": (None, 0.02e-3, -22, None, (0.45, 0.48, 0.53), "perfect conductor; roughness of painted sheet"),
-}
-
-#: Directive and backscatter shares of the diffuse power; none: Lambert.
-_LOBES = dict.fromkeys(
-    ["concrete", "plasterboard", "wood", "plywood", "chipboard", "floorboard", "glass", "marble", "vinyl", "acrylic",
-     "metal"], (0.4, 0.1),
-) | dict.fromkeys(["brick", "asphalt"], (0.2, 0.3))  # fmt: skip
-
-#: Acrylic stands for black fronts of screens and machines.
-_CLEAR = {"glass"}
-
-MATERIALS: dict[str, Material] = {
-    name: Material(
-        name, eps, rms, decibel(db), thickness, color, source, *_LOBES.get(name, (0.0, 0.0)), clear=name in _CLEAR
+def _registered(name: str, permittivity: object, sigma0_db: float, color: list[float], **about: object) -> Material:
+    law = (
+        skin if permittivity == "skin" else constant(*permittivity) if isinstance(permittivity, list) else permittivity
     )
-    for name, (eps, rms, db, thickness, color, source) in _TABLE.items()
-}
+    return Material(name, law, sigma0=decibel(sigma0_db), color=tuple(color), **about)
+
+
+MATERIALS = {name: _registered(name, **about) for name, about in read_yaml(Path(__file__).with_suffix(".yaml")).items()}
 
 
 def material(name: str) -> Material:

@@ -76,7 +76,9 @@ class Part:
         return point, normal
 
 
-class MovingThing(BaseModel, ABC):
+class Mover(BaseModel, ABC):
+    """What moves by itself. A subclass with a `kind` of its own can be named in scene files."""
+
     model_config = ConfigDict(extra="forbid", frozen=True)
 
     name: Annotated[str, Field(min_length=1)]
@@ -90,7 +92,7 @@ class MovingThing(BaseModel, ABC):
         """Rotation (part to world) and centre (m) of every part at times t, s."""
 
 
-class Person(MovingThing):
+class Person(Mover):
     """Somebody who walks to and fro along a polyline, arms and legs swinging.
 
     Ten capsules: trunk, head, upper and lower arms and legs. Hips and shoulders swing as sines at the step frequency,
@@ -178,7 +180,7 @@ class Person(MovingThing):
         return place, bearing @ weight
 
 
-class Door(MovingThing):
+class Door(Mover):
     """A leaf of a material that swings about a vertical hinge between two angles, as a sine."""
 
     kind: Literal["door"] = "door"
@@ -211,7 +213,7 @@ class Door(MovingThing):
         return turn.as_matrix()[:, None], (np.asarray(self.hinge) + turn.apply([self.width / 2, 0, 0]))[:, None]
 
 
-class Fan(MovingThing):
+class Fan(Mover):
     """Blades that turn about an axis."""
 
     kind: Literal["fan"] = "fan"
@@ -247,11 +249,8 @@ class Fan(MovingThing):
         return blade, np.asarray(self.center) + center
 
 
-Mover = Annotated[Person | Door | Fan, Field(discriminator="kind")]
-
-
 def poses(
-    movers: list[MovingThing], t: Float[np.ndarray, "n"]
+    movers: list[Mover], t: Float[np.ndarray, "n"]
 ) -> tuple[Float[np.ndarray, "n part 3 3"], Float[np.ndarray, "n part 3"]]:
     """Rotation and centre of every part of every mover at times, s."""
     if not movers:

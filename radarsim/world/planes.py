@@ -25,6 +25,10 @@ STRAIGHT = 2.0
 #: A region that fills this share of its bounding rectangle is taken for it, unless it is one trapezoid: walls that lean
 #: fill all but a thousandth, and meet without an overlap. Other regions are cut into strips.
 SMALLEST_FILL, EXACT_FILL = 0.97, 1 - 1e-6
+#: Straightening an outline changes its area by less than this share.
+LOSS = 0.01
+#: Outlines are computed on a grid of this step, m. What is not ten steps wide is left out.
+GRID = 1e-6
 
 
 @dataclass(frozen=True)
@@ -161,14 +165,13 @@ def _cover(mesh, faces) -> list[Plate]:
     corners = shapely.get_coordinates(outline)
     sides = np.diff(corners[:3], axis=0)
     lengths = np.linalg.norm(sides, axis=1)
-    if len(corners) < 5 or lengths.min() < 1e-6:
+    if len(corners) < 5 or lengths.min() < 10 * GRID:
         return []
     turn = sides[0] / lengths[0]
     turn = np.array([turn, [-turn[1], turn[0]]])
     fill, quads = mesh.area_faces[faces].sum() / lengths.prod(), []
     if fill < EXACT_FILL:
-        region = shapely.union_all(shapely.polygons(flat @ turn.T), grid_size=1e-6)
-        quads = trapezoids(shapely.simplify(region, OFFSET))
+        quads = trapezoids(_smoothed(shapely.union_all(shapely.polygons(flat @ turn.T), grid_size=GRID)))
     if fill >= SMALLEST_FILL and len(quads) != 1:
         quads = [shapely.get_coordinates(shapely.transform(outline, lambda xy: xy @ turn.T).envelope)[:4]]
     u, v = turn @ axes
@@ -179,6 +182,13 @@ def _cover(mesh, faces) -> list[Plate]:
         half = np.array([x1 - x0, y1 - y0]) / 2
         found.append(Plate(center + quad @ np.stack([u, v]), middle, normal, u, v, half))
     return found
+
+
+def _smoothed(region: shapely.Geometry) -> shapely.Geometry:
+    """A region without what its outline's corners are off straight lines, unless that takes more than `LOSS` of it."""
+    tolerances = OFFSET / 2.0 ** np.arange(12)
+    coarse = (shapely.simplify(region, tolerance) for tolerance in tolerances)
+    return next((found for found in coarse if abs(found.area - region.area) < LOSS * region.area), region)
 
 
 def trapezoids(region: shapely.Geometry) -> list[Float[np.ndarray, "4 2"]]:
@@ -192,17 +202,22 @@ def trapezoids(region: shapely.Geometry) -> list[Float[np.ndarray, "4 2"]]:
 
 
 def _trapezoids(region) -> list[Float[np.ndarray, "4 2"]]:
-    levels = np.sort(shapely.get_coordinates(region)[:, 1])
-    levels = levels[np.diff(levels, prepend=-np.inf) > 1e-6]
-    found = []
+    rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(shapely.get_parts(region))]
+    sides = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
+    sides = np.take_along_axis(sides, sides[:, :, 1].argsort(axis=1)[:, :, None], axis=1)  # upwards
+    levels = np.unique(sides[:, :, 1])
+    levels = levels[np.diff(levels, prepend=-np.inf) > GRID]
+    (x0, y0), (x1, y1) = sides.transpose(1, 2, 0)
+    thin, found = min(OFFSET / 2, LOSS / 2 * np.ptp(sides[:, :, 0])), []
     for low, high in zip(levels[:-1], levels[1:], strict=True):
-        margin = min(1e-6, (high - low) / 10)
-        below, above = _crossings(region, low + margin), _crossings(region, high - margin)
-        if below.shape != above.shape:  # they differ where a part is thinner than the margin
-            below = above = _crossings(region, (low + high) / 2)
-        for (x0, x1), (x3, x2) in zip(below, above, strict=True):
-            if x1 - x0 + x2 - x3 > OFFSET / 2:
-                found.append(np.array([[x0, low], [x1, low], [x2, high], [x3, high]]))
+        middle = (low + high) / 2
+        through = (y0 <= middle) & (middle < y1)
+        share = (np.array([[low], [middle], [high]]) - y0[through]) / (y1 - y0)[through]
+        x = x0[through] + share.clip(0, 1) * (x1 - x0)[through]
+        bottom, _, top = x[:, np.argsort(x[1])].reshape(3, -1, 2)  # the region lies between the 1st and 2nd side, ...
+        for (a, b), (d, c) in zip(bottom, top, strict=True):
+            if b - a + c - d > thin:
+                found.append(np.array([[a, low], [b, low], [c, high], [d, high]]))
     return found
 
 
@@ -221,11 +236,3 @@ def inner_rectangle(quad: Float[np.ndarray, "4 2"]) -> tuple[float, float, float
         if (right - left) * (y1 - y0) > (best[2] - best[0]) * (best[3] - best[1]):
             best = left, y0, right, y1
     return (best[1], best[0], best[3], best[2]) if flip else best
-
-
-def _crossings(region, y: float) -> Float[np.ndarray, "interval 2"]:
-    """Intervals of x in which a region is crossed by a line of constant y."""
-    x0, _, x1, _ = region.bounds
-    cut = shapely.intersection(region, shapely.LineString([(x0 - 1, y), (x1 + 1, y)]))
-    intervals = [np.sort(shapely.get_coordinates(part)[:, 0])[[0, -1]] for part in shapely.get_parts(cut)]
-    return np.array(sorted(i.tolist() for i in intervals if i[1] > i[0])).reshape(-1, 2)

@@ -17,9 +17,9 @@ from numba import njit
 from radarize.errors import InputError
 from radarsim.machine import llvm
 from radarsim.world.description import built, find, read, split_level
-from radarsim.world.life import DRAWN, Life
 from radarsim.world.materials import EPS0, Material
 from radarsim.world.objects import SceneObject
+from radarsim.world.surface_settings import IDEAL, SurfaceSettings
 
 FREQUENCY = 77e9  # at which Sionna RT's own solvers start out
 _REACH = 1000.0
@@ -34,7 +34,7 @@ class Scene:
         name: for titles and recordings.
         objects: with unique names.
         movers: things that move by themselves (`movers`); ray tests know the objects only.
-        life: how lived-in the place is.
+        surface_settings: clutter and roughness.
         interferers: other radars that send (`interferers`).
 
     Attributes:
@@ -51,11 +51,11 @@ class Scene:
         name: str,
         objects: list[SceneObject],
         movers: Sequence = (),
-        life: Life = DRAWN,
+        surface_settings: SurfaceSettings = IDEAL,
         interferers: Sequence = (),
     ):
-        self.name, self.objects, self.movers, self.life = name, list(objects), list(movers), life
-        self.interferers = list(interferers)
+        self.name, self.objects, self.movers, self.interferers = name, list(objects), list(movers), list(interferers)
+        self.surface_settings = surface_settings
         if not self.objects:
             raise InputError(f"scene {name}: has no objects, expected at least one")
         seen: set[str] = set()
@@ -77,7 +77,7 @@ class Scene:
 
     def __reduce__(self):
         """Pickled without the geometry for ray tests, which every process makes for itself."""
-        return Scene, (self.name, self.objects, self.movers, self.life, self.interferers)
+        return Scene, (self.name, self.objects, self.movers, self.surface_settings, self.interferers)
 
     @classmethod
     def load(cls, path: str | Path) -> "Scene":

@@ -29,7 +29,7 @@ def out_of_square(objects: list[SceneObject], unevenness: float, seed: int) -> l
 
     Args:
         objects: as drawn.
-        unevenness: of the place (`life.Life`); 0: as drawn, to the bit.
+        unevenness: of `SurfaceSettings`; 0: as drawn, to the bit.
         seed: of the building.
     """
     if unevenness == 0:

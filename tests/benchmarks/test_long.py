@@ -24,9 +24,10 @@ def test_a_quarter_of_an_hour_at_a_blow():
     assert row["MB at the end"] - row["MB after warm-up"] < 10
 
 
-def test_a_killed_run_and_a_killed_capture(tmp_path):
+def test_a_killed_run_and_a_killed_capture(tmp_path, monkeypatch):
+    monkeypatch.setattr(kills, "LIVES", (0.5, 1.0))
     noise = tmp_path / "noise.h5"
-    record(noise, PRESETS["radarize"], 40)
+    record(noise, PRESETS["radarize"], 12)
     methods = ["--odometry", "doppler", "--scans", "first-echo"]
     case = kills.Case(["radarize.cli", "run", noise, "-o", "{out}/run", *methods], "run/*.[tp][ug]m")
     made = kills.killed("run", case, 1, tmp_path, np.random.default_rng(0))

@@ -31,7 +31,7 @@ def understood(command: str) -> None:
         assert words[0] != "benchmark" or context.params["name"] in (*BENCHMARKS, "all", "real")
     else:
         assert [program, words[0]] == ["python", "-m"] and words[1].startswith("benchmarks."), command
-        importlib.import_module(words[1]).PARSER.parse_args(words[2:])
+        importlib.import_module(words[1]).main.parser.parse_args(words[2:])
 
 
 @pytest.mark.parametrize("name", PAGES)

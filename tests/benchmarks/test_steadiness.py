@@ -5,8 +5,8 @@ import pytest
 
 from benchmarks.steadiness import CONFIG, changes
 from radarsim.motion.walk import Walk
-from radarsim.propagation.echoes import Echoes
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.paths import Paths
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
 
@@ -24,13 +24,13 @@ def test_a_room_is_steady(scenario):
 
 def test_what_becomes_weaker_is_not(scenario, monkeypatch):
     """Half of the amplitude in every other frame: a quarter of the power is gone, or as much as there was comes."""
-    batch = EchoFinder.batch
+    batch = PathFinder.batch
 
-    def every_other(finder, *poses) -> list[Echoes]:
+    def every_other(finder, *poses) -> list[Paths]:
         found = batch(finder, *poses)
         for echoes in found[1::2]:
             echoes.amplitude[:] /= 2
         return found
 
-    monkeypatch.setattr(EchoFinder, "batch", every_other)
+    monkeypatch.setattr(PathFinder, "batch", every_other)
     assert changes(scenario, scenario.times[:4]) == pytest.approx([-6.0, 0.0, -6.0], abs=0.5)

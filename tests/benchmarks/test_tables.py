@@ -16,9 +16,9 @@ from radarsim.recording.simulate import simulate
 
 @pytest.fixture(scope="module")
 def recording(tmp_path_factory) -> Path:
-    """Two seconds of the office with provenance."""
+    """A second of the office with provenance."""
     path = tmp_path_factory.mktemp("data") / "office.h5"
-    return simulate("office", path, duration=1.5, seed=4, sensors=["ghosts"])
+    return simulate("office", path, duration=1.0, seed=4, sensors=["ghosts"])
 
 
 @pytest.fixture(scope="module")

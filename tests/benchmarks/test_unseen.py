@@ -7,7 +7,7 @@ from benchmarks.unseen import pose_nees
 from radarize.odometry.claims import Claims
 from radarize.pose import compose
 
-FRAMES, WALKS = 40, 800
+FRAMES, WALKS = 40, 400
 
 
 def test_claims_of_steps_add_up_to_those_of_poses(monkeypatch):

@@ -6,7 +6,6 @@ import urllib.request
 
 import numpy as np
 import pytest
-from browser import CHROMIUM, Browser
 from typer.testing import CliRunner
 
 from radarize.batch import Intake
@@ -22,6 +21,7 @@ from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
 from tests import virtual
+from tests.capture.browser import CHROMIUM, Browser
 from tests.virtual import SMALL, emulated
 
 FRAMES = 60

@@ -8,11 +8,11 @@ import time
 
 import numpy as np
 import pytest
-import sources
 
 from radarize.capture.ring import FrameRing
 from radarize.capture.stream import Stream, follow
 from radarize.errors import InputError
+from tests.capture import sources
 from tests.virtual import SMALL
 
 

@@ -12,6 +12,7 @@ from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
 from radarsim.dataset.task import ATTRIBUTE, Task
+from tests.disk import fill
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
 
@@ -19,7 +20,7 @@ CONFIG = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})
 @dataclass(frozen=True)
 class FakeTask(Task):
     """Attributes:
-    trouble: ``killed once``, ``killed``, ``fails``, ``breaks``, ``full disk``, ``slow``, or none.
+    trouble: ``killed once``, ``killed``, ``fails``, ``breaks``, ``full disk``, ``small rooms``, ``slow``, or none.
     """
 
     trouble: str = ""
@@ -29,8 +30,10 @@ class FakeTask(Task):
             raise InputError(f"{self.name}: no room to move")
         if self.trouble == "breaks":
             raise ZeroDivisionError("odd")
+        if self.trouble == "small rooms":
+            raise InputError(f"{self.name}: no space left for a desk")
         if self.trouble == "full disk":
-            raise InputError(f"{self.name}: cannot write x: no space left on the device")
+            fill(folder / "others")
         rng = np.random.default_rng(self.seed)
         with RecordingWriter(self.path(folder), CONFIG, attributes={ATTRIBUTE: self.identity}) as writer:
             for k in range(self.frames):

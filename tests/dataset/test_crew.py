@@ -1,19 +1,22 @@
 """The run of a data set, whatever makes its recordings: progress, failures, killed workers, resuming, refusals."""
 
 import os
+import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
 
 import pytest
-from fakes import FakeSpecification, fake
 
-from radarize.errors import InputError
+from radarize.errors import DiskFull, InputError
 from radarize.jobs import News
 from radarize.recording import Recording
-from radarsim.dataset import run
+from radarsim.dataset import physics, run
 from radarsim.dataset.run import make
+from tests.dataset.fakes import FakeSpecification, fake
+
+ROOT = Path(__file__).parents[2]
 
 
 def made(folder: Path) -> dict[str, bytes]:
@@ -22,8 +25,10 @@ def made(folder: Path) -> dict[str, bytes]:
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
+    """Recordings that this process has made."""
     folder = tmp_path_factory.mktemp("undisturbed")
-    make(FakeSpecification(*(fake(name) for name in "abcd")), folder, workers=2, say=lambda line: None)
+    for name in "abcd":
+        fake(name).make(folder, lambda done, total: None)
     return made(folder)
 
 
@@ -44,7 +49,7 @@ def test_failures_do_not_stop_the_others(undisturbed, tmp_path):
     """A bad tour, a bug, and a process that is killed each time: named, and nothing half-written stays."""
     tasks = fake("a", "fails"), fake("b", "breaks"), fake("x", "killed"), fake("c"), fake("d")
     lines = []
-    outcome = make(FakeSpecification(*tasks), tmp_path, workers=2, say=lines.append)
+    outcome = make(FakeSpecification(*tasks), tmp_path, workers=1, say=lines.append)
     assert sorted(outcome.made) == ["c", "d"]
     assert outcome.failed["a"] == "a: no room to move"
     assert outcome.failed["b"] == "b: internal error, ZeroDivisionError: odd"
@@ -64,13 +69,14 @@ def test_half_written_recordings_are_redone(undisturbed, tmp_path):
     specification = FakeSpecification(*(fake(name) for name in "abcd"))
     for name, cut in (("a.h5.part", 5000), ("b.h5", 5000), ("c.h5", None)):  # half-written, cut short, whole
         (tmp_path / name).write_bytes(undisturbed[name[:4]][:cut])
-    outcome = make(specification, tmp_path, workers=2, say=lambda line: None)
+    outcome = make(specification, tmp_path, workers=1, say=lambda line: None)
     assert outcome.kept == ["c"] and sorted(outcome.made) == ["a", "b", "d"]
     assert made(tmp_path) == undisturbed
 
 
 def test_recordings_of_other_parameters_are_named_and_kept(tmp_path):
-    make(FakeSpecification(fake("a"), fake("b")), tmp_path, workers=1, say=lambda line: None)
+    for name in "ab":
+        fake(name).make(tmp_path, lambda done, total: None)
     before = made(tmp_path)
     longer = FakeSpecification(fake("a"), fake("b", frames=5))
     with pytest.raises(InputError, match=r"b has frames 4, now 5; --replace makes such recordings anew"):
@@ -80,10 +86,34 @@ def test_recordings_of_other_parameters_are_named_and_kept(tmp_path):
     assert outcome.kept == ["a"] and outcome.made == ["b"]
 
 
-def test_a_full_disk_ends_the_run(tmp_path):
-    tasks = fake("a", "full disk"), fake("b"), fake("c")
-    with pytest.raises(InputError, match="no space left on the device; 0 of 3 recordings are finished"):
-        make(FakeSpecification(*tasks), tmp_path, workers=1, say=lambda line: None)
+def test_a_full_disk_ends_the_run(small_disk):
+    """Whatever the system's language, for the worker's error carries what it is; a room without space does not."""
+    tasks = fake("a", "small rooms"), fake("b"), fake("c", "full disk"), fake("d")
+    with pytest.raises(DiskFull, match="no space left on the device; 1 of 4 recordings are finished"):
+        make(FakeSpecification(*tasks), small_disk, workers=1, say=lambda line: None)
+
+
+def test_recordings_of_other_physics_are_named_and_made_anew(tmp_path, monkeypatch):
+    task = FakeSpecification(fake("a"))
+    make(task, tmp_path, workers=1, say=lambda line: None)
+    monkeypatch.setattr(physics, "digest", lambda: "other")
+    with pytest.raises(InputError, match=r'a has physics "[0-9a-f]{16}", now "other"; --replace makes such recordings'):
+        make(task, tmp_path)
+
+
+def test_physics_are_the_sources_wherever_they_are(tmp_path):
+    """Installed, without what was compiled, they have the same digest; with a changed line of the propagation another,
+    of a report not."""
+    for package in ("radarsim", "radarize"):
+        shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "weights"))
+    shutil.copytree(ROOT / "scenes", tmp_path / "radarsim" / "scenes")
+    digest = physics.digest.__wrapped__
+    same = digest(tmp_path)
+    assert same == digest(ROOT) == physics.digest()
+    for file, changes in (("radarsim/twin/report.py", False), ("radarsim/propagation/fields.py", True)):
+        with (tmp_path / file).open("a") as source:
+            source.write("# changed\n")
+        assert (digest(tmp_path) != same) == changes
 
 
 def test_an_interrupt_loses_nothing(tmp_path, monkeypatch):
@@ -108,7 +138,7 @@ def test_only_a_held_folder_is_anothers(tmp_path):
 ORPHANS = """
 import sys
 from pathlib import Path
-from fakes import FakeSpecification, fake
+from tests.dataset.fakes import FakeSpecification, fake
 from radarsim.dataset.run import make
 
 if __name__ == "__main__":
@@ -119,7 +149,7 @@ if __name__ == "__main__":
 def test_workers_end_with_a_killed_parent_and_runs_exclude_each_other(tmp_path):
     script, folder = tmp_path / "script.py", tmp_path / "out"
     script.write_text(ORPHANS)
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path])}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
     parent = subprocess.Popen([sys.executable, script, folder], env=environment)
     part = folder / "b.h5.part"
     waited = time.monotonic() + 60

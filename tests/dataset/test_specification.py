@@ -50,7 +50,7 @@ def test_recordings_of_a_specification(tmp_path):
     assert len({task.seed for task in tasks}) == 7
 
 
-def test_buildings_say_how_lived_in_they_are(tmp_path):
+def test_buildings_have_clutter_and_unevenness(tmp_path):
     """Clutter, unevenness and other radars stand beside the building in its scene, and change neither seed nor walk."""
     lived = load(tmp_path, buildings=PLAIN["buildings"] | {"old": {"kind": "B", "seed": 3, "clutter": 2}})
     assert lived.tasks[1].scene == {"building": {"kind": "B", "seed": 3, "floor": 2}, "clutter": 2}
@@ -107,10 +107,10 @@ def test_a_changed_mesh_is_another_recording(tmp_path):
 def test_variants_change_parts_of_parts(tmp_path):
     """A calibrated board keeps its channels when another of its leakage's fields changes."""
     channels = tuple(Channel(gain_db=-40.0 - k, phase_deg=10.0 * k) for k in range(12))
-    FrontEndConfig(leakage=Leakage(channels=channels, delay=0.3e-9)).save(tmp_path / "board.yaml")
+    FrontEndConfig.of(CONFIG.board, leakage=Leakage(channels=channels, delay=0.3e-9)).save(tmp_path / "board.yaml")
     variants = {"far": {"frontend": {"leakage": {"delay": 0.9e-9}, "noise_figure_db": {30: 20.0}}}, "none": {}}
     variants["none"]["frontend"] = {"leakage": None}
-    far, none = (task.variant.frontend_of(task.frontend)
+    far, none = (task.variant.frontend_of(task.frontend, CONFIG.board)
                  for task in load(tmp_path, frontend="board.yaml", variants=variants).tasks[:2])  # fmt: skip
     assert far.leakage == Leakage(channels=channels, delay=0.9e-9) and none.leakage is None
     assert far.noise_figure_db == {30.0: 20.0}  # a table is one value
@@ -248,7 +248,11 @@ def test_ablations_change_what_they_are_called_after():
     check("antennas", lambda _, radar: radar.loop_time, lambda value: 516e-6)
     check("loops", lambda _, radar: radar.velocity_resolution, lambda value: CONFIG.wavelength / 2 / (value * 516e-6))
     check("frame_rate", lambda _, radar: radar.frame_rate, lambda value: value)
-    check("noise_figure", lambda task, _: 10 * np.log10(task.variant.frontend_of(None).noise_factor(30)), lambda v: v)
+    check(
+        "noise_figure",
+        lambda task, radar: 10 * np.log10(task.variant.frontend_of(None, radar.board).noise_factor(30)),
+        lambda v: v,
+    )
     check("height", lambda task, _: 1.2 + task.variant.mounted.lever_arm[2], lambda value: value)
     check(
         "tilt", lambda task, _: -np.rad2deg(np.arcsin(task.variant.mounted.rotation.apply([1, 0, 0])[2])), lambda v: v

@@ -19,9 +19,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
-from given import ALL, DATASETS, GIVEN, SECONDS, STUDIO, specification
-from pages import FIRST, PAGES, ROOT, THEN, Command, commands
 
+from tests.documents.given import ALL, DATASETS, GIVEN, SECONDS, STUDIO, specification
+from tests.documents.pages import FIRST, PAGES, ROOT, THEN, Command, commands
 from tests.virtual import free_ports
 
 WALK = f"--duration {SECONDS}"
@@ -30,7 +30,7 @@ TYPED_INSTEAD = (
     # Shorter.
     (r"--duration \d+", WALK),
     (r"^(radarsim simulate (?!.*--(?:duration|waypoints|trajectory)).*)$", rf"\1 {WALK}"),
-    (r"^(radarsim simulate .*--(?:engine sionna|sensors adc-by-cause)).*$", r"\1 --duration 0.1"),
+    (r"^(radarsim simulate .*--sensors adc-by-cause).*$", r"\1 --duration 0.1"),
     (r"^radarsim dataset (\S+)", r"radarsim dataset short/\1.yaml"),
     (r"--epochs \d+", "--epochs 1"),
     (r"^((?:radarize|torchrun .* -m radarize\.cli) train (?!.*--epochs).*)$", r"\1 --epochs 1"),

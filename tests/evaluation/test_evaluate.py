@@ -5,13 +5,13 @@ import json
 import h5py
 import numpy as np
 import pytest
-from fake_run import PLAN, write_run
 
 from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate
 from radarize.evaluation.mapping import distance_to_plan, segment_points
 from radarize.runfolder import OccupancyMap, RunFolder
 from radarize.runfolder.occupancy import read_pgm
+from tests.evaluation.fake_run import PLAN, write_run
 
 
 @pytest.fixture(scope="module")

@@ -133,7 +133,9 @@ WORLDS: dict[str, Callable[[], Reader]] = {
     "Mitsuba": lambda: _text(_XML + "</scene>", "a.xml", mitsuba.parts),
     "CARMEN log": _log,
     "way-points": lambda: _text("waypoints:\n- [1, 2]\n- [3.5, 4]\n", "a.yaml", read_waypoints),
-    "front end": lambda: _text("noise_figure_db: 12\n", "a.yaml", FrontEndConfig.load),
+    "front end": lambda: _text(
+        "noise_figure_db: 12\n", "a.yaml", lambda path: FrontEndConfig.load(path, "iwr1843boost")
+    ),
     "SLAM settings": lambda: _text("grid: {nodes: 10, resolution: 0.05}\n", "a.yaml", SlamConfig.load),
     "settings": lambda: _text(Configuration().text(), "a.yaml", Configuration.load),
 }

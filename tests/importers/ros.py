@@ -75,11 +75,11 @@ class BagWriter:
         """
         received = time + (config.burst_time if latency is None else latency)
         words = encode(samples[None], config)
-        pairs = np.asarray(calibration if calibration is not None else config.channel_calibration, float).reshape(-1)
+        pairs = config.channel_factors.view(float) if calibration is None else np.asarray(calibration, float)
         loops, tx, rx, count, _ = config.frame_shape
         self.write(
             RADAR, FRAME, received, header=self.header(stamp), platform="xWR18xx", adc_output_fmt=1, max_range=4.0,
-            range_bias=config.range_bias, rx_phase_bias=pairs,
+            range_bias=config.range_bias, rx_phase_bias=pairs.ravel(),
             rx=np.isin(np.arange(4), config.rx).astype(np.uint8), tx=np.isin(np.arange(3), config.tx).astype(np.uint8),
             shape=np.array([loops, tx * rx, count]), data=words, LIMIT=7,
         )  # fmt: skip

@@ -3,12 +3,12 @@
 from pathlib import Path
 
 import pytest
-from work import Fall, Threads, Wait, refuse
 
 from radarize.benchmark.steps import perform as do_steps
 from radarize.errors import InputError
 from radarize.jobs import News, perform
 from tests.benchmark.test_steps import Note, log
+from tests.jobs.work import Fall, Threads, Wait, refuse
 
 
 def test_jobs_end_as_they_do_here(cluster, tmp_path, monkeypatch):

@@ -7,9 +7,9 @@ import time
 from pathlib import Path
 
 import pytest
-from work import Fall, Sleep, Threads, refuse, stumble
 
 from radarize.jobs import News, perform
+from tests.jobs.work import Fall, Sleep, Threads, refuse, stumble
 
 CORES = len(os.sched_getaffinity(0))
 

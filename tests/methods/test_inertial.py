@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from walks_known import RATE, attitude, imu, pose, walk
 
 from radarize.errors import InputError
 from radarize.methods.rnin.training import displacement
 from radarize.odometry.inertial import GRAVITY, PERIOD, Imu, instants
 from radarize.recording import Recording
+from tests.methods.walks_known import RATE, attitude, imu, pose, walk
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 import torch
-from walks_known import CONFIG, RATE, attitude, pose, walk
 
 from radarize.errors import InputError
 from radarize.methods.milliego.network import MilliEgoNet
@@ -17,6 +16,7 @@ from radarize.pose import between
 from radarize.recording import Recording
 from radarize.tum import planar
 from tests.batches import batch
+from tests.methods.walks_known import CONFIG, RATE, attitude, pose, walk
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 

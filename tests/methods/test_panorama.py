@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from walks_known import walk
 
 from radarize.heatmaps import Heatmaps
 from radarize.methods.milliego.network import COLUMNS, ROWS
 from radarize.methods.milliego.panorama import panoramas, seen
 from radarize.points import DENSE, PointClouds
 from radarize.recording import Recording
+from tests.methods.walks_known import walk
 
 
 def point(depth: float, azimuth: float, elevation: float) -> np.ndarray:

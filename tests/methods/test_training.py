@@ -7,7 +7,6 @@ import onnxruntime
 import pytest
 import torch
 from scipy.spatial.transform import Rotation
-from walks_known import CONFIG, walk
 
 from radarize.errors import InputError
 from radarize.features.grid import Grid
@@ -25,6 +24,7 @@ from radarize.recording import Recording, RecordingWriter, Stream
 from radarize.training.team import Team
 from radarize.training.train import train
 from radarize.training.trainer import Trainer
+from tests.methods.walks_known import CONFIG, walk
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 

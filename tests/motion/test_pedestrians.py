@@ -9,7 +9,7 @@ from radarsim.motion.pedestrians import crowded
 from radarsim.motion.walk import Walk
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
-from tests.distances import column, least_distance, obstacles
+from tests.motion.distances import column, least_distance, obstacles
 
 TIMES = np.arange(0, 20, 0.07)
 
@@ -36,7 +36,7 @@ def test_people_keep_their_distance(walk):
     # Some walk, and none through walls or furniture: a trunk's half width is 0.16 m.
     assert np.ptp(people[..., :2], axis=1).max() > 1.5
     for person in people:
-        standing = column(person[::5, :2], 0.5, 1.7, 0.2)
+        standing = column(person[::10, :2], 0.5, 1.7, 0.2)
         assert least_distance(standing, obstacles(scene)).min() > 0.16
     assert np.array_equal(places(crowded(scene, motion, 3, 3)), people)
     assert not np.array_equal(places(crowded(scene, motion, 3, 4)), people)

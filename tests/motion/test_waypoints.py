@@ -11,7 +11,7 @@ from radarsim.motion.platforms import PLATFORMS
 from radarsim.motion.waypoints import read_waypoints
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
-from tests.distances import least_distance, obstacles
+from tests.motion.distances import least_distance, obstacles
 
 PLACES = [[1.5, 6.0], [7.0, 6.2], [9.5, 6.0], [3.0, 6.0]]
 

@@ -5,19 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.references.brute_force import bounced, fan
+from benchmarks.references.corners import looking
+from benchmarks.references.rigs import isotropic
 from radarize.radar.presets import PRESETS
-from radarsim.propagation import visible_mirrors
-from radarsim.propagation.mechanisms import images
-from radarsim.propagation.movingplates import MovingPlates
-from radarsim.propagation.movingtargets import MovingTargets
-from radarsim.propagation.obstacles import CLEARANCE, Obstacles
+from radarsim.propagation.environment import Environment, View
+from radarsim.propagation.mechanisms import image_chains
 from radarsim.propagation.reflectors import Reflectors
-from radarsim.propagation.transmission import Transmission
+from radarsim.propagation.scatterers import Scatterers
 from radarsim.world.materials import MATERIALS
 from radarsim.world.scene import Scene
-from tests.propagation.brute_force import bounced, fan
-from tests.propagation.corners import looking
-from tests.propagation.rigs import isotropic
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -36,17 +33,13 @@ def by_chains(office, position, axis, spread, bounces):
     """Amplitude of all chains of so many mirrors that leave within a fan, weighted as its rays are."""
     scene, reflectors = office
     level = axis * [1, 1, 0] / np.hypot(axis[0], axis[1])
-    observation = isotropic(position, LAMBDA, looking(level), 7.0)
-    flat = reflectors.near(observation.position, observation.range)
-    nobody = MovingTargets([], np.random.default_rng(0))
-    plates = MovingPlates(nobody, CONFIG, CLEARANCE)
-    obstacles = Obstacles(scene, Transmission(scene, CONFIG, CLEARANCE), nobody, plates)
-    found = images.by_chains(observation, flat, visible_mirrors.find(observation, flat, scene), obstacles)
-    away = np.einsum("pij,j->pi", found.isometry[:, :, :3], position) + found.isometry[:, :, 3] - position
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    environment = Environment.of(scene, nothing, reflectors, CONFIG)
+    found = image_chains.find(View(environment, isotropic(position, LAMBDA, looking(level), 7.0)))
+    away = np.einsum("pij,j->pi", found.images[..., :3], position) + found.images[..., 3] - position
     path, ahead = np.linalg.norm(away, axis=1), away @ axis
     off = np.linalg.norm(np.cross(away, axis), axis=1) / np.where(ahead > 0, ahead, 1e-9)
-    order = np.where(np.linalg.det(found.isometry[:, :, :3]) > 0, 2, 3)
-    return np.sum((found.amplitude * np.exp(2j * np.pi * path / LAMBDA) * fan(off, spread))[order == bounces])
+    return np.sum((found.amplitude * np.exp(2j * np.pi * path / LAMBDA) * fan(off, spread))[found.bounces == bounces])
 
 
 HERE, THERE = np.array([8.3705, 5.6786, 1.1985]), np.array([5.4405, 6.1516, 1.1822])

@@ -18,16 +18,19 @@ from radarsim.propagation.clutter import (
     STANDOFF,
     UNDER_CEILINGS,
     Clutter,
-    Cluttered,
 )
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.fields import facing
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.media import mirror, scattering
+from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
-from radarsim.propagation.surface import Surface
+from radarsim.propagation.surface import Cluttered, Surface
+from radarsim.propagation.transmission import Transmission
 from radarsim.world import shapes
-from radarsim.world.life import Life
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
+from radarsim.world.surface_settings import SurfaceSettings
 
 CONFIG = PRESETS["radarize"]
 K = 2 * np.pi / CONFIG.wavelength
@@ -42,7 +45,49 @@ def room(clutter=1.0, **parts):
         "desk": shapes.rectangle((6, 0, 0.75), (4, 4), (0, 0, 1)),
     }
     objects = [SceneObject(name, mesh, MATERIALS["wood"]) for name, mesh in parts.items()]
-    return Scene("room", objects, life=Life(clutter=clutter))
+    return Scene("room", objects, surface_settings=SurfaceSettings(clutter=clutter))
+
+
+#: Where the surface of each kind is, which way it faces, what it is of, and how many things are on a square metre.
+KINDS = {
+    "wall": ((0, 0, 30), (-1, 0, 0), "plasterboard", ON_WALLS),
+    "desk": ((0, 0, 0.75), (0, 0, 1), "wood", ON_TOPS),
+    "floor": ((0, 0, 0), (0, 0, 1), "floorboard", ON_FLOORS),
+    "ceiling": ((0, 0, 3), (0, 0, -1), "ceiling board", UNDER_CEILINGS),
+}
+SIDE = 60.0
+
+
+def lone(kind, level):
+    """A square of 60 m, high over the lowest point of the scene as its kind asks."""
+    center, facing_, material, _ = KINDS[kind]
+    objects = [
+        SceneObject("square", shapes.rectangle(center, (SIDE, SIDE), facing_), MATERIALS[material]),
+        SceneObject("crumb", shapes.box((0, 90, 0.005), (0.01, 0.01, 0.01)), MATERIALS["metal"]),
+    ]
+    return Scene("lone", objects, surface_settings=SurfaceSettings(clutter=level))
+
+
+def sphere(steps=45):
+    """Directions all around, and the solid angle of each, sr."""
+    theta, phi = (np.arange(steps) + 0.5) / steps * np.pi, (np.arange(2 * steps) + 0.5) / steps * np.pi
+    t, p = (x.ravel() for x in np.meshgrid(theta, phi, indexing="ij"))
+    way = np.column_stack([np.sin(t) * np.cos(p), np.sin(t) * np.sin(p), np.cos(t)])
+    return way, np.sin(t) * (np.pi / steps) ** 2
+
+
+def scattered(points, normal, source):
+    """Share of what falls from `source` on the square that its points scatter: their bistatic cross sections over 4 pi,
+    integrated over the sphere. All have one pattern but for their size."""
+    for column in (points.normal, points.lobe, points.two_sided):
+        assert np.all(column == column[0])
+    face, lobe, two_sided = points.normal[0], points.lobe[0], points.two_sided[0]
+    there, total = facing(face, source, two_sided), 0.0
+    for way, angle in zip(*sphere(), strict=True):
+        back = facing(face, way, two_sided)
+        if there > 0 and back > 0:
+            total += scattering(there, back, source @ way, lobe) * angle / (4 * np.pi)
+    return total * points.sigma.sum() / (SIDE**2 * (source @ normal))
 
 
 def clutter(scene, seed=0):
@@ -70,12 +115,15 @@ def test_densities_by_what_things_are_on():
     assert abs(off.mean() - NEAREST - STANDOFF) < 0.003
 
 
-def test_cross_sections_are_weibulls():
-    """Their law, and so the power a square metre of wall sends back: density times mean."""
-    sigma = np.concatenate([everything(clutter(room(5.0), seed)).sigma for seed in range(10)])
-    scale = CROSS_SECTION / gamma(1 + 1 / EXPONENT)
+@pytest.mark.parametrize("level", [0.5, 5.0])
+def test_cross_sections_are_weibulls(level):
+    """Their law, and so the power a square metre of wall sends back: density times mean, less what is in shadow."""
+    sigma = np.concatenate([everything(clutter(lone("wall", level), seed)).sigma for seed in range(3)])
+    share = level * ON_WALLS * CROSS_SECTION / 4
+    mean = CROSS_SECTION * (1 - np.exp(-share)) / share
+    scale = mean / gamma(1 + 1 / EXPONENT)
     assert stats.kstest(sigma, stats.weibull_min(EXPONENT, scale=scale).cdf).pvalue > 0.01
-    assert abs(sigma.mean() / CROSS_SECTION - 1) < 0.05
+    assert abs(sigma.mean() / mean - 1) < 0.05
 
 
 def test_those_seen_over_mirrors_have_the_power_of_all():
@@ -101,7 +149,7 @@ def test_same_things_from_everywhere():
 
 def test_coherent_under_motion():
     """An echo's phase moves by 2k times the way gone towards its thing, whatever the direction; nothing is redrawn."""
-    found = EchoFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
+    found = PathFinder(None, clutter(room()), None, CONFIG, range=30.0, antenna=ISOTROPIC)
     step = np.array([0.004, -0.003, 0.002])
     start = np.array([3.0, 0.5, 1.0])
     fields, places = [], []
@@ -127,7 +175,7 @@ def test_hidden_things_are_not_seen():
     }
     scene = room(10.0, **parts)
     things = clutter(scene)
-    found = EchoFinder(scene, things, None, CONFIG, antenna=ISOTROPIC)
+    found = PathFinder(scene, things, None, CONFIG, antenna=ISOTROPIC)
     seen = found(np.array([0.0, 0.0, 1.5]), np.eye(3)).points[:, 0]
     assert len(seen) > 50
     assert seen[:, 0].max() < 2
@@ -147,6 +195,46 @@ def test_none_at_level_nought():
 
 def test_more_than_memory_holds():
     wall = SceneObject("wall", shapes.rectangle((0, 0, 0), (1900, 1900), (1, 0, 0)), MATERIALS["wood"])
-    place = Scene("plain", [wall], life=Life(clutter=10))
+    place = Scene("plain", [wall], surface_settings=SurfaceSettings(clutter=10))
     with pytest.raises(InputError, match="clutter is 10, which makes 1.3e.08 points"):
         clutter(place)
+
+
+@pytest.mark.parametrize("level", [0, 0.5, 1, 3])
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_surface_gives_more_than_falls_on_it(kind, level):
+    """What the mirror reflects, the rough surface and the things on it scatter, and passes, from head-on to 80 deg."""
+    center, normal = (np.array(x, float) for x in KINDS[kind][:2])
+    scene, bare = lone(kind, level), lone(kind, 0)
+    surface = Surface(scene, np.random.default_rng(0), density=4.0).all()
+    surface = surface[np.abs((surface.position - center) @ normal) < 1e-6]
+    things = everything(clutter(scene))
+    things = things[np.abs(things.position - center).max(axis=1) < SIDE / 2 + 1]
+    facets, plain = (Reflectors.of(s, CONFIG).flat for s in (scene, bare))
+    assert np.allclose(facets.normal[0], normal)
+    through = Transmission(scene, CONFIG, 1e-3)
+    tangent, shares = np.roll(normal, 1), []
+    spread = np.sqrt(gamma(1 + 2 / EXPONENT)) / gamma(1 + 1 / EXPONENT)  # of a Poisson sum of one thing on average
+    for angle in np.deg2rad([0.01, 30, 60, 80]):
+        source = np.cos(angle) * normal + np.sin(angle) * tangent
+        te = np.cross(normal, tangent)
+        ends = np.tile(center + 1.0 * source, (2, 1)), np.tile(center - 1.0 * source, (2, 1))
+        gamma_ = np.array(mirror(facets.layer[0], np.cos(angle)))
+        passed = np.mean(np.abs(through.passage(*ends, np.array([te, np.cross(source, te)]))[0]) ** 2)
+        diffuse = scattered(surface, normal, source)
+        small = scattered(things, normal, source) if len(things) else 0.0
+        shares.append(small)
+        assert np.mean(np.abs(gamma_) ** 2) + diffuse + small + passed <= 1
+        # what is scattered is taken from the mirror, the rough surface and what passes alike
+        taken = 1 - np.mean(np.abs(gamma_) ** 2) / np.mean(np.abs(np.array(mirror(plain.layer[0], np.cos(angle)))) ** 2)
+        assert small == pytest.approx(taken, rel=4 * spread / np.sqrt(max(len(things), 1)))
+    assert np.ptp(shares) < 0.01 * max(shares) + 1e-9
+
+
+@pytest.mark.parametrize(("kind", "decibel"), [("wall", -0.4), ("desk", -1.2), ("floor", -0.1), ("ceiling", -0.3)])
+def test_mean_return_at_45_degrees(kind, decibel):
+    """At level 1 a square metre returns 0.1 m^2 a thing at 45 deg, less what stands in the shadow of others."""
+    things = everything(clutter(lone(kind, 1.0), 3))
+    cosine = np.cos(np.pi / 4)
+    returned = np.sum(things.sigma * scattering(cosine, cosine, 1.0, things.lobe[0])) / SIDE**2
+    assert 10 * np.log10(returned / (0.1 * KINDS[kind][3])) == pytest.approx(decibel, abs=0.3)

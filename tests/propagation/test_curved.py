@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from benchmarks.references.rigs import Rig, burst, isotropic, locate
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
 from radarsim.propagation.bodies import recognise
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Flat, Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import Rig, burst, isotropic, locate
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -91,7 +91,7 @@ def test_range_and_doppler_of_a_passing_sphere():
     radius, center = 0.1, np.array([3.0, 0.5, 0.0])
     scene = scene_of(shapes.sphere(center, radius))
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-    finder = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)
+    finder = PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)
     for velocity in ([1.0, 0, 0], [0, 1.2, 0], [0.7, -0.7, 0]):
         rig = Rig(velocity=tuple(velocity))
         middle = CONFIG.burst_center * np.array(velocity)
@@ -134,7 +134,7 @@ def test_phase_close_by(kind, gap, speed):
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     # the round body alone: a cylinder's lids are flat
     reflectors = replace(Reflectors.of(scene, CONFIG), flat=Flat.none())
-    echoes = EchoFinder(scene, nothing, reflectors, CONFIG, antenna=ISOTROPIC)(np.zeros(3), np.eye(3))
+    echoes = PathFinder(scene, nothing, reflectors, CONFIG, antenna=ISOTROPIC)(np.zeros(3), np.eye(3))
     fit = echoes.lengths(CONFIG, Rig((0, speed, 0)), -CONFIG.burst_center)[np.abs(echoes.amplitude).argmax()]
     axis, radius = (reflectors.round.axis[0], reflectors.round.radius[0])
 

@@ -4,37 +4,38 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
+from benchmarks.references.doors import (
+    CONFIG,
+    HALF,
+    HEIGHT,
+    HINGE,
+    INSTANTS,
+    MIDDLE,
+    NOTHING,
+    THICKNESS,
+    WIDTH,
+    door,
+    finder,
+    foot_speed,
+    lengths,
+    swinging,
+)
+from benchmarks.references.rigs import field
 from radarize.errors import InputError
 from radarize.radar.array import rx_positions, tx_positions
-from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.coefficients import as_slab, lag
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.media import as_slab, lag
 from radarsim.propagation.movingtargets import MovingTargets
-from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.paths import Kind
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.surface import Surface
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
-from radarsim.world.movers import Door
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import Rig, field
 
-CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
 HERE, AHEAD = np.zeros(3), np.eye(3)
-NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-#: Behind the radar, where it sees nothing: a scene has to have something that stands.
-BEHIND = SceneObject("behind", shapes.rectangle((-9, 0, 0), (0.1, 0.1), (-1, 0, 0)), MATERIALS["wood"])
-HINGE, WIDTH, HEIGHT, THICKNESS = np.array([2.0, -0.45, 0.0]), 0.9, 2.0, 0.04
-
-
-def door(angle, material="wood", **values):
-    """One that stands still at an angle, deg from the x axis, if nothing else is said."""
-    place = {"hinge": tuple(HINGE), "width": WIDTH, "height": HEIGHT, "thickness": THICKNESS}
-    return Door(name="door", material=material, **(place | {"angles": (angle, angle)} | values))
 
 
 def standing(angle, material="wood"):
@@ -43,15 +44,6 @@ def standing(angle, material="wood"):
     center = HINGE + WIDTH / 2 * np.array([np.cos(turn), np.sin(turn), 0])
     leaf = shapes.placed(shapes.box((0, 0, 0), (WIDTH, THICKNESS, HEIGHT)), center, (0, 0, turn))
     return SceneObject("leaf", leaf, MATERIALS[material])
-
-
-def finder(things, movers=(), surface=NOTHING):
-    """Of a scene with some things, and movers without scatterers of their own."""
-    scene = Scene("door", [BEHIND, *things])
-    moving = MovingTargets(list(movers), np.random.default_rng(0))
-    moving.sigma[:] = 1e-30
-    reflectors = Reflectors.of(scene, CONFIG)
-    return EchoFinder(scene, surface, reflectors, CONFIG, 1e-13, antenna=ISOTROPIC, moving=moving)
 
 
 def both(angle, things=(), surface=NOTHING, material="wood"):
@@ -77,7 +69,7 @@ def test_a_door_flashes_as_if_it_stood(angle):
     truth, found = (field(e, HERE, LAMBDA) for e in (stands, moves))
     assert abs(truth) > 0
     assert abs(found - truth) < 1e-3 * abs(truth)
-    assert (moves.provenance == Provenance.MOVING).all()
+    assert moves.moving.all()
 
 
 @pytest.mark.parametrize("angle", [90.0, 70.0, 45.0, 10.0])
@@ -87,9 +79,9 @@ def test_a_door_scatters_no_more_than_if_it_stood(angle):
     powers = []
     for seed in range(4):
         surface = Surface(scene, np.random.default_rng(seed))
-        scattered = EchoFinder(scene, surface, None, CONFIG)(HERE, AHEAD)
+        scattered = PathFinder(scene, surface, None, CONFIG)(HERE, AHEAD)
         crowd = MovingTargets([door(angle)], np.random.default_rng(seed), density=300.0)
-        moved = EchoFinder(None, NOTHING, None, CONFIG, moving=crowd)(HERE, AHEAD)
+        moved = PathFinder(None, NOTHING, None, CONFIG, moving=crowd)(HERE, AHEAD)
         powers.append([np.sum(np.abs(e.amplitude) ** 2) for e in (scattered, moved)])
     truth, found = np.mean(powers, axis=0)
     assert 10 * np.log10(found / truth) == pytest.approx(0, abs=1)
@@ -103,7 +95,7 @@ def test_what_is_behind_a_door(angle, material):
     """A point and a wall: weakened and delayed as by a slab that stands; beside an open door, they are as they were."""
     point = Scatterers.points(np.array([[3.0, 0.1, 0.2]]), np.ones(1))
     stands, moves = both(angle, [WALL], point, material)
-    truth, found = (e.of(Provenance.THROUGH_SLAB if angle else Provenance.DIRECT) for e in (stands, moves))
+    truth, found = (e.where(through=bool(angle), bounces=0, moving=False) for e in (stands, moves))
     assert len(truth) and len(truth.points) and len(truth.images)
     if angle:  # open, its edges and corners are direct echoes of the one and moving ones of the other
         assert same(found, truth)
@@ -121,34 +113,23 @@ SIDE = SceneObject("side", shapes.rectangle((1.5, 1.5, 0), (6.0, 3.0), (0, -1, 0
 def test_a_lamp_is_seen_over_a_door():
     """Over its face on one way and on both: as over one that stands."""
     stands, moves = both(60.0, [LAMP])
-    truth = [stands.of(cause) for cause in (Provenance.GHOST_1, Provenance.GHOST_2)]
+    truth = [stands.where(bounces=n, through=False) for n in (1, 2)]
     assert [len(e.points) for e in truth] == [2, 1]
-    found, n = moves.of(Provenance.MOVING), len(moves.moves)
-    assert n == 3 and len(moves.of(Provenance.GHOST_1)) == len(moves.of(Provenance.GHOST_2)) == 0
+    found = moves.where(moving=True, kind=Kind.POINT)
+    assert len(found) == 3 == (moves.bounces > 0).sum()
     expected = np.concatenate([e.amplitude for e in truth])
-    assert np.sort(np.abs(found.amplitude[:n])) == pytest.approx(np.sort(np.abs(expected)), rel=1e-3)
+    assert np.sort(np.abs(found.amplitude)) == pytest.approx(np.sort(np.abs(expected)), rel=1e-3)
     assert np.abs(field(moves, HERE, LAMBDA)) == pytest.approx(np.abs(field(stands, HERE, LAMBDA)), rel=1e-3)
 
 
 def test_chains_over_a_door():
     """A door at an angle to a metal wall: the same images of the radar."""
     stands, moves = both(50.0, [SIDE])
-    ghosts = stands.of(Provenance.GHOST_2)
+    ghosts = stands.where(bounces=2, through=False, moving=False)
     assert len(ghosts)
     assert field(moves, HERE, LAMBDA) == pytest.approx(field(stands, HERE, LAMBDA), rel=1e-3)
     for image in ghosts.images:
-        assert np.abs(moves.images[-len(moves.turns) :] - image).max(axis=(1, 2)).min() < 1e-9
-
-
-def swinging(angle):
-    """A door on its way, at an angle (deg) at the time `MIDDLE`, some 0.8 rad/s fast."""
-    return door(0, angles=(angle - 30, angle + 30), period=4.0)
-
-
-#: The middle of a burst, s, and the ends of it and the middle after that.
-MIDDLE = 1.0
-HALF = (CONFIG.chirp_times.max() - CONFIG.chirp_times.min()) / 2
-INSTANTS = np.array([-1.0, 0.0, 1.0])
+        assert np.abs(moves.where(moving=True).images - image).max(axis=(1, 2)).min() < 1e-9
 
 
 def reflection(mover, t):
@@ -158,18 +139,6 @@ def reflection(mover, t):
     normal = np.array([-np.sin(angle), np.cos(angle), 0.0])
     normal *= -np.sign(HINGE @ normal)
     return np.eye(3) - 2 * np.outer(normal, normal), 2 * (HINGE @ normal + THICKNESS / 2) * normal
-
-
-def foot_speed(mover):
-    """At which the point of a swinging door nearest the radar closes in at `MIDDLE`, m/s: omega times its way along."""
-    angle, rate = np.deg2rad(np.mean(mover.angles)), np.pi / mover.period * np.deg2rad(np.ptp(mover.angles))
-    return -rate * HINGE @ [np.cos(angle), np.sin(angle), 0.0]
-
-
-def lengths(echoes):
-    """Paths of echoes at the instants, (echo, virtual, instant), m."""
-    fit = echoes.lengths(CONFIG, Rig(), MIDDLE - CONFIG.burst_center)
-    return np.stack([fit @ [1, s, s * s] for s in INSTANTS], axis=-1)
 
 
 TX, RX = tx_positions(CONFIG), rx_positions(CONFIG)
@@ -194,7 +163,7 @@ def test_corners_with_a_door_move_as_it_does():
     """Chains over a door and a wall, either way round."""
     mover = swinging(50.0)
     echoes = finder([SIDE], [mover])(HERE, AHEAD, MIDDLE)
-    found = lengths(echoes)[len(echoes.points) :]
+    found = lengths(echoes)[echoes.kind == Kind.IMAGE]
     (matrix, offset), wall, above = reflection(mover, MIDDLE), np.diag([1.0, -1.0, 1.0]), np.array([0, 3.0, 0])
     for wall_first in (False, True):
         middle = (wall @ matrix, wall @ offset + above) if wall_first else (matrix @ wall, matrix @ above + offset)
@@ -214,11 +183,11 @@ def test_points_move_over_a_door():
     """A point that stands, seen over a door on one way and on both, through the whole burst."""
     mover, place = swinging(60.0), np.array([1.2, 1.3, 0.1])
     echoes = finder([], [mover], Scatterers.points(place[None], np.ones(1)))(HERE, AHEAD, MIDDLE)
-    n = len(echoes.points)
+    points, n = echoes.where(kind=Kind.POINT), len(echoes.points)
     over = np.linalg.norm(echoes.points - place, axis=2) > 0.01
-    assert sorted(over.sum(axis=1)) == [0, 1, 1, 2] and len(echoes.moves) == 3
-    assert (echoes.provenance[:n] == np.where(over.any(axis=1), Provenance.MOVING, Provenance.DIRECT)).all()
-    found = lengths(echoes)
+    assert sorted(over.sum(axis=1)) == [0, 1, 1, 2] and points.moving.sum() == 3
+    assert np.array_equal(points.moving, over.any(axis=1))
+    found = lengths(points)
     for k, s in enumerate(INSTANTS):
         matrix, offset = reflection(mover, MIDDLE + s * HALF)
         image = matrix @ place + offset
@@ -232,6 +201,7 @@ def test_ghosts_of_a_lamp_move_with_the_door():
     """The shortest way over the sphere between radar and image; its point wanders, which is of second order."""
     mover, center, radius = swinging(60.0), np.array([1.2, 1.3, 0.1]), 0.1
     echoes = finder([LAMP], [mover])(HERE, AHEAD, MIDDLE)
+    echoes = echoes.where(kind=Kind.POINT)
     singles = np.flatnonzero(np.abs(np.linalg.norm(echoes.points - center, axis=2) - radius).max(axis=1) > 0.02)
     found = lengths(echoes)[singles].mean(axis=1)
 
@@ -256,9 +226,9 @@ def test_echoes_of_one_cause_keep_their_motion():
     mover = swinging(60.0)
     point = Scatterers.points(np.array([[1.2, 1.3, 0.1]]), np.ones(1))
     echoes = finder([LAMP, WALL], [mover], point)(HERE, AHEAD, MIDDLE)
-    some = echoes.provenance == Provenance.MOVING
+    some = echoes.moving
     assert 0 < some.sum() < len(some)
-    assert lengths(echoes.of(Provenance.MOVING)) == pytest.approx(lengths(echoes)[some], abs=1e-12)
+    assert lengths(echoes.where(moving=True)) == pytest.approx(lengths(echoes)[some], abs=1e-12)
 
 
 def test_an_unknown_material_is_named():

@@ -5,10 +5,11 @@ import pytest
 import yaml
 from scipy import stats
 
-from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import amplitude_gain, gain_pattern
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
+from benchmarks.references.rigs import ELEMENT, Rig, burst
+from benchmarks.references.speckle import AHEAD, CONFIG, HERE, speckle
+from radarsim.propagation.antenna import amplitude_gain
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.paths import Kind
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.surface import Surface
@@ -16,10 +17,7 @@ from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import rectangle
-from tests.propagation.rigs import Rig, burst, field
 
-CONFIG = PRESETS["radarize"]
-HERE, AHEAD = np.zeros(3), np.eye(3)
 WALL = {"shape": "rectangle", "name": "wall", "material": "metal", "size": [8, 3], "position": [0, 1.5, 0],
         "facing": [0, -1, 0]}  # fmt: skip
 
@@ -36,13 +34,13 @@ def corner(tmp_path_factory):
 
 
 def finder_with_one_target(scene, place, weakest=0.0):
-    return EchoFinder(scene, Scatterers.points(place, np.ones(1)), Reflectors.of(scene, CONFIG), CONFIG, weakest)
+    return PathFinder(scene, Scatterers.points(place, np.ones(1)), Reflectors.of(scene, CONFIG), CONFIG, weakest)
 
 
 def test_ghosts_stand_where_the_image_method_puts_them(corner):
     """A target in front of a wall has one image, reached out on one leg and back on the other, both ways round."""
     place = np.array([2.2, 0.4, 0.1])
-    echoes = finder_with_one_target(corner, place)(HERE, AHEAD).of(Provenance.GHOST_1)
+    echoes = finder_with_one_target(corner, place)(HERE, AHEAD).where(bounces=1)
     image = place * [1, -1, 1] + [0, 3.0, 0]
     assert len(echoes) == 2
     assert echoes.points[0] == pytest.approx(np.stack([place, image]))
@@ -50,7 +48,7 @@ def test_ghosts_stand_where_the_image_method_puts_them(corner):
     # radar equation with both legs, a conductor's coefficient and the antenna's gain in both directions
     out, back = np.linalg.norm(place), np.linalg.norm(image)
     isotropic = CONFIG.wavelength / (4 * np.pi) ** 1.5 / (out * back)
-    gain = amplitude_gain(*place, gain_pattern()) * amplitude_gain(*image, gain_pattern())
+    gain = amplitude_gain(*place, ELEMENT) * amplitude_gain(*image, ELEMENT)
     assert abs(echoes.amplitude[0]) == pytest.approx(isotropic * gain, rel=0.02)
     assert echoes.amplitude[0] == echoes.amplitude[1]
 
@@ -61,22 +59,26 @@ def test_no_ghost_where_the_bounce_misses_the_mirror():
     mesh = rectangle(tuple(short["position"]), tuple(short["size"]), tuple(short["facing"]))
     scene = Scene("short", [SceneObject("wall", mesh, MATERIALS["metal"])])
     echoes = finder_with_one_target(scene, np.array([2.2, 0.4, 0.1]))(HERE, AHEAD)
-    assert not len(echoes.of(Provenance.GHOST_1)) and len(echoes.of(Provenance.DIRECT).points) == 1
+    assert not len(echoes.where(bounces=1)) and len(echoes.where(bounces=0, kind=Kind.POINT)) == 1
 
 
 def test_polarisation_of_the_bounce(corner):
     """Upright fields on an upright wall are TE (a conductor turns the sign), on a conducting floor TM (it does not)."""
-    wall_ghost = finder_with_one_target(corner, np.array([2.2, 0.4, 0.0]))(HERE, AHEAD).of(Provenance.GHOST_1)
+    wall_ghost = finder_with_one_target(corner, np.array([2.2, 0.4, 0.0]))(HERE, AHEAD).where(
+        bounces=1, through=False, moving=False
+    )
     assert wall_ghost.amplitude[0].real < 0
     floor = Scene("floor", [SceneObject("floor", rectangle((0, 0, -0.3), (20, 20), (0, 0, 1)), MATERIALS["metal"])])
-    floor_ghost = finder_with_one_target(floor, np.array([3.5, 0.0, 0.1]))(HERE, AHEAD).of(Provenance.GHOST_1)
+    floor_ghost = finder_with_one_target(floor, np.array([3.5, 0.0, 0.1]))(HERE, AHEAD).where(
+        bounces=1, through=False, moving=False
+    )
     assert floor_ghost.amplitude[0].real > 0
 
 
 def test_the_hidden_are_not_seen(corner):
     """Scatterers of the board behind the box give no direct echo; those beside the box do."""
     scatterers = Surface(corner, np.random.default_rng(0), density=400.0).all()
-    echoes = EchoFinder(corner, scatterers, None, CONFIG)(HERE, AHEAD)
+    echoes = PathFinder(corner, scatterers, None, CONFIG)(HERE, AHEAD)
     seen = echoes.points[:, 0]
     board = scatterers.position[np.abs(scatterers.position[:, 0] - 3.5) < 1e-9]
     # brute force: the line of sight to the board crosses the box's slab of x in 1.8 ... 2.2 at |y + 0.9| < 0.3
@@ -91,8 +93,8 @@ def test_the_hidden_are_not_seen(corner):
 def test_reciprocity(corner):
     """Swapping the legs of every echo, that is TX and RX, leaves the set of echoes as it was."""
     scatterers = Surface(corner, np.random.default_rng(1), density=100.0).all()
-    echoes = EchoFinder(corner, scatterers, Reflectors.of(corner, CONFIG), CONFIG)(HERE, AHEAD)
-    assert len(echoes.of(Provenance.GHOST_1)) > 50
+    echoes = PathFinder(corner, scatterers, Reflectors.of(corner, CONFIG), CONFIG)(HERE, AHEAD)
+    assert len(echoes.where(bounces=1)) > 50
     key = np.concatenate([echoes.points.reshape(-1, 6), echoes.amplitude[: len(echoes.points), None].view(float)], 1)
     swapped = np.concatenate([echoes.points[:, ::-1].reshape(-1, 6), key[:, 6:]], axis=1)
     assert np.array_equal(np.unique(key, axis=0), np.unique(swapped, axis=0))
@@ -101,7 +103,7 @@ def test_reciprocity(corner):
 def test_speckle_is_the_same_world_from_elsewhere(corner):
     """After a shift of d the field equals that of the same frozen scatterers: nothing is drawn anew."""
     scatterers = Surface(corner, np.random.default_rng(2), density=150.0).all()
-    finder = EchoFinder(corner, scatterers, None, CONFIG)
+    finder = PathFinder(corner, scatterers, None, CONFIG)
     reference = finder(HERE, AHEAD)
     for shift in (1e-4, 5e-4, 2e-3, 1e-2):
         moved = np.array([0.0, shift, 0.0])
@@ -116,19 +118,6 @@ def test_speckle_is_the_same_world_from_elsewhere(corner):
         assert correlation > 0.999
 
 
-def speckle(places):
-    """Amplitudes of many scatterers in a cell, from places so far apart that the field decorrelates; RMS sqrt(2)."""
-    rng = np.random.default_rng(5)
-    place = np.stack([np.full(20000, 3.0), rng.uniform(-3, 3, 20000), rng.uniform(-1.0, 1.0, 20000)], axis=1)
-    scatterers = Scatterers.points(place, np.ones(20000), rng.uniform(0, 2 * np.pi, 20000))
-    finder = EchoFinder(None, scatterers, None, CONFIG, range=10.0)
-    fields = []
-    for y in np.arange(places) * 0.2:
-        position = np.array([0.0, (y % 3) - 1.5, (y // 3) * 0.1 - 0.4])
-        fields.append(field(finder(position, AHEAD), position, CONFIG.wavelength))
-    return np.abs(fields) / np.sqrt(np.mean(np.abs(fields) ** 2) / 2)
-
-
 def test_speckle_is_rayleigh():
     """Kolmogorov-Smirnov."""
     assert stats.kstest(speckle(60), stats.rayleigh.cdf).pvalue > 0.01
@@ -141,7 +130,7 @@ def test_power_does_not_depend_on_the_number_of_scatterers(corner):
         power = []
         for seed in range(8):
             scatterers = Surface(corner, np.random.default_rng(seed), density).all()
-            echoes = EchoFinder(corner, scatterers, None, CONFIG)(HERE, AHEAD)
+            echoes = PathFinder(corner, scatterers, None, CONFIG)(HERE, AHEAD)
             power.append(np.sum(np.abs(echoes.amplitude) ** 2))
         levels.append(10 * np.log10(np.mean(power)))
     assert levels[1] - levels[0] == pytest.approx(0, abs=0.3)
@@ -151,7 +140,7 @@ def test_wall_flash_survives_the_whole_chain(corner):
     """The metal wall seen face on: lambda / (8 pi R) times the gain at boresight, at its range."""
     facing = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])  # boresight towards +y
     scatterers = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-    echoes = EchoFinder(corner, scatterers, Reflectors.of(corner, CONFIG), CONFIG)(HERE, facing)
+    echoes = PathFinder(corner, scatterers, Reflectors.of(corner, CONFIG), CONFIG)(HERE, facing)
     flash = np.argmax(np.abs(echoes.amplitude))
     gain = 10 ** (10.5 / 10)
     rough = np.exp(-8 * (np.pi * 2e-5 / CONFIG.wavelength) ** 2)

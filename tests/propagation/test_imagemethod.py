@@ -1,23 +1,14 @@
 """Images of the radar in two and three mirrors: box rooms, dihedral and trihedral corners."""
 
-from itertools import product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
-from radarize.radar.presets import PRESETS
-from radarsim.propagation import apertures, plates
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
-from radarsim.propagation.mechanisms import image_chains
-from radarsim.propagation.reflectors import Reflectors
-from radarsim.propagation.scatterers import Scatterers
-from radarsim.receiver.frontend import FrontEnd
-from radarsim.world.scene import Scene
-from tests.propagation.corners import (
-    both_ways,
+from benchmarks.references.box_room import CONFIG, images_of_a_room, lattice
+from benchmarks.references.corners import (
     chains,
     corner,
     cross_section,
@@ -26,9 +17,17 @@ from tests.propagation.corners import (
     seen_by_all,
     seen_by_both,
 )
-from tests.propagation.rigs import isotropic
+from benchmarks.references.rigs import isotropic
+from radarsim.propagation import apertures, plates
+from radarsim.propagation.antenna import Antenna, gain_pattern
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.mechanisms import image_chains
+from radarsim.propagation.path_types import PathType, PathTypes
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.receiver.frontend import FrontEnd
+from radarsim.world.scene import Scene
 
-CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
 
 
@@ -122,28 +121,6 @@ def test_what_an_edge_diffracts(seed):
     assert apertures.diffracted(-s, low, high) == -apertures.diffracted(s, low, high)
 
 
-def images_of_a_room(observation):
-    """Images of a radar in a box room, by walls and chains of them: isometries, amplitudes, orders."""
-    flat = Reflectors.of(Scene.load("physics/room"), CONFIG).flat
-    parts = plates.parts(flat, observation, 0)
-    single = parts.isometry
-    walls = (
-        np.abs(np.linalg.det(single[:, :, :3]) + 1 + np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1)) < 1e-6
-    )
-    chain, isometry, amplitude = both_ways(flat, observation)
-    order = np.concatenate([np.ones(walls.sum(), int), 2 + (chain[:, 1] != chain[:, 2])])
-    return np.concatenate([single[walls], isometry]), np.concatenate([parts.amplitude[walls], amplitude]), order
-
-
-def lattice(p):
-    """The same images by the lattice of rooms: order, by axis whether it is turned, and place."""
-    low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
-    for cell in product(range(-3, 4), repeat=3):
-        order, even = int(np.abs(cell).sum()), np.array(cell) % 2 == 0
-        if 1 <= order <= 3:
-            yield order, ~even, low + cell * (high - low) + np.where(even, p - low, high - p)
-
-
 def test_box_room_has_all_its_images(monkeypatch):
     """6 images of first, 18 of second and 38 of third order and no others, with delay, sign and strength.
 
@@ -177,19 +154,28 @@ def test_box_room_has_all_its_images(monkeypatch):
     assert known.all()
 
 
-def test_causes_in_a_box_room():
-    """Edges and corners of a room echo from where they stand; images behind its walls are ghosts, by order."""
+def test_ghosts_of_a_box_room():
+    """Edges and corners of a room echo from where they stand; images farther behind its walls than the radar can
+    resolve are ghosts."""
     scene = Scene.load("physics/room")
-    finder = EchoFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Reflectors.of(scene, CONFIG), CONFIG)
+    finder = PathFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Reflectors.of(scene, CONFIG), CONFIG)
     position = np.array([0.37, -0.21, 1.23])
     finder.range = 8.0
-    echoes = finder(position, looking(direction(0.2, 0.1)))
-    apparent = (position + echoes.images[:, :, :3] @ position + echoes.images[:, :, 3]) / 2
+    pose = looking(direction(0.2, 0.1))
+    paths = finder(position, pose)
+    apparent = (position + paths.images[:, :, :3] @ position + paths.images[:, :, 3]) / 2
     low, high = np.array([-2.5, -2, 0]), np.array([2.5, 2, 3])
-    inside = np.all((apparent > low - 1e-6) & (apparent < high + 1e-6), axis=1)
-    real = echoes.provenance <= Provenance.FLOOR_CEILING
-    assert np.array_equal(inside, real)
-    assert len(echoes.of(Provenance.GHOST_3)) and real.sum() > 10
+    outside = np.maximum(np.maximum(low - apparent, apparent - high), 0).max(axis=1)
+    types = PathTypes(scene, CONFIG, gain_pattern(Antenna.of(CONFIG.board)))
+    still = SimpleNamespace(
+        position=lambda t: np.tile(position, (len(t), 1)),
+        rotation=lambda t: Rotation.from_matrix(np.tile(pose, (len(t), 1, 1))),
+    )
+    lengths = paths.lengths(CONFIG, still, 0.0)[..., 0]
+    (found,) = types([paths], [lengths], position[None], pose[None])
+    assert (found[outside < 1e-6] <= PathType.FLOOR_CEILING).all() and (outside < 1e-6).sum() > 10
+    far = outside > 1.0
+    assert far.sum() > 5 and (found[far] == PathType.GHOST).mean() > 0.9
 
 
 def test_images_fade_out_before_their_paths_get_too_long():

@@ -3,24 +3,14 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.bursts import CONFIG, point_echoes, slot_phases, tone_ranges
+from benchmarks.references.rigs import ELEMENT, Rig, burst, locate, polar
 from radarize.radar.array import virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
-from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import gain_pattern
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import Band, FrontEndConfig
-from tests.propagation.rigs import Rig, burst, locate, polar
-
-CONFIG = PRESETS["radarize"]
-HERE = np.zeros(3)
-
-
-def point_echoes(place, sigma=1.0):
-    return EchoFinder(None, Scatterers.points(place, np.full(len(np.atleast_2d(place)), sigma)), None, CONFIG)(
-        HERE, np.eye(3)
-    )
 
 
 @pytest.mark.parametrize(
@@ -32,7 +22,7 @@ def test_point_target_obeys_the_radar_equation(range_, azimuth, elevation):
     signal = burst(CONFIG, point_echoes(place, sigma=0.5), Rig())
     guess = (range_ + 0.01, np.deg2rad(azimuth + 1), np.deg2rad(elevation - 1), 0.02)
     found_range, found_azimuth, found_elevation, speed, amplitude = locate(CONFIG, signal, guess)
-    az, el, _ = gain_pattern()
+    az, el, _ = ELEMENT
     degrees = np.linspace(0, 90, 181)
     gain = np.interp(abs(azimuth), degrees, az) ** 2 * np.interp(abs(elevation), degrees, el) ** 2
     expected = gain**2 * CONFIG.wavelength**2 * 0.5 / ((4 * np.pi) ** 3 * range_**4)
@@ -60,7 +50,7 @@ def test_doppler_of_a_lever_arm(rate):
     """Turning about a point 0.4 m behind the sensor moves it sideways at omega x r, left for a left turn."""
     rig = Rig(yaw_rate=rate, yaw=-rate * CONFIG.burst_center, lever=(0.4, 0, 0))
     place = np.array([0.4, 0, 0]) + polar(3.0, 40)
-    finder = EchoFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)
+    finder = PathFinder(None, Scatterers.points(place, np.ones(1)), None, CONFIG)
     signal = burst(CONFIG, finder(np.array([0.4, 0, 0]), np.eye(3)), rig)
     truth = 0.4 * rate * np.sin(np.deg2rad(40))
     *_, speed, _ = locate(CONFIG, signal, (3.0, np.deg2rad(40), 0.0, truth))
@@ -77,30 +67,11 @@ def test_doppler_frequency_in_hertz():
     assert frequency == pytest.approx(-513.69 * CONFIG.center_frequency / 77e9 * speed, rel=2e-3)
 
 
-def slot_phases(speed):
-    """Phase of an echo that closes, by transmitter against TX1: as simulated, and -4 pi v Tc / lambda a slot, rad."""
-    place = polar(3.0)
-    still = burst(CONFIG, point_echoes(place), Rig())
-    moving = burst(CONFIG, point_echoes(place), Rig(velocity=(speed, 0, 0)))
-    middle = CONFIG.samples // 2
-    turn = np.angle(moving[:, :, 0, middle] * still[:, :, 0, middle].conj())
-    per_slot = -4 * np.pi * speed * CONFIG.chirp_time / CONFIG.wavelength
-    return np.angle(np.exp(1j * (turn - turn[:, :1])).mean(axis=0)), per_slot * np.array(CONFIG.slot)
-
-
 @pytest.mark.parametrize("speed", [-1.6, 0.8])
 def test_tdm_slot_phase(speed):
     """TX3 fires one slot and TX2 two slots after TX1."""
     advance, law = slot_phases(speed)
     assert advance == pytest.approx(np.angle(np.exp(1j * law)), abs=0.02)
-
-
-def tone_ranges(signal, near):
-    """Range that the tone of each of TX1-RX1's chirps stands for, by a line through its phase."""
-    n = np.arange(CONFIG.samples) / CONFIG.sample_rate
-    expected = 2 * CONFIG.slope * near / SPEED_OF_LIGHT
-    phase = np.unwrap(np.angle(signal[:, 0, 0] * np.exp(-2j * np.pi * expected * n)), axis=1)
-    return near + np.polyfit(n, phase.T, 1)[0] / (2 * np.pi) * SPEED_OF_LIGHT / (2 * CONFIG.slope)
 
 
 def test_range_walk_within_a_burst():

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.rigs import ELEMENT, Rig, polar
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import amplitude_gain, gain_pattern
+from radarsim.propagation.antenna import amplitude_gain
 from radarsim.propagation.burst import BurstClock
-from radarsim.propagation.echoes import Provenance
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
@@ -19,7 +19,6 @@ from radarsim.world.movers import Door, Fan, Person
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import rectangle
-from tests.propagation.rigs import Rig, polar
 
 CONFIG = PRESETS["radarize"]
 NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
@@ -64,7 +63,7 @@ def alone(movers, scene=None, surface=NOTHING, seed=0):
     """A finder that sees movers, and the crowd that they are."""
     crowd = MovingTargets(movers, np.random.default_rng(seed), density=60.0)
     facets = None if scene is None else Reflectors.of(scene, CONFIG)
-    return EchoFinder(scene, surface, facets, CONFIG, moving=crowd), crowd
+    return PathFinder(scene, surface, facets, CONFIG, moving=crowd), crowd
 
 
 def brute_force(echoes, crowd, time, which, mirror=None):
@@ -109,7 +108,7 @@ def test_phases_against_brute_force(mover, below):
     finder, crowd = alone([mover])
     time = 0.7
     echoes = finder(np.zeros(3), np.eye(3), time + CONFIG.burst_center)
-    assert len(echoes) > 5 and (echoes.provenance == Provenance.MOVING).all()
+    assert len(echoes) > 5 and echoes.moving.all()
     found = Synthesizer(CONFIG)(echoes.lengths(CONFIG, Rig(), time), echoes.amplitude)
     middle = crowd.positions(np.array([time + CONFIG.burst_center]))[0]
     gap = np.linalg.norm(middle - echoes.points[:, :1], axis=2)
@@ -122,7 +121,7 @@ def test_ghosts_of_movers_move_as_mirrored():
     wall = Scene("wall", [SceneObject("wall", rectangle((2, 2, 0), (8, 4), (0, -1, 0)), MATERIALS["metal"])])
     finder, crowd = alone([Person(name="p", path=((2, -0.5), (2, 1.0)), speed=1.3, floor=-1.0)], wall)
     time = 0.5
-    echoes = finder(np.zeros(3), np.eye(3), time + CONFIG.burst_center).of(Provenance.MOVING)
+    echoes = finder(np.zeros(3), np.eye(3), time + CONFIG.burst_center).where(moving=True)
     middle = crowd.positions(np.array([time + CONFIG.burst_center]))[0]
     mirrored = echoes.points[:, :, 1] > 2
     assert mirrored.any(axis=1).sum() >= 6 and mirrored.all(axis=1).any()
@@ -148,7 +147,7 @@ def test_a_person_casts_a_shadow():
     person = Person(name="p", path=((1.5, 0),), floor=-1.0)
     place = np.array([polar(3.0, azimuth) for azimuth in (-20, 0, 20)])
     finder, _ = alone([person], surface=Scatterers.points(place, np.ones(3)))
-    echoes = finder(np.zeros(3), np.eye(3), 0.0).of(Provenance.DIRECT)
+    echoes = finder(np.zeros(3), np.eye(3), 0.0).where(bounces=0, through=False, moving=False)
     seen = {round(float(np.rad2deg(np.arctan2(p[1], p[0])))) for p in echoes.points[:, 0]}
     assert seen == {-20, 20}
 
@@ -158,7 +157,7 @@ def test_cross_section_of_a_person():
     person = Person(name="p", path=((3.0, 0),), floor=-1.0, cross_section=0.5)
     finder, _ = alone([person])
     echoes = finder(np.zeros(3), np.eye(3), 0.0)
-    gain = np.array([amplitude_gain(*point, gain_pattern()) for point in echoes.points[:, 0]])
+    gain = np.array([amplitude_gain(*point, ELEMENT) for point in echoes.points[:, 0]])
     scale = CONFIG.wavelength / (4 * np.pi) ** 1.5 * gain**2 / np.sum(echoes.points[:, 0] ** 2, axis=1)
     found = np.sum((np.abs(echoes.amplitude) / scale) ** 2)
     assert 10 * np.log10(found / 0.5) == pytest.approx(0, abs=1.5)  # limbs hide one another

@@ -5,15 +5,15 @@ import pytest
 import shapely
 import trimesh
 
+from benchmarks.references.rigs import field
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import planes, shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import field
 
 CONFIG = PRESETS["radarize"]
 
@@ -33,7 +33,7 @@ def coherent_field(mesh, position):
     """Sum of all flashes, edges and corners that can be seen."""
     scene = Scene("scan", [SceneObject("wall", mesh, MATERIALS["concrete"])])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
-    echoes = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(position, np.eye(3))
+    echoes = PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(position, np.eye(3))
     return field(echoes, position, CONFIG.wavelength)
 
 

@@ -2,20 +2,26 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
 from radarsim.motion.walk import Walk
-from radarsim.propagation import finder as finding
 from radarsim.propagation import visible_mirrors
-from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.mechanisms import diffuse
+from radarsim.propagation.paths import Paths
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.surface import Surface
 from radarsim.scenario import Scenario
+from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
+from radarsim.world.shapes import box, cylinder, placed, rectangle
 
 CONFIG = PRESETS["radarize"]
-GHOSTS = Provenance.GHOST_1, Provenance.GHOST_2, Provenance.GHOST_3
 
 
-def every_mirror(observation, flat, scene):
+def every_mirror(observation, flat, obstacles):
     """All reflectors that turn a face to the radar, and after them all before which they stand, as corners tell."""
     found = []
     for p in observation.position:
@@ -37,8 +43,9 @@ def every_mirror(observation, flat, scene):
 
 
 def power(frames):
-    """Of all ghosts."""
-    return sum(np.sum(np.abs(e.of(kind).amplitude) ** 2) for e in frames.echoes for kind in GHOSTS)
+    """Of all paths over mirrors that move nothing and pass no slab."""
+    every = Paths.joined([p.where(moving=False, through=False) for p in frames.paths])
+    return np.sum(np.abs(every.amplitude[every.bounces > 0]) ** 2)
 
 
 @pytest.mark.parametrize("name", ["office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"])
@@ -48,7 +55,46 @@ def test_ghosts_that_are_found(name, monkeypatch):
     scenario = Scenario(scene, Walk("handheld", 30).through(scene, 1), CONFIG, seed=1)
     times = np.array([19.0])
     found = power(scenario.frames(times))
-    monkeypatch.setattr(finding.visible_mirrors, "find", every_mirror)
-    monkeypatch.setattr(finding, "LEAST_TWICE", 0.0)
+    monkeypatch.setattr(visible_mirrors, "find", every_mirror)
+    monkeypatch.setattr(diffuse, "LEAST_TWICE", 0.0)
     all_there_are = power(scenario.frames(times))
+    assert found > 0.99 * all_there_are > 0
+
+
+def rooms():
+    """A room whose end is a glass partition and a closed door of wood, and behind these a furnished one of concrete."""
+    sheets = [
+        ("floor", "concrete", (3, 0, 0), (8, 5), (0, 0, 1)),
+        ("ceiling", "concrete", (3, 0, 2.6), (8, 5), (0, 0, -1)),
+        ("left", "concrete", (3, 2, 1.3), (8, 2.6), (0, -1, 0)),
+        ("right", "concrete", (3, -2, 1.3), (8, 2.6), (0, 1, 0)),
+        ("end", "concrete", (4.2, 0, 1.3), (4, 2.6), (-1, 0, 0)),
+        ("glass", "glass", (1.5, -0.75, 1.3), (2.5, 2.6), (-1, 0, 0)),
+    ]
+    boxes = [
+        ("door", "wood", (1.5, 1.25, 1.3), (0.04, 1.5, 2.6)),
+        ("cabinet", "metal", (3.9, -1.2, 0.6), (0.5, 0.8, 1.2)),
+        ("locker", "metal", (2.6, 1.7, 0.9), (0.6, 0.5, 1.8)),
+    ]
+    objects = [SceneObject(name, rectangle(*shape), MATERIALS[material]) for name, material, *shape in sheets]
+    objects += [SceneObject(name, box(*shape), MATERIALS[material]) for name, material, *shape in boxes]
+    post = placed(cylinder((0, 0, 0), 0.03, 2.0, 24), (2.9, 0.3, 1.0))
+    return Scene("rooms", [*objects, SceneObject("post", post, MATERIALS["metal"])])
+
+
+@pytest.mark.parametrize("yaw", [-0.3, 0.3])
+def test_ghosts_behind_glass_and_doors(yaw, monkeypatch):
+    """The same of those that pass a pane or a door on their way."""
+    scene = rooms()
+    surface = Surface(scene, np.random.default_rng(0), 60.0)
+    finder = PathFinder(scene, surface, Reflectors.of(scene, CONFIG), CONFIG, 7.5e-9)
+
+    def ghosts():
+        found = finder(np.array([0.2, 0.1, 1.2]), Rotation.from_euler("z", yaw).as_matrix()).where(through=True)
+        return np.sum(np.abs(found.amplitude[found.bounces > 0]) ** 2)
+
+    found = ghosts()
+    monkeypatch.setattr(visible_mirrors, "find", every_mirror)
+    monkeypatch.setattr(diffuse, "LEAST_TWICE", 0.0)
+    all_there_are = ghosts()
     assert found > 0.99 * all_there_are > 0

@@ -2,28 +2,36 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from benchmarks.references.rigs import conductors, isotropic, layer
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.curved import RoundBodies
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.mechanisms import curved_ghosts
+from radarsim.propagation.paths import Kind
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import isotropic
+from tests.propagation.test_multipath import slab
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
 WALL = SceneObject("wall", shapes.rectangle((1.5, 1.0, 0), (4.0, 3.0), (0, -1, 0)), MATERIALS["metal"])
 
 
+FLOOR = conductors(((2, 0, 0), (1, 0, 0), (0, 1, 0), (2.5, 2.0)))
+HIGH = np.array([0.0, 0.0, 0.8])
+
+
 def ghosts(body, wall=WALL):
     """Ghosts of a metal body as seen from the origin."""
     found = Reflectors.of(Scene("ghosts", [wall, SceneObject("body", body, MATERIALS["metal"])]), CONFIG)
     facing = np.flatnonzero(np.abs(found.flat.normal[:, 1]) > 0.99)[:1]
-    return curved_ghosts.find(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found)
+    return curved_ghosts.ghosts(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found)
 
 
 def summed(points, normals, areas, one, two, image):
@@ -77,6 +85,34 @@ def test_ghosts_of_round_bodies(kind):
         assert np.rad2deg(np.angle(turned)) == pytest.approx(0, abs=6)
 
 
+def leg_ghosts(bottom, tilt):
+    """Ghosts over a metal floor of a leg 2 m off, up to 0.7 m and tilted (deg), and the integral over what is above it,
+    both as the sum of the two orders of floor and leg."""
+    half = 0.35 - bottom / 2
+    center, turned = np.array([2.0, 0, 0.7 - half]), Rotation.from_euler("y", tilt, degrees=True)
+    leg = RoundBodies.of([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
+    found = curved_ghosts.ghosts(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, leg))
+    points, normals, areas = pole(np.zeros(3), 0.03, 2 * half)
+    points, normals = turned.apply(points) + center, turned.apply(normals)
+    lit = points[:, 2] > 0
+    truth = 2 * summed(points[lit], normals[lit], areas[lit], HIGH, HIGH * [1, 1, -1], 0.0)
+    path = np.linalg.norm(found.points - HIGH, axis=2).sum(axis=1)
+    return np.sum(found.amplitude * np.exp(2j * np.pi * path / LAMBDA)), truth
+
+
+@pytest.mark.parametrize("bottom", [0.0, -0.4, 0.03])
+@pytest.mark.parametrize("tilt", [0.0, 1e-6, -1e-6, 0.05, -0.05, 0.5, -0.5])
+def test_a_leg_on_a_level_floor(bottom, tilt):
+    """A table leg that stands on a metal floor, in it, or above it; only what is above the floor makes ghosts.
+
+    With the floor it is a corner of 90 deg, whose ghosts come from its foot; tilted, from above or from below that.
+    """
+    value, truth = leg_ghosts(bottom, tilt)
+    assert 20 * np.log10(abs(value) / abs(truth)) == pytest.approx(0, abs=0.5)
+    # Two conductors: upright fields keep their sign.
+    assert np.rad2deg(np.angle(-value / truth)) == pytest.approx(0, abs=6)
+
+
 def test_a_finder_has_them():
     """A lamp beside a wall: its ghosts are among the echoes; a board in the way of the wall hides them."""
     lamp = SceneObject("lamp", shapes.sphere((2.5, 0.2, 0.1), 0.1, 3), MATERIALS["metal"])
@@ -85,7 +121,35 @@ def test_a_finder_has_them():
     found = []
     for objects in ([WALL, lamp], [WALL, lamp, board]):
         scene = Scene("lamp", objects)
-        echoes = EchoFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(np.zeros(3), np.eye(3))
+        echoes = PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG)(np.zeros(3), np.eye(3))
         at_image = np.linalg.norm(echoes.points - [2.5, 1.8, 0.1], axis=2) < 0.11
         found.append(at_image.any(axis=1).sum())
     assert found == [3, 0]
+
+
+@pytest.mark.parametrize("kind", ["sphere", "pole"])
+def test_ghosts_behind_a_pane(kind):
+    """Over a wall on one way and on both, all of it behind 6 mm of glass: as without it, times what the pane leaves on
+    either way at the angle at which that meets it, and later by what it delays."""
+    center = np.array([2.5, 0.2, 0.0])
+    shape = shapes.sphere(center, 0.1, 4) if kind == "sphere" else shapes.cylinder(center, 0.03, 1.2, 24)
+    wall = SceneObject("wall", shapes.rectangle((2.1, 1.0, 0), (1.8, 3.0), (0, -1, 0)), MATERIALS["metal"])
+    pane = SceneObject("pane", shapes.rectangle((1.0, 0, 0), (6.0, 4.0), (-1, 0, 0)), MATERIALS["glass"])
+    objects, levels = [wall, SceneObject("body", shape, MATERIALS["metal"])], []
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    for things in (objects, [*objects, pane]):
+        scene = Scene("pane", things)
+        echoes = PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG, 1e-12)(np.zeros(3), np.eye(3))
+        echoes = echoes.where(kind=Kind.POINT)
+        over = np.linalg.norm(echoes.points - [2.5, 1.8, 0.0], axis=2) < 0.15
+        levels.append({tuple(o): (p, a) for o, p, a in zip(over, echoes.points, echoes.amplitude, strict=True)})
+    clear, behind = levels
+    assert sorted(clear) == sorted(behind) == [(False, True), (True, False), (True, True)]
+    for ways, (points, amplitude) in clear.items():
+        lengths = np.linalg.norm(points, axis=1)
+        truth = amplitude * np.prod([slab("glass", cosine) for cosine in points[:, 0] / lengths])
+        seen, found = behind[ways]
+        late = np.linalg.norm(seen, axis=1).sum() - lengths.sum()
+        assert 20 * np.log10(abs(found / truth)) == pytest.approx(0, abs=0.1)
+        assert np.rad2deg(np.angle(found / truth * np.exp(2j * np.pi * late / LAMBDA))) == pytest.approx(0, abs=4)
+        assert 0.005 < late < 0.03

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from benchmarks.references.rigs import ELEMENT, Rig, burst
 from radarize.radar.presets import PRESETS
-from radarsim.propagation.antenna import amplitude_gain, gain_pattern
+from radarsim.propagation.antenna import amplitude_gain
 from radarsim.propagation.clutter import Clutter
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.level_of_detail import detail, share
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.surface import DENSITY, Surface
 from radarsim.world import shapes
-from radarsim.world.life import Life
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import Rig, burst
+from radarsim.world.surface_settings import SurfaceSettings
 
 CONFIG = PRESETS["radarize"]
 AHEAD = np.eye(3)
@@ -46,7 +46,7 @@ def surface(seed=0, **options):
 def weights(scatterers, position):
     """Amplitude factor of each scatterer from a position, looking along x."""
     offset = scatterers.position - position
-    shares = [share(amplitude_gain(*d, gain_pattern()) / gain_pattern().peak_gain, np.linalg.norm(d)) for d in offset]
+    shares = [share(amplitude_gain(*d, ELEMENT) / ELEMENT.peak_gain, np.linalg.norm(d)) for d in offset]
     return np.array([detail(rank, used) for rank, used in zip(scatterers.rank, shares, strict=True)])
 
 
@@ -109,10 +109,10 @@ def test_mean_power_does_not_depend_on_distance():
     for distance in (0.7, 1.0, 2.0, 4.0):
         power = 0.0
         for seed in range(60):
-            finder = EchoFinder(None, Surface(board, np.random.default_rng(seed)), None, CONFIG)
+            finder = PathFinder(None, Surface(board, np.random.default_rng(seed)), None, CONFIG)
             echoes = finder(np.array([-distance, 0, 0]), AHEAD)
             place = echoes.points[:, 0] + [distance, 0, 0]
-            gain = np.array([amplitude_gain(*d, gain_pattern()) for d in place])
+            gain = np.array([amplitude_gain(*d, ELEMENT) for d in place])
             away = np.linalg.norm(place, axis=1)
             power += np.sum(np.abs(echoes.amplitude) ** 2 * (away / gain) ** 4 / (distance / away) ** 2)
         levels.append(10 * np.log10(power))
@@ -127,7 +127,7 @@ def amplitudes(finder, position):
 
 def test_nothing_pops_along_a_walk():
     """Frame to frame on a straight walk no scatterer comes, goes or changes by more than a part of its neighbours."""
-    finder = EchoFinder(None, surface(), None, CONFIG, range=4.0)
+    finder = PathFinder(None, surface(), None, CONFIG, range=4.0)
     path = [np.array([x, 0.1, 0.0]) for x in 0.5 + 0.03 * np.arange(12)]
     frames = [amplitudes(finder, p) for p in path]
     for before, after, position in zip(frames, frames[1:], path, strict=False):
@@ -146,10 +146,10 @@ def test_nothing_pops_along_a_walk():
 def test_speckle_stays_coherent(step):
     """The field after a step equals that of the very same scatterers, weights frozen: only their fading differs."""
     world, start = surface(), np.array([1.0, 0.2, 0.1])
-    finder = EchoFinder(None, world, None, CONFIG)
+    finder = PathFinder(None, world, None, CONFIG)
     moved = start + np.array(step)
     drawn = world.near(np.stack([start, moved]), finder.range)
-    whole = EchoFinder(None, replace(drawn, rank=np.full(len(drawn), -1.0)), None, CONFIG)(moved, AHEAD)
+    whole = PathFinder(None, replace(drawn, rank=np.full(len(drawn), -1.0)), None, CONFIG)(moved, AHEAD)
     before, now = (dict(zip(map(bytes, drawn.position), weights(drawn, p), strict=True)) for p in (start, moved))
 
     class Shifted(Rig):
@@ -170,7 +170,7 @@ def test_speckle_is_rayleigh():
     """Amplitude of one range-azimuth cell over independent worlds (Kolmogorov-Smirnov)."""
     cells = []
     for seed in range(150):
-        echoes = EchoFinder(None, surface(seed), None, CONFIG)(np.array([2.0, 0, 0]), AHEAD)
+        echoes = PathFinder(None, surface(seed), None, CONFIG)(np.array([2.0, 0, 0]), AHEAD)
         place = echoes.points[:, 0] - [2.0, 0, 0]
         r, azimuth = np.linalg.norm(place, axis=1), np.arctan2(place[:, 1], place[:, 0])
         for low in (2.4, 2.8, 3.2):
@@ -185,7 +185,7 @@ def test_speckle_is_rayleigh():
 def cell_powers(seed, density):
     """Mean power per cell, 0.5 m of range by 20 deg of azimuth."""
     position = np.array([1.5, 0.3, 0.0])
-    echoes = EchoFinder(None, surface(seed, density=density), None, CONFIG)(position, AHEAD)
+    echoes = PathFinder(None, surface(seed, density=density), None, CONFIG)(position, AHEAD)
     place = echoes.points[:, 0] - position
     r, azimuth = np.linalg.norm(place, axis=1), np.rad2deg(np.arctan2(place[:, 1], place[:, 0]))
     edges = [1.5, 2, 2.5, 3, 3.5, 4], np.arange(-50, 51, 20)
@@ -209,7 +209,7 @@ def test_cells_hold_ten_scatterers():
     azimuth_cell = 0.22  # of eight virtual antennas half a wavelength apart
     counts = {2.3: [], 3.0: [], 4.0: []}
     for seed in range(6):
-        echoes = EchoFinder(None, surface(seed), None, CONFIG)(position, AHEAD)
+        echoes = PathFinder(None, surface(seed), None, CONFIG)(position, AHEAD)
         place = echoes.points[np.abs(np.abs(echoes.points[:, 0, 1]) - 2) < 1e-9, 0] - position
         r, azimuth = np.linalg.norm(place, axis=1), np.arctan2(place[:, 1], place[:, 0])
         for distance, found in counts.items():
@@ -235,7 +235,11 @@ def test_cost_does_not_depend_on_the_building():
 def test_a_room_in_one_mesh_has_the_floor_of_one_in_parts():
     """As in a scan: scatterers, flat parts and small things on floor and ceiling are told from those on walls."""
     parts = [item.mesh for item in SCENE.objects]
-    whole = Scene("scan", [SceneObject("room", shapes.joined(*parts), MATERIALS["concrete"])], life=Life(clutter=1.0))
+    whole = Scene(
+        "scan",
+        [SceneObject("room", shapes.joined(*parts), MATERIALS["concrete"])],
+        surface_settings=SurfaceSettings(clutter=1.0),
+    )
     found = Surface(whole, np.random.default_rng(0)).all()
     assert (found.horizontal == (np.abs(np.abs(found.position[:, 2]) - 1.3) < 1e-6)).all()
     flat = Reflectors.of(whole, CONFIG).flat

@@ -5,15 +5,15 @@ import pytest
 
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.propagation.unevenness import SCALES, Heights
 from radarsim.world import shapes
-from radarsim.world.life import Life
 from radarsim.world.materials import material
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
+from radarsim.world.surface_settings import SurfaceSettings
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -25,7 +25,9 @@ NOWHERE = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
 def wall(unevenness, what="plasterboard"):
     """6 x 6 m at x = 0, seen from x > 0."""
     mesh = shapes.rectangle((0, 0, 0), (6, 6), (1, 0, 0))
-    return Scene("wall", [SceneObject("wall", mesh, material(what))], life=Life(unevenness=unevenness))
+    return Scene(
+        "wall", [SceneObject("wall", mesh, material(what))], surface_settings=SurfaceSettings(unevenness=unevenness)
+    )
 
 
 def heights(unevenness=1.0, seed=0):
@@ -103,7 +105,7 @@ def test_heights_are_as_rough_as_they_say():
 
 def finder(scene):
     field = Heights.of(scene, np.random.default_rng(0))
-    return EchoFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG, field), CONFIG, antenna=ISOTROPIC)
+    return PathFinder(scene, NOWHERE, Reflectors.of(scene, CONFIG, field), CONFIG, antenna=ISOTROPIC)
 
 
 def flash(scene, place):

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from radarize.radar.array import BOARDS, azimuth_row, elevation_pairs, rows, virtual_positions
+from radarize.radar.array import azimuth_row, elevation_pairs, rows, virtual_positions
+from radarize.radar.boards import BOARDS
 from radarize.radar.presets import PRESETS
 
 BASE = PRESETS["radarize"]

@@ -1,9 +1,10 @@
 import json
 
+import numpy as np
 import pytest
 
 from radarize.errors import InputError
-from radarize.radar.array import BOARDS
+from radarize.radar.boards import BOARDS
 from radarize.radar.presets import load_config
 from radarize.radar.studio import parse_studio
 
@@ -34,7 +35,7 @@ def test_the_public_capture(recordings):
 def test_board_and_its_reversed_feeds(settings, device, board):
     config = parse_studio(json.dumps(settings), device=device)
     assert config.board == "iwr6843" + board
-    assert config.channel_calibration == BOARDS[config.board].channel_calibration
+    assert np.array_equal(config.calibration.real, np.tile(BOARDS[config.board].rx_sign, (3, 1)))
 
 
 def _at(settings: dict, path: str) -> tuple[dict, str]:

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.rigs import Rig, polar
 from radarize.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.calibrate import calibrate
 from radarsim.receiver.frontend import FrontEnd
@@ -14,7 +15,6 @@ from radarsim.receiver.frontend_config import Band, FrontEndConfig, Leakage, Mis
 from radarsim.receiver.synthesis import Synthesizer
 from radarsim.recording.simulate import simulate
 from tests.importers import public
-from tests.propagation.rigs import Rig, polar
 
 CONFIG = PRESETS["radarize"]
 
@@ -26,7 +26,7 @@ def record(path, settings, board, config=CONFIG, velocity=(0, 0, 0), targets=((2
     sigma = np.array([0.3, 0.3][: len(targets)] + [1e-6] * 200)
     scatterers = Scatterers.points(np.array(place), sigma, rng.uniform(0, 2 * np.pi, len(place)))
     front, rig = FrontEnd(config, settings, np.random.default_rng(board)), Rig(velocity=velocity)
-    finder, synthesize = EchoFinder(None, scatterers, None, config), Synthesizer(config)
+    finder, synthesize = PathFinder(None, scatterers, None, config), Synthesizer(config)
     with RecordingWriter(path, config) as writer:
         for k in range(4):
             time = k * config.frame_period
@@ -52,13 +52,13 @@ def without_slope(channel):
 @pytest.mark.parametrize(("board", "velocity"), [(1, (0, 0, 0)), (2, (0.7, -0.2, 0))])
 def test_a_known_board_is_found(tmp_path, board, velocity):
     """Full scale within 0.3 dB, leakage 1 dB and 0.1 ns, band edge 2 %, channels 0.1 dB and 1 deg."""
-    settings = FrontEndConfig(
-        full_scale_dbm=2.0, band=Band(flat=0.85, high=1.15), leakage=Leakage(level_db=-40, delay=0.7e-9),
+    settings = FrontEndConfig.of(
+        CONFIG.board, full_scale_dbm=2.0, band=Band(flat=0.85, high=1.15), leakage=Leakage(level_db=-40, delay=0.7e-9),
         mismatch=Mismatch(gain_db=2.0, phase_deg=20.0),
     )  # fmt: skip
     front = record(tmp_path / "real.h5", settings, board, velocity=velocity)
     found = calibrate(tmp_path / "real.h5", tmp_path / "board.yaml").settings
-    assert found == FrontEndConfig.load(tmp_path / "board.yaml")
+    assert found == FrontEndConfig.load(tmp_path / "board.yaml", CONFIG.board)
     assert found.full_scale_dbm == pytest.approx(2.0, abs=0.3)
     assert found.leakage.level_db == pytest.approx(-40, abs=1)
     assert found.leakage.delay == pytest.approx(0.7e-9, abs=0.1e-9)
@@ -73,7 +73,7 @@ def test_a_known_board_is_found(tmp_path, board, velocity):
 
 
 def test_a_quiet_board_has_no_leakage(tmp_path):
-    record(tmp_path / "real.h5", FrontEndConfig(leakage=None, full_scale_dbm=8.0), 3, targets=())
+    record(tmp_path / "real.h5", FrontEndConfig.of(CONFIG.board, leakage=None, full_scale_dbm=8.0), 3, targets=())
     found = calibrate(tmp_path / "real.h5", tmp_path / "board.yaml")
     assert found.settings.leakage is None
     assert found.settings.mismatch == Mismatch()  # nothing to tell it from
@@ -82,7 +82,7 @@ def test_a_quiet_board_has_no_leakage(tmp_path):
 
 def test_one_channel(tmp_path):
     config = CONFIG.model_copy(update={"tx_order": (1,), "rx": (2,)})
-    record(tmp_path / "real.h5", FrontEndConfig(), 1, config)
+    record(tmp_path / "real.h5", FrontEndConfig.of(CONFIG.board), 1, config)
     found = calibrate(tmp_path / "real.h5", tmp_path / "board.yaml")
     assert found.settings.full_scale_dbm == pytest.approx(5.0, abs=0.3)
     assert "1 channels: mismatch left" in " ".join(found.remarks)
@@ -117,7 +117,7 @@ def test_real_captures_give_boards_that_sound_like_them(captures, tmp_path):
         with Recording(path) as recording:
             config = recording.config
             adc = recording.adc(0, 1).astype(np.float32)
-        front = FrontEnd(config, FrontEndConfig.load(tmp_path / f"{name}.yaml"))
+        front = FrontEnd(config, FrontEndConfig.load(tmp_path / f"{name}.yaml", config.board))
         silence = np.zeros(config.frame_shape[:-1], np.complex64)
         again = front.digitize(silence, np.random.default_rng(0)).astype(np.float32)[None]
         levels = []
@@ -132,9 +132,9 @@ def test_real_captures_give_boards_that_sound_like_them(captures, tmp_path):
 
 def test_simulate_takes_the_file(tmp_path):
     """From a recording to a front-end file to a recording that calibrates to the same file."""
-    settings = FrontEndConfig(full_scale_dbm=0.0, leakage=Leakage(level_db=-38))
+    settings = FrontEndConfig.of(CONFIG.board, full_scale_dbm=0.0, leakage=Leakage(level_db=-38))
     settings.save(tmp_path / "made.yaml")
-    first = simulate("office", tmp_path / "a.h5", duration=0.3, seed=2, frontend=tmp_path / "made.yaml")
+    first = simulate("office", tmp_path / "a.h5", duration=0.1, seed=2, frontend=tmp_path / "made.yaml")
     found = calibrate(first, tmp_path / "found.yaml").settings
     assert found.full_scale_dbm == pytest.approx(0.0, abs=0.5)
     simulate("office", tmp_path / "b.h5", duration=0.1, seed=2, frontend=tmp_path / "found.yaml")

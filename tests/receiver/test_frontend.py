@@ -3,44 +3,19 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.front_end import CONFIG, PHASE_NOISE, db, law, noise_factor, power_by_bin, rng, skirt, tone
 from radarize.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT
-from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC, Antenna, amplitude_gain, gain_pattern
 from radarsim.receiver.frontend import FrontEnd
-from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, PhaseNoise
+from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch
 
-CONFIG = PRESETS["radarize"]
 SHAPE = CONFIG.frame_shape[:-1]
 N = CONFIG.samples
 OFF = FrontEndConfig.ideal()
 
 
-def db(power):
-    return 10 * np.log10(power)
-
-
-def rng():
-    return np.random.default_rng(1)
-
-
-def tone(beat_bins, level_db, config=CONFIG):
-    """An echo of `level_db` (received over transmitted power) that fills a bin."""
-    n = np.arange(config.samples)
-    line = 10 ** (level_db / 20) * np.exp(2j * np.pi * beat_bins * n / config.samples)
-    return np.broadcast_to(line.astype(np.complex64), config.frame_shape[:-1])
-
-
-def power_by_bin(counts):
-    """Mean power per bin over all traces, counts^2."""
-    return np.mean(np.abs(np.fft.fft(counts, axis=-1) / counts.shape[-1]) ** 2, axis=(0, 1, 2))
-
-
 # --- thermal noise ---------------------------------------------------------------------------------------------------
-def noise_factor(gain):
-    """15.6 dB at 30 dB of receive gain, 15 dB at 48 dB, and Friis's line between."""
-    later = (10**1.56 - 10**1.5) / (10**-3.0 - 10**-4.8)  # noise factor of all that follows the gain
-    return 10**1.5 + later * (10 ** (-gain / 10) - 10**-4.8)
 
 
 @pytest.mark.parametrize("gain", [24.0, 30.0, 38.0, 48.0])
@@ -54,8 +29,20 @@ def test_noise_by_receive_gain(gain):
 
 
 def test_noise_figure_of_one_measurement_holds_for_every_gain():
-    settings = FrontEndConfig(noise_figure_db={30: 13.0})
+    settings = FrontEndConfig.of(CONFIG.board, noise_figure_db={30: 13.0})
     assert db(settings.noise_factor(24)) == db(settings.noise_factor(48)) == pytest.approx(13.0)
+
+
+@pytest.mark.parametrize("band", [Band(), Band(low=-0.3, flat=0.8, high=1.4)], ids=["default", "wide"])
+def test_noise_folds_as_echoes_do(band):
+    """Its spectrum is that of white noise of the same density at eight times the rate, filtered and decimated."""
+    front = FrontEnd(CONFIG, FrontEndConfig.ideal(noise=True, band=band))
+    found = sum(power_by_bin(front.receive(np.zeros(SHAPE, np.complex64), np.random.default_rng(k))) for k in range(8))
+    white = rng().normal(size=(3000, 8 * N, 2)).view(complex)[..., 0] * np.sqrt(front._bin_noise * N / 2 * 8)
+    beat = np.fft.fftfreq(8 * N, 1 / (8 * CONFIG.sample_rate))
+    sampled = np.fft.ifft(np.fft.fft(white) * front.beat_response(beat))[:, ::8]
+    truth = power_by_bin(sampled[:, None, None])
+    assert db(found / 8 / truth) == pytest.approx(np.zeros(N), abs=0.5)
 
 
 # --- converter -------------------------------------------------------------------------------------------------------
@@ -107,19 +94,6 @@ def test_measured_leakage_is_taken_as_it_is():
 
 
 # --- phase noise -----------------------------------------------------------------------------------------------------
-def skirt(cell, level_db=-40.0, settings=None, config=CONFIG):
-    """Power by bin around an echo in a cell, over the echo's power."""
-    settings = settings or FrontEndConfig.ideal(phase_noise=PhaseNoise())
-    counts = FrontEnd(config, settings).receive(tone(cell, level_db, config), rng())
-    power = power_by_bin(counts)
-    return power / power[cell]
-
-
-def law(cell, offset_bins, mask_db=lambda f: np.where(f < 316e3, -83, -93 - 20 * np.log10(f / 1e6)), config=CONFIG):
-    """4 L(f) sin^2(pi f tau) over the width of a bin."""
-    step = config.sample_rate / config.samples
-    f, tau = np.abs(offset_bins) * step, cell / config.bandwidth
-    return 10 ** (mask_db(f) / 10) * 4 * np.sin(np.pi * f * tau) ** 2 * step
 
 
 @pytest.mark.parametrize("cell", [20, 45, 90])
@@ -149,7 +123,7 @@ def test_near_echoes_have_no_skirt():
     offset = db(law(80, np.arange(20, 40) - 80).mean() / law(10, np.arange(70, 90) - 10).mean())
     assert offset > 15
     assert db(far / near) == pytest.approx(offset, abs=0.5)
-    leak = FrontEndConfig.ideal(leakage=Leakage(level_db=-20, delay=0.5e-9), phase_noise=PhaseNoise())
+    leak = FrontEndConfig.ideal(leakage=Leakage(level_db=-20, delay=0.5e-9), phase_noise=PHASE_NOISE)
     counts = FrontEnd(CONFIG, leak).receive(np.zeros(SHAPE, np.complex64), rng())
     power = power_by_bin(counts - counts.mean(axis=0))[10:80]
     f = np.arange(10, 80) * CONFIG.sample_rate / N
@@ -160,7 +134,7 @@ def test_near_echoes_have_no_skirt():
 
 
 def test_phase_noise_is_common_to_the_receivers_of_a_chirp():
-    counts = FrontEnd(CONFIG, FrontEndConfig.ideal(phase_noise=PhaseNoise())).receive(tone(60, -40), rng())
+    counts = FrontEnd(CONFIG, FrontEndConfig.ideal(phase_noise=PHASE_NOISE)).receive(tone(60, -40), rng())
     rest = counts - counts.mean(axis=(0, 1), keepdims=True)
     within = np.abs(np.vdot(rest[:, :, 0], rest[:, :, 3])) / np.linalg.norm(rest[:, :, 0]) ** 2
     between = np.abs(np.vdot(rest[1:], rest[:-1])) / np.linalg.norm(rest) ** 2
@@ -169,7 +143,7 @@ def test_phase_noise_is_common_to_the_receivers_of_a_chirp():
 
 def test_skirts_below_the_noise_may_be_left_out():
     """The speed-up for weak echoes takes away less than 1 % of the noise in any bin."""
-    settings = FrontEndConfig.ideal(noise=True, phase_noise=PhaseNoise())
+    settings = FrontEndConfig.ideal(noise=True, phase_noise=PHASE_NOISE)
     weak, plain = (FrontEnd(CONFIG, s).receive(tone(60, -75), rng()) for s in (settings, OFF))
     noise = power_by_bin(weak - plain)
     assert db(noise / FrontEnd(CONFIG, settings)._bin_noise) == pytest.approx(np.zeros(N), abs=1.2)
@@ -218,7 +192,7 @@ def test_mismatch_acts_on_every_echo():
 # --- antenna ---------------------------------------------------------------------------------------------------------
 def test_antenna_pattern():
     """10.5 dBi; 3 dB down at 28 deg azimuth and 14 deg elevation, 6 dB at 50 and 20."""
-    tables = gain_pattern()
+    tables = gain_pattern(Antenna.of(CONFIG.board))
     for azimuth, elevation, expected in ((0, 0, 10.5), (28, 0, 7.5), (-50, 0, 4.5), (0, 14, 7.5), (0, -20, 4.5)):
         a, e = np.deg2rad([azimuth, elevation])
         gain = amplitude_gain(np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e), tables)
@@ -254,9 +228,10 @@ def test_everything_off_is_the_ideal():
 def test_each_switch_does_something_alone(switch):
     """With everything on but one, the samples differ from those with everything on."""
     name = next(iter(switch))
-    on, off = FrontEnd(CONFIG, FrontEndConfig(), rng()), FrontEnd(CONFIG, FrontEndConfig(**switch), rng())
+    on = FrontEnd(CONFIG, rng=rng())
+    off = FrontEnd(CONFIG, FrontEndConfig.of(CONFIG.board, **switch), rng())
     if name == "antenna":
-        assert off.settings.pattern == ISOTROPIC and on.settings.pattern == Antenna()
+        assert off.settings.pattern == ISOTROPIC and on.settings.pattern == Antenna.of(CONFIG.board)
     elif name == "high_pass":
         assert abs(off.if_response(np.array(0.5))) == 1 > abs(on.if_response(np.array(0.5)))
     else:
@@ -266,7 +241,7 @@ def test_each_switch_does_something_alone(switch):
 
 def test_parts_by_cause_add_up():
     """With noise off, what each signal makes and the leakage are together what the front end makes of their sum."""
-    front = FrontEnd(CONFIG, FrontEndConfig(noise=False, phase_noise=None), rng())
+    front = FrontEnd(CONFIG, FrontEndConfig.of(CONFIG.board, noise=False, phase_noise=None), rng())
     signals = [tone(3, -60), tone(30.3, -70), tone(70.9, -80)]
     parts, whole = front.by_cause(signals), front.receive(np.sum(signals, axis=0), rng())
     assert len(parts) == 4
@@ -274,12 +249,14 @@ def test_parts_by_cause_add_up():
 
 
 def test_files_round_trip(tmp_path):
-    settings = FrontEndConfig(noise_figure_db={30: 14.0}, leakage=None, mismatch=Mismatch(gain_db=1), adc_bits=12)
+    settings = FrontEndConfig.of(
+        CONFIG.board, noise_figure_db={30: 14.0}, leakage=None, mismatch=Mismatch(gain_db=1), adc_bits=12
+    )
     settings.save(tmp_path / "board.yaml", ["measured on a Sunday"])
-    assert FrontEndConfig.load(tmp_path / "board.yaml") == settings
+    assert FrontEndConfig.load(tmp_path / "board.yaml", CONFIG.board) == settings
     assert (tmp_path / "board.yaml").read_text().startswith("# measured on a Sunday")
     (tmp_path / "part.yaml").write_text("tx_power_dbm: 10\n")
-    assert FrontEndConfig.load(tmp_path / "part.yaml") == FrontEndConfig(tx_power_dbm=10)
+    assert FrontEndConfig.load(tmp_path / "part.yaml", CONFIG.board) == FrontEndConfig.of(CONFIG.board, tx_power_dbm=10)
 
 
 @pytest.mark.parametrize(
@@ -299,5 +276,5 @@ def test_bad_files_are_refused_in_a_sentence(tmp_path, text, words):
     path = tmp_path / "bad.yaml"
     path.write_text(text)
     with pytest.raises(InputError) as caught:
-        FrontEndConfig.load(path)
+        FrontEndConfig.load(path, CONFIG.board)
     assert words in str(caught.value) and "bad.yaml" in str(caught.value) and "\n" not in str(caught.value)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
+from benchmarks.references.brute_force import beat, direct_sum
+from benchmarks.references.rigs import Rig
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.burst import BurstClock
-from radarsim.propagation.echoes import Echoes
+from radarsim.propagation.paths import Kind, Paths
 from radarsim.receiver.synthesis import Synthesizer
-from tests.propagation.brute_force import beat, direct_sum
-from tests.propagation.rigs import Rig
 
 CONFIG = PRESETS["radarize"]
 
@@ -25,7 +25,7 @@ def cloud(rng, n):
     points = np.repeat(place[:, None], 2, axis=1)
     points[: n // 4, 1] += rng.uniform(-1, 1, (n // 4, 3))
     amplitude = (rng.normal(size=n) + 1j * rng.normal(size=n)) / np.sum(place**2, axis=1)
-    return Echoes(points, np.zeros((0, 3, 4)), amplitude, np.zeros(n, np.uint8))
+    return Paths.of(Kind.POINT, points, amplitude)
 
 
 FAST = Rig(velocity=(1.6, 0.5, 0.1), yaw_rate=1.5, lever=(0.3, 0.1, 0))
@@ -74,7 +74,7 @@ def test_images_follow_the_mirror():
     wall = 2.0
     matrix = np.diag([-1.0, 1, 1])
     image = np.concatenate([matrix, [[2 * wall], [0], [0]]], axis=1)[None]
-    echoes = Echoes(np.zeros((0, 2, 3)), image, np.ones(1, complex), np.zeros(1, np.uint8))
+    echoes = Paths.of(Kind.IMAGE, image, np.ones(1, complex))
     lengths = echoes.lengths(CONFIG, FAST, 0.1)
     clock = BurstClock.of(CONFIG)
     for s in (-0.9, 0.3, 1.0):

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import open3d as o3d
 import pytest
-from mounting import beside, box
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.presets import PRESETS
@@ -16,6 +15,7 @@ from radarsim.sensors.depth import MOUNT, QUARTER, STRIP, DepthCamera, Intrinsic
 from radarsim.world.description import Custom
 from radarsim.world.movers import Person
 from radarsim.world.scene import Scene
+from tests.sensors.mounting import beside, box
 
 NOW = np.array([0.0])
 

@@ -6,7 +6,7 @@ import pytest
 from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
 from radarsim.motion.walk import Walk
-from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
 from radarsim.sensors.causes import CAUSES, AdcByCause
@@ -22,7 +22,7 @@ def seen():
     """Three frames of people in an office: (ghost sensor, its rows, map of the I/Q by cause)."""
     scene = Scene.load("visitors")
     motion = Walk("handheld", 5.0).through(scene, 1)
-    scenario = Scenario(scene, motion, CONFIG, FrontEndConfig(mismatch=None), seed=1)
+    scenario = Scenario(scene, motion, CONFIG, FrontEndConfig.of(CONFIG.board, mismatch=None), seed=1)
     sensor, frames = Ghosts(scenario), scenario.frames(np.array([1.4, 4.1, 4.9]))
     iq = AdcByCause(scenario).observe(frames)["truth/adc_by_cause"].astype(np.float32)
     maps = Heatmaps(CONFIG, azimuths=AZIMUTHS)
@@ -32,7 +32,7 @@ def seen():
 
 @pytest.mark.parametrize(
     ("cause", "least"),
-    [(Provenance.DIRECT, 1e-3), (Provenance.FLOOR_CEILING, 1e-3), (Provenance.GHOST_1, 1e-3), (Provenance.MOVING, 0.1)],
+    [(PathType.DIRECT, 1e-3), (PathType.FLOOR_CEILING, 1e-3), (PathType.GHOST, 1e-3), (PathType.MOVING, 0.1)],
 )
 def test_maps_are_those_of_the_iq(seen, cause, least):
     """A few instants stand for 32 loops, nine cells of ten above the noise within a dB.
@@ -45,7 +45,7 @@ def test_maps_are_those_of_the_iq(seen, cause, least):
     strong = expected > np.maximum(least * expected.max(), 10 ** ((sensor._floor + 3) / 10))
     off = 10 * np.log10(found[strong] / expected[strong])
     assert strong.sum() > 20
-    median, most = (0.2, 1.0) if cause != Provenance.MOVING else (1.0, 4.0)
+    median, most = (0.2, 1.0) if cause != PathType.MOVING else (1.0, 4.0)
     assert abs(np.median(off)) < median and np.quantile(np.abs(off), 0.9) < most
     assert 10 * np.log10(found[strong].sum() / expected[strong].sum()) == pytest.approx(0, abs=1.0)
 

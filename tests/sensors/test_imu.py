@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from mounting import CONFIG, beside, rows, stream, tumble
 from scipy.spatial.transform import Rotation
 
 from radarsim.motion.trajectory import Motion
 from radarsim.sensors.depth import MOUNT
 from radarsim.sensors.imu import ACCELEROMETER, GYROSCOPE, RATE, STANDARD_GRAVITY, Imu, Triad
+from tests.sensors.mounting import CONFIG, beside, rows, stream, tumble
 
 
 def test_samples_come_at_200_hz_without_gaps():

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from mounting import beside, box, rows
 
 from radarize import polar
 from radarsim.motion.trajectory import Motion
 from radarsim.sensors.lidar import Lidar
+from tests.sensors.mounting import beside, box, rows
 
 WALL = box("wall", [2.0, -20, 0], [2.2, 20, 3])
 

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from mounting import CONFIG, beside, box, rows
 
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.trajectory import Motion
@@ -10,6 +9,7 @@ from radarsim.scenario import Scenario
 from radarsim.sensors.depth import MOUNT, QUARTER, DepthCamera
 from radarsim.sensors.scan import AZIMUTHS, Cell, Occupancy, PlanarScan
 from radarsim.world.scene import Scene
+from tests.sensors.mounting import CONFIG, beside, box, rows
 
 WALL = box("wall", [2.0, -20, 0], [2.2, 20, 3])
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from mounting import beside, rows, tumble
 from scipy.spatial.transform import Rotation
 
 from radarsim.motion.trajectory import Motion
 from radarsim.sensors.tracking import HEADING_WALK, JITTER, SCALE_ERROR, TrackingCamera
+from tests.sensors.mounting import beside, rows, tumble
 
 
 def both(motion, count, seed):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import torch
 from torch.utils.data import DataLoader
-from walks import CONFIG, TURN, VELOCITY, walk
 
 from radarize.errors import InputError
 from radarize.features.keeping import keep_maps
 from radarize.features.maps import MAPS, STEP
 from radarize.recording import Recording
 from radarize.training.dataset import DEFAULT, Frames
+from tests.training.walks import CONFIG, TURN, VELOCITY, walk
 
 HOW_TO = Path(__file__).parents[2] / "docs" / "learning.md"
 

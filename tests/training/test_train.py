@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from ridges import CONFIG, data_set, write
 from typer.testing import CliRunner
 
 from radarize.cli import app
@@ -24,6 +23,7 @@ from radarize.nets.weights import header_of, load, read
 from radarize.recording import Recording
 from radarize.training.team import Team
 from radarize.training.train import Options, train
+from tests.training.ridges import CONFIG, data_set, write
 
 pytestmark = pytest.mark.usefixtures("one_thread")
 
@@ -258,7 +258,7 @@ def test_what_cannot_be_used_is_named(small, tmp_path, change, expected):
 
 def test_recordings_of_two_radars_or_broken_truth_are_refused(tmp_path):
     good = write(tmp_path / "a.h5", "velocity", 5)
-    from walks import walk
+    from tests.training.walks import walk
 
     with pytest.raises(InputError, match="b.h5: has maps of rows 8 instead of 16 as in a.h5, expected one radar's"):
         Table.read([good, walk(tmp_path / "b.h5")], ("doppler_azimuth",), (VELOCITY,))

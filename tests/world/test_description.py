@@ -5,8 +5,8 @@ import pytest
 
 from radarize.errors import InputError
 from radarsim.world import shapes
-from radarsim.world.life import Life
 from radarsim.world.scene import Scene
+from radarsim.world.surface_settings import SurfaceSettings
 
 WALL = "{name: wall, shape: rectangle, size: [4, 3], position: [3, 0, 1], facing: [-1, 0, 0], material: concrete}"
 
@@ -64,7 +64,7 @@ PLAIN += f", {PLAIN.replace('top', 'floor').replace('[0, 0, 1], f', '[0, 0, 0], 
         ("building: {kind: castle}", "building.kind is 'castle'"),
         ("building: {kind: office, seed: x}", "building.seed is 'x'"),
         ("building: {kind: office, seed: -1}", "building.seed is -1"),
-        (f"objects: [{PLAIN}]\nclutter: 10", "clutter is 10, for which 3.*e.08 things are tried"),
+        (f"objects: [{PLAIN}]\nclutter: 10", "clutter is 10, for which 3.*e.08 objects are tried"),
         ("objects: [3]", r"objects\[0\]"),
         ("objects: 3", "objects is 3"),
     ],
@@ -171,14 +171,14 @@ def test_mistakes_in_levels(tmp_path, level, text, complaint):
 
 
 @pytest.mark.parametrize(
-    ("text", "life"),
+    ("text", "settings"),
     [
-        (f"objects: [{WALL}]", Life(0, 0)),
-        ("building: {kind: office}", Life(0, 0)),
-        ("building: {kind: B, seed: 3}\nclutter: 1", Life(1, 0)),
-        (f"objects: [{WALL}]\nclutter: 0.5\nunevenness: 2", Life(0.5, 2)),
+        (f"objects: [{WALL}]", SurfaceSettings(0, 0)),
+        ("building: {kind: office}", SurfaceSettings(0, 0)),
+        ("building: {kind: B, seed: 3}\nclutter: 1", SurfaceSettings(1, 0)),
+        (f"objects: [{WALL}]\nclutter: 0.5\nunevenness: 2", SurfaceSettings(0.5, 2)),
     ],
 )
-def test_how_lived_in_a_place_is(tmp_path, text, life):
-    """Not at all, unless the file says so."""
-    assert load(tmp_path, text).life == life
+def test_clutter_and_unevenness(tmp_path, text, settings):
+    """None by default."""
+    assert load(tmp_path, text).surface_settings == settings

@@ -9,8 +9,7 @@ from scipy import ndimage
 
 from radarsim.world.clearance import Clearance
 from radarsim.world.generators import walls
-from radarsim.world.generators.buildings import Building
-from radarsim.world.generators.office import Office
+from radarsim.world.generators.buildings import Building, Office
 from radarsim.world.scene import Scene
 
 

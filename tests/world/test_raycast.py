@@ -4,10 +4,10 @@ import numpy as np
 import open3d as o3d
 import pytest
 import trimesh
-from mounting import beside
 
 from radarsim.motion.trajectory import Motion
 from radarsim.world.movers import Door, Person
+from tests.sensors.mounting import beside
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene, _lent
-from tests.beams import level_beams
+from tests.world.beams import level_beams
 
 WOOD, METAL = MATERIALS["wood"], MATERIALS["metal"]
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
+from benchmarks.references import corners
+from benchmarks.references.corners import LAMBDA
+from benchmarks.references.rigs import isotropic
 from radarsim.world.description import built
 from radarsim.world.generators.buildings import Building
 from radarsim.world.planes import plates
 from radarsim.world.squareness import CORNER, LEAN, out_of_square, shear
-from tests.propagation import corners
-from tests.propagation.corners import LAMBDA
-from tests.propagation.rigs import isotropic
 
 BUILDING = Building(kind="C", seed=4, furnished=False)
 

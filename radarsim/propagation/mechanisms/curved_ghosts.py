@@ -18,7 +18,7 @@ from jaxtyping import Complex, Float, Int
 from numba import njit
 
 from radarsim.propagation.apertures import STRIP_FAR, aperture, passes, strip
-from radarsim.propagation.echoes import Provenance
+from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
     along,
     cross,
@@ -35,16 +35,17 @@ from radarsim.propagation.fields import (
     write,
 )
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fresnelzone import LEAST_LOSS
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.obstacles import Obstacles
 from radarsim.propagation.patches import strength
-from radarsim.propagation.pointechoes import PointEchoes
+from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat, Reflectors
 from radarsim.propagation.table import Table, filled
-from radarsim.propagation.visible_mirrors import Mirrors
 
 #: Steps to the point between two images; each shrinks the error by at least the share of the radius in the distance.
 STEPS = 12
+#: Rays to a cylinder aim at least this far inside the part of it that is lit, m: a leg's end is in the floor.
+_INSIDE = 0.01
 
 
 @dataclass(frozen=True)
@@ -69,24 +70,28 @@ class RoundGhosts(Table):
         return (self.mirrors >= 0).sum(axis=1)
 
 
-def seen(
-    observation: Observation, flat: Flat, mirrors: list[Mirrors], reflectors: Reflectors, obstacles: Obstacles
-) -> PointEchoes:
-    """Ghosts that nothing hides; slabs are opaque to them."""
-    found = [find(observation, k, flat, some.seen, reflectors) for k, some in enumerate(mirrors)]
+def find(view: View) -> Paths:
+    """Ghosts above the threshold that nothing hides, weakened and delayed where they pass slabs."""
+    observation, flat, reflectors = view.observation, view.flat, view.environment.reflectors
+    if reflectors is None:
+        return Paths.none()
+    found = [ghosts(observation, k, flat, some.seen, reflectors) for k, some in enumerate(view.mirrors)]
     frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
     n = 2 * len(every)
-    factor, _ = obstacles.way(
-        observation, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), np.zeros(n, bool)
-    )
-    clear = (factor != 0).reshape(-1, 2).all(axis=1)
-    frame, every = frame[clear], every[clear]
-    cause = np.where(every.bounces == 1, Provenance.GHOST_1, Provenance.GHOST_2).astype(np.uint8)
-    mirrors = np.stack([every.mirrors, np.full_like(every.mirrors, -1)], axis=2)
-    return PointEchoes(frame, every.points, mirrors, np.full(len(frame), -1), every.amplitude, cause)
+    allowed = np.repeat(np.abs(every.amplitude) > LEAST_LOSS * observation.threshold, 2)
+    passed = view.obstacles.way(
+        observation, np.repeat(frame, 2), every.stops.reshape(n, 2, 3), np.full(n, 2), allowed
+    )  # fmt: skip
+    here = observation.position[frame, None]
+    away = every.points - here  # a delay moves the point away
+    points = here + away * (1 + passed.delay.reshape(-1, 2, 1) / np.linalg.norm(away, axis=2, keepdims=True))
+    mirrors = np.full((len(every), 4), -1)
+    mirrors[:, [0, 2]] = every.mirrors
+    paths = Paths.of(Kind.POINT, points, every.amplitude, frame=frame, bounces=every.bounces, mirrors=mirrors)
+    return paths.behind(observation, passed.after_one_another(2))
 
 
-def find(
+def ghosts(
     observation: Observation, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], reflectors: Reflectors
 ) -> RoundGhosts:
     """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
@@ -111,11 +116,9 @@ def _find(observation, frame, flat, seen, curved, found):
         ways = _ways(observation, p, flat, seen, ball, (mirrors, images))
         for i in range(ways):
             for j in range(max(i, 1), ways):
-                place, n, size = _strength(observation, bodies, b, vec(images[i]), vec(images[j]))
                 way = mirrors[i], vec(images[i]), mirrors[j], vec(images[j])
-                count += _add(
-                    observation, frame, flat, way, (place, place, n, size, bodies.reflection[b]), (found, count)
-                )
+                place, aim, n, size = _strength(observation, flat, bodies, b, way)
+                count += _add(observation, frame, flat, way, (place, aim, n, size, bodies.layer[b]), (found, count))
     for k in range(len(patches.ball)):
         ways = _ways(observation, p, flat, seen, (vec(patches.ball[k]), patches.ball[k, 3]), (mirrors, images))
         for i in range(ways):
@@ -123,7 +126,7 @@ def _find(observation, frame, flat, seen, curved, found):
                 for turn in range(2 if patches.two_sided[k] else 1):
                     of, way = (k, 1.0 - 2.0 * turn), (mirrors[i], vec(images[i]), mirrors[j], vec(images[j]))
                     aim, quadric, place, size = strength(observation, patches, of, way[1], way[3])
-                    echo = place, aim, quadric[2], size, patches.reflection[k]
+                    echo = place, aim, quadric[2], size, patches.layer[k]
                     count += _add(observation, frame, flat, way, echo, (found, count))
     return count
 
@@ -135,19 +138,21 @@ def _add(observation, frame, flat, way, echo, found):
     Args:
         observation, frame, flat: of `_find`.
         way: mirrors and images of the radar out and back.
-        echo: place, a point for rays to aim at, normal, amplitude from image to image, reflection.
+        echo: place P, a lit point for rays to aim at, normal, amplitude from image to image, layer.
         found: ghosts so far, and how many.
     """
     one, source, two, sink = way
-    place, aim, n, size, reflection = echo
+    place, aim, n, size, layer = echo
     ghosts, count = found
     if abs(size) * observation.peak_gain**2 <= observation.threshold:
         return 0
-    out, back = _over(observation, frame, flat, one, source, place), _over(observation, frame, flat, two, sink, place)
-    value = size * out[2] * back[2]
+    if not (_before(flat, one, source, aim) and _before(flat, two, sink, aim)):
+        return 0
+    out, back = _over(observation, frame, flat, one, source, aim), _over(observation, frame, flat, two, sink, aim)
+    value = size * out[1] * back[1]
     if abs(value) <= observation.threshold:
         return 0
-    value *= _polarisation(observation, frame, flat, ((one, out[0]), (two, back[0])), place, n, reflection)
+    value *= _polarisation(upwards(observation.rotation[frame]), flat, way, aim, n, layer)
     if abs(value) <= observation.threshold:
         return 0
     clear, ways = along(aim, 2e-3, n), 1 if one == two else 2
@@ -158,7 +163,7 @@ def _add(observation, frame, flat, way, echo, found):
             for end in range(2):
                 leg, m = (out, one) if end == swapped else (back, two)
                 ghosts.mirrors[row, end] = m
-                write(leg[1], ghosts.points[row, end])
+                write(_seen(flat, m, place), ghosts.points[row, end])
                 write(leg[0] if m >= 0 else clear, ghosts.stops[row, end, 0])
                 write(clear, ghosts.stops[row, end, 1])
     return ways
@@ -177,10 +182,10 @@ def _ways(observation, p, flat, seen, ball, ways):
         c, n = vec(flat.center[m]), vec(flat.normal[m])
         height = dot(minus(p, c), n)
         level = dot(minus(center, c), n) * (1.0 if height > 0 else -1.0)
-        if abs(height) < 0.01 or level < 0.01:
+        if abs(height) < 0.01 or level + size < 0.01:
             continue
         source = along(p, -2 * height, n)
-        share = abs(height) / (abs(height) + level)
+        share = abs(height) / (abs(height) + max(level, 0.0))
         at = minus(along(source, share, minus(center, source)), c)
         spare = size * share + STRIP_FAR * np.sqrt(observation.wavelength * observation.range / 8) + 0.1
         if (
@@ -194,10 +199,11 @@ def _ways(observation, p, flat, seen, ball, ways):
 
 
 @njit
-def _strength(observation, bodies, b, one, two):
-    """The point of a body between two places, its normal there, and the amplitude that an isotropic antenna gets from
-    one place to the other."""
+def _strength(observation, flat, bodies, b, way):
+    """The specular point of a body between two images of the radar, a lit point near it for rays to aim at, the normal
+    there, and the amplitude that an isotropic antenna gets from one image to the other."""
     radius, half, axis, none = bodies.radius[b], bodies.half[b], vec(bodies.axis[b]), (0.0, 0.0, 0.0)
+    first, one, second, two = way
     a, c = minus(one, vec(bodies.center[b])), minus(two, vec(bodies.center[b]))
     z_a, z_c = dot(a, axis), dot(c, axis)
     a, c = along(a, -z_a, axis), along(c, -z_c, axis)
@@ -206,13 +212,14 @@ def _strength(observation, bodies, b, one, two):
         n = unit(along(unit(along(a, -radius, n)), 1.0, unit(along(c, -radius, n))))
     near, far = length(along(a, -radius, n)), length(along(c, -radius, n))
     z = z_a + (z_c - z_a) * near / (near + far)
-    place = along(along(vec(bodies.center[b]), radius, n), z, axis)
+    line = along(vec(bodies.center[b]), radius, n)
+    place = along(line, z, axis)
     there, back = minus(place, one), minus(place, two)
     r1, r2 = length(there), length(back)
     there, back = unit(there), unit(back)
     cosine = -dot(n, there)
     if cosine < 1e-3 or dot(n, back) > -1e-3 or r1 + r2 > 2 * observation.range:
-        return none, none, 0j
+        return none, none, none, 0j
     # Hessians of the path over the tangent plane, of a plane there and of the body
     side = axis if half > 0 else unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.9 else (1.0, 0.0, 0.0)))
     curvature, bend = 1 / r1 + 1 / r2, 2 * cosine / radius
@@ -221,51 +228,84 @@ def _strength(observation, bodies, b, one, two):
     plane = h11 * h22 - h12 * h12
     h11, h22 = h11 + bend, h22 + (0.0 if half > 0 else bend)
     size = observation.wavelength / (4 * np.pi * (r1 + r2)) * np.sqrt(plane / (h11 * h22 - h12 * h12)) + 0j
-    if half > 0:
-        zone = np.sqrt(observation.wavelength / (2 * (h22 - h12 * h12 / h11)))
-        if abs(z) >= half + STRIP_FAR * zone:
-            return none, none, 0j
-        size *= strip((-half - z) / zone, (half - z) / zone)
-    return place, n, size
+    if half == 0:
+        return place, place, n, size
+    zone = np.sqrt(observation.wavelength / (2 * (h22 - h12 * h12 / h11)))
+    low, high = _above(flat, second, two, line, axis, _above(flat, first, one, line, axis, (-half, half)))
+    if low >= high or z <= low - STRIP_FAR * zone or z >= high + STRIP_FAR * zone:
+        return none, none, none, 0j
+    inside = min(_INSIDE, (high - low) / 2)
+    aim = along(line, min(max(z, low + inside), high - inside), axis)
+    return place, aim, n, size * strip((low - z) / zone, (high - z) / zone)
+
+
+@njit
+def _above(flat, m, image, line, axis, span):
+    """What of a span along a line lies before a mirror, on the side from which the radar of that image sees it."""
+    if m < 0:
+        return span
+    c, n = vec(flat.center[m]), vec(flat.normal[m])
+    turn = -1.0 if dot(minus(image, c), n) > 0 else 1.0
+    level, rise, (low, high) = turn * dot(minus(line, c), n), turn * dot(axis, n), span
+    if abs(rise) < 1e-9:
+        return span if level > 0 else (low, low)
+    return (max(low, -level / rise), high) if rise > 0 else (low, min(high, -level / rise))
+
+
+@njit
+def _before(flat, m, image, place):
+    """Whether a place is before a mirror, where its light gets to."""
+    if m < 0:
+        return True
+    c, n = vec(flat.center[m]), vec(flat.normal[m])
+    return dot(minus(image, c), n) * dot(minus(place, c), n) < 0
+
+
+@njit
+def _seen(flat, m, place):
+    """Where a place is seen over a mirror, or straight."""
+    return place if m < 0 else mirrored(place, vec(flat.center[m]), vec(flat.normal[m]))
 
 
 @njit
 def _over(observation, frame, flat, m, source, place):
-    """Where a way to a place leaves for, where the place is seen, and gain times what the mirror's aperture passes."""
+    """Where a way to a place leaves for, and gain times what the mirror's aperture passes."""
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
     if m < 0:
-        return place, place, gain_towards(minus(place, p), rotation, observation) + 0j
+        return place, gain_towards(minus(place, p), rotation, observation) + 0j
     center, normal = vec(flat.center[m]), vec(flat.normal[m])
     h, level = abs(dot(minus(source, center), normal)), abs(dot(minus(place, center), normal))
     share, far = h / (h + level), length(minus(place, source))
     stop = along(source, share, minus(place, source))
     square = 0.5 * observation.wavelength * far * share * (1 - share)
     value = passes(stop, unit(minus(place, source)), square, aperture(flat, m))
-    return stop, mirrored(place, center, normal), value * gain_towards(minus(stop, p), rotation, observation)
+    return stop, value * gain_towards(minus(stop, p), rotation, observation)
 
 
 @njit
-def _polarisation(observation, frame, flat, ends, place, n, reflection):
+def _polarisation(up, flat, way, place, n, layer):
     """Product of the reflection coefficients, an upright field sent and taken.
 
+    Directions are those from the images: where the body stands on the mirror, both reflections are at one place.
+
     Args:
-        ends: mirror and stop, out and back.
-        place, n, reflection: of the body.
+        up: of the board.
+        flat, way: mirrors and images of the radar out and back.
+        place, n, layer: of the body.
     """
-    p, rotation = vec(observation.position[frame]), observation.rotation[frame]
-    up = upwards(rotation)
-    (m, stop), (last, end) = ends
-    now = unit(minus(stop, p))
-    field = sent(up, now)
-    if m >= 0:
-        after = unit(minus(place, stop))
-        field = reflected(field, now, after, vec(flat.normal[m]), flat.reflection[m])
-        now = after
-    after = unit(minus(end if last >= 0 else p, place))
-    field = reflected(field, now, after, n, reflection)
-    now = after
-    if last >= 0:
-        after = unit(minus(p, end))
-        field = reflected(field, now, after, vec(flat.normal[last]), flat.reflection[last])
-        now = after
-    return dot(field, upright(up, now))
+    one, source, two, sink = way
+    there, back = unit(minus(place, source)), unit(minus(sink, place))
+    first, last = _turned(flat, one, there), _turned(flat, two, back)
+    field = sent(up, first)
+    if one >= 0:
+        field = reflected(field, first, there, vec(flat.normal[one]), flat.layer[one])
+    field = reflected(field, there, back, n, layer)
+    if two >= 0:
+        field = reflected(field, back, last, vec(flat.normal[two]), flat.layer[two])
+    return dot(field, upright(up, last))
+
+
+@njit
+def _turned(flat, m, way):
+    """A direction beyond a mirror, or the same."""
+    return way if m < 0 else mirrored(way, (0.0, 0.0, 0.0), vec(flat.normal[m]))

@@ -7,7 +7,8 @@ each order of the mirrors then holds its own share of the light.
 
 The mirrors are apertures on the unfolded path. One at distance d from an end of a path of length L diffracts as its
 offset x over sqrt(lambda d (L - d) / (2 L)) says (Fresnel), so in these units all apertures of a chain overlap to one
-polygon W, and the amplitude lambda / (4 pi L) of an endless mirror is taken F times,
+polygon W (a mirror that runs on behind the next one ends where their planes meet: no ray gets there), and the amplitude
+lambda / (4 pi L) of an endless mirror is taken F times,
 
     F = (1 / 2j) int_W exp(j pi r^2 / 2) dA = (1 / 2 pi) closed int (1 - exp(j pi r^2 / 2)) dphi,
 
@@ -23,7 +24,9 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
+from radarsim.propagation import fresnelzone
 from radarsim.propagation.apertures import CORNERS, FAR, depth, kirchhoff, outlines, overlap
+from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
     along,
     cross,
@@ -40,7 +43,10 @@ from radarsim.propagation.fields import (
     write,
 )
 from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
+from radarsim.propagation.isometry import inverse
 from radarsim.propagation.observation import Observation
+from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table, filled
 
@@ -68,6 +74,67 @@ class Chains(Table):
     stops: Float[np.ndarray, "chain 3 3"]
 
 
+def find(view: View) -> Paths:
+    """Chains of two and three mirrors above the threshold, either way round."""
+    observation, flat = view.observation, view.flat
+    found = [chains(flat, some.pairs, observation, k) for k, some in enumerate(view.mirrors)]
+    frame = np.repeat(np.arange(len(found)), [len(f) for f in found])
+    every = Chains.joined(found)
+    two = every.mirrors[:, 1] == every.mirrors[:, 2]
+    stretches = _stretches(observation, flat, frame, every)
+    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(every.amplitude))
+    directions = []
+    for reverse, rows in (
+        (False, np.arange(len(every))),
+        (True, np.flatnonzero(every.mirrors[:, 0] != every.mirrors[:, 2])),
+    ):
+        order = every.mirrors[rows, ::-1] if reverse else every.mirrors[rows]
+        mirrors = np.full((len(rows), 4), -1)
+        mirrors[:, :3] = np.where(two[rows, None], order[:, [1, 2, 0]] if reverse else order, order)
+        mirrors[two[rows], 2] = -1
+        isometry = inverse(every.isometry[rows]) if reverse else every.isometry[rows]
+        paths = Paths.of(
+            Kind.IMAGE, isometry, every.amplitude[rows], frame=frame[rows], bounces=3 - two[rows], mirrors=mirrors
+        )
+        directions.append(paths.behind(observation, passed[rows]))
+    return Paths.joined(directions)
+
+
+def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "chain"], chains: Chains) -> Stretches:
+    """The four stretches of each chain, of two mirrors one of no length."""
+    here = observation.position[frame, None]
+    stops = np.concatenate([here, chains.stops, here], axis=1)
+    way = np.diff(stops, axis=1)
+    size = np.linalg.norm(way, axis=2)
+    there, whole = np.cumsum(size, axis=1)[:, :3], size.sum(axis=1)[:, None]
+    unit = np.sqrt(observation.wavelength * there * (whole - there) / (2 * whole))
+    now = way[:, 0] / size[:, 0, None]
+    aside = np.cross(now, observation.rotation[frame, :, 2])
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    axes = np.stack([aside, np.cross(now, aside)], axis=1)
+    apart = np.empty((len(frame), 5, 2, 3))  # of a unit aside, by stop
+    apart[:, 0] = AT_RADAR * unit[:, 0, None, None] * axes
+    for k in range(3):
+        normal = flat.normal[chains.mirrors[:, k]]
+        lift = np.einsum("cad,cd->ca", axes, normal)[..., None]
+        slope = np.einsum("cd,cd->c", now, normal)[:, None]
+        apart[:, k + 1] = unit[:, k, None, None] * (axes - lift * (now / slope)[:, None])  # in the mirror's plane
+        last = (chains.mirrors[:, k] == chains.mirrors[:, min(k + 1, 2)]) & (k < 2)  # twice: it reflects once
+        axes = np.where(last[:, None, None], axes, axes - 2 * lift * normal[:, None])
+        now = np.where(last[:, None], now, now - 2 * slope * normal)
+    apart[:, 4] = AT_RADAR * unit[:, 2, None, None] * axes
+    two = chains.mirrors[:, 1] == chains.mirrors[:, 2]
+    mirrors = np.where(two[:, None] & (np.arange(3) == 2), -1, chains.mirrors)
+    along = np.concatenate([np.zeros_like(whole), there, whole], axis=1) / whole
+    return Stretches(
+        np.repeat(np.arange(len(frame)), 4), np.repeat(frame, 4),
+        stops[:, :-1].reshape(-1, 3), stops[:, 1:].reshape(-1, 3),
+        apart[:, :-1].reshape(-1, 2, 3), apart[:, 1:].reshape(-1, 2, 3),
+        *(np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4])),
+        np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2), np.ones((4 * len(frame), 2)),
+    )  # fmt: skip
+
+
 class _Orders(NamedTuple):
     """What can follow what: firsts[start[b] : start[b + 1]] are the mirrors that can be before b, and after it."""
 
@@ -78,7 +145,7 @@ class _Orders(NamedTuple):
 class _Room(NamedTuple):
     """Scratch for polygons."""
 
-    planes: Float[np.ndarray, "12 3"]
+    planes: Float[np.ndarray, "14 3"]
     polygon: Float[np.ndarray, "corner 2"]
     spare: Float[np.ndarray, "corner 3"]
 
@@ -104,7 +171,7 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observatio
 def _search(observation, frame, flat, orders, found):
     """Tries all chains whose mirrors can follow one another; returns how many lead back, of which as many as fit."""
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
-    room = _Room(np.empty((12, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 3)))
+    room = _Room(np.empty((14, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 3)))
     edges = outlines(flat)
     way = np.empty(3, np.int64)
     count = 0
@@ -219,8 +286,9 @@ def _chain(way, p, path, ray, observation, frame, flat, room):
     field = sent(up, ray)
     # Instead of unfolding the mirrors, the path and its axes are folded; the start moves to its images.
     start, now, f1, f2 = p, ray, e1, e2
-    count, before = 0, 0.0
-    for m in way:
+    count, before, last = 0, 0.0, ray
+    for k in range(len(way)):
+        m = way[k]
         n, c = vec(normal[m]), vec(flat.center[m])
         slope = dot(now, n)
         if abs(slope) < 0.02 or (slope > 0 and not flat.two_sided[m]):
@@ -228,39 +296,36 @@ def _chain(way, p, path, ray, observation, frame, flat, room):
         t = dot(minus(c, start), n) / slope
         if t <= 0.005 or t >= path - 0.005 or t < before - np.sqrt(wavelength * path):
             return none
+        if k > 0:
+            count = _bounded(planes, count, _junction((now, f1, f2), (before, last), (t, n)), path, wavelength)
+            if count < 0:
+                return none
         before = t
         x, y = 0.0, 0.0  # the middle of the window
-        for k in range(4):
-            one = minus(vec(corners[m, k]), start)
+        for side in range(4):
+            one = minus(vec(corners[m, side]), start)
             x, y = x + dot(one, f1) / 4, y + dot(one, f2) / 4
         middle = (x, y)
-        for k in range(4):
-            one, two = minus(vec(corners[m, k]), start), minus(vec(corners[m, (k + 1) % 4]), start)
+        for side in range(4):
+            one, two = minus(vec(corners[m, side]), start), minus(vec(corners[m, (side + 1) % 4]), start)
             x, y = dot(one, f1), dot(one, f2)
             dx, dy = dot(two, f1) - x, dot(two, f2) - y
             square = dx * dx + dy * dy
             if square < 1e-8:
                 continue
-            side = dx * (middle[1] - y) - dy * (middle[0] - x)
-            sign = (1.0 if side < 0 else -1.0) / np.sqrt(square)
+            turn = dx * (middle[1] - y) - dy * (middle[0] - x)
+            sign = (1.0 if turn < 0 else -1.0) / np.sqrt(square)
             nx, ny = -dy * sign, dx * sign  # outward
-            offset = nx * x + ny * y
             share = min(max(-(x * dx + y * dy) / square, 0.0), 1.0)
-            d = (dot(one, now) + share * (dot(two, now) - dot(one, now))) / path
-            if d < 0.02 or d > 0.98:  # an edge beside or behind the radar
-                if offset < 0:
-                    return none
-                continue
-            offset /= np.sqrt(wavelength * path * d * (1 - d) / 2)
-            if offset < -FAR:
+            at = dot(one, now) + share * (dot(two, now) - dot(one, now))
+            count = _bounded(planes, count, (nx, ny, nx * x + ny * y, at), path, wavelength)
+            if count < 0:
                 return none
-            planes[count, 0], planes[count, 1], planes[count, 2] = nx, ny, offset
-            count += 1
         after = along(now, -2 * slope, n)
-        field = reflected(field, now, after, n, flat.reflection[m])
+        field = reflected(field, now, after, n, flat.layer[m])
         start = mirrored(start, c, n)
         f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
-        now = after
+        now, last = after, n
     taken = upright(up, now)
     value = dot(field, taken)
     corner = overlap(planes, count, room.polygon, room.spare)
@@ -278,6 +343,45 @@ def _chain(way, p, path, ray, observation, frame, flat, room):
         if depth(planes, count, step * mx, step * my) > 0.25:
             break
     return value * share, e1, e2, (toward * mx, toward * my)
+
+
+@njit
+def _junction(axes, last, mirror):
+    """The line where the planes of two mirrors of a chain meet, as `_bounded` takes it: no ray meets the second mirror
+    before the first, however far either runs on behind the other.
+
+    Args:
+        axes: the path's direction between the mirrors, and across it.
+        last, mirror: distance along the path, and normal, of either.
+    """
+    (now, f1, f2), (before, a), (t, b) = axes, last, mirror
+    # at x, y across the path, a mirror is met t - (x f1 + y f2) . n / (now . n) along it
+    x1, y1, x2, y2 = dot(f1, a), dot(f2, a), dot(f1, b), dot(f2, b)
+    away, slope = dot(now, a), dot(now, b)
+    nx, ny = x2 / slope - x1 / away, y2 / slope - y1 / away
+    size = np.hypot(nx, ny) + 1e-9
+    nx, ny, offset = nx / size, ny / size, (t - before) / size
+    return nx, ny, offset, t - offset * (nx * x2 + ny * y2) / slope
+
+
+@njit
+def _bounded(planes, count, line, path, wavelength):
+    """Bounds the polygon by a line across the path; returns the number of bounds, -1 where nothing is left.
+
+    Args:
+        planes, count: bounds so far, outward normals and offsets in Fresnel units.
+        line: outward normal, offset (m), and how far along the path (m) it is nearest to it.
+        path, wavelength: m.
+    """
+    nx, ny, offset, at = line
+    d = at / path
+    if d < 0.02 or d > 0.98:  # beside or behind the radar
+        return -1 if offset < 0 else count
+    offset /= np.sqrt(wavelength * path * d * (1 - d) / 2)
+    if offset < -FAR:
+        return -1
+    planes[count, 0], planes[count, 1], planes[count, 2] = nx, ny, offset
+    return count + 1
 
 
 @njit(cache=True)

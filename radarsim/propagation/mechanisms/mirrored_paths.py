@@ -25,7 +25,7 @@ from radarsim.propagation.fields import (
 )
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.paths import OneWay
+from radarsim.propagation.one_way import OneWay
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.targets import Targets
 
@@ -274,10 +274,10 @@ def _over(observation, flat, chains, k, aims, scatterers, hits):
         field = sent(up, now)
         if two >= 0:
             after = unit(minus(stop, bounce))
-            field = reflected(field, now, after, n1, flat.reflection[one])
+            field = reflected(field, now, after, n1, flat.layer[one])
             now = after
         after = unit(minus(s, stop))
-        field = reflected(field, now, after, nl, flat.reflection[last])
+        field = reflected(field, now, after, nl, flat.layer[last])
         value = size * passed * dot(field, upright(up, after))
         if abs(value) > least:
             hits.aim[n] = i

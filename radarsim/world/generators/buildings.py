@@ -1,43 +1,53 @@
-"""Procedural buildings of four styles: any floor from a style, a seed and a floor's number.
+"""Procedural buildings: any floor from a style, a seed and a floor's number, or an office of a given size.
 
     building: {kind: A, seed: 3, floor: 2}
+    building: {kind: office, seed: 7, length: 18}
 
 The seed gives what the floors of a building share (`skeleton`): outline, corridors, stairs. The floor's number varies
-rooms, doors (`floorplan`) and what stands in them (`furnishing`). World origin at the south-west corner of the
-building's rooms, floor at z = 0. What stands on a plan is made by the same functions for the `office`.
+rooms, doors (`layout`) and furniture (`furnishing`). World origin at the south-west corner, floor at z = 0.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
+from shapely.geometry import box as area
 
 from radarsim.world import shapes
-from radarsim.world.generators import furniture, joinery, walls
+from radarsim.world.generators import joinery, walls
 from radarsim.world.generators.furnishing import furnish
+from radarsim.world.generators.furniture import make
 from radarsim.world.generators.layout import FloorPlan
+from radarsim.world.generators.office import OfficePlan, arrange
 from radarsim.world.generators.openings import Opening
 from radarsim.world.generators.rooms import Room, Site
-from radarsim.world.generators.skeleton import Skeleton, skeleton
+from radarsim.world.generators.skeleton import Block, Skeleton, skeleton
 from radarsim.world.generators.styles import STYLES, Style
 from radarsim.world.objects import SceneObject
 
 
-class Building(BaseModel):
-    """One floor of a building; `build` gives its objects. Same parameters, same objects to the last bit."""
+class Floor(BaseModel):
+    """One floor of a building. Same parameters, same objects to the last bit."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    kind: Literal["A", "B", "C", "D"]
+    kind: str
     seed: Annotated[int, Field(ge=0)] = 0
-    floor: Annotated[int, Field(ge=0)] = 0
     furnished: bool = True
 
     @property
     def style(self) -> Style:
         """Materials, sizes and densities."""
         return STYLES[self.kind]
+
+
+class Building(Floor):
+    """A floor of style A, B, C or D."""
+
+    kind: Literal["A", "B", "C", "D"]
+    floor: Annotated[int, Field(ge=0)] = 0
 
     def skeleton(self) -> Skeleton:
         """What all floors share."""
@@ -58,6 +68,46 @@ class Building(BaseModel):
 
     def _rng(self, purpose: int) -> np.random.Generator:
         return np.random.default_rng([self.seed, ord(self.kind), self.floor, purpose])
+
+
+class Office(Floor):
+    """A floor of style `office`."""
+
+    kind: Literal["office"] = "office"
+    length: Annotated[float, Field(ge=8, le=200)] = 18.0  # along x, outside to outside, m
+    depth: Annotated[float, Field(ge=8, le=40)] = 12.0  # along y
+    height: Annotated[float, Field(ge=2.4, le=6)] = 2.7  # floor to ceiling
+    corridor: Annotated[float, Field(ge=1.4, le=6)] = 2.0  # width
+    room: Annotated[float, Field(ge=2.8, le=12)] = 4.2  # mean width of a room
+
+    @property
+    def style(self) -> Style:
+        """Materials, sizes and densities."""
+        return replace(STYLES["office"], height=self.height)
+
+    def skeleton(self) -> Skeleton:
+        """A corridor between two blocks of rooms, the southern one first."""
+        thick, wall = self.style.outer, self.style.inner
+        low, far = self.depth / 2 - self.corridor / 2, self.length - thick
+        high = low + self.corridor
+        sides = (thick, low - wall), (high + wall, self.depth - thick)
+        blocks = [Block((thick, y0, far, y1), 0, "rooms", self.room) for y0, y1 in sides]
+        outline = area(0.0, 0.0, self.length, self.depth)
+        return Skeleton({"corridor": (thick, low, far, high)}, blocks, outline=outline)
+
+    def build(self) -> list[SceneObject]:
+        """All objects of the floor: doors, windows, walls, floors, ceilings, fittings, furniture."""
+        rng = np.random.default_rng(self.seed)
+        plan, site = OfficePlan(self.skeleton(), self.style, rng), Site(rng, self.height)
+        for opening in plan.openings:
+            fit(site, plan, opening)
+            if opening.kind == "window" and opening.room.kind != "corridor":
+                width = plan.window(opening.room)[1]
+                piece = make("radiator", w=min(1.2, width))
+                site.put(opening.room, piece, *opening.room.wall_place(opening.side, opening.low + width / 2, 0.1))
+        surfaces(site, plan)
+        equip(site, plan, arrange if self.furnished else None)
+        return site.objects
 
 
 def surfaces(site: Site, plan: FloorPlan) -> None:
@@ -95,7 +145,7 @@ def fit(site: Site, plan: FloorPlan, opening: Opening) -> None:
 def equip(site: Site, plan: FloorPlan, furnish: Callable[[Site, Room, FloorPlan], None] | None) -> None:
     """Lamps in all rooms, and furniture where there is some."""
     style = plan.style
-    lamp = furniture.lamp(style.height, *style.lamp[:2])
+    lamp = make("lamp", height=style.height, d=style.lamp[0], w=style.lamp[1])
     for room in plan.rooms:
         along_x = style.plain or room.size[0] > room.size[1]
         site.lamps(room, lamp, style.lamp[2], np.pi / 2 if along_x else 0.0)

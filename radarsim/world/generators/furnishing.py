@@ -1,20 +1,19 @@
 """What stands in a room, by its kind: pieces in rows along the walls, tables in the middle, as people arrange them."""
 
-from collections.abc import Callable
-from functools import partial
+from pathlib import Path
 
 import numpy as np
 from shapely.geometry import box as area
 
+from radarize.yamlfile import read_yaml
 from radarsim.world import shapes
-from radarsim.world.generators import fittings, furniture
-from radarsim.world.generators.furniture import Piece
+from radarsim.world.generators.furniture import Piece, evaluate, make
 from radarsim.world.generators.layout import FloorPlan
 from radarsim.world.generators.openings import OPPOSITE
 from radarsim.world.generators.rooms import Room, Site, footprint
+from radarsim.world.generators.stairs import stairs
 
-Make = Callable[[np.random.Generator], Piece]
-
+_ROOMS = read_yaml(Path(__file__).with_suffix(".yaml"))
 #: Clear width left beside things in a corridor, m.
 CLEAR = 1.25
 
@@ -29,7 +28,12 @@ def furnish(site: Site, room: Room, plan: FloorPlan) -> None:
         layout.stairs()
         return
     layout.at_windows()
-    _KINDS[room.kind](layout)
+    if room.kind == "lecture":
+        _lecture(layout)
+    elif room.kind == "lounge":
+        _lounge(layout)
+    else:
+        layout.arrange(_ROOMS[room.kind])
 
 
 class _Layout:
@@ -48,30 +52,40 @@ class _Layout:
         if self.rng.random() < 0.5:
             self.left, self.right = self.right, self.left
         self.windows = [o for o in self.openings if o.kind == "window"]
-        self.cabinet: Make = partial(furniture.cabinet, material=self.style.storage[0])
-        self.shelf: Make = partial(furniture.shelf, material=self.style.storage[1])
+        self._materials = dict(zip(("cabinet", "shelf"), self.style.storage, strict=True))
 
     def at_windows(self) -> None:
         """Radiators below windows, pipes in a corner."""
         for o in self.windows:
             if o.bottom > 0.75 and self.rng.random() < self.style.radiators:
-                piece = furniture.radiator(self.rng, width=round(min(1.2, 0.9 * (o.high - o.low)), 2))
+                piece = make("radiator", w=round(min(1.2, 0.9 * (o.high - o.low)), 2))
                 self.site.put_if_free(self.room, piece, *self.room.wall_place(o.side, (o.low + o.high) / 2, 0.1))
         if self.rng.random() < self.style.risers:
-            piece, corner = fittings.riser(self.site.height), 0.02 + 0.07
+            piece, corner = make("riser", height=self.site.height), 0.02 + 0.07
             x = self.room.x0 + corner if "w" in (self.left, self.back) else self.room.x1 - corner
             y = self.room.y0 + corner if "s" in (self.left, self.back) else self.room.y1 - corner
             self.site.put_if_free(self.room, piece, x, y, 0.0)
 
+    def made(self, kind: str, material: str = "", **given: float) -> Piece:
+        """A piece of a material, by default the style's."""
+        return make(kind, self.rng, material or self._materials.get(kind, ""), **given)
+
     def line(
-        self, side: str, make: Make, count: int, start: float = 0.1, gap: float = 0.03, off: float = 0.03
+        self,
+        side: str,
+        kind: str,
+        count: int,
+        start: float = 0.1,
+        gap: float = 0.03,
+        off: float = 0.03,
+        material: str = "",
     ) -> list[tuple[float, float, float]]:
         """A row of pieces along a wall, from the window's end (or the low end), and the places they got."""
         room = self.room
         low, high = room.wall(side)
         downward = self.back in "ne" and side in (self.left, self.right)
         lit = any(o.side == side for o in self.windows)
-        places, at, piece = [], start, make(self.rng)
+        places, at, piece = [], start, self.made(kind, material)
         while len(places) < count and at + piece.width < high - low - 0.03:
             middle = at + piece.width / 2
             place = room.wall_place(side, high - middle if downward else low + middle, off + piece.depth / 2)
@@ -79,22 +93,39 @@ class _Layout:
             if not (lit and tall) and self.site.put_if_free(room, piece, *place, margin=-0.003):
                 places.append(place)
                 at += piece.width + gap
-                piece = make(self.rng)
+                piece = self.made(kind, material)
             else:
                 at += 0.15
         return places
 
+    def arrange(self, steps: list[dict]) -> None:
+        """Put furniture as `furnishing.yaml` says."""
+        short, long = sorted(self.room.size)
+        for step in steps:
+            more = {name: value for name, value in step.items() if name not in ("at", "put", "count")}
+            side, kind = step["at"], step["put"]
+            kind = kind if isinstance(kind, str) else kind[int(self.rng.random() >= 0.5)]
+            count = int(evaluate(step.get("count", 1), {"area": short * long, "short": short, "long": long}))
+            if side == "middle":
+                self.tables(count, kind, **more)
+            elif kind == "desk":
+                self.desks(getattr(self, side), count)
+            else:
+                self.line(getattr(self, side), kind, count, **more)
+
     def desks(self, side: str, count: int) -> None:
         """Desks along a wall, a chair at each."""
-        for place in self.line(side, furniture.desk, count, start=self.rng.uniform(0.3, 0.6), gap=0.4, off=0.06):
+        for place in self.line(side, "desk", count, start=self.rng.uniform(0.3, 0.6), gap=0.4, off=0.06):
             self.site.seat(self.room, *place)
 
-    def tables(self, rows: int, make: Make, seats: tuple[int, ...], gap: float = 0.01) -> None:
+    def tables(self, rows: int, kind: str, seats: tuple[int, ...] = (), gap: float = 0.01, **given: float) -> None:
         """Tables in the middle, end to end along the room's longer side, with chairs along `seats` (their sides)."""
-        room, rng = self.room, self.rng
+        room = self.room
+        if not rows:
+            return
         along_x = room.size[0] >= room.size[1]
         yaw = np.pi / 2 if along_x else 0.0
-        pieces = [make(rng) for _ in range(rows)]
+        pieces = [self.made(kind, **given) for _ in range(rows)]
         total = sum(p.width for p in pieces) + gap * (rows - 1)
         # As far from the door as the room allows, or in the middle.
         for shift in (0.0, 0.4, 0.8, 1.2, -0.4, -0.8):
@@ -125,28 +156,7 @@ class _Layout:
         length, width = room.size[0] - 0.9, 2.5
         x = room.x1 - length / 2 if at_low else room.x0 + length / 2
         y = room.y1 - width / 2 if door.side == "s" else room.y0 + width / 2
-        self.site.put(room, fittings.stairs(self.site.height, width, length), x, y, -np.pi / 2 if at_low else np.pi / 2)
-
-
-def _office(x: _Layout) -> None:
-    area = x.room.size[0] * x.room.size[1]
-    x.desks(x.left, 2)
-    x.desks(x.right, 2 if area > 14 else 0)
-    x.desks(x.back, int(area / 15))
-    if area > 34:
-        x.tables(2, furniture.desk, (1,))
-    x.line(x.front, x.cabinet, 2)
-    x.line(x.right, x.shelf, 1, start=2.0)
-    x.line(x.left, x.shelf if x.rng.random() < 0.5 else x.cabinet, 1, start=2.4)
-    x.line(x.front, furniture.bin, 1)
-    x.line(x.right, furniture.whiteboard, 1, start=0.8)
-
-
-def _meeting(x: _Layout) -> None:
-    x.tables(max(1, int((max(x.room.size) - 2.4) / 1.7)), partial(furniture.table, width=1.6), (-1, 1))
-    x.line(x.left, furniture.whiteboard, 1, start=1.0)
-    x.line(x.right, x.cabinet, 1, start=1.4)
-    x.line(x.front, furniture.bin, 1)
+        self.site.put(room, stairs(self.site.height, width, length), x, y, -np.pi / 2 if at_low else np.pi / 2)
 
 
 def _lecture(x: _Layout) -> None:
@@ -156,16 +166,16 @@ def _lecture(x: _Layout) -> None:
     length, across = room.size if along_x else room.size[::-1]
     stage = ("w", "e") if along_x else ("s", "n")
     stage = stage[int(x.rng.integers(2))]
-    x.line(stage, partial(furniture.whiteboard), 2, start=0.6, gap=0.1)
+    x.line(stage, "whiteboard", 2, start=0.6, gap=0.1)
     middle = room.center[1] if along_x else room.center[0]
-    site.put_if_free(room, fittings.lectern(x.rng), *room.wall_place(stage, middle + 0.9, 1.1))
+    site.put_if_free(room, make("lectern"), *room.wall_place(stage, middle + 0.9, 1.1))
     width, rows = 1.6, 0
     columns = max(1, int((across - 0.4) / (width + 0.8)))
     for row in range(int((length - 3.4) / 1.25) + 1):
         for k in range(columns):
             along = middle + (k - (columns - 1) / 2) * (across - 0.2) / columns
             px, py, yaw = room.wall_place(stage, along, 2.2 + 1.25 * row)
-            if site.put_if_free(room, furniture.table(x.rng, 0.5, width), px, py, yaw):
+            if site.put_if_free(room, make("table", d=0.5, w=width), px, py, yaw):
                 rows += 1
                 for side in (-0.4, 0.4):
                     sx, sy = px - side * np.sin(yaw), py + side * np.cos(yaw)
@@ -173,69 +183,19 @@ def _lecture(x: _Layout) -> None:
     if not rows:  # the ways between its doors leave no room for rows
         x.desks(x.left, 2)
         x.desks(x.right, 2)
-        x.line(x.front, x.shelf, 3)
-    x.line(x.front, furniture.bin, 1)
+        x.line(x.front, "shelf", 3)
+    x.line(x.front, "bin", 1)
 
 
 def _lounge(x: _Layout) -> None:
     for side in (x.left, x.right):
-        for px, py, yaw in x.line(side, furniture.sofa, 2, start=0.5, gap=0.2):
-            low = furniture.table(x.rng, 0.6, 1.0)
+        for px, py, yaw in x.line(side, "sofa", 2, start=0.5, gap=0.2):
+            low = make("table", d=0.6, w=1.0)
             x.site.put_if_free(x.room, low, px + 0.95 * np.cos(yaw), py + 0.95 * np.sin(yaw), yaw)
-    x.line(x.back, fittings.plant, 2, start=0.1, gap=0.5)
-    x.line(x.left, fittings.vending, 1)
-    x.tables(1, partial(furniture.table, width=1.2), (-1, 1))
-    x.line(x.front, fittings.plant, 1)
-
-
-def _lab(x: _Layout) -> None:
-    x.line(x.left, fittings.lab_bench, 4, gap=0.01)
-    x.line(x.right, fittings.lab_bench, 3, gap=0.01)
-    x.line(x.front, x.cabinet, 2)
-    if min(x.room.size) > 4.6:
-        x.tables(max(1, int((max(x.room.size) - 2.6) / 1.8)), fittings.lab_bench, ())
-    x.line(x.right, furniture.shelf, 1)
-
-
-def _library(x: _Layout) -> None:
-    x.line(x.left, x.shelf, 6, gap=0.01)
-    x.line(x.right, x.shelf, 6, gap=0.01)
-    x.line(x.front, x.shelf, 3, gap=0.01)
-    x.tables(1, furniture.table, (-1, 1))
-
-
-def _storage(x: _Layout) -> None:
-    x.line(x.left, x.shelf, 5, gap=0.02)
-    x.line(x.right, x.cabinet, 3, gap=0.02)
-    x.line(x.back, x.cabinet, 2, gap=0.02)
-    x.line(x.front, x.shelf, 2, gap=0.02)
-    x.tables(1, x.shelf, ())
-    x.line(x.back, furniture.printer, 1)
-
-
-def _kitchen(x: _Layout) -> None:
-    x.line(x.left, fittings.fridge, 1)
-    x.line(x.left, fittings.counter, 4, gap=0.005)
-    x.tables(1, partial(furniture.table, width=1.6), (-1, 1))
-    x.line(x.front, furniture.bin, 1)
-
-
-def _toilet(x: _Layout) -> None:
-    x.line(x.left, fittings.cubicle, 3, gap=0.0, start=0.03)
-    x.line(x.right, fittings.basin, 3, start=0.5, gap=0.1, off=0.005)
-    x.line(x.front, furniture.bin, 1)
-
-
-_KINDS = {
-    "office": _office, "meeting": _meeting, "lecture": _lecture, "lounge": _lounge, "lab": _lab, "library": _library,
-    "storage": _storage, "kitchen": _kitchen, "toilet": _toilet,
-}  # fmt: skip
-
-_ALONG_CORRIDORS: dict[str, Make] = {
-    "cabinet": furniture.cabinet, "shelf": furniture.shelf, "bin": furniture.bin, "plant": fittings.plant,
-    "extinguisher": furniture.extinguisher, "lift": fittings.lift, "lockers": fittings.lockers,
-    "bench": fittings.bench, "noticeboard": fittings.noticeboard, "vending": fittings.vending,
-}  # fmt: skip
+    x.line(x.back, "plant", 2, start=0.1, gap=0.5)
+    x.line(x.left, "vending", 1)
+    x.tables(1, "table", (-1, 1), w=1.2)
+    x.line(x.front, "plant", 1)
 
 
 def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
@@ -249,9 +209,9 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
     avoid += [c.floor.buffer(0.3) for c in plan.corridors if c is not room]
     for what, density in style.fittings.items():
         for _ in range(int(density * length / 10 + rng.random())):
-            piece = _ALONG_CORRIDORS[what](rng)
+            piece = make(what, rng)
             if what == "cabinet":
-                piece = furniture.cabinet(rng, style.storage[0])
+                piece = make(what, rng, style.storage[0])
             if width - piece.depth < CLEAR and piece.depth > 0.2:
                 continue
             for _ in range(12):
@@ -271,7 +231,7 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
                 break
     for k in range(style.mains if length > 8 else 0):
         radius = (0.055, 0.04)[k % 2]
-        piece = fittings.main_pipe(round(length - 0.1, 2), radius, site.height - 0.2 - 0.1 * k)
+        piece = make("pipe", w=round(length - 0.1, 2), radius=radius, height=site.height - 0.2 - 0.1 * k)
         side = "n" if along_x else "e"
         middle = room.center[0] if along_x else room.center[1]
         x, y, yaw = room.wall_place(side, middle, 0.15 + 0.16 * k)

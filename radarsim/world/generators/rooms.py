@@ -10,8 +10,7 @@ from shapely.geometry import Polygon
 from shapely.geometry import box as area
 
 from radarsim.world import shapes
-from radarsim.world.generators import furniture
-from radarsim.world.generators.furniture import Piece
+from radarsim.world.generators.furniture import Piece, make
 from radarsim.world.materials import material
 from radarsim.world.objects import SceneObject
 
@@ -122,7 +121,7 @@ class Site:
     ) -> None:  # fmt: skip
         """A chair in front of what stands at a place, turned to it up to a `sway` (rad)."""
         turn = yaw + np.pi + self.rng.uniform(-sway, sway)
-        piece = furniture.chair(self.rng)
+        piece = make("chair")
         x, y = x + away * np.cos(yaw), y + away * np.sin(yaw)
         if room.is_free(footprint(piece, x, y, turn), ignore_kept):
             self.put(room, piece, x, y, turn)

@@ -15,23 +15,9 @@ from radarsim.world.validation import format_validation_error
 
 Choice = str | dict
 
-_WORDS = {
-    "ceiling board": "ceiling",
-    "floorboard": "floor parquet laminate",
-    "carpet": "rug carpet mat",
-    "plasterboard": "wall plaster drywall gypsum paint column pillar beam",
-    "glass": "window glazing pane vase",
-    "wood": "door wooden table desk cabinet shelf shelving bookcase wardrobe drawer chest stool bench counter",
-    "fabric": "sofa couch chair armchair bed cushion pillow curtain blind blanket bedding towel cloth clothes seating",
-    "metal": "steel aluminium aluminum iron fridge refrigerator radiator sink lamp pipe rail railing mirror",
-    "marble": "stone granite",
-    "brick": "bricks masonry",
-    "vinyl": "tile tiles linoleum",
-    "acrylic": "tv monitor screen plastic",
-}
-_MEANING = {word: name for name, words in _WORDS.items() for word in words.split()} | {
-    name: name for name in MATERIALS if " " not in name
-}
+_WORDS = read_yaml(Path(__file__).with_suffix(".yaml"))
+_MEANING = {word: name for name, words in _WORDS.items() for word in words.split()}
+_MEANING |= {name: name for name in MATERIALS if " " not in name}
 
 
 class MaterialMap:

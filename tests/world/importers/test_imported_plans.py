@@ -19,7 +19,7 @@ from radarsim.scenario import Scenario
 from radarsim.world.importers import Options, import_scene
 from radarsim.world.importers.carmen import scans_of
 from radarsim.world.scene import Scene
-from tests.beams import level_beams
+from tests.world.beams import level_beams
 
 RADISH = Path(__file__).parents[3] / ".." / "shared" / "recordings" / "radish"
 #: Two rooms with a doorway between them: faces at x = 0, 5, 5.2, 9 and y = 0, 4; a door from y = 1 to 2.

@@ -5,18 +5,18 @@ import pytest
 import shapely
 import trimesh
 
+from benchmarks.references.rigs import field
 from radarize.console import run
 from radarize.radar.presets import PRESETS
 from radarsim.cli import app
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.trajectory import Motion
-from radarsim.propagation.finder import EchoFinder
+from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
 from radarsim.world.importers import Options, import_scene
 from radarsim.world.scene import Scene
-from tests.propagation.rigs import field
 
 CONFIG = PRESETS["radarize"]
 ROOM = shapes.box((3, 2, 1.35), (6, 4, 2.7))
@@ -42,7 +42,7 @@ def test_a_closed_box_is_a_room(tmp_path, inwards):
     motion = plan_motion(scene, "handheld", 3.0, np.random.default_rng(0))
     assert isinstance(motion, Motion)
     place = np.array([3.0, 2.0, 1.2])
-    finder = EchoFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Reflectors.of(scene, CONFIG), CONFIG)
+    finder = PathFinder(scene, Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Reflectors.of(scene, CONFIG), CONFIG)
     echoes = finder(place, np.eye(3))
     away = np.linalg.norm(place - echoes.images[:, :, :3] @ place - echoes.images[:, :, 3], axis=1)
     ahead = np.abs(echoes.amplitude[np.abs(away - 6.0) < 1e-6]).max()

@@ -1,0 +1,103 @@
+"""What surrounds the radar, and how a batch of frames looks at it: what every mechanism of `mechanisms` is given."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from radarize.radar.config import RadarConfig
+from radarsim.propagation import visible_mirrors
+from radarsim.propagation.candidates import Candidates
+from radarsim.propagation.movingtargets import MovingTargets
+from radarsim.propagation.observation import Observation
+from radarsim.propagation.obstacles import Obstacles
+from radarsim.propagation.reflectors import Flat, Reflectors
+from radarsim.propagation.scatterers import Scatterers
+from radarsim.propagation.surface import Surface
+from radarsim.propagation.targets import Targets
+from radarsim.propagation.visible_mirrors import Mirrors
+from radarsim.world.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """The world as a radar meets it.
+
+    Attributes:
+        scene: ray tests run on its geometry; None where nothing can stand in the way.
+        surface: the diffuse surface, or a given set of scatterers.
+        reflectors: flat and curved ones; None: there are none.
+        moving: what moves by itself.
+        obstacles: what stands in the way of rays.
+    """
+
+    scene: Scene | None
+    surface: Surface | Scatterers
+    reflectors: Reflectors | None
+    moving: MovingTargets
+    obstacles: Obstacles
+
+    @classmethod
+    def of(
+        cls, scene: Scene | None, surface: Surface | Scatterers, reflectors: Reflectors | None, config: RadarConfig,
+        moving: MovingTargets | None = None,
+    ) -> "Environment":  # fmt: skip
+        """The environment of a radar's configuration."""
+        moving = MovingTargets([], np.random.default_rng()) if moving is None else moving
+        return cls(scene, surface, reflectors, moving, Obstacles.of(scene, moving, config))
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """An environment as a batch of frames looks at it.
+
+    Attributes:
+        environment, observation: what, and from where.
+    """
+
+    environment: Environment
+    observation: Observation
+
+    @property
+    def obstacles(self) -> Obstacles:
+        """What stands in the way of rays."""
+        return self.environment.obstacles
+
+    @cached_property
+    def targets(self) -> Targets:
+        """Scatterers in range of any frame."""
+        return Targets.of(self.observation, self.environment.surface, self.environment.moving)
+
+    @cached_property
+    def candidates(self) -> Candidates:
+        """Scatterers that may echo, by frame."""
+        return Candidates.of(self.observation, self.targets)
+
+    @cached_property
+    def _reflectors(self) -> tuple[Flat, Flat]:
+        reflectors, observation, plates = self.environment.reflectors, self.observation, self.obstacles.plates
+        if reflectors is None:
+            return Flat.none(), Flat.none()
+        flat = reflectors.near(observation.position, observation.range)
+        inner = reflectors.inner_near(observation.position, observation.range)
+        if len(plates):
+            moving, hollow = plates.faces(observation)
+            flat, inner = Flat.joined([flat, moving]), Flat.joined([inner, hollow])
+        return flat, Flat.joined([flat, inner])
+
+    @property
+    def flat(self) -> Flat:
+        """Flat reflectors in range of any frame, moving ones last."""
+        return self._reflectors[0]
+
+    @property
+    def facing(self) -> Flat:
+        """Those, and after them the inner faces of hollow bodies, which mirror nothing."""
+        return self._reflectors[1]
+
+    @cached_property
+    def mirrors(self) -> list[Mirrors]:
+        """Of each frame, which of `flat` the radar sees, and which see one another."""
+        if self.environment.reflectors is None:
+            return [Mirrors.none()] * self.observation.frames
+        return visible_mirrors.find(self.observation, self.flat, self.obstacles)

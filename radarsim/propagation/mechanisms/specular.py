@@ -1,0 +1,124 @@
+"""Specular reflections of plates and curved bodies that face the radar, with the echoes of their edges and corners."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Complex, Float
+
+from radarsim.propagation import fresnelzone, patches, plates
+from radarsim.propagation.curved import LINE, Arcs
+from radarsim.propagation.environment import View
+from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
+from radarsim.propagation.observation import Observation
+from radarsim.propagation.paths import GEOMETRY, Kind, Paths
+from radarsim.propagation.reflectors import Flat
+from radarsim.propagation.unevenness import Heights
+
+
+def find(view: View) -> Paths:
+    """Those of all frames above the threshold."""
+    observation, flat, reflectors = view.observation, view.facing, view.environment.reflectors
+    if reflectors is None:
+        return Paths.none()
+    found, ways = [], []
+    for frame in range(observation.frames):
+        parts = plates.parts(flat, observation, frame)
+        parts = parts[flat.present(frame)[parts.facet]]
+        bodies = reflectors.round.flashes(observation, frame), patches.flashes(observation, frame, reflectors.smooth)
+        arcs = Arcs.joined(list(bodies))
+        if reflectors.heights is not None:
+            uneven = _uneven(observation, frame, flat[parts.facet], parts.aim, reflectors.heights)
+            parts = replace(parts, amplitude=parts.amplitude * uneven)
+        ways += [_to_parts(observation, frame, flat, parts), _to_bodies(observation, frame, arcs)]
+        mirrors = np.full((len(parts), 4), -1)
+        mirrors[:, 0] = parts.facet
+        shape = np.pad(arcs.shape, ((0, 0), (0, GEOMETRY - arcs.shape.shape[1])))
+        found += [
+            Paths.of(
+                Kind.IMAGE, parts.isometry, parts.amplitude, frame=frame, level=flat.horizontal[parts.facet],
+                mirrors=mirrors,
+            ),
+            Paths.of(Kind.CURVED, shape, arcs.amplitude, frame=frame),
+        ]  # fmt: skip
+    paths = Paths.joined(found)
+    stretches = replace(Stretches.joined(ways), path=np.arange(len(paths)))
+    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(paths.amplitude))
+    lag = np.append(flat.lag, 0.0)[paths.mirrors[:, 0]]  # at the centre of the sweep, amplitudes know it
+    paths = replace(paths, amplitude=paths.amplitude * np.exp(-2j * np.pi * lag / observation.wavelength))
+    return paths.behind(observation, replace(passed, delay=passed.delay + lag))
+
+
+def _to_parts(observation: Observation, frame: int, flat: Flat, parts: plates.Parts) -> Stretches:
+    """The ways to parts of plates: a flash mirrors, an edge mirrors along its line, a corner echoes like a point.
+
+    Across an edge that is near the flash, in Fresnel units, it is a part of the same zone and goes over into it.
+    """
+    here, n = observation.position[frame], len(parts)
+    way = parts.aim - here
+    turn = parts.isometry[:, :, :3]
+    kind = np.trace(turn, axis1=1, axis2=2).round().astype(int)  # 1: reflection, -1: half turn, -3: inversion
+    unit = np.sqrt(observation.wavelength * np.linalg.norm(way, axis=1) / 4)
+    u, normal = flat.u[parts.facet], flat.normal[parts.facet]
+    # (M + 1) / 2 of a half turn projects on its axis
+    line = np.einsum("pii->pi", turn).argmax(axis=1)
+    u = np.where((kind == -1)[:, None], (turn + np.eye(3))[np.arange(n), line], u)
+    u = u / np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(normal, u)
+    beside = np.abs(np.einsum("pd,pd->p", way, v)) / unit
+    mirroring = np.ones((n, 2))
+    mirroring[:, 1] = np.where(kind == -1, 1 / (1 + beside**2), 1)
+    mirroring[kind == -3] = 0
+    axes = unit[:, None, None] * np.stack([u, v], axis=1)
+    before, after = _spread(mirroring, axes)
+    mirrors = np.where(np.arange(3) == 0, np.where(kind == -3, -1, parts.facet)[:, None], -1)
+    stops = np.repeat(parts.aim[:, None], 3, axis=1), np.repeat(after[:, None], 3, axis=1)
+    span = np.tile([0.0, 0.5], (n, 1))
+    begin = np.broadcast_to(here, parts.aim.shape)
+    return Stretches(
+        np.zeros(n, int), np.full(n, frame), begin, parts.aim, before, after, mirrors, *stops, span, mirroring
+    )  # fmt: skip
+
+
+def _spread(mirroring, axes):
+    """How far a Fresnel unit moves both ends of ways: to a mirror, and to a point, which is the tip of a cone."""
+    mirroring = mirroring[..., None]
+    return (1 - (1 - AT_RADAR) * mirroring) * axes, mirroring * axes
+
+
+def _to_bodies(observation: Observation, frame: int, arcs: Arcs) -> Stretches:
+    """The ways to round bodies, which echo like points, and cylinders along their axis like mirrors."""
+    begin, n = np.broadcast_to(observation.position[frame], arcs.aim.shape), len(arcs)
+    way = arcs.aim - begin
+    size = np.linalg.norm(way, axis=1, keepdims=True)
+    line = arcs.shape[:, :1] == LINE
+    aside = np.where(line, arcs.shape[:, 4:7], np.cross(way / size, observation.rotation[frame, :, 2]))
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    axes = np.sqrt(observation.wavelength * size / 4)[..., None] * np.stack(
+        [aside, np.cross(way / size, aside)], axis=1
+    )
+    mirroring = np.column_stack([line, np.zeros(n)]).astype(float)
+    before, after = _spread(mirroring, axes)
+    none, span = (np.full((n, 3), -1), np.zeros((n, 3, 3)), np.zeros((n, 3, 2, 3))), np.tile([0.0, 0.5], (n, 1))
+    return Stretches(
+        np.zeros(n, int), np.full(n, frame), begin, arcs.aim, before, after, *none, span, mirroring
+    )  # fmt: skip
+
+
+def _uneven(
+    observation: Observation, frame: int, flat: Flat, aim: Float[np.ndarray, "part 3"], heights: Heights
+) -> Complex[np.ndarray, "part"]:
+    """What unevenness makes of parts of plates: the factor at the foot, less and less of it away from there."""
+    begin = observation.position[frame]
+    height = np.einsum("pd,pd->p", begin - flat.center, flat.normal)
+    foot, away = begin - height[:, None] * flat.normal, np.abs(height)
+    reach = heights.reach(away, flat.finish, observation.wavelength)
+    share = np.clip(2 * (1 - np.linalg.norm(aim - foot, axis=1) / np.maximum(reach, 1e-9)), 0, 1)
+    factor, near = np.ones(len(aim), complex), np.flatnonzero((share > 0) & (flat.finish > 0))
+    # Parts of one plate, and plates of one wall, share a foot.
+    _, one, which = np.unique(foot[near].round(6), axis=0, return_index=True, return_inverse=True)
+    some = near[one]
+    found = heights.factors(
+        np.broadcast_to(begin, (len(some), 3)), foot[some], flat.finish[some], observation.wavelength
+    )
+    factor[near] += share[near] * (found[which.ravel()] - 1)
+    return factor

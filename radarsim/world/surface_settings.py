@@ -1,0 +1,22 @@
+"""Clutter and roughness settings of a scene."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class SurfaceSettings:
+    """How far surfaces are from their drawing, as shares of what is usual.
+
+    Attributes:
+        clutter: objects on walls, desks and shelves and under ceilings: down to 2 cm as geometry
+            (`radarsim.world.generators.small_objects`), smaller ones as points (`radarsim.propagation.clutter`).
+        unevenness: deviation of walls, floors and ceilings from planes (`radarsim.propagation.unevenness`), and of
+            buildings from square (`radarsim.world.squareness`).
+    """
+
+    clutter: float = 0.0
+    unevenness: float = 0.0
+
+
+#: Bare, flat and square.
+IDEAL = SurfaceSettings()

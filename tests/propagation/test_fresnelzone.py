@@ -93,7 +93,7 @@ def test_an_edge_that_covers_the_flash_bit_by_bit():
 
 
 def test_an_edge_that_goes_behind_a_pillar_bit_by_bit():
-    """The edge of a plate beside which the radar passes, in steps of 3 mm; seen by one ray, all of it (0.53) went in one."""
+    """The edge of a plate beside which the radar passes, in steps of 3 mm: no step, as by one ray (0.53)."""
     plate = SceneObject("plate", shapes.rectangle((2, -0.5, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     reflectors, scene = Reflectors.of(Scene("plate", [plate]), CONFIG), Scene("all", [plate, board(1.0, 0.15)])

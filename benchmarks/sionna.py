@@ -141,7 +141,7 @@ class SionnaScenario(Scenario):
     def finder(self) -> PathSolverFinder:
         """Finds the paths of a pose."""
         seed = int(self.rng("sionna").integers(2**31))
-        return PathSolverFinder(self.scene, self.config, self.board.weakest, self.front_end.pattern, seed)
+        return PathSolverFinder(self.scene, self.config, self.board.weakest, self.board.settings.pattern, seed)
 
 
 def _unit(zenith: Float[np.ndarray, "n"], azimuth: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n 3"]:

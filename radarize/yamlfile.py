@@ -1,7 +1,7 @@
 """YAML files that people write."""
 
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -28,6 +28,11 @@ def read_yaml(path: str | Path, most: int = _BYTES) -> object:
         return _content(text)
     except (yaml.YAMLError, ValueError) as error:  # a date like 2026-99-99 is a ValueError
         raise InputError(f"{path}: malformed YAML, {' '.join(str(error).split())}") from error
+
+
+def read_beside(module: str) -> dict[str, Any]:
+    """What the YAML file that comes with a module (its ``__file__``) and has its name holds, a mapping."""
+    return cast(dict[str, Any], read_yaml(Path(module).with_suffix(".yaml")))
 
 
 def _content(text: str) -> object:

@@ -48,7 +48,7 @@ def simulate(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes; by default one per core, fewer for short recordings.")
     ] = None,
-):
+) -> None:
     """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
     from radarize.recording import Recording, keeping
     from radarsim.motion.statistics import Statistics
@@ -63,7 +63,7 @@ def simulate(
             workers=workers, progress=report,
         )  # fmt: skip
     with Recording(written) as recording:
-        print(Statistics.from_json(recording.attributes["motion"]))
+        print(Statistics.from_json(str(recording.attributes["motion"])))
         if recording.attributes["warnings"]:
             print(f"warning: {recording.attributes['warnings']}")
     print(written)
@@ -78,7 +78,7 @@ def dataset(
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Make recordings of other parameters anew.")] = False,
-):
+) -> None:
     """Make the recordings of a data set. Started again, it goes on where it was stopped."""
     from radarsim.dataset.run import make
     from radarsim.dataset.specification import Specification
@@ -97,7 +97,7 @@ def calibrate(
     recording: Annotated[Path, typer.Argument(metavar="REAL.h5", help="Recording of a real radar, best at rest.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Front-end file to write (.yaml).")],
     frames: Annotated[int, typer.Option(min=1, help="Frames to look at.")] = 8,
-):
+) -> None:
     """Fit the simulated front end to a real radar: noise, band edge, leakage, channels."""
     from radarsim.receiver.calibrate import calibrate
 
@@ -129,18 +129,18 @@ def twin(
     every: Annotated[int, typer.Option(min=1, help="Simulate every so manieth frame.")] = 1,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Of the recording, s; else all of it.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of speckle and noise.")] = 0,
-):
+) -> None:
     """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
     from radarize.recording import Recording, keeping
     from radarsim.motion.trajectory import Mounting
     from radarsim.twin.report import report_twin
     from radarsim.twin.twin import Options, make_twin
 
-    places = [Mounting.parse(text) if text else None for text in (origin, mounting, at)]
+    start, mount, rest = (Mounting.parse(text) if text else None for text in (origin, mounting, at))
     with keeping(output), progress("twin") as report:
         made = make_twin(
             recording, scene, output,
-            Options(*places, frontend, calibrate, every, duration, seed),
+            Options(start, mount, rest, frontend, calibrate, every, duration, seed),
             progress=lambda *done: report("simulate", *done),
         )  # fmt: skip
         page, sentences = report_twin(recording, made, progress=lambda *done: report("compare", *done))
@@ -153,7 +153,7 @@ def twin(
 
 
 @scene_app.command()
-def info(scene: SceneName):
+def info(scene: SceneName) -> None:
     """Say what SCENE is made of."""
     from radarsim.world.scene import Scene
 
@@ -178,7 +178,7 @@ def preview(
     web: Annotated[bool, typer.Option("--web", help="A page instead: building, tour and echoes in 3-D.")] = False,
     time: Annotated[float, typer.Option(min=0.0, help="Of the frame whose echoes the page draws, s.")] = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="Of the page's tour.")] = 0,
-):
+) -> None:
     """Draw SCENE as pictures: its floor plan and a rendering with the ceilings taken off."""
     from radarsim.world.scene import Scene
 
@@ -221,7 +221,7 @@ def import_(
     height: Annotated[float, typer.Option(help="Floor to ceiling of a map or log, m.")] = 2.7,
     thickness: Annotated[float, typer.Option(help="Thinnest wall of a map or log, m.")] = 0.1,
     resolution: Annotated[float, typer.Option(help="Cells of a log, m.")] = 0.05,
-):
+) -> None:
     """Make a scene of a mesh, a Mitsuba scene, a ROS map or a lidar log."""
     from radarsim.world.importers import Options, import_scene
 
@@ -249,7 +249,7 @@ def export(
         Literal["dca1000", "rosbag", "tum"], typer.Option(help="Raw samples + .cfg, a ROS 2 bag, or the true poses.")
     ],
     output: Annotated[Path, typer.Option("--output", "-o", help="What to write (.bin, a folder, .tum).")],
-):
+) -> None:
     """Write a recording in another format, as `radarize export` does."""
     from radarize.exporters import export
 
@@ -278,7 +278,7 @@ def emulate(
     duration: Annotated[float, typer.Option(min=0.0, help="Length of the walk through a scene, s.")] = 40.0,
     radar: Annotated[str, typer.Option(help="Configuration to expect for a scene: a .cfg or a preset.")] = "radarize",
     ahead: Annotated[float, typer.Option(min=0.0, help="How much to make ahead of time, s.")] = 10.0,
-):
+) -> None:
     """Be an IWR1843 with a DCA1000: a serial port and UDP on this machine, for any capture software."""
     import time
 
@@ -290,9 +290,9 @@ def emulate(
     from radarsim.emulator.emulator import Emulator
 
     if Path(source).suffix == ".h5":
-        from radarsim.emulator.source import Playback
+        from radarsim.emulator.source import Playback, Source
 
-        given = Playback(Path(source), loop)
+        given: Source = Playback(Path(source), loop)
     else:
         from radarsim.emulator.simulation import Simulation
         from radarsim.motion.walk import Walk
@@ -318,7 +318,7 @@ def emulate(
 @app.command()
 def doctor(
     report: Annotated[bool, typer.Option("--report", help="Print text for a bug report instead.")] = False,
-):
+) -> None:
     """Say what is missing on this machine and how to get it."""
     from radarsim.doctor import describe, examine
 

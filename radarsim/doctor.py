@@ -113,10 +113,9 @@ def _package(name: str) -> Finding:
 
 def _llvm() -> Finding:
     try:
-        llvm.require()
+        path, major = llvm.require()
     except InputError as error:
         return Finding("LLVM", "missing", str(error).partition("; ")[0], llvm.INSTALL)
-    path, major = llvm.find()
     return Finding("LLVM", "ok", f"{major}, {path}")
 
 
@@ -194,7 +193,7 @@ def describe() -> str:
     from radarize import __version__
 
     needed = importlib.metadata.requires("radarize") or []
-    names = sorted({re.match(r"[\w.-]+", line)[0] for line in needed} - {"radarize"})
+    names = sorted({re.split(r"[^\w.-]", line, maxsplit=1)[0] for line in needed} - {"radarize"})
     versions = [f"{name} {_package(name).detail}" for name in names if _package(name).state == "ok"]
     lines = [
         f"radarize {__version__}, {platform.platform()}, {os.cpu_count()} cores",

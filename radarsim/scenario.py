@@ -53,10 +53,6 @@ class Scenario:
     seed: int = 0
     sensors: tuple[str, ...] = ()
 
-    def __post_init__(self):
-        if self.front_end is None:
-            object.__setattr__(self, "front_end", FrontEndConfig.of(self.config.board))
-
     def frames(self, times: Float[np.ndarray, "frame"], end: float | None = None) -> "Frames":
         """The frames that start at `times`, ascending, s; nothing is computed before it is asked for.
 
@@ -98,7 +94,7 @@ class Scenario:
     @cached_property
     def finder(self) -> PathFinder:
         """Finds the echoes of a pose."""
-        weakest, antenna = self.board.weakest, self.front_end.pattern
+        weakest, antenna = self.board.weakest, self.board.settings.pattern
         reach = SPEED_OF_LIGHT * self.board.passband[1] / (2 * self.config.slope)
         scatterers = Cluttered(Surface(self.scene, self.rng("surface")), Clutter(self.scene, self.rng("clutter")))
         reflectors = Reflectors.of(self.scene, self.config, Heights.of(self.scene, self.rng("unevenness")))
@@ -107,7 +103,7 @@ class Scenario:
     @cached_property
     def path_types(self) -> PathTypes:
         """Tells ghosts from echoes of what is really there."""
-        return PathTypes(self.scene, self.config, gain_pattern(self.front_end.pattern))
+        return PathTypes(self.scene, self.config, gain_pattern(self.board.settings.pattern))
 
     @cached_property
     def _moving(self) -> MovingTargets:

@@ -68,11 +68,11 @@ def brute_force(made: Scenario, time: float, loop: int, tx: int, rx: int, fine: 
     product *= other.radar.wavelength / (4 * np.pi * away)
     count = 4 * len(t)
     beat = np.fft.fftfreq(count, 1 / rate)
-    low, high = (-0.06, 1.05) if made.front_end.band else (-10e6 / config.sample_rate, 10e6 / config.sample_rate)
+    low, high = (-0.06, 1.05) if made.board.settings.band else (-10e6 / config.sample_rate, 10e6 / config.sample_rate)
     inside = (beat > low * config.sample_rate) & (beat < high * config.sample_rate)
     spectrum = np.fft.fft(product, count)
-    if made.front_end.image_rejection_db is not None:
-        image = np.fft.fft(product.conj(), count) * 10 ** (-made.front_end.image_rejection_db / 20)
+    if made.board.settings.image_rejection_db is not None:
+        image = np.fft.fft(product.conj(), count) * 10 ** (-made.board.settings.image_rejection_db / 20)
         spectrum += np.where(beat > 0, image, 0)
     spectrum = spectrum[inside] * made.board.beat_response(beat[inside])
     at = config.adc_start_time + np.arange(config.samples) / config.sample_rate

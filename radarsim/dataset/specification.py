@@ -163,14 +163,16 @@ class Specification(Strict):
         """
         radar = self._beside(self.radar)
         frontend = None if self.frontend is None else self._beside(self.frontend)
-        fixed = {"radar": radar, "frontend": frontend, "sensors": self._sensors(), "storage": self.storage}
+        sensors = self._sensors()
         variants = {f"_{key}": each.with_board(self._beside) for key, each in self.variants.items()} or {"": Variant()}
         made_in = [[f"_{key}" for key in group.variants] or list(variants) for group in self.recordings]
         total = sum(g.count * len(g.platforms) * len(keys) for g, keys in zip(self.recordings, made_in, strict=True))
         if total > MOST:
             raise InputError(f"recordings: stand for {total} recordings, expected at most {MOST}")
         settings = {key: self._settings(key, variant, radar, frontend) for key, variant in variants.items()}
-        tasks, count, scenes = [], Counter(), {}
+        tasks: list[Task] = []
+        count: Counter[str] = Counter()
+        scenes: dict[tuple, tuple] = {}
         for number, group in enumerate(self.recordings):
             for name, platform, floor in group.each(count):
                 seed = np.random.SeedSequence([self.seed, *name.encode()]).generate_state(1, np.uint64)[0]
@@ -179,7 +181,7 @@ class Specification(Strict):
                     place = group.building, floor, variant.level
                     if place not in scenes:
                         scene = self._scene(*place)
-                        scenes[place] = {"scene": scene, "content": content(scene)}
+                        scenes[place] = scene, content(scene)
                     frames = config.frames_within(group.duration)
                     if not frames:
                         raise InputError(
@@ -188,11 +190,12 @@ class Specification(Strict):
                         )
                     tasks.append(
                         Task(
-                            name=name + key, building=group.building, floor=floor, platform=platform,
+                            name=name + key, radar=radar, frontend=frontend, sensors=sensors, storage=self.storage,
+                            building=group.building, floor=floor, platform=platform,
                             duration=group.duration, frames=frames, seed=int(seed >> np.uint64(1)), settings=digest,
                             waypoints=group.waypoints, people=group.people, variant=variant,
                             attributes=self.attributes | group.attributes | variant.attributes,
-                            **scenes[place], **fixed,
+                            scene=scenes[place][0], content=scenes[place][1],
                         )
                     )  # fmt: skip
         return tuple(tasks)
@@ -200,7 +203,7 @@ class Specification(Strict):
     @cached_property
     def members(self) -> dict[str, dict[str, list[str]]]:
         """Split name to train, validation and test to names of recordings."""
-        found = {}
+        found: dict[str, dict[str, list[str]]] = {}
         for name, split in self.splits.items():
             rng = np.random.default_rng([self.seed, *name.encode()])
             try:
@@ -228,12 +231,11 @@ class Specification(Strict):
         return config, hashlib.sha256((config.model_dump_json() + settings.model_dump_json()).encode()).hexdigest()
 
     def _sensors(self) -> tuple[str, ...]:
-        names = {"all": ("all",), "none": ()}.get(self.sensors, self.sensors)
-        if not names:
+        if not self.sensors or self.sensors == "none":
             return ()
         from radarsim.sensors.suite import chosen
 
-        return tuple(chosen(names))
+        return tuple(chosen(["all"] if self.sensors == "all" else self.sensors))
 
     def _scene(self, building: str, floor: int | None, level: int) -> dict | str:
         given = self.buildings[building]

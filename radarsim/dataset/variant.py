@@ -54,10 +54,11 @@ class Variant(Strict):
         Raises:
             InputError: there is no such file, or it cannot be used.
         """
-        board = self.radar.get("board") if isinstance(self.radar, dict) else None
+        radar = self.radar if isinstance(self.radar, dict) else {}
+        board = radar.get("board")
         if not isinstance(board, str) or board in BOARDS:
             return self
-        return self.model_copy(update={"radar": {**self.radar, "board": load_board(beside(board))}})
+        return self.model_copy(update={"radar": {**radar, "board": load_board(beside(board))}})
 
     def radar_of(self, name: str) -> str | RadarConfig:
         """The radar of that name (preset or file) with the changes; the name itself where there are none.
@@ -65,9 +66,9 @@ class Variant(Strict):
         Raises:
             InputError: no such preset or file, or an impossible value.
         """
-        if not self.radar or isinstance(self.radar, str):
-            return self.radar or name
-        return load_config(name)[0].changed("radar", **self.radar)
+        if isinstance(self.radar, str):
+            return self.radar
+        return load_config(name)[0].changed("radar", **self.radar) if self.radar else name
 
     def frontend_of(self, file: str | None, board: str | Board) -> FrontEndConfig:
         """The front end of that file, by default the board's, with the changes.
@@ -81,4 +82,4 @@ class Variant(Strict):
     @property
     def mounted(self) -> Mounting | None:
         """The sensor's mounting; None: the platform's own."""
-        return self.mounting and Mounting.of(self.mounting[:3], self.mounting[3:])
+        return Mounting.of(self.mounting[:3], self.mounting[3:]) if self.mounting else None

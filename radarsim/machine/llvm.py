@@ -64,8 +64,11 @@ def find() -> tuple[str, int] | None:
     return None
 
 
-def require() -> None:
+def require() -> tuple[str, int]:
     """Make Dr.Jit use a suitable LLVM; call before anything imports drjit, mitsuba or sionna.
+
+    Returns:
+        path and major version.
 
     Raises:
         InputError: there is none, with the command that installs one.
@@ -85,3 +88,4 @@ def require() -> None:
             f"type: {INSTALL}"
         )
     os.environ["DRJIT_LIBLLVM_PATH"] = path
+    return found

@@ -76,7 +76,8 @@ def _timeline(
 ) -> tuple[Float[np.ndarray, "step 2"], Float[np.ndarray, "step"]]:
     """Place and course of the carrier's front (rad, unwrapped) at 100 Hz, with turns on the spot between legs."""
     still = int((_MARGIN + STANDSTILL + 4 * carrier.smoothing) * _RATE)
-    places, courses = [], []
+    places: list[np.ndarray] = []
+    courses: list[np.ndarray] = []
     for leg in legs:
         place, course = _leg(carrier, leg, rng)
         if not places:

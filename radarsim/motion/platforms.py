@@ -1,11 +1,10 @@
 """The carriers of the sensor (`platforms.yaml`): a hand, a cart, a small robot."""
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import read_beside
 from radarsim.world.clearance import LOWEST
 
 
@@ -62,4 +61,4 @@ def _platform(about: dict) -> Platform:
     return Platform(**about | angles | {"sway": tuple(np.deg2rad(about.get("sway", (0.0, 0.0, 0.0))))})
 
 
-PLATFORMS = {name: _platform(about) for name, about in read_yaml(Path(__file__).with_suffix(".yaml")).items()}
+PLATFORMS = {name: _platform(about) for name, about in read_beside(__file__).items()}

@@ -114,7 +114,8 @@ def tour(
     apart = np.linalg.norm(ground.points[goals, None] - ground.points[goals], axis=2)
     home = int(goals[np.sum(apart < _REACH * length, axis=1).argmax()])
     cost, before = ground.search(home)
-    travelled, nodes, fresh = 0.0, [home], []
+    travelled, nodes = 0.0, [home]
+    fresh: list[int] = []
     while travelled < length:
         fresh = fresh or [int(g) for g in rng.permutation(goals) if g != home]
         # The first way round is short enough that the walk comes back to where it has been.

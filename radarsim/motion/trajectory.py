@@ -143,9 +143,9 @@ class Motion:
     ) -> "Motion":
         """Constant world `velocity` (m/s) and yaw rate (rad/s); the body passes `position` at t = 0."""
         # Knots close enough that no turn between two exceeds half a right angle.
-        span = np.array([-1.0, duration + 1.0])
-        count = 2 + int(np.ceil(abs(yaw_rate) * np.ptp(span) / (np.pi / 4)))
-        times = np.linspace(*span, count)
+        begin, end = -1.0, duration + 1.0
+        count = 2 + int(np.ceil(abs(yaw_rate) * (end - begin) / (np.pi / 4)))
+        times = np.linspace(begin, end, count)
         path = np.asarray(position, float) + times[:, None] * np.asarray(velocity, float)
         turn = Rotation.from_euler("z", (yaw + yaw_rate * times)[:, None])
         return cls(duration, CubicSpline(times, path), RotationSpline(times, turn), lever_arm)

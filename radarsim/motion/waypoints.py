@@ -1,9 +1,11 @@
 """Way-points from a file: places x y that a walk goes through."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from radarize.errors import InputError
 from radarize.files import read_text
@@ -26,7 +28,7 @@ def read_waypoints(path: str | Path) -> Float[np.ndarray, "n 2"]:
     """
     path = Path(path)
     if path.suffix == ".tum":
-        rows = _thinned(read_tum(path)[1][:, :2])
+        rows: Sequence[ArrayLike] = _thinned(read_tum(path)[1][:, :2])
     else:
         rows = _listed(path) if path.suffix in (".yaml", ".yml") else _lines(path)
     if len(rows) < 2:
@@ -44,7 +46,7 @@ def _listed(path: Path) -> list[list[float]]:
 
 
 def _lines(path: Path) -> list[list[float]]:
-    rows = []
+    rows: list[list[float]] = []
     for number, line in enumerate(read_text(path, "way-points").splitlines(), 1):
         words = line.split("#")[0].replace(",", " ").split()
         if words and not (not rows and all(word[0].isalpha() for word in words) and number == 1):
@@ -54,7 +56,7 @@ def _lines(path: Path) -> list[list[float]]:
 
 def _place(where: str, item: object) -> list[float]:
     try:
-        x, y = (float(value) for value in item)
+        x, y = map(float, item if isinstance(item, list) else ())
         if np.isfinite([x, y]).all():
             return [x, y]
     except (TypeError, ValueError, OverflowError):

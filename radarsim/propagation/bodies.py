@@ -37,7 +37,7 @@ def recognise(mesh: trimesh.Trimesh) -> tuple[list[RoundBody], Bool[np.ndarray, 
     return bodies, taken
 
 
-def _sphere(mesh, faces: Int[np.ndarray, "face"]):
+def _sphere(mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]) -> tuple[RoundBody, Int[np.ndarray, "side"]] | None:
     corners = mesh.vertices[np.unique(mesh.faces[faces])]
     center, radius = _round(corners)
     outward = mesh.triangles_center[faces] - center
@@ -47,7 +47,9 @@ def _sphere(mesh, faces: Int[np.ndarray, "face"]):
     return (RoundBody(center, np.zeros(3), radius, 0.0), faces) if even and covers and facing.all() else None
 
 
-def _cylinder(mesh, faces: Int[np.ndarray, "face"]):
+def _cylinder(
+    mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]
+) -> tuple[RoundBody, Int[np.ndarray, "side"]] | None:
     normals, areas = mesh.face_normals[faces], mesh.area_faces[faces]
     for axis in np.linalg.eigh((normals * areas[:, None]).T @ normals)[1].T:
         tilt = np.abs(normals @ axis)

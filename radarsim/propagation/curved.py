@@ -193,7 +193,10 @@ def stationary(quadric, one, two):
     return place, r1 + r2, (h11, h22, h12), (p11, p22, p12)
 
 
-def _side_terms(across, slant, h, wavelength) -> Complex[np.ndarray, "facet side part"]:
+def _side_terms(
+    across: Float[np.ndarray, "facet side 3"], slant: Float[np.ndarray, "facet side 3"], h: Float[np.ndarray, "facet"],
+    wavelength: float,
+) -> Complex[np.ndarray, "facet side 3"]:  # fmt: skip
     """Interior and edge terms of the Fresnel integral along each side, phases referred to the part's own path."""
     u = 2 * np.sqrt(2 * np.maximum(slant - h[:, None, None], 0) / wavelength)
     sine, cosine = fresnel(u)

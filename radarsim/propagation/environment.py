@@ -12,8 +12,7 @@ from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Obstacles
 from radarsim.propagation.reflectors import Flat, Reflectors
-from radarsim.propagation.scatterers import Scatterers
-from radarsim.propagation.surface import Surface
+from radarsim.propagation.surface import Scattering
 from radarsim.propagation.targets import Targets
 from radarsim.propagation.visible_mirrors import Mirrors
 from radarsim.world.scene import Scene
@@ -32,14 +31,14 @@ class Environment:
     """
 
     scene: Scene | None
-    surface: Surface | Scatterers
+    surface: Scattering
     reflectors: Reflectors | None
     moving: MovingTargets
     obstacles: Obstacles
 
     @classmethod
     def of(
-        cls, scene: Scene | None, surface: Surface | Scatterers, reflectors: Reflectors | None, config: RadarConfig,
+        cls, scene: Scene | None, surface: Scattering, reflectors: Reflectors | None, config: RadarConfig,
         moving: MovingTargets | None = None,
     ) -> "Environment":  # fmt: skip
         """The environment of a radar's configuration."""

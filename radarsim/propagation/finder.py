@@ -18,8 +18,7 @@ from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.paths import Paths
 from radarsim.propagation.reflectors import Reflectors
-from radarsim.propagation.scatterers import Scatterers
-from radarsim.propagation.surface import Surface
+from radarsim.propagation.surface import Scattering
 from radarsim.world.scene import Scene
 
 #: Ways in which an echo comes about; plug-ins append theirs.
@@ -43,7 +42,7 @@ class PathFinder:
     def __init__(
         self,
         scene: Scene | None,
-        surface: Surface | Scatterers,
+        surface: Scattering,
         reflectors: Reflectors | None,
         config: RadarConfig,
         threshold: float = 0.0,
@@ -70,8 +69,10 @@ class PathFinder:
         times: Float[np.ndarray, "frame"],
     ) -> View:
         """The environment from the poses of some frames; arguments as for `batch`."""
-        poses = (np.ascontiguousarray(each, float) for each in (positions, rotations, times))
-        observation = Observation(*poses, self.range, self.config.wavelength, self.threshold, *self._pattern)
+        position, rotation, time = (np.ascontiguousarray(each, float) for each in (positions, rotations, times))
+        observation = Observation(
+            position, rotation, time, self.range, self.config.wavelength, self.threshold, *self._pattern
+        )
         return View(self.environment, observation)
 
     def batch(

@@ -282,7 +282,7 @@ def _couple(one, two, rho, mirroring, couplings, out):
         out[p] = passed / clear if abs(clear) > 0.05 else np.nan
 
 
-def _rays(flat: Flat, stretches: Stretches, lattice: Lattice):
+def _rays(flat: Flat, stretches: Stretches, lattice: Lattice) -> tuple[np.ndarray, ...]:
     """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which stretch these are."""
     shape = len(stretches), len(lattice.nodes)
     begin, end, inside = np.empty((*shape, 3)), np.empty((*shape, 3)), np.empty(shape, np.bool_)

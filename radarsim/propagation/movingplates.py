@@ -33,15 +33,18 @@ class MovingPlates:
     def __init__(self, moving: MovingTargets, config: RadarConfig, margin: float):
         self._moving, self._margin = moving, margin
         self._offsets = BurstClock.of(config).half * np.append(NODES, 0.0)
-        self._part = np.array([k for k, part in enumerate(moving.parts) if part.material is not None], int)
-        scenes = [Scene("part", [moving.parts[k].object]) for k in self._part]
+        things = {k: thing for k, part in enumerate(moving.parts) if (thing := part.object)}
+        self._part = np.array([*things], int)
+        scenes = [Scene("part", [thing]) for thing in things.values()]
         self._reflectors = [Reflectors.of(scene, config) for scene in scenes]
         self._transmission = [Transmission(scene, config, margin) for scene in scenes]
 
     def __len__(self) -> int:
         return len(self._part)
 
-    def _places(self, times: Float[np.ndarray, "n"]):
+    def _places(
+        self, times: Float[np.ndarray, "n"]
+    ) -> tuple[Float[np.ndarray, "n plate 3 3"], Float[np.ndarray, "n plate 3"]]:
         """Rotations and centres of the plates at some times, s."""
         # one instant at a time: sums over many at once are ordered otherwise, and a frame is to hang on no other
         poses = [self._moving.poses(np.array([t])) for t in times]
@@ -83,14 +86,17 @@ class MovingPlates:
             met = met[allowed[met]]
             if len(met):
                 turn, center = turns[frame[met], plate], centers[frame[met], plate]
-                ends = (np.einsum("nij,ni->nj", turn, x[met] - center) for x in (begin, end))
+                start, stop = (np.einsum("nij,ni->nj", turn, x[met] - center) for x in (begin, end))
                 up = np.einsum("nij,ni->nj", turn, observation.rotation[frame[met], :, 2])
-                passed, late = own.passage(*ends, up)
+                passed, late = own.passage(start, stop, up)
                 factor[met] *= passed
                 delay[met] += late
         return factor, delay
 
-    def _met(self, observation: Observation, frame, begin, end, part: int) -> Int[np.ndarray, "met"]:
+    def _met(
+        self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
+        end: Float[np.ndarray, "ray 3"], part: int,
+    ) -> Int[np.ndarray, "met"]:  # fmt: skip
         """Rays that one of them stands in the way of."""
         found = [np.zeros(0, int)]
         for k in np.unique(frame):
@@ -100,7 +106,7 @@ class MovingPlates:
         return np.concatenate(found)
 
 
-def _placed(flat: Flat, turn, center, plate: int, frame: int) -> Flat:
+def _placed(flat: Flat, turn: Float[np.ndarray, "3 3"], center: Float[np.ndarray, "3"], plate: int, frame: int) -> Flat:
     """Faces of a plate as they stand in a frame."""
     n = len(flat)
     return replace(

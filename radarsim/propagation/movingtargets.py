@@ -45,7 +45,7 @@ class MovingTargets:
             for each in parts:
                 if each.material is None:
                     # Half of an upright round body faces the radar, and there Lambert's squared cosine averages 1/2.
-                    per_area = 4 * mover.cross_section / area
+                    per_area = 4 * getattr(mover, "cross_section", 0.0) / area
                 else:
                     per_area = each.material.sigma0
                 count = max(int(round(density * each.area)), 4)

@@ -61,7 +61,10 @@ class Obstacles:
         transmission = None if scene is None else Transmission(scene, config, CLEARANCE)
         return cls(scene, transmission, moving, MovingPlates(moving, config, CLEARANCE))
 
-    def _shadowed(self, observation: Observation, frame, begin, end) -> Bool[np.ndarray, "ray"]:
+    def _shadowed(
+        self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
+        end: Float[np.ndarray, "ray 3"],
+    ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
         """Whether an opaque part of a mover stands in the way."""
         hidden = np.zeros(len(frame), bool)
         for k in np.unique(frame) if len(self.moving.opaque) else ():
@@ -92,7 +95,7 @@ class Obstacles:
             allowed: slabs are looked for in the way of these, and are opaque to the others.
         """
         factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
-        if self.scene is not None and len(frame):
+        if self.scene is not None and self.transmission is not None and len(frame):
             blocked = self.scene.occluded(begin, end, margin=CLEARANCE)
             factor[blocked] = 0
             through, opaque = np.flatnonzero(blocked & allowed), self.transmission.opaque

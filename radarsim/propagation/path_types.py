@@ -86,10 +86,10 @@ class PathTypes:
         shared = [np.unique(each, axis=0, return_inverse=True) for each in places]
         each = [len(some) for some, _ in shared]
         real = self._near_surface(np.concatenate([some for some, _ in shared]), np.repeat(positions, each, axis=0))
-        for types, rows, (_, which), some in zip(
+        for types, rows, (_, which), near in zip(
             found, mirrored, shared, np.split(real, np.cumsum(each)), strict=False
         ):
-            types[rows[~some[which.ravel()]]] = PathType.GHOST
+            types[rows[~near[which.ravel()]]] = PathType.GHOST
         return found
 
     @cached_property

@@ -18,9 +18,11 @@ from typing import Self
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Float32, Int, UInt8
 from numba import njit, prange
+from numpy.typing import ArrayLike
 
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import RadarConfig
+from radarsim.motion.trajectory import Motion
 from radarsim.propagation.burst import BurstClock, parabola
 from radarsim.propagation.curved import SHAPE, facing_point, path_over
 from radarsim.propagation.fields import dot, length, minus
@@ -83,7 +85,11 @@ class Paths(Table):
 
     @classmethod
     def of(
-        cls, kind: Kind, geometry: Float[np.ndarray, "path *shape"], amplitude: Complex[np.ndarray, "path"], **columns
+        cls,
+        kind: Kind,
+        geometry: Float[np.ndarray, "path *shape"],
+        amplitude: Complex[np.ndarray, "path"],
+        **columns: ArrayLike,
     ) -> Self:
         """Paths of one kind; columns that are not given are zero, indices -1.
 
@@ -159,7 +165,7 @@ class Paths(Table):
         blocked = passed.blocked.astype(np.float32)
         return replace(paths, geometry=geometry, amplitude=amplitude[kept], through=passed.through, blocked=blocked)
 
-    def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "path virtual 3"]:
+    def lengths(self, config: RadarConfig, motion: Motion, time: float) -> Float[np.ndarray, "path virtual 3"]:
         """Length of each path and virtual antenna over the burst of the frame that starts at `time`.
 
         Args:

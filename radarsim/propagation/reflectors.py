@@ -118,14 +118,14 @@ class Reflectors:
             bodies += [(b.center, b.axis, b.radius, b.half, bent) for b in round_]
             smooth += [(piece, item.two_sided, bent) for piece in curved]
             found = plates(item.mesh, ~(is_round | is_curved), config.wavelength**2)
-            hollow = slab.thickness is not None and not (whole or item.two_sided)
+            deep = None if whole or item.two_sided else slab.thickness  # of the wall of a hollow body, m
             middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
             lying = item.floors_and_ceilings(middles, np.reshape([p.normal for p in found], (-1, 3)))
             for p, horizontal in zip(found, lying, strict=True):
                 rest = (item.two_sided, horizontal, made_of, late, finish, -1, -1)
                 flat.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *rest))
-                if hollow:
-                    inwards = -slab.thickness * p.normal
+                if deep is not None:
+                    inwards = -deep * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
         outer = _table(flat)

@@ -71,7 +71,8 @@ def pieces(
         among: which triangles to take.
         smallest: pieces of less area are left out, m^2.
     """
-    found, taken = [], np.zeros(len(mesh.faces), bool)
+    found: list[Piece] = []
+    taken = np.zeros(len(mesh.faces), bool)
     joins = (mesh.face_adjacency_angles < CREASE) & among[mesh.face_adjacency].all(axis=1)
     if not np.any(joins & (mesh.face_adjacency_angles > COPLANAR)):
         return found, taken
@@ -103,7 +104,9 @@ def pieces(
     return found, taken
 
 
-def _filled(groups, pairs, area) -> Int[np.ndarray, "face"]:
+def _filled(
+    groups: list[np.ndarray], pairs: Int[np.ndarray, "pair 2"], area: Float[np.ndarray, "face"]
+) -> Int[np.ndarray, "face"]:
     """The group that each triangle is of, -1: none; odd triangles between two of one group are of it, too."""
     group = np.full(len(area), -1)
     for k, faces in enumerate(groups):
@@ -117,7 +120,7 @@ def _filled(groups, pairs, area) -> Int[np.ndarray, "face"]:
     return group
 
 
-def _uneven(mesh, among) -> Bool[np.ndarray, "face"]:
+def _uneven(mesh: trimesh.Trimesh, among: Bool[np.ndarray, "face"]) -> Bool[np.ndarray, "face"]:
     """Triangles of uneven planes, as a scan has them."""
     rows, uneven = np.flatnonzero(among), np.zeros(len(mesh.faces), bool)
     for faces in regions(trimesh.Trimesh(mesh.vertices, mesh.faces[rows], process=False)):
@@ -127,7 +130,7 @@ def _uneven(mesh, among) -> Bool[np.ndarray, "face"]:
 
 
 def _surfaces(
-    mesh, rows, pairs
+    mesh: trimesh.Trimesh, rows: Int[np.ndarray, "face"], pairs: Int[np.ndarray, "pair 2"]
 ) -> tuple[
     Float[np.ndarray, "corner 3"], Float[np.ndarray, "corner 3"], Int[np.ndarray, "face 3"],
     Float[np.ndarray, "face 3 3"],
@@ -161,7 +164,9 @@ def _surfaces(
     return place, normal, corners, tensor
 
 
-def _by_chords(place, mean, sides) -> Float[np.ndarray, "corner 3"]:
+def _by_chords(
+    place: Float[np.ndarray, "corner 3"], mean: Float[np.ndarray, "corner 3"], sides: Int[np.ndarray, "side 2"]
+) -> Float[np.ndarray, "corner 3"]:
     """Normals near some means for which sides are chords of circles."""
     chord = _unit(place[sides[:, 1]] - place[sides[:, 0]])
     columns = 3 * sides[:, :, None] + np.arange(3)
@@ -236,7 +241,10 @@ def _sense(bend: Float[np.ndarray, "n 2"]) -> Int[np.ndarray, "n 2"]:
     return np.sign(np.where(np.abs(bend) < LITTLE * np.abs(bend).max(axis=1, keepdims=True), 0, bend)).astype(int)
 
 
-def _piece(place, normal, corners, tensor, pairs) -> Piece:
+def _piece(
+    place: Float[np.ndarray, "corner 3"], normal: Float[np.ndarray, "corner 3"], corners: Int[np.ndarray, "face 3"],
+    tensor: Float[np.ndarray, "face 3 3"], pairs: Int[np.ndarray, "pair 2"],
+) -> Piece:  # fmt: skip
     """The piece of some triangles with these corners and tensors, and which of them join."""
     used, own = np.unique(corners, return_inverse=True)
     own = own.reshape(-1, 3)

@@ -64,7 +64,8 @@ class Surface:
             self._horizontal[begin:end] = item.floors_and_ceilings(*here)
         corners = self._triangles.reshape(-1, 3)
         starts = 3 * self._first[:-1]
-        self._grid = Grid(*(f.reduceat(corners, starts) if len(tile) else corners for f in (np.minimum, np.maximum)))
+        low, high = (f.reduceat(corners, starts) if len(tile) else corners for f in (np.minimum, np.maximum))
+        self._grid = Grid(low, high)
         self._owner = owner[self._first[:-1]]
         left = uncovered(scene, self._triangles.mean(axis=1), self._normals)
         self._sigma = (np.array([o.material.sigma0 for o in used]) / density)[owner] * left
@@ -98,7 +99,7 @@ class Surface:
         owner = np.repeat(self._owner[tiles], counts)
         return Scatterers(
             position, self._normals[triangle], self._sigma[triangle], phase, self._two_sided[owner],
-            self._horizontal[triangle], *bounces, self._lobe[owner], rank,
+            self._horizontal[triangle], bounces[0], bounces[1], self._lobe[owner], rank,
         )  # fmt: skip
 
 
@@ -115,6 +116,9 @@ class Cluttered:
     def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> Scatterers:
         """Those within `reach` (m) of any of the positions, see `Surface.near`."""
         return Scatterers.joined([part.near(positions, reach) for part in (self.surface, self.clutter)])
+
+
+Scattering = Surface | Cluttered | Scatterers  # what gives the scatterers near some positions
 
 
 def _split(triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "m 3 3"]:

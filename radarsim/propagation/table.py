@@ -3,7 +3,7 @@
 from collections import namedtuple
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Self, TypeVar
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -16,7 +16,7 @@ class Table:
         SHARED: fields that belong to all rows together.
     """
 
-    Columns: ClassVar[type]
+    Columns: ClassVar[type[Any]]
     SHARED: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls):
@@ -33,7 +33,7 @@ class Table:
     def __len__(self) -> int:
         return len(self.columns[0])
 
-    def __getitem__(self, index) -> Self:
+    def __getitem__(self, index: slice | np.ndarray) -> Self:
         shared = (getattr(self, name) for name in self.SHARED)
         return type(self)(*(column[index] for column in self.columns), *shared)
 

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.scatterers import Scatterers
-from radarsim.propagation.surface import Surface
+from radarsim.propagation.surface import Scattering
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class Targets:
     weights: Float[np.ndarray, "scatterer 3"]
 
     @classmethod
-    def of(cls, observation: Observation, surface: Surface | Scatterers, moving: MovingTargets | None) -> "Targets":
+    def of(cls, observation: Observation, surface: Scattering, moving: MovingTargets | None) -> "Targets":
         """The surface's scatterers within range of any pose, and all moving targets'."""
         found = surface.near(observation.position, observation.range)
         still = len(found)

@@ -3,7 +3,6 @@
 from functools import cached_property
 
 import numpy as np
-import trimesh
 from jaxtyping import Complex, Float
 from numba import njit
 
@@ -12,6 +11,7 @@ from radarsim.propagation.clutter import uncovered
 from radarsim.propagation.fields import cross, dot, unit, upright
 from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.media import LAYER, as_slab, layer, sweep_share, window
+from radarsim.world import shapes
 from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
 
@@ -30,15 +30,10 @@ class Transmission:
 
     def __init__(self, scene: Scene, config: RadarConfig, margin: float):
         self.scene, self.margin, self._wavelength = scene, margin, config.wavelength
-        layers, self._layer, self._body = {}, [], []
-        for item in scene.objects:
-            slab, whole = as_slab(item)
-            if slab.thickness is not None and slab not in layers:
-                layers[slab] = len(layers), layer(slab, config)
-            self._layer.append(-1 if slab.thickness is None else layers[slab][0])
-            self._body.append(whole)
-        self._layer, self._body = np.array(self._layer), np.array(self._body)
-        self._layers = np.array([row for _, row in layers.values()]).reshape(-1, LAYER)
+        slabs, whole = zip(*map(as_slab, scene.objects), strict=True)
+        number = {s: k for k, s in enumerate(dict.fromkeys(s for s in slabs if s.thickness is not None))}
+        self._layer, self._body = np.array([number.get(slab, -1) for slab in slabs]), np.array(whole)
+        self._layers = np.array([layer(slab, config) for slab in number]).reshape(-1, LAYER)
         self._share = sweep_share(config)
         #: what small objects on a face leave of the amplitude
         self._left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
@@ -49,7 +44,7 @@ class Transmission:
         solid = [item for item, layer in zip(self.scene.objects, self._layer, strict=True) if layer < 0]
         if not solid or len(solid) == len(self._layer):
             return self.scene if solid else None
-        mesh = trimesh.util.concatenate([item.mesh for item in solid])
+        mesh = shapes.joined(*(item.mesh for item in solid))
         return Scene(self.scene.name, [SceneObject("opaque", mesh, solid[0].material)])
 
     def passage(

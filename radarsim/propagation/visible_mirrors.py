@@ -88,7 +88,9 @@ def _turned(flat: Flat, observation: Observation, frame: int) -> Int[np.ndarray,
     return np.flatnonzero(faced & ahead & (np.hypot(height, away) < observation.range) & flat.present(frame))
 
 
-def _spread(flat: Flat, index, around, reach: float) -> tuple[Float[np.ndarray, "point 3"], Int[np.ndarray, "point"]]:
+def _spread(
+    flat: Flat, index: Int[np.ndarray, "n"], around: Float[np.ndarray, "n 3"], reach: float
+) -> tuple[Float[np.ndarray, "point 3"], Int[np.ndarray, "point"]]:
     """Points on reflectors, on the part within a square of +-`reach` around a position each; and whose they are."""
     u, v, half, center = flat.u[index], flat.v[index], flat.half[index], flat.center[index]
     foot = np.stack([np.einsum("md,md->m", around - center, axis) for axis in (u, v)], axis=1)

@@ -170,7 +170,7 @@ def find_leakage(
     low = np.exp(-2j * np.pi * np.outer(np.arange(5), np.arange(n)) / n) * window  # the five lowest bins
     seen = static.reshape(-1, n) @ low.T
 
-    def explained(delay: float):
+    def explained(delay: float) -> tuple[float, Complex[np.ndarray, "virtual"]]:
         columns = low @ np.stack([np.exp(2j * np.pi * config.slope * delay * t), np.ones(n)], axis=1)
         parts, *_ = np.linalg.lstsq(columns, seen.T, rcond=None)
         return np.sum(np.abs(seen.T - columns @ parts) ** 2), parts[0]
@@ -222,7 +222,9 @@ def fit_channels(
     )
 
 
-def _snapshots(signal, config: RadarConfig, floor: float) -> list[Complex[np.ndarray, "virtual"]]:
+def _snapshots(
+    signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarConfig, floor: float
+) -> list[Complex[np.ndarray, "virtual"]]:
     """The strongest cells of all frames' range-Doppler maps, as if all channels had been sampled at once."""
     loops, n = signal.shape[1], config.samples
     slow, fast = periodic(np.hanning, loops), periodic(np.hanning, n)
@@ -239,11 +241,15 @@ def _snapshots(signal, config: RadarConfig, floor: float) -> list[Complex[np.nda
     return [cube[f, d, :, :, b].ravel() for f, d, b in zip(frame[keep], doppler[keep], bin_[keep], strict=True)]
 
 
-def _steering(sines: Float[np.ndarray, "2"], antennas, wavelength: float) -> Complex[np.ndarray, "virtual"]:
+def _steering(
+    sines: Float[np.ndarray, "2"], antennas: Float[np.ndarray, "virtual 3"], wavelength: float
+) -> Complex[np.ndarray, "virtual"]:
     return np.exp(-2j * np.pi / wavelength * (antennas[:, 1:] @ sines))
 
 
-def _direction(snapshot, antennas, wavelength: float) -> tuple[Float[np.ndarray, "2"], float]:
+def _direction(
+    snapshot: Complex[np.ndarray, "virtual"], antennas: Float[np.ndarray, "virtual 3"], wavelength: float
+) -> tuple[Float[np.ndarray, "2"], float]:
     """Direction (sines to the left and up) of the plane wave that explains most of a snapshot, and how much."""
 
     def unexplained(sines):

@@ -113,21 +113,21 @@ class FrontEnd:
         band, rate, edge = self.settings.band, self.config.sample_rate, self.settings.if_bandwidth_hz
         return (-edge, edge) if band is None else (band.low * rate, band.high * rate)
 
-    def if_response(self, path_length: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"] | complex:
+    def if_response(self, path_length: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"]:
         """Response of the IF chain to an echo of a path length (out and back, m)."""
         return self.beat_response(self.config.slope * np.asarray(path_length) / SPEED_OF_LIGHT)
 
-    def beat_response(self, beat: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"] | complex:
+    def beat_response(self, beat: Float[np.ndarray, "*n"] | float) -> Complex[np.ndarray, "*n"]:
         """Response at beat frequencies, Hz: two first-order high-pass stages, then the decimation filter."""
-        response = np.asarray(self._decimation(beat), complex)
+        response = self._decimation(np.asarray(beat)).astype(complex)
         if self.settings.high_pass:
             for corner in self.config.high_pass:
                 response = response * (1j * beat / (1j * beat + corner))
-        return response
+        return np.asarray(response)
 
     def _decimation(self, beat: np.ndarray) -> np.ndarray:
         band = self.settings.band
-        return np.ones(np.shape(beat)) if band is None else band.response(beat / self.config.sample_rate)
+        return np.ones(beat.shape) if band is None else np.asarray(band.response(beat / self.config.sample_rate))
 
     # --- the chain ---------------------------------------------------------------------------------------------------
     def digitize(
@@ -157,8 +157,8 @@ class FrontEnd:
             delay = self.settings.leakage.delay if self.settings.leakage else 0.0
             extra += self._skirts(bins, (self.scale * self.leakage).astype(np.complex64), delay, noise, rng)
         leakage = self._couple()
-        if self.settings.image_rejection_db is not None:
-            extra += self._image(bins + scipy.fft.fft(leakage, axis=-1, norm="forward") + extra)
+        if (rejection := self.settings.image_rejection_db) is not None:
+            extra += self._image(bins + scipy.fft.fft(leakage, axis=-1, norm="forward") + extra, rejection)
         return echoes + leakage + scipy.fft.ifft(extra, axis=-1, norm="forward")
 
     def convert(self, counts: Complex[np.ndarray, "loop tx rx sample"]) -> Int16[np.ndarray, "loop tx rx sample 2"]:
@@ -177,9 +177,9 @@ class FrontEnd:
         """
         shape = self.config.frame_shape[:-1]
         parts = [self._amplify(s) for s in signals] + [np.broadcast_to(self._couple(), shape)]
-        if self.settings.image_rejection_db is None:
+        if (rejection := self.settings.image_rejection_db) is None:
             return parts
-        images = (self._image(scipy.fft.fft(p, axis=-1, norm="forward")) for p in parts)
+        images = (self._image(scipy.fft.fft(p, axis=-1, norm="forward"), rejection) for p in parts)
         return [p + scipy.fft.ifft(i, axis=-1, norm="forward") for p, i in zip(parts, images, strict=True)]
 
     @property
@@ -208,9 +208,11 @@ class FrontEnd:
         draw = rng.standard_normal((*shape, 2), dtype=np.float32).view(np.complex64)[..., 0]
         return draw * np.float32(level)
 
-    def _image(self, bins: Complex[np.ndarray, "*trace sample"]) -> Complex[np.ndarray, "*trace sample"]:
-        """Image of bin b at -b, as far as the decimation filter lets it through; bin -b is bin N - b."""
-        passed = 10 ** (-self.settings.image_rejection_db / 20) * self._decimation(-self._bins)
+    def _image(
+        self, bins: Complex[np.ndarray, "*trace sample"], rejection: float
+    ) -> Complex[np.ndarray, "*trace sample"]:
+        """Image of bin b at -b, so many dB down, as far as the decimation filter lets it through; -b is bin N - b."""
+        passed = 10 ** (-rejection / 20) * self._decimation(-self._bins)
         # conj(x(t)) has the conjugate coefficients in mirrored order
         image = np.zeros_like(bins)
         some = np.flatnonzero(passed)

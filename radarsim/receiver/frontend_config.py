@@ -3,6 +3,7 @@
 Every effect can be switched off by itself (`null`, `false`), and `FrontEndConfig.ideal()` has none.
 """
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -219,7 +220,7 @@ class FrontEndConfig(_Strict):
         except ValidationError as error:
             raise InputError(f"{source}: {format_validation_error(error, fields)}") from error
 
-    def save(self, path: Path, remarks: list[str] = ()) -> None:
+    def save(self, path: Path, remarks: Sequence[str] = ()) -> None:
         """Write as a front-end file, with remarks as comments on top."""
         text = "".join(f"# {remark}\n" for remark in remarks) + yaml.safe_dump(
             self.model_dump(mode="json"), sort_keys=False, default_flow_style=None, width=120

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
-from jaxtyping import Bool, Complex, Float
+from jaxtyping import Bool, Complex, Float, Int
 from numba import njit
 from scipy.special import fresnel
 
@@ -120,7 +120,9 @@ class Interference:
                 self._add(sweeps.mirrored(), amplitude.conjugate() * 10 ** (-rejection / 20) * above, out)
         return out.reshape(loops, tx, rx, samples) * self._receivers.astype(np.complex64)
 
-    def _add(self, sweeps: Sweeps, response: Complex[np.ndarray, "bin"], out) -> None:
+    def _add(
+        self, sweeps: Sweeps, response: Complex[np.ndarray, "bin"], out: Complex[np.ndarray, "chirp rx sample"]
+    ) -> None:
         """Add the samples of sweeps (chirp, candidate, rx) that a response lets through."""
         for candidate in range(sweeps.begin.shape[1]):
             some = Sweeps(*(each[:, candidate] for each in sweeps))
@@ -171,7 +173,9 @@ class Interference:
         return Sweeps(phase, begin, np.where(number[..., None] < 0, begin, end))
 
 
-def _chirps(theirs: RadarConfig, time: Float[np.ndarray, "chirp"], duration: float):
+def _chirps(
+    theirs: RadarConfig, time: Float[np.ndarray, "chirp"], duration: float
+) -> tuple[Int[np.ndarray, "chirp candidate"], Float[np.ndarray, "chirp candidate"]]:
     """Numbers of a radar's chirps that may be sent within a duration after each time, and starts of their ramps.
 
     Args:
@@ -190,7 +194,9 @@ def _chirps(theirs: RadarConfig, time: Float[np.ndarray, "chirp"], duration: flo
     return number, start + theirs.idle_time
 
 
-def _lengths(config: RadarConfig, other: Interferer, motion: Motion, times: Float[np.ndarray, "chirp end"]):
+def _lengths(
+    config: RadarConfig, other: Interferer, motion: Motion, times: Float[np.ndarray, "chirp end"]
+) -> Float[np.ndarray, "chirp end tx rx"]:
     """From another radar's transmitters to the receivers at times, s: (chirp, end, their tx, rx), m."""
     t = times.ravel()
     rx = motion.position(t)[:, None] + rx_positions(config) @ motion.rotation(t).as_matrix().transpose(0, 2, 1)

@@ -101,7 +101,7 @@ class Batches:
         for news in perform(jobs, workers):
             if news.error is not None:
                 raise news.failure
-            if news.ended:
+            if isinstance(news.result, Batch):
                 made[news.name] = news.result
             while awaited and awaited[0] in made:
                 yield made.pop(awaited.popleft())

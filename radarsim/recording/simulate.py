@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from llvmlite.binding import get_host_cpu_name
@@ -31,7 +32,7 @@ def simulate(
     *,
     workers: int | None = 1,
     progress: Callable[[int, int], None] | None = None,
-    **plan: object,
+    **plan: Any,
 ) -> Path:
     """Simulate a recording.
 
@@ -63,7 +64,7 @@ def planned(
     frontend: Path | FrontEndConfig | None = None,
     sensors: Sequence[str] = (),
     people: int = 0,
-    **walk: object,
+    **walk: Any,
 ) -> tuple[Scenario, str, dict[str, object]]:
     """What `simulate` simulates.
 
@@ -130,11 +131,10 @@ def record(
             output, scenario.config, cfg_text=cfg_text, attributes=about, products=suite.products, streams=suite.streams
         ) as writer,
     ):
-        alike = found is not None and found.config == scenario.config
-        begun = found if alike and _fits(found, batches, about) else None
+        begun = found if found is not None and _fits(found, batches, about) else None
         spans = batches.spans()
         kept = [span for span in spans if begun is not None and span[1] <= len(begun)]
-        taken = (Batch(begun.adc(*span), {name: begun.rows(name, *span) for name in suite.streams}) for span in kept)
+        taken = (Batch(begun.adc(*s), {n: begun.rows(n, *s) for n in suite.streams}) for s in kept) if begun else ()
         made = batches.each(spans[len(kept) :], workers)
         for (first, last), batch in zip(spans, chain(taken, made), strict=True):
             arrived = None if batches.valid is None else batches.valid[first:last]
@@ -154,7 +154,7 @@ def facts(scenario: Scenario) -> dict[str, object]:
         "seed": scenario.seed,
         "radarsim_version": __version__,
         "engine": "radarsim",
-        "front_end": scenario.front_end.model_dump_json(),
+        "front_end": scenario.board.settings.model_dump_json(),
         "motion": Statistics.of(scenario.motion, scenario.scene).json(),
         "warnings": crossings(scenario.motion, scenario.scene),
         "processor": get_host_cpu_name(),
@@ -188,7 +188,8 @@ def _fits(begun: Recording, batches: Batches, about: Mapping) -> bool:
     """Whether the frames of a recording are the first of one that is to be made; two of them are made to see."""
     count = len(begun)
     return (
-        about.items() <= begun.attributes.items()
+        begun.config == batches.scenario.config
+        and about.items() <= begun.attributes.items()
         and np.array_equal(begun.times, (batches.times + batches.start)[:count])
         and all(map(begun.has, batches.suite.streams))
         and all(np.array_equal(begun.adc(k, k + 1), batches.made(k, k + 1).samples) for k in (0, count - 1))

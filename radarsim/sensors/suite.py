@@ -21,9 +21,9 @@ from radarsim.sensors.sensor import Sensor
 from radarsim.sensors.tracking import TrackingCamera
 
 #: Sensors that cost next to nothing and are always there.
-ALWAYS = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}
+ALWAYS: dict[str, type[Sensor]] = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}
 #: Sensors to choose from; plug-ins enter theirs.
-SENSORS = {
+SENSORS: dict[str, type[Sensor]] = {
     "depth": DepthCamera,
     "depth-strip": DepthStrip,
     "occupancy": Occupancy,

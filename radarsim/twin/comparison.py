@@ -9,9 +9,11 @@ single frames (Doppler least squares; Capon's maps, first echo), so that any rad
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
 from radarize.batch import Batch, Signal
 from radarize.errors import InputError
@@ -59,13 +61,13 @@ class Comparison:
         frames: numbers in the recording and in the twin.
         times: stamps since the recording's first frame, s.
         ranges, azimuths: of the range-azimuth maps' cells, m and rad.
+        profiles: of recording and twin, counts^2.
+        noise: noise floors of recording and twin, counts^2.
         figures: one value a frame, NaN where there is none, see `FIGURES`.
         chance: the same figures' medians between frames that have nothing to do with each other: the recording's, and
             the twin's of half a recording later.
-        profiles: of recording and twin, counts^2.
-        noise: noise floors of recording and twin, counts^2.
-        velocity: of recording, twin, and poses (NaN if unknown), m/s, forward and left.
-        scans: of recording and twin on `BEARINGS`, m, inf where nothing is seen.
+        velocity: of recording, twin, and poses (NaN if unknown), m/s, forward and left; none of a single antenna.
+        scans: of recording and twin on `BEARINGS`, m, inf where nothing is seen; none of a single antenna.
         alignment: mean correlation of range-azimuth maps over shifts of the twin: by what is shifted, the shifts (s,
             rad, m) and the correlations.
         frechet: by map, Fréchet's distance of patch statistics: twin from recording, and, for scale, the recording's
@@ -77,12 +79,12 @@ class Comparison:
     times: Float[np.ndarray, "frame"]
     ranges: Float[np.ndarray, "range"]
     azimuths: Float[np.ndarray, "azimuth"]
+    profiles: Float[np.ndarray, "frame 2 range"]
+    noise: Float[np.ndarray, "frame 2"]
     figures: dict[str, np.ndarray] = field(default_factory=dict)
     chance: dict[str, float] = field(default_factory=dict)
-    profiles: np.ndarray | None = None
-    noise: np.ndarray | None = None
-    velocity: np.ndarray | None = None
-    scans: np.ndarray | None = None
+    velocity: Float[np.ndarray, "frame 3 2"] = field(default_factory=lambda: np.empty((0, 3, 2)))
+    scans: Float[np.ndarray, "frame 2 bearing"] = field(default_factory=lambda: np.empty((0, 2, 0)))
     alignment: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
     frechet: dict[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -92,7 +94,7 @@ class Comparison:
         Time, heading or distances of the poses are then off, or those of the scene. A best shift at the end of those
         tried says nothing, nor does one of a few frames.
         """
-        found = {}
+        found: dict[str, tuple[float, float]] = {}
         if len(self.frames) < FEWEST:
             return found
         for name, (shifts, values) in self.alignment.items():
@@ -107,7 +109,7 @@ class Comparison:
         known = self.noise[np.isfinite(self.noise).all(axis=1)]
         return np.sqrt(np.median(known, axis=0)) if len(known) else np.full(2, np.nan)
 
-    def summary(self) -> dict[str, object]:
+    def summary(self) -> dict[str, Any]:
         """All figures as plain data; not-a-number is None."""
         spread = {
             name: {
@@ -134,10 +136,10 @@ class Comparison:
         }
 
 
-def _plain(value) -> object:
+def _plain(value: ArrayLike) -> object:
     if np.ndim(value):
-        return [_plain(item) for item in value]
-    return round(float(value), 5) if np.isfinite(value) else None
+        return [_plain(item) for item in np.asarray(value)]
+    return round(float(np.asarray(value)), 5) if np.isfinite(value) else None
 
 
 def compare(real: Path, twin: Path, progress: Callable[[int, int], None] | None = None) -> Comparison:
@@ -163,21 +165,21 @@ def compare(real: Path, twin: Path, progress: Callable[[int, int], None] | None 
         moved = other.read("truth/velocity")[frames[:, 1], :2] if other.has("truth/velocity") else np.nan
     seen = [{name: np.concatenate([part[k][name] for part in parts]) for name in parts[0][k]} for k in range(2)]
     start = one.times[0]
-    result = Comparison(one.config, frames, one.times[frames[:, 0]] - start, analysis.ranges, analysis.azimuths)
+    profiles, noise = (np.stack([part[name] for part in seen], axis=1) for name in ("profile", "noise"))
+    times = one.times[frames[:, 0]] - start
+    result = Comparison(one.config, frames, times, analysis.ranges, analysis.azimuths, profiles, noise)
     result.figures = _figures(*seen)
     half = len(frames) // 2
     if half:
         later = {name: np.roll(values, -half, axis=0) for name, values in seen[1].items()}
         result.chance = {n: float(np.nanmedian(v)) for n, v in _figures(seen[0], later).items() if np.isfinite(v).any()}
-    result.profiles = np.stack([part["profile"] for part in seen], axis=1)
-    result.noise = np.stack([part["noise"] for part in seen], axis=1)
     if "range_azimuth" in seen[0]:
         result.velocity = np.stack([*(part["velocity"] for part in seen), np.broadcast_to(moved, (len(frames), 2))], 1)
         for k, name in enumerate(("recording", "twin")):
             off = np.linalg.norm(result.velocity[:, k] - result.velocity[:, 2], axis=1)
             result.figures[f"velocity_error_{name}"] = off
         result.scans = np.stack([part["scan"] for part in seen], axis=1)
-        result.alignment = _alignment(*(part["range_azimuth"] for part in seen), result)
+        result.alignment = _alignment(seen[0]["range_azimuth"], seen[1]["range_azimuth"], result)
         result.frechet = {name: _distances(seen[0][name], seen[1][name]) for name in analysis.maps}
     return result
 
@@ -196,7 +198,7 @@ def _pairs(one: Recording, other: Recording) -> Int[np.ndarray, "frame 2"]:
         raise InputError(f"{(other if len(one) else one).path}: has no whole frame, expected at least one")
     nearest = np.clip(np.searchsorted(other.times, one.times - _SAME), 0, len(other) - 1)
     same = np.abs(other.times[nearest] - one.times) <= _SAME
-    there = one.valid(0, len(one)).any(axis=(1, 2)) & other.valid(0, len(other)).any(axis=(1, 2))[nearest]
+    there = np.any(one.valid(0, len(one)), axis=(1, 2)) & np.any(other.valid(0, len(other)), axis=(1, 2))[nearest]
     if not same.any():
         raise InputError(f"{other.path}: has no frame with the stamp of a frame of {one.path}, expected its twin")
     if not (same & there).any():
@@ -235,7 +237,7 @@ class _Analysis:
     def _noise(self, adc: np.ndarray, valid: np.ndarray) -> Float[np.ndarray, "frame"]:
         """Noise floors, counts^2; NaN of frames with lost chirps, or of too few to tell."""
         signal = adc.astype(np.float32).view(np.complex64)[..., 0]
-        whole = valid.all(axis=(1, 2)) & (self.config.loops >= _LOOPS)
+        whole = np.all(valid, axis=(1, 2)) & (self.config.loops >= _LOOPS)
         return np.array(
             [noise_floor(noise_profile(s[None])) if w else np.nan for s, w in zip(signal, whole, strict=True)]
         )

@@ -50,9 +50,10 @@ def similarity(
     if not scales:
         return np.full(len(one), np.nan)
     weights = np.array(SCALES[: scales[-1]])
+    first, second = (torch.as_tensor(np.asarray(maps, np.float32))[:, None] for maps in (one, other))
     found = [
         ms_ssim(
-            *(torch.as_tensor(np.asarray(maps, np.float32))[:, None] for maps in (one[k : k + 64], other[k : k + 64])),
+            first[k : k + 64], second[k : k + 64],
             sigma=1.5, data_range=DEPTH, betas=tuple(weights / weights.sum()), reduction="none", normalize="relu",
             kernel_size=1,  # of uniform windows; a Gaussian one's follows from sigma
         ).double().numpy()

@@ -54,7 +54,7 @@ def report_twin(
         _table(page, summary)
         _alignment(page, found)
         _profiles(page, found)
-        if found.scans is not None:
+        if len(found.scans):
             _frames(page, found, one, other)
             _velocities(page, found)
         _over_time(page, found)
@@ -97,7 +97,7 @@ def _doubts(found: Comparison, warnings: str) -> list[str]:
             f"Maps correlate by {gain:.2f} better with the twin shifted by {factor * shift:+.3g} {unit} in {name}: "
             f"probably {cause}."
         )
-    if found.scans is None:
+    if not len(found.scans):
         told.append("A single virtual antenna tells no direction: no maps, velocities or scans to compare.")
     return told
 
@@ -126,8 +126,9 @@ def _table(page: Page, summary: dict) -> None:
             "Fréchet's distance of the maps' patches, whatever place they show: as sets, do the two look alike? For "
             "scale, that of the recording's second half from its first."
         )
-        rows = [(n.replace("_", " "), text(d["twin"]), text(d["own_halves"])) for n, d in summary["frechet_db"].items()]
-        page.table(("map", "twin, dB", "own halves, dB"), rows, numbers=(1, 2))
+        distances = summary["frechet_db"].items()
+        halves = [(n.replace("_", " "), text(d["twin"]), text(d["own_halves"])) for n, d in distances]
+        page.table(("map", "twin, dB", "own halves, dB"), halves, numbers=(1, 2))
 
 
 def _alignment(page: Page, found: Comparison) -> None:

@@ -145,8 +145,8 @@ class _Walk:
             middles = recording.times[wanted] + config.burst_center
             if at is not None:
                 span = float(recording.times[-1] - start) + config.frame_period
-                turn = at.rotation.as_euler("ZYX")
-                motion, known = Motion.still(at.lever_arm, *turn, duration=span), np.ones(len(wanted), bool)
+                yaw, pitch, roll = at.rotation.as_euler("ZYX")
+                motion, known = Motion.still(at.lever_arm, yaw, pitch, roll, span), np.ones(len(wanted), bool)
             else:
                 stamps, poses = _poses(recording, config.burst_time)
                 poses = _moved(poses, options.origin)

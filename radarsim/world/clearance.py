@@ -107,10 +107,11 @@ def nearest(scene: Scene, points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.nd
     if not high.any():
         return np.full(len(points), np.inf), np.full(len(points), -1)
     corners = np.ascontiguousarray(scene.triangles[high].reshape(-1, 3), np.float32)
-    world = open3d.t.geometry.RaycastingScene()
-    world.add_triangles(corners, np.arange(len(corners), dtype=np.uint32).reshape(-1, 3))
+    tensor, world = open3d.core.Tensor.from_numpy, open3d.t.geometry.RaycastingScene()
+    numbers = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
+    world.add_triangles(tensor(corners), tensor(numbers))
     query = np.asarray(points, np.float32)
-    found = world.compute_closest_points(query)
+    found = world.compute_closest_points(tensor(query))
     distance = np.linalg.norm(found["points"].numpy() - query, axis=1).astype(float)
     return distance, scene.triangle_object[high][found["primitive_ids"].numpy()]
 

@@ -31,7 +31,7 @@ import re
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Literal, Union
+from typing import Annotated, Literal, NamedTuple, Union
 
 import numpy as np
 import trimesh
@@ -56,7 +56,16 @@ Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=10)]
 Vector = tuple[Number, Number, Number]
-Parts = tuple[str, list[SceneObject], list[Mover], SurfaceSettings, list[Interferer]]
+
+
+class Parts(NamedTuple):
+    """What a scene is made of; no name: ""."""
+
+    name: str
+    objects: list[SceneObject]
+    movers: list[Mover]
+    surface_settings: SurfaceSettings
+    interferers: list[Interferer]
 
 
 class _Strict(BaseModel):
@@ -79,8 +88,10 @@ class Custom(_Strict):
     def material(self, name: str) -> Material:
         law = None if self.conductor else constant(self.permittivity, self.conductivity)
         sigma0 = decibel(self.sigma0_db)
-        told = {"directive": self.directive, "backscatter": self.backscatter, "clear": self.clear}
-        return Material(name, law, self.roughness, sigma0, self.thickness, source="scene file", **told)
+        return Material(
+            name, law, self.roughness, sigma0, self.thickness, source="scene file",
+            directive=self.directive, backscatter=self.backscatter, clear=self.clear,
+        )  # fmt: skip
 
 
 class CustomMaterial(_Strict):
@@ -94,6 +105,10 @@ class Shape(_Strict):
     material: str | CustomMaterial
     position: Vector = (0.0, 0.0, 0.0)
     solid: bool = False  # part of the surface of a body, though open: seen from its outside only
+
+    def mesh(self, folder: Path) -> trimesh.Trimesh:
+        """In world coordinates; files that it names are relative to a folder."""
+        raise NotImplementedError
 
 
 class TurnedShape(Shape):
@@ -152,6 +167,8 @@ class Mesh(TurnedShape):
             raise InputError(f"object {self.name!r}: file {path} does not exist, expected a mesh (.ply, .obj, .stl)")
         try:
             loaded = trimesh.load(path, force="mesh", process=False)
+            if not isinstance(loaded, trimesh.Trimesh):
+                raise ValueError(f"it holds a {type(loaded).__name__}")
             vertices, faces = np.asarray(loaded.vertices, float), np.asarray(loaded.faces)
         except Exception as error:  # trimesh's readers raise whatever their parsers do
             raise InputError(f"object {self.name!r}: file {path} is not a readable mesh ({error})") from error
@@ -201,7 +218,7 @@ def description_model() -> type[Description]:
 @lru_cache
 def _model_of(shapes: tuple[type, ...], movers: tuple[type, ...]) -> type[Description]:
     objects, moving = (
-        list[Annotated[Union[classes], Field(discriminator=tag)]]  # noqa: UP007
+        list[Annotated[Union[classes], Field(discriminator=tag)]]  # type: ignore[valid-type]  # noqa: UP007
         for classes, tag in ((shapes, "shape"), (movers, "kind"))
     )
     return create_model("Description", __base__=Description, objects=(objects, []), moving=(moving, []))
@@ -273,9 +290,9 @@ def read(path: Path, level: int = 0) -> Parts:
     Raises:
         InputError: unreadable, malformed YAML, unknown key, value, material, mesh file or level.
     """
-    name, *parts = built(read_yaml(path), str(path), path.parent, level)
-    name = name or path.stem
-    return (f"{name}@{level}" if level else name), *parts
+    parts = built(read_yaml(path), str(path), path.parent, level)
+    name = parts.name or path.stem
+    return parts._replace(name=f"{name}@{level}" if level else name)
 
 
 def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
@@ -302,7 +319,7 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
     if description.building:
         objects = out_of_square(objects, description.unevenness, description.building.seed)
-    return description.name, objects, description.moving, description.surface_settings, description.interferers
+    return Parts(description.name, objects, description.moving, description.surface_settings, description.interferers)
 
 
 def described(data: object, source: str, level: int = 0) -> Description:

@@ -21,14 +21,14 @@ lower it by as much at grazing.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, partial
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 from jaxtyping import Complex, Float
 
 from radarize.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import read_beside
 
 EPS0 = 8.8541878128e-12
 
@@ -194,14 +194,17 @@ def decibel(value: float) -> float:
     return 10.0 ** (value / 10.0)
 
 
-def _registered(name: str, permittivity: object, sigma0_db: float, color: list[float], **about: object) -> Material:
+def _registered(
+    name: str, permittivity: str | list[float] | None, sigma0_db: float, color: list[float], **about: Any
+) -> Material:
     law = (
         skin if permittivity == "skin" else constant(*permittivity) if isinstance(permittivity, list) else permittivity
     )
-    return Material(name, law, sigma0=decibel(sigma0_db), color=tuple(color), **about)
+    red, green, blue = color
+    return Material(name, law, sigma0=decibel(sigma0_db), color=(red, green, blue), **about)
 
 
-MATERIALS = {name: _registered(name, **about) for name, about in read_yaml(Path(__file__).with_suffix(".yaml")).items()}
+MATERIALS = {name: _registered(name, **about) for name, about in read_beside(__file__).items()}
 
 
 def material(name: str) -> Material:

@@ -44,10 +44,11 @@ class Part:
     material: Material | None = None
 
     @property
-    def object(self) -> SceneObject:
+    def object(self) -> SceneObject | None:
         """A part of a material as a thing that stands at the origin."""
-        size = tuple(2 * x for x in self.half)
-        return SceneObject("part", shapes.box((0, 0, 0), size), self.material)
+        if self.material is None:
+            return None
+        return SceneObject("part", shapes.box((0, 0, 0), [2 * x for x in self.half]), self.material)
 
     @property
     def area(self) -> float:
@@ -77,7 +78,10 @@ class Part:
 
 
 class Mover(BaseModel, ABC):
-    """What moves by itself. A subclass with a `kind` of its own can be named in scene files."""
+    """What moves by itself. A subclass with a `kind` of its own can be named in scene files.
+
+    Parts of no material share the mover's `cross_section`, m^2; where it has none, they hide and do not echo.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

@@ -117,7 +117,9 @@ def _grow(seeds, first, neighbours, triangles, normals, areas):
     return label
 
 
-def _plane(mesh, faces) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+def _plane(
+    mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """Unit normal of a region and a point on its plane: means over its area."""
     area = mesh.area_faces[faces][:, None]
     normal = (area * mesh.face_normals[faces]).sum(axis=0)
@@ -131,7 +133,7 @@ def _frame(normal: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2 3"]:
     return np.stack([u, np.cross(normal, u)])
 
 
-def _bends(mesh, faces) -> bool:
+def _bends(mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]) -> bool:
     """Whether a paraboloid through the corners of a region has a curvature that a radar would notice."""
     corners = np.unique(mesh.faces[faces])
     if len(corners) < 7:
@@ -149,14 +151,14 @@ def _bends(mesh, faces) -> bool:
     return bool(curvature * STRAIGHT > 1)
 
 
-def _flat_parts(mesh, faces) -> list[Int[np.ndarray, "face"]]:
+def _flat_parts(mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]) -> list[Int[np.ndarray, "face"]]:
     """The exactly coplanar groups of triangles of a region, and its other triangles one by one."""
     inside = set(faces.tolist())
     groups = [np.array(group) for group in mesh.facets if inside.issuperset(group.tolist())]
     return groups + [np.array([face]) for face in sorted(inside.difference(*(g.tolist() for g in groups)))]
 
 
-def _cover(mesh, faces) -> list[Plate]:
+def _cover(mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]) -> list[Plate]:
     """The quadrilateral that a region is, or trapezoids that add up to it."""
     normal, center = _plane(mesh, faces)
     axes = _frame(normal)
@@ -201,7 +203,7 @@ def trapezoids(region: shapely.Geometry) -> list[Float[np.ndarray, "4 2"]]:
     return min(along_x, along_y, key=len)
 
 
-def _trapezoids(region) -> list[Float[np.ndarray, "4 2"]]:
+def _trapezoids(region: shapely.Geometry) -> list[Float[np.ndarray, "4 2"]]:
     rings = [shapely.get_coordinates(ring) for ring in shapely.get_rings(shapely.get_parts(region))]
     sides = np.concatenate([np.stack([ring[:-1], ring[1:]], axis=1) for ring in rings])
     sides = np.take_along_axis(sides, sides[:, :, 1].argsort(axis=1)[:, :, None], axis=1)  # upwards

@@ -13,6 +13,7 @@ import shapely
 import trimesh
 from jaxtyping import Bool, Float, Float32, Int
 from numba import njit
+from numpy.typing import ArrayLike
 
 from radarize.errors import InputError
 from radarsim.machine import llvm
@@ -103,8 +104,7 @@ class Scene:
         Raises:
             InputError: unknown key, value, material or mesh file; with the field.
         """
-        _, *parts = built(description, f"scene {name}", Path())
-        return cls(name, *parts)
+        return cls(name, *built(description, f"scene {name}", Path())[1:])
 
     @property
     def bounds(self) -> Float[np.ndarray, "2 3"]:
@@ -251,18 +251,18 @@ def _room(shape: tuple[int, ...], dtype: type) -> np.ndarray:
     """An array with room after its end: Dr.Jit reads NumPy's memory where it lies, in whole packets, and where the end
     of an array is the end of what the process may read, that would be its end, too."""
     size = int(np.prod(shape))
-    room = np.empty(size + _PACKET, dtype)
+    room: np.ndarray = np.empty(size + _PACKET, dtype)
     room[size:] = 0
     return room[:size].reshape(shape)
 
 
-def _radio_material(material: Material):
+def _radio_material(material: Material) -> object:
     """Sionna's counterpart: permittivity as here, roughness as a Lambertian share of the reflected amplitude."""
     import drjit as dr
     import mitsuba as mi
     import sionna.rt as rt
 
-    def law(frequency) -> tuple:
+    def law(frequency: ArrayLike) -> tuple:
         hertz = float(np.ravel(np.array(frequency))[0])
         if material.conductor:
             return mi.Float(1.0), mi.Float(1e7)

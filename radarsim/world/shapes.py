@@ -10,8 +10,11 @@ import numpy as np
 import shapely
 import trimesh
 from jaxtyping import Float
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 from shapely.geometry import Polygon
+
+Vector = ArrayLike  # x, y, z
 
 # Corner signs of each face of a box, counter-clockwise seen from outside.
 _FACES = {
@@ -24,21 +27,19 @@ _FACES = {
 }
 
 
-def mesh(vertices: Float[np.ndarray, "v 3"], faces: np.ndarray) -> trimesh.Trimesh:
+def mesh(vertices: Float[np.ndarray, "v 3"], faces: ArrayLike) -> trimesh.Trimesh:
     """A mesh exactly as given, equal vertices merged, nothing reordered or repaired."""
     result = trimesh.Trimesh(np.asarray(vertices, float), np.asarray(faces), process=False)
     result.merge_vertices(digits_vertex=9)
     return result
 
 
-def exact(vertices: Float[np.ndarray, "v 3"], faces: np.ndarray) -> trimesh.Trimesh:
+def exact(vertices: Float[np.ndarray, "v 3"], faces: ArrayLike) -> trimesh.Trimesh:
     """A mesh of vertices that are known to be different."""
     return trimesh.Trimesh(np.asarray(vertices, float), np.array(faces), process=False)
 
 
-def box(
-    center: tuple[float, float, float], size: tuple[float, float, float], without: tuple[str, ...] = ()
-) -> trimesh.Trimesh:
+def box(center: Vector, size: Vector, without: tuple[str, ...] = ()) -> trimesh.Trimesh:
     """Axis-aligned box, `without` some of its faces (``"-x"``, ``"+x"``, ... ``"+z"``)."""
     corners, faces = _box_without(tuple(without))
     return exact(np.asarray(center, float) + 0.5 * np.asarray(size, float) * corners, faces)
@@ -53,17 +54,13 @@ def _box_without(without: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
     return corners, np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
-def span(
-    low: tuple[float, float, float], high: tuple[float, float, float], without: tuple[str, ...] = ()
-) -> trimesh.Trimesh:
+def span(low: Vector, high: Vector, without: tuple[str, ...] = ()) -> trimesh.Trimesh:
     """Axis-aligned box between two corners."""
-    low, high = np.asarray(low, float), np.asarray(high, float)
-    return box((low + high) / 2, high - low, without)
+    begin, end = np.asarray(low, float), np.asarray(high, float)
+    return box((begin + end) / 2, end - begin, without)
 
 
-def rectangle(
-    center: tuple[float, float, float], size: tuple[float, float], facing: tuple[float, float, float]
-) -> trimesh.Trimesh:
+def rectangle(center: Vector, size: tuple[float, float], facing: Vector) -> trimesh.Trimesh:
     """Rectangle of (width, height) whose normal is `facing`.
 
     Height runs as close to vertical as the plane allows; if it is horizontal, height runs along y and width along x.
@@ -80,7 +77,7 @@ def rectangle(
 
 
 def cylinder(
-    center: tuple[float, float, float], radius: float, height: float, sides: int = 12, without: tuple[str, ...] = ()
+    center: Vector, radius: float, height: float, sides: int = 12, without: tuple[str, ...] = ()
 ) -> trimesh.Trimesh:
     """Upright prism with `sides` facets around, `without` its lower (``"-z"``) or upper (``"+z"``) cap."""
     angle = 2 * np.pi * np.arange(sides) / sides
@@ -97,7 +94,7 @@ def cylinder(
     return exact(vertices, np.concatenate(faces))
 
 
-def sphere(center: tuple[float, float, float], radius: float, subdivisions: int = 3) -> trimesh.Trimesh:
+def sphere(center: Vector, radius: float, subdivisions: int = 3) -> trimesh.Trimesh:
     """Icosphere."""
     result = trimesh.creation.icosphere(subdivisions=subdivisions, radius=radius)
     result.apply_translation(center)
@@ -106,9 +103,9 @@ def sphere(center: tuple[float, float, float], radius: float, subdivisions: int 
 
 def polygon(
     outline: Polygon,
-    origin: tuple[float, float, float] = (0, 0, 0),
-    u: tuple[float, float, float] = (1, 0, 0),
-    v: tuple[float, float, float] = (0, 1, 0),
+    origin: Vector = (0, 0, 0),
+    u: Vector = (1, 0, 0),
+    v: Vector = (0, 1, 0),
 ) -> trimesh.Trimesh:
     """Planar polygon, holes included: the point (a, b) of `outline` lies at origin + a u + b v, the normal is u x v."""
     flat, faces = trimesh.creation.triangulate_polygon(shapely.geometry.polygon.orient(outline), engine="earcut")
@@ -120,8 +117,8 @@ def polygon(
 
 def placed(
     shape: trimesh.Trimesh,
-    position: tuple[float, float, float] = (0, 0, 0),
-    rotation: tuple[float, float, float] = (0, 0, 0),
+    position: Vector = (0, 0, 0),
+    rotation: Vector = (0, 0, 0),
 ) -> trimesh.Trimesh:
     """A copy, rotated by roll, pitch, yaw (rad; about x, then y, then z) about the origin and moved to `position`."""
     turn = Rotation.from_euler("xyz", rotation).as_matrix()

@@ -1,5 +1,7 @@
 """What pydantic finds wrong with something that a user wrote, as one sentence."""
 
+from typing import Any
+
 from pydantic import ValidationError
 
 
@@ -7,7 +9,8 @@ def format_validation_error(error: ValidationError, data: object) -> str:
     """The first thing that is wrong, with its place in `data`, the value found there and what was expected."""
     problem = error.errors()[0]
     kind, loc = problem["type"], problem["loc"]
-    field, owner, here = "", "", data
+    field, owner = "", ""
+    here: Any = data
     for part in loc:
         # Parts that are not there tell which branch of a union was tried, unless it is they that miss or that are odd.
         missing = isinstance(here, dict) and kind == "missing" and part == loc[-1]

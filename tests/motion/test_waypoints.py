@@ -87,6 +87,8 @@ def test_files(tmp_path, name, text):
     ("name", "text", "complaint"),
     [
         ("a.yaml", "- [1, 2]\n- [1, x]\n", "a.yaml, way-point 2: is '1 x', expected two finite numbers"),
+        ("a.yaml", "- [1, 2]\n- '34'\n", "a.yaml, way-point 2: is '34'"),
+        ("a.yaml", "- [1, 2]\n- {3: x, 4: y}\n", "a.yaml, way-point 2: is .{3: 'x', 4: 'y'}"),
         ("a.yaml", "places: 3\n", "a.yaml: holds dict, expected a list"),
         ("a.yaml", "- [1\n", "a.yaml: malformed YAML"),
         ("a.csv", "1,2\n3,nan\n", "a.csv, line 2: is '3 nan'"),

@@ -211,7 +211,7 @@ def test_ghosts():
     body = SceneObject("body", shapes.placed(stretched(axes, 4), center), MATERIALS["metal"])
     found = Reflectors.of(Scene("ghosts", [WALL, body]), CONFIG)
     facing = np.flatnonzero(np.abs(found.flat.normal[:, 1]) > 0.99)[:1]
-    ghosts = curved_ghosts.find(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found)
+    ghosts = curved_ghosts.ghosts(isotropic(np.zeros(3), LAMBDA), 0, found.flat, facing, found)
     place, normal, area = ellipsoid(axes, 1600)
     here, image = np.zeros(3), np.array([0.0, 2.0, 0.0])
     assert sorted(ghosts.bounces) == [1, 1, 2]

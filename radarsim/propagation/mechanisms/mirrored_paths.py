@@ -59,7 +59,7 @@ class _Hits(NamedTuple):
     """Paths that there are: how many over each chain, and from its slot on, to which aims and how strong."""
 
     slots: Int[np.ndarray, "chain+1"]
-    count: Int[np.ndarray, "chain"]
+    counts: Int[np.ndarray, "chain"]
     aim: Int[np.ndarray, "slot"]
     amplitude: Complex[np.ndarray, "slot"]
 
@@ -117,9 +117,9 @@ class SpecularCandidates:
         slots = _from_nought(count)
         hits = _Hits(slots, np.zeros_like(count), np.empty(slots[-1], np.int32), np.empty(slots[-1], complex))
         _strengths(observation, flat.columns, chains, aims, targets.scatterers.columns, hits)
-        n = hits.count.sum()
+        n = hits.counts.sum()
         found = OneWay(
-            np.empty(n, np.int64), np.repeat(mirrors, hits.count, axis=0), np.empty(n, complex),
+            np.empty(n, np.int64), np.repeat(mirrors, hits.counts, axis=0), np.empty(n, complex),
             np.empty((n, 3)), np.empty((n, 3)), np.zeros(n, bool),
         )  # fmt: skip
         stops = np.empty((n, 3, 3))
@@ -283,15 +283,15 @@ def _over(observation, flat, chains, k, aims, scatterers, hits):
             hits.aim[n] = i
             hits.amplitude[n] = value
             n += 1
-    hits.count[k] = n - hits.slots[k]
+    hits.counts[k] = n - hits.slots[k]
 
 
 @njit(parallel=True, cache=True)
 def _courses(observation, flat, chains, aims, scatterers, hits, found, stops):
     """The paths that exist, in a row."""
-    ends = np.cumsum(hits.count)
+    ends = np.cumsum(hits.counts)
     for k in prange(len(chains.frame)):
-        _course(observation, flat, chains, aims, scatterers, hits, (k, ends[k] - hits.count[k]), (found, stops))
+        _course(observation, flat, chains, aims, scatterers, hits, (k, ends[k] - hits.counts[k]), (found, stops))
 
 
 @njit(cache=True)
@@ -301,7 +301,7 @@ def _course(observation, flat, chains, aims, scatterers, hits, where, rows):
     p, one, two = vec(observation.position[chains.frame[k]]), chains.mirrors[k, 0], chains.mirrors[k, 1]
     c1, n1 = vec(flat.center[one]), vec(flat.normal[one])
     source = mirrored(p, c1, n1)
-    for i in range(hits.count[k]):
+    for i in range(hits.counts[k]):
         e, j = first + i, hits.slots[k] + i
         found.candidate[e], found.amplitude[e] = aims.candidate[hits.aim[j]], hits.amplitude[j]
         s = vec(scatterers.position[aims.scatterer[hits.aim[j]]])

@@ -1,11 +1,9 @@
 """What stands in a room, by its kind: pieces in rows along the walls, tables in the middle, as people arrange them."""
 
-from pathlib import Path
-
 import numpy as np
 from shapely.geometry import box as area
 
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import read_beside
 from radarsim.world import shapes
 from radarsim.world.generators.furniture import Piece, evaluate, make
 from radarsim.world.generators.layout import FloorPlan
@@ -13,7 +11,7 @@ from radarsim.world.generators.openings import OPPOSITE
 from radarsim.world.generators.rooms import Room, Site, footprint
 from radarsim.world.generators.stairs import stairs
 
-_ROOMS = read_yaml(Path(__file__).with_suffix(".yaml"))
+_ROOMS = read_beside(__file__)
 #: Clear width left beside things in a corridor, m.
 CLEAR = 1.25
 
@@ -85,7 +83,8 @@ class _Layout:
         low, high = room.wall(side)
         downward = self.back in "ne" and side in (self.left, self.right)
         lit = any(o.side == side for o in self.windows)
-        places, at, piece = [], start, self.made(kind, material)
+        places: list[tuple[float, float, float]] = []
+        at, piece = start, self.made(kind, material)
         while len(places) < count and at + piece.width < high - low - 0.03:
             middle = at + piece.width / 2
             place = room.wall_place(side, high - middle if downward else low + middle, off + piece.depth / 2)
@@ -125,7 +124,7 @@ class _Layout:
             return
         along_x = room.size[0] >= room.size[1]
         yaw = np.pi / 2 if along_x else 0.0
-        pieces = [self.made(kind, **given) for _ in range(rows)]
+        pieces = [self.made(kind, "", **given) for _ in range(rows)]
         total = sum(p.width for p in pieces) + gap * (rows - 1)
         # As far from the door as the room allows, or in the middle.
         for shift in (0.0, 0.4, 0.8, 1.2, -0.4, -0.8):
@@ -144,8 +143,8 @@ class _Layout:
             self.site.put(room, piece, float(x), float(y), yaw)
             for side in seats:
                 for along in (-0.27, 0.27):
-                    seat = np.array([x, y]) + along * piece.width * direction
-                    self.site.seat(room, *seat, yaw + (0 if side > 0 else np.pi), away=piece.depth / 2 + 0.37)
+                    sx, sy = np.array([x, y]) + along * piece.width * direction
+                    self.site.seat(room, sx, sy, yaw + (0 if side > 0 else np.pi), away=piece.depth / 2 + 0.37)
             at += piece.width + gap
 
     def stairs(self) -> None:
@@ -164,8 +163,7 @@ def _lecture(x: _Layout) -> None:
     room, site = x.room, x.site
     along_x = room.size[0] >= room.size[1]
     length, across = room.size if along_x else room.size[::-1]
-    stage = ("w", "e") if along_x else ("s", "n")
-    stage = stage[int(x.rng.integers(2))]
+    stage = ("we" if along_x else "sn")[int(x.rng.integers(2))]
     x.line(stage, "whiteboard", 2, start=0.6, gap=0.1)
     middle = room.center[1] if along_x else room.center[0]
     site.put_if_free(room, make("lectern"), *room.wall_place(stage, middle + 0.9, 1.1))

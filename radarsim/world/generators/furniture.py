@@ -1,15 +1,16 @@
 """Furniture, fittings and small objects as meshes by material, each in its own frame (`furniture.yaml`)."""
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from types import CodeType
+from typing import Any
 
 import numpy as np
 import trimesh
 
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import read_beside
 from radarsim.world import shapes
 
 #: What formulas in the file may use beside a piece's variables.
@@ -46,10 +47,11 @@ def make(kind: str, rng: np.random.Generator | None = None, material: str = "", 
         material: of its `own` parts; default: as in the file.
         given: variables.
     """
-    about, values, found = _table()[kind], dict(given), {}
+    about, values = _table()[kind], dict[str, Any](given)
+    found: dict[str, list[trimesh.Trimesh]] = {}
     for name, choice in about.get("with", {}).items():
         if name not in given:
-            values[name] = rng.choice(choice) if isinstance(choice, list) else _value(choice, values, rng)
+            values[name] = _needed(rng).choice(choice) if isinstance(choice, list) else _value(choice, values, rng)
     for what, shape, arguments, *more in about["parts"]:
         without, variables = more + ["", {}][len(more) :]
         what = (material or about["material"]) if what == "own" else what
@@ -61,14 +63,14 @@ def make(kind: str, rng: np.random.Generator | None = None, material: str = "", 
     return Piece(kind, depth, width, {what: shapes.joined(*some) for what, some in found.items()})
 
 
-def evaluate(formula: object, values: dict[str, object]) -> object:
+def evaluate(formula: object, values: Mapping[str, object]) -> Any:
     """The value of a formula, or those of a list of them, from a file of this package."""
     return eval(_compiled(_source(formula)), _NAMES, values)
 
 
 @cache
 def _table() -> dict[str, dict]:
-    return read_yaml(Path(__file__).with_suffix(".yaml"))
+    return read_beside(__file__)
 
 
 def _repeated(variables: list[tuple], values: dict, rng: np.random.Generator | None) -> Iterator[dict]:
@@ -82,9 +84,15 @@ def _repeated(variables: list[tuple], values: dict, rng: np.random.Generator | N
         yield from _repeated(rest, values | {name: each}, rng)
 
 
-def _value(choice: object, values: dict, rng: np.random.Generator | None) -> object:
+def _value(choice: object, values: dict, rng: np.random.Generator | None) -> Any:
     """A uniform number, or what a formula gives."""
-    return rng.uniform(choice["from"], choice["to"]) if isinstance(choice, dict) else evaluate(choice, values)
+    return _needed(rng).uniform(choice["from"], choice["to"]) if isinstance(choice, dict) else evaluate(choice, values)
+
+
+def _needed(rng: np.random.Generator | None) -> np.random.Generator:
+    if rng is None:
+        raise ValueError("nothing to draw with, expected a generator or all variables of the piece")
+    return rng
 
 
 def _source(formula: object) -> str:
@@ -92,7 +100,7 @@ def _source(formula: object) -> str:
 
 
 @cache
-def _compiled(source: str):
+def _compiled(source: str) -> CodeType:
     """Arithmetic, comparisons, and calls of what `_NAMES` holds; nothing else can be in a formula."""
     tree = ast.parse(source, "furniture.yaml", "eval")
     calls = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}

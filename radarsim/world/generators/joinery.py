@@ -96,8 +96,8 @@ def _glazing(
     holes = []
     if door:
         clear = (door[0] - half, door[1] + half)
-        mullions = [*(m for m in mullions if not clear[0] - 0.3 < m < clear[1] + 0.3), *clear]
-        mullions = np.clip(sorted([half, *mullions, width - half]), half, width - half)
+        kept = [*(m for m in mullions if not clear[0] - 0.3 < m < clear[1] + 0.3), *clear]
+        mullions = np.clip(sorted([half, *kept, width - half]), half, width - half)
         mullions = mullions[np.diff(mullions, prepend=-1.0) > BAR]
         holes = [clear]
         levels = np.array([bottom + half, DOOR_HEIGHT + half, top - half])
@@ -145,8 +145,8 @@ def _casement(o: Opening, frame: str) -> list[Part]:
     level += o.thickness / 2
 
     def bar(a: float, b: float, bottom: float, top: float, without: str) -> trimesh.Trimesh:
-        ends = np.array([(a, level - 0.035, bottom), (b, level + 0.035, top)])[:, axes]
-        return shapes.span(*ends, tuple(without.replace("x", "xy"[axes[0]]).split()))
+        begin, end = np.array([(a, level - 0.035, bottom), (b, level + 0.035, top)])[:, axes]
+        return shapes.span(begin, end, tuple(without.replace("x", "xy"[axes[0]]).split()))
 
     left, right, middle = o.low + BAR, o.high - BAR, (o.low + o.high) / 2
     bars = [

@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import shapely
+from jaxtyping import Float
 from shapely.geometry import LineString
 from shapely.geometry import box as area
 
@@ -92,7 +94,8 @@ class FloorPlan:
         least = max(1, int(np.ceil(NARROWEST / pitch)))
         usual = max(least, round(USUAL / pitch))
         most = max(usual, int(WIDEST / pitch))
-        widths, choices = [], [usual, max(least, usual - 1), min(most, 2 * usual), usual + 1]
+        widths: list[int] = []
+        choices = [usual, max(least, usual - 1), min(most, 2 * usual), usual + 1]
         while sum(widths) < modules:
             widths += [int(rng.choice(choices, p=[0.55, 0.2, 0.15, 0.1]))] * int(rng.integers(1, 4))
         while sum(widths) > modules:
@@ -114,7 +117,9 @@ class FloorPlan:
             half = style.inner / 2
             self._room(block, a + (half if a > start + 0.01 else 0), b - (half if b < end - 0.01 else 0), "")
 
-    def _joined_at_corners(self, block: Block, cuts: list[tuple[float, float]], axes) -> list[tuple[float, float]]:
+    def _joined_at_corners(
+        self, block: Block, cuts: list[tuple[float, float]], axes: Float[np.ndarray, "axis"]
+    ) -> list[tuple[float, float]]:
         """A room in a corner of the building may touch no corridor: it takes from its neighbour what it needs."""
         for last in (False, True):
             cuts = cuts[::-1] if last else cuts
@@ -130,10 +135,10 @@ class FloorPlan:
             cuts = cuts[::-1] if last else cuts
         return cuts
 
-    def _box(self, block: Block, a: float, b: float) -> tuple[float, float, float, float]:
+    def _box(self, block: Block, a: float, b: float) -> Box:
         x0, y0, x1, y1 = block.box
-        box = (a, y0, b, y1) if block.axis == 0 else (x0, a, x1, b)
-        return tuple(round(v, 2) for v in box)
+        x0, y0, x1, y1 = (round(v, 2) for v in ((a, y0, b, y1) if block.axis == 0 else (x0, a, x1, b)))
+        return x0, y0, x1, y1
 
     def _reaches_corridor(self, block: Block, a: float, b: float) -> bool:
         room = Room("", *self._box(block, a, b), "")
@@ -164,7 +169,7 @@ class FloorPlan:
         ways = {room.name: [b for b in self.borders[room.name] if b.other in self.corridors
                             and b.length > DOOR + 2 * JAMB] for room in entered}  # fmt: skip
         suites = self._suites(entered)
-        joined = {room.name for pair in suites for room in (pair.room, pair.other)}
+        joined = {room.name for pair in suites for room in (pair.room, pair.other) if room}
         for number, room in enumerate(entered):
             if room.kind == "stairs":
                 ways[room.name] = [b for b in ways[room.name] if b.side in "ns"]
@@ -205,7 +210,7 @@ class FloorPlan:
         # Hinged at the end next to the corner, as far open as the corner allows.
         free = low - border.low if at_low else border.high - low - DOOR
         angle = min(angle, np.pi / 2 + np.arcsin(np.clip((free - 0.2) / DOOR, -0.1, 0.35)))
-        swing = {"leaf": leaf, "angle": float(angle), "hinge": -1 if at_low else 1}
+        swing: dict[str, Any] = {"leaf": leaf, "angle": float(angle), "hinge": -1 if at_low else 1}
         if room.kind in ("office", "meeting", "lecture", "lab") and rng.random() < style.glazed and border.length > 2.4:
             ends = border.low + 0.12, border.high - 0.12
             self._open(border, *ends, "glass wall", bay=(low, low + DOOR), top=style.height - 0.5, **swing)
@@ -237,7 +242,7 @@ class FloorPlan:
         self._open(border, at, at + DOOR, "way", top=DOOR_HEIGHT)
 
     def _open(
-        self, border: Border, low: float, high: float, kind: str, top: float, bottom: float = 0.0, **more
+        self, border: Border, low: float, high: float, kind: str, top: float, bottom: float = 0.0, **more: Any
     ) -> None:
         room, other = border.room, border.other
         thickness = self.style.outer if other is None else _gap(room, other, border.side)
@@ -292,20 +297,22 @@ class FloorPlan:
                 continue
             # Shorter ways stand for the longer ones round about them.
             for k in range(1, len(at)):
-                nearest = min(at[:k], key=lambda p, q=at[k]: np.hypot(p[0] - q[0], p[1] - q[1]))
+                nearest = at[np.hypot(*(np.array(at[:k]) - at[k]).T).argmin()]
                 room.kept.append(LineString([nearest, at[k]]).buffer(0.55))
 
     # Walls
 
     def _columns(self) -> list[Box]:
         """Where walls between rooms meet the facade, and in the corners of large rooms."""
-        (what, width), found = self.style.column, []
+        what, width = self.style.column
+        found: list[Box] = []
         large = [r for r in self.rooms if r.kind not in ("corridor", "stairs", "toilet") and min(r.size) >= 3.5]
         for border in (b for room in large for b in self.borders[room.name] if what):
             if border.other is None and border.length >= 3.5:
                 low = border.room.wall(border.side)[0]
                 box = strip(border.room, border.side, low, low + width, -0.6 * width, 0.0)
-                found.append(tuple(round(v, 3) for v in box))
+                x0, y0, x1, y1 = (round(v, 3) for v in box)
+                found.append((x0, y0, x1, y1))
                 border.room.taken.append(area(*found[-1]).buffer(0.02))
         return found
 

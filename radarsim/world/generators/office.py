@@ -29,7 +29,7 @@ class OfficePlan(FloorPlan):
         count = max(2, round(length / block.pitch))
         widths = self._rng.uniform(0.8, 1.2, count)
         edges = (x0 + np.concatenate([[0], np.cumsum(widths / widths.sum())]) * length).round(2)
-        kinds = [kind for kind, number in self.style.kinds.items() for _ in range(number)]
+        kinds = [kind for kind, number in self.style.kinds.items() for _ in range(int(number))]
         half, (row, shift) = self.style.inner / 2, ("north", 2) if self.rooms else ("south", 0)
         for i, k in enumerate(self._rng.permutation(count)):
             west, east = edges[i] + (half if i else 0), edges[i + 1] - (half if i < count - 1 else 0)
@@ -78,7 +78,7 @@ class OfficePlan(FloorPlan):
                 count, width = self.window(room)
                 for k in range(count):
                     low = round(room.x0 + (k + 0.5) * (room.size[0] / count) - width / 2, 2)
-                    places.append((k + 1, room, side, low, low + width))
+                    places.append((str(k + 1), room, side, low, low + width))
         places += [(end, hall, end[0], hall.center[1] - half, hall.center[1] + half) for end in ("west", "east")]
         w, thick = self.style.windows, self.style.outer
         for name, room, side, low, high in places:
@@ -90,7 +90,7 @@ class OfficePlan(FloorPlan):
             if o.angle:
                 o.room.taken.append(o.leaf_area(0.03, 0.08))
             for room, side in ((o.room, o.side), (o.other, OPPOSITE[o.side])):
-                if o.passage and room.kind != "corridor":
+                if o.passage and room and room.kind != "corridor":
                     depth, middle = (1.1 if o.kind == "door" else 0.9), (o.low + o.high) / 2
                     room.kept.append(area(*strip(room, side, o.low - 0.1, o.high + 0.1, -depth, 0.0)))
                     # The way to the middle of the room stays walkable, through whichever doors there are.
@@ -125,7 +125,8 @@ def arrange(site: Site, room: Room, plan: FloorPlan) -> None:
         for _ in range(3):
             yaw = site.against_wall(room, make("desk", site.rng), gap=0.2)
             if yaw is not None:
-                site.seat(room, *room.taken[-1].centroid.coords[0], yaw, ignore_kept=True)
+                x, y = room.taken[-1].centroid.coords[0]
+                site.seat(room, x, y, yaw, ignore_kept=True)
     elif room.kind == "meeting":
         _meeting(site, room)
     for kind in _ALONG_WALLS[room.kind]:

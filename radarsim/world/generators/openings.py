@@ -6,6 +6,7 @@ import numpy as np
 from shapely.geometry import LineString, Polygon
 
 from radarsim.world.generators.rooms import Room
+from radarsim.world.generators.skeleton import Box
 from radarsim.world.generators.walls import Span
 
 DOOR, DOOR_HEIGHT = 1.0, 2.1  # m
@@ -62,14 +63,14 @@ class Opening:
 
     def leaf_area(self, off: float = 0.0, around: float = 0.1) -> Polygon:
         """Floor under an open leaf that hangs `off` the wall (m), and a little `around` it (m)."""
-        low, high = self.passage
+        low, high = self.passage or (self.low, self.high)
         hinge = (low if self.hinge < 0 else high) - self.hinge * off
         tip = hinge - self.hinge * np.cos(self.angle) * (high - low), off + np.sin(self.angle) * (high - low)
         ends = [self.room.wall_place(self.side, *end)[:2] for end in ((hinge, 0.0), tip)]
         return LineString(ends).buffer(around)
 
 
-def strip(room: Room, side: str, low: float, high: float, near: float, far: float) -> tuple[float, ...]:
+def strip(room: Room, side: str, low: float, high: float, near: float, far: float) -> Box:
     """Box along a wall of a room, from `near` to `far` (m) outward of its face."""
     face, out = {"n": (room.y1, 1), "s": (room.y0, -1), "e": (room.x1, 1), "w": (room.x0, -1)}[side]
     a, b = sorted((face + out * near, face + out * far))

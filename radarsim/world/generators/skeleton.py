@@ -166,6 +166,7 @@ def _stub(plan: Skeleton, at: float, low: float, high: float, southward: bool, w
         plan.solid.append(_cm(at, low, at + STUB, low + shaft))
 
 
-def _cm(*values: float) -> tuple[float, ...]:
+def _cm(*box: float) -> Box:
     """Rounded to centimetres, as plans are."""
-    return tuple(round(float(v), 2) for v in values)
+    x0, y0, x1, y1 = (round(float(v), 2) for v in box)
+    return x0, y0, x1, y1

@@ -6,7 +6,6 @@ the walk's seed: the same surfaces have the same objects, in ray tests, cameras,
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -14,7 +13,7 @@ import trimesh
 from jaxtyping import Float
 
 from radarize.errors import InputError
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import read_beside
 from radarsim.world.generators.furniture import evaluate, make
 from radarsim.world.generators.spots import WALLS, Spots, Surroundings
 from radarsim.world.materials import MATERIALS
@@ -68,7 +67,7 @@ class Run:
     material: str = "vinyl"
 
 
-_FILE = read_yaml(Path(__file__).with_suffix(".yaml"))
+_FILE = read_beside(__file__)
 RUNS = {kind: Run(**about) for kind, about in _FILE["runs"].items()}
 OBJECTS = {
     kind: SmallObject(**about | {"often": evaluate(about["often"], {})}) for kind, about in _FILE["objects"].items()
@@ -124,7 +123,10 @@ def placed(objects: Sequence[SceneObject], level: float) -> dict[str, Spots]:
     seed, found = around.seed, {}
     for number, (kind, about) in enumerate((RUNS | OBJECTS).items()):
         rng = np.random.default_rng([seed, number])
-        found[kind] = (_along if isinstance(about, Run) else _scattered)(about, around, level, rng)
+        if isinstance(about, Run):
+            found[kind] = _along(about, around, level, rng)
+        else:
+            found[kind] = _scattered(about, around, level, rng)
     owner = np.repeat(list(found), [len(spots) for spots in found.values()])
     spots = Spots.joined(list(found.values()))
     kept = spots.apart()
@@ -158,7 +160,9 @@ def _scattered(about: SmallObject, around: Surroundings, level: float, rng: np.r
     return spots[around.unlit(spots)] if about.lamp else spots
 
 
-def _on_walls(about: SmallObject, around: Surroundings, level: float, rng: np.random.Generator):
+def _on_walls(
+    about: SmallObject, around: Surroundings, level: float, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
     """Places on walls at a kind's height, and normals."""
     begin, normal, length = around.walls
     on = np.repeat(np.arange(len(length)), rng.poisson(level * about.often * length))

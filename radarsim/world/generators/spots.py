@@ -135,7 +135,9 @@ class Surroundings:
         self._body = np.repeat([not o.two_sided for o in objects], counts)
         self._world = open3d.t.geometry.RaycastingScene()
         flat = self._corners.reshape(-1, 3).astype(np.float32)
-        self._world.add_triangles(flat, np.arange(len(flat), dtype=np.uint32).reshape(-1, 3))
+        self._tensor = open3d.core.Tensor.from_numpy
+        numbers = np.arange(len(flat), dtype=np.uint32).reshape(-1, 3)
+        self._world.add_triangles(self._tensor(flat), self._tensor(numbers))
         up, height = self._normals[:, 2], self._corners[:, :, 2].mean(axis=1)
         rising = np.flatnonzero(up > LEVEL)
         # floors are among the lowest that faces up, but for what lies astray in scans
@@ -233,7 +235,7 @@ class Surroundings:
     def on_floor(self, spots: Spots) -> Bool[np.ndarray, "spot"]:
         """Whether the lower ends of what is on a wall stand on a floor."""
         foot = spots.points(np.array([(x, -1.0, 1.0) for x in _THREE])) + [0, 0, LIFT]
-        return (np.abs(self._hit(foot, DOWN)[0] - LIFT) < OFF).all(axis=1)
+        return np.all(np.abs(self._hit(foot, DOWN)[0] - LIFT) < OFF, axis=1)
 
     def headroom(self, spots: Spots) -> Float[np.ndarray, "spot"]:
         """How high something is over what is on a wall, m; very high: nothing."""
@@ -246,19 +248,21 @@ class Surroundings:
         eye = spots.place - [0, 0, 0.3]
         seen = self._hit(eye[:, None], around[:, 0])[0][..., None] > UNLIT
         above, _ = self._hit(eye[:, None, None] + UNLIT[:, None] * around, -DOWN)
-        return ~(seen & (above < 0.27)).any(axis=(1, 2))
+        return ~np.any(seen & (above < 0.27), axis=(1, 2))
 
     def _hit(
         self, origins: Float[np.ndarray, "*#n 3"], directions: Float[np.ndarray, "*#n 3"]
     ) -> tuple[Float[np.ndarray, "*#n"], Int[np.ndarray, "*#n"]]:
         """Distance to the first triangle (inf: none) and which it is (0 if none)."""
         rays = np.concatenate(np.broadcast_arrays(origins, directions), axis=-1).astype(np.float32)
-        found = self._world.cast_rays(rays)
+        found = self._world.cast_rays(self._tensor(rays))
         triangle = found["primitive_ids"].numpy().astype(np.int64)
         return found["t_hit"].numpy().astype(float), np.where(triangle < len(self._corners), triangle, 0)
 
 
-def _straight(lines: Float[np.ndarray, "line 2 3"], normals: Float[np.ndarray, "line 3"]):
+def _straight(
+    lines: Float[np.ndarray, "line 2 3"], normals: Float[np.ndarray, "line 3"]
+) -> tuple[Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall 3"], Float[np.ndarray, "wall"]]:
     """Lines in line as one: where each begins on the left, its normal, its length."""
     along = np.cross([0.0, 0.0, 1.0], normals)
     offset, low, high = (

@@ -1,6 +1,7 @@
 """Stairs of a building, in a frame as in `furniture.yaml`."""
 
 import numpy as np
+import trimesh
 from shapely.geometry import Polygon
 
 from radarsim.world.generators.furniture import Piece
@@ -48,12 +49,12 @@ def stairs(height: float, width: float, length: float) -> Piece:
                                            "metal": joined(*rails)})  # fmt: skip
 
 
-def _upright(corners: list[list[float]], x: float):
+def _upright(corners: list[list[float]], x: float) -> trimesh.Trimesh:
     """An upright polygon in the plane of constant x, given as (y, z)."""
     return polygon(Polygon(corners), (x, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
-def _sloped(across: tuple[float, float], line: tuple[float, float, float, float]):
+def _sloped(across: tuple[float, float], line: tuple[float, float, float, float]) -> trimesh.Trimesh:
     """The underside of a flight: between two x, from (y, z) to (y, z)."""
     (x0, x1), (y0, z0, y1, z1) = across, line
     z0, z1 = z0 - 0.15, z1 - 0.15

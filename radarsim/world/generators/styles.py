@@ -5,9 +5,8 @@ relative.
 """
 
 from dataclasses import dataclass, field
-from pathlib import Path
 
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import read_beside
 
 
 @dataclass(frozen=True)
@@ -110,4 +109,4 @@ def _style(about: dict) -> Style:
     return Style(**about | {"windows": Windows(**about["windows"]), "doors": Doors(**about["doors"])})
 
 
-STYLES = {name: _style(about) for name, about in read_yaml(Path(__file__).with_suffix(".yaml")).items()}
+STYLES = {name: _style(about) for name, about in read_beside(__file__).items()}

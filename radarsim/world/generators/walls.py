@@ -5,13 +5,14 @@ solid or not, and a face lies between a solid and an open cell. No face is hidde
 rectangle with corners of its own, so that it stays one planar facet.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import trimesh
 from jaxtyping import Bool, Float
 
+Corner = tuple[float, float]
 Span = tuple[float, float, float, float, float, float]  # x0 y0 z0 x1 y1 z1
 
 
@@ -77,12 +78,14 @@ def faces(solids: list[Span], openings: list[Span], pillars: Sequence[Span] = ()
     return found
 
 
-def _rectangles(mask: Bool[np.ndarray, "a b"], a: np.ndarray, b: np.ndarray):
+def _rectangles(
+    mask: Bool[np.ndarray, "a b"], a: np.ndarray, b: np.ndarray
+) -> Iterator[tuple[tuple[float, float], tuple[float, float]]]:
     """Disjoint rectangles that cover a mask on a grid: runs along b, then equal runs of neighbouring columns joined."""
     open_runs: dict[tuple[int, int], int] = {}
     filled = np.flatnonzero(mask.any(axis=1))
     for i in np.union1d(filled, filled + 1):
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[i], [0]]))) if i < len(mask) else []
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], mask[i], [0]]))) if i < len(mask) else np.zeros(0, int)
         runs = {(int(s), int(e)) for s, e in np.reshape(edges, (-1, 2))}
         for run in [run for run in open_runs if run not in runs]:
             start = open_runs.pop(run)

@@ -168,9 +168,11 @@ def _kind(source: Path) -> str:
     )
 
 
-def _fit(parts, source, options: Options, remarks, progress) -> list[Part]:
+def _fit(
+    parts: list[Part], source: Path, options: Options, remarks: list[str], progress: Callable[..., None] | None
+) -> list[Part]:
     """Clean, scale, turn and place the parts of a mesh."""
-    units, up = options.units, options.up
+    units, up = options.units or "m", options.up
     if up == "y":
         for part in parts:
             part.mesh.vertices = np.asarray(part.mesh.vertices)[:, [0, 2, 1]] * [1, -1, 1]
@@ -208,7 +210,9 @@ def _fit(parts, source, options: Options, remarks, progress) -> list[Part]:
     return parts
 
 
-def _flat(part: Part, source, number: int, count: int, remarks: list[str], progress) -> Part:
+def _flat(
+    part: Part, source: Path, number: int, count: int, remarks: list[str], progress: Callable[..., None] | None
+) -> Part:
     """A scanned part with its planes flat."""
     found = flatten(part.mesh)
     if progress:
@@ -271,12 +275,9 @@ def _place(parts: list[Part], floor: bool, remarks: list[str]) -> None:
 
 def _floor_level(parts: list[Part]) -> float:
     """Height of the lowest large horizontal surface, or of the lowest corner if there is none, m."""
-    level, area = [], []
-    for part in parts:
-        flat = np.abs(part.mesh.face_normals[:, 2]) > 0.9
-        level.append(part.mesh.triangles_center[flat, 2])
-        area.append(part.mesh.area_faces[flat])
-    level, area = np.concatenate(level), np.concatenate(area)
+    flat = [np.abs(part.mesh.face_normals[:, 2]) > 0.9 for part in parts]
+    level = np.concatenate([part.mesh.triangles_center[some, 2] for part, some in zip(parts, flat, strict=True)])
+    area = np.concatenate([part.mesh.area_faces[some] for part, some in zip(parts, flat, strict=True)])
     return round(lowest_level(level, area), 6) if len(level) else float(_corners(parts)[:, 2].min())
 
 
@@ -289,7 +290,9 @@ def _write(path: Path, parts: list[Part], source: Path) -> None:
     fresh = folder.with_name(folder.name + ".part")
     shutil.rmtree(fresh, ignore_errors=True)
     fresh.mkdir()
-    objects, files, names = [], set(), set()
+    objects = []
+    files: set[str] = set()
+    names: set[str] = set()
     try:
         for part in parts:
             name = _unlike(part.name, names)

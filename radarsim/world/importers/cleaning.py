@@ -99,7 +99,7 @@ def distances(mesh: trimesh.Trimesh, other: trimesh.Trimesh, count: int) -> Floa
     """Distance of about `count` corners of a mesh from the surface of another, m."""
     import open3d as o3d
 
-    scene = o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(np.asarray(other.vertices, np.float32), np.asarray(other.faces, np.uint32))
+    tensor, scene = o3d.core.Tensor.from_numpy, o3d.t.geometry.RaycastingScene()
+    scene.add_triangles(tensor(np.array(other.vertices, np.float32)), tensor(np.array(other.faces, np.uint32)))
     points = mesh.vertices[:: max(1, len(mesh.vertices) // max(count, 1))]
-    return scene.compute_distance(np.ascontiguousarray(points, np.float32)).numpy()
+    return scene.compute_distance(tensor(np.ascontiguousarray(points, np.float32))).numpy()

@@ -111,7 +111,9 @@ def faces(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Face]:
     return found
 
 
-def _border(grid: OccupancyGrid, inside) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]]:
+def _border(
+    grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 2"]]:
     """Points about a cell apart on the border of free ground where something is, and unit normals into the free."""
     # Thickened by a cell so that smoothing does not wash thin walls out; the border is moved back afterwards.
     near = ndimage.distance_transform_edt(~grid.occupied)
@@ -119,7 +121,7 @@ def _border(grid: OccupancyGrid, inside) -> tuple[Float[np.ndarray, "n 2"], Floa
     lines = contourpy.contour_generator(z=field.T).lines(0.5)
     if not lines:
         return np.zeros((0, 2)), np.zeros((0, 2))
-    cells = np.concatenate(lines)
+    cells = np.concatenate([np.asarray(line) for line in lines])
     slope = np.stack([ndimage.map_coordinates(g, cells.T, order=1) for g in np.gradient(field)], axis=1)
     normals = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-9)
     real = ndimage.map_coordinates(near, cells.T, order=1) < 2.5
@@ -127,7 +129,9 @@ def _border(grid: OccupancyGrid, inside) -> tuple[Float[np.ndarray, "n 2"], Floa
     return points[real], normals[real]
 
 
-def _grown(points, normals, cell: float) -> list[Int[np.ndarray, "n"]]:
+def _grown(
+    points: Float[np.ndarray, "n 2"], normals: Float[np.ndarray, "n 2"], cell: float
+) -> list[Int[np.ndarray, "m"]]:
     """Groups of neighbouring points near one line, by their numbers; each point in one group."""
     around = cKDTree(points).query_ball_point(points, 3 * cell)
     coherence = np.array([np.linalg.norm(normals[near].mean(axis=0)) for near in around])
@@ -158,7 +162,7 @@ def _grown(points, normals, cell: float) -> list[Int[np.ndarray, "n"]]:
     return groups
 
 
-def _joined(found: list[Face], grid: OccupancyGrid, inside) -> list[Face]:
+def _joined(found: list[Face], grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> list[Face]:
     """Faces on one line made one, longest first."""
     pending = sorted(found, key=lambda face: -face.length)
     done: list[Face] = []
@@ -174,7 +178,7 @@ def _joined(found: list[Face], grid: OccupancyGrid, inside) -> list[Face]:
     return sorted(done, key=lambda face: -face.length)
 
 
-def _on_one_line(face: Face, other: Face, grid: OccupancyGrid, inside) -> bool:
+def _on_one_line(face: Face, other: Face, grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> bool:
     if face.normal @ other.normal < np.cos(np.deg2rad(30)):
         return False
     ends = other.ends - face.center

@@ -66,7 +66,9 @@ def parts(
     return [*built, Part("floor", floor, "vinyl"), Part("ceiling", ceiling, "ceiling board")]
 
 
-def walls(found: list[Face], thickness: float, grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]):
+def walls(
+    found: list[Face], thickness: float, grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]
+) -> shapely.Geometry:
     """The area that walls cover: behind each face, as deep as `thickness` or to the middle of a thinner wall."""
     bodies = []
     for number, face in enumerate(found):
@@ -89,7 +91,7 @@ def _without_courts(part: Polygon) -> Polygon:
     return Polygon(part.exterior, [ring for ring in part.interiors if Polygon(ring).area >= _COURT])
 
 
-def _depth(face: Face, thickness: float, grid: OccupancyGrid, inside) -> float:
+def _depth(face: Face, thickness: float, grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"]) -> float:
     """How far behind a face free ground begins again, m, at most `thickness`."""
     steps = np.arange(1.0, np.ceil(thickness / grid.resolution) + 2)
     along = np.linspace(face.low, face.high, max(3, int(face.length / grid.resolution)))
@@ -111,7 +113,7 @@ def _overlap(face: Face, end: float, sign: int, found: list[Face], number: int, 
     return 0.0
 
 
-def clutter(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"], solid) -> list[Polygon]:
+def clutter(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"], solid: shapely.Geometry) -> list[Polygon]:
     """Outlines of what stands on free ground apart from the walls."""
     cell = grid.resolution
     taken = solid.buffer(1.5 * cell)
@@ -134,7 +136,7 @@ def clutter(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"], solid) -> list
     return [part for part in shapely.get_parts(apart) if isinstance(part, Polygon) and part.area > cell**2]
 
 
-def upright(area, height: float, lid: bool = False) -> trimesh.Trimesh:
+def upright(area: shapely.Geometry, height: float, lid: bool = False) -> trimesh.Trimesh:
     """The upright sides of an area from the floor to `height` (m), seen from outside; its top too if `lid`."""
     pieces = []
     for part in shapely.get_parts(area):
@@ -149,7 +151,7 @@ def upright(area, height: float, lid: bool = False) -> trimesh.Trimesh:
     return shapes.joined(*pieces)
 
 
-def _placed(area, grid: OccupancyGrid):
+def _placed(area: shapely.Geometry, grid: OccupancyGrid) -> shapely.Geometry:
     return shapely.transform(area, grid.to_world)
 
 

@@ -105,8 +105,8 @@ def _mesh(shape: ElementTree.Element, folder: Path) -> trimesh.Trimesh:
 
 def _vector(item: ElementTree.Element, default: float = 0.0) -> Float[np.ndarray, "3"]:
     """A vector as x, y, z or as one value for all three, or as three of them."""
-    if "value" in item.attrib:
-        numbers = np.array(item.get("value").replace(",", " ").split(), float)
+    if (text := item.get("value")) is not None:
+        numbers = np.array(text.replace(",", " ").split(), float)
         if len(numbers) not in (1, 3):
             raise InputError(f"<{item.tag}> has {len(numbers)} numbers, expected one or three")
         return np.broadcast_to(numbers, 3)
@@ -140,7 +140,7 @@ def _transform(item: ElementTree.Element | None) -> Float[np.ndarray, "4 4"]:
 def _material(shape: ElementTree.Element, bsdfs: dict) -> tuple[Choice | None, tuple[str, ...]]:
     """What a shape is made of, and what its BSDFs are called."""
     refs = [bsdfs[ref.get("id")] for ref in shape.findall("ref") if ref.get("id") in bsdfs]
-    labels = [ref.get("id") for ref in shape.findall("ref") if ref.get("id")]
+    labels = [label for ref in shape.findall("ref") if (label := ref.get("id"))]
     for bsdf in [*refs, *shape.findall("bsdf")]:
         for item in bsdf.iter("bsdf"):
             values = _values(item)

@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from radarize.errors import InputError
-from radarize.yamlfile import read_yaml
+from radarize.yamlfile import read_beside, read_yaml
 from radarsim.world.description import CustomMaterial
 from radarsim.world.importers.part import Part
 from radarsim.world.materials import MATERIALS, material
@@ -15,8 +15,7 @@ from radarsim.world.validation import format_validation_error
 
 Choice = str | dict
 
-_WORDS = read_yaml(Path(__file__).with_suffix(".yaml"))
-_MEANING = {word: name for name, words in _WORDS.items() for word in words.split()}
+_MEANING = {word: name for name, words in read_beside(__file__).items() for word in words.split()}
 _MEANING |= {name: name for name in MATERIALS if " " not in name}
 
 

@@ -52,7 +52,7 @@ def grid(path: Path) -> OccupancyGrid:
     if about.mode == "raw":
         known, share = values <= 100, values / 100
     else:
-        known, share = True, (values if about.negate else 255 - values) / 255
+        known, share = np.ones(256, bool), (values if about.negate else 255 - values) / 255
     occupied, free = (known & (share > about.occupied_thresh))[value], (known & (share < about.free_thresh))[value]
     # Rows run downwards from the top, cells upwards from the origin.
     return OccupancyGrid(occupied[::-1].T.copy(), free[::-1].T.copy(), about.resolution, about.origin)

@@ -1,10 +1,15 @@
 """A scene's plan as an architect draws it: cut at breast height, walls filled, furniture light below."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import shapely
 
 from radarsim.world.preview.section import Section
 from radarsim.world.scene import Scene
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Height of the cut, m: above sills, through windows and doors. What lies below is seen from above.
 CUT = 1.25
@@ -13,7 +18,7 @@ _WALL = 0.9
 _OUTLINES = (0.1, 0.3, 0.6, 0.735, 1.1)  # m, where furniture is outlined
 
 
-def blueprint(scene: Scene):
+def blueprint(scene: Scene) -> "Figure":
     """The plan as a matplotlib figure, with a scale and the materials' colours."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.collections import LineCollection, PolyCollection
@@ -35,7 +40,7 @@ def blueprint(scene: Scene):
     pale = np.where(on_floor[:, None], 0.22, 0.55)
     faces = 1 - pale + pale * colors[scene.triangle_object[order]]
     axes.add_collection(
-        PolyCollection(scene.triangles[order][:, :, :2], facecolors=faces, edgecolors="face", linewidths=0.3)
+        PolyCollection(list(scene.triangles[order][:, :, :2]), facecolors=faces, edgecolors="face", linewidths=0.3)
     )
     top = np.array([o.mesh.bounds[1, 2] for o in scene.objects])
     wall = top > low[2] + _WALL * size[2]
@@ -53,7 +58,7 @@ def blueprint(scene: Scene):
             axes.fill(*ring.T, facecolor=face, edgecolor="none", zorder=3)
     shade = np.where(wall[cut.owner, None], 0.85, 0.7) * colors[cut.owner]
     axes.add_collection(
-        LineCollection(cut.lines, colors=shade, linewidths=np.where(wall[cut.owner], 1.3, 0.7), zorder=4)
+        LineCollection(list(cut.lines), colors=shade, linewidths=np.where(wall[cut.owner], 1.3, 0.7), zorder=4)
     )
 
     seen = {o.material.name: o.material.color for o in scene.objects}

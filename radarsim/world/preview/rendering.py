@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import ModuleType
 
 import numpy as np
 import trimesh
@@ -35,7 +36,7 @@ def render(scene: Scene, width: int = 1100, samples: int = 40) -> Float[np.ndarr
     corners = np.concatenate([m.vertices for m, _ in meshes])
     eye, target, tangent, height = _camera(corners, width)
     with _rgb() as mi:
-        plan = {
+        plan: dict[str, object] = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": 5, "hide_emitters": True},
             "sky": {"type": "constant", "radiance": {"type": "rgb", "value": [0.62, 0.66, 0.72]}},
@@ -75,7 +76,8 @@ def _rgb() -> Iterator:
     try:
         yield mi
     finally:
-        mi.set_variant(before)
+        if before:
+            mi.set_variant(before)
 
 
 def cut_open(scene: Scene) -> list[tuple[trimesh.Trimesh, Material | None]]:
@@ -89,7 +91,9 @@ def cut_open(scene: Scene) -> list[tuple[trimesh.Trimesh, Material | None]]:
         if len(below):
             by_material.setdefault(item.material.name, []).append(below)
             made[item.material.name] = item.material
-    parts = [(_mesh(np.concatenate(t)), made[name]) for name, t in by_material.items()]
+    parts: list[tuple[trimesh.Trimesh, Material | None]] = [
+        (_mesh(np.concatenate(t)), made[name]) for name, t in by_material.items()
+    ]
     caps = [
         shapes.polygon(area.buffer(0), (0, 0, level)) for area, _ in Section.of(scene, level - 2e-3).areas(scene)
         if area.area > 1e-3
@@ -119,7 +123,7 @@ def _finish(material: Material) -> dict:
     return _diffuse(material.color)
 
 
-def _shape(mi, name: str, mesh: trimesh.Trimesh, finish: dict):
+def _shape(mi: ModuleType, name: str, mesh: trimesh.Trimesh, finish: dict) -> object:
     properties = mi.Properties()
     properties["bsdf"] = mi.load_dict(finish)
     shape = mi.Mesh(name, len(mesh.vertices), len(mesh.faces), props=properties)

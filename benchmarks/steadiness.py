@@ -29,8 +29,8 @@ CONFIG = PRESETS["radarize"]
 LIMIT = -10.0
 #: Rays of the reference: to see whether a path is partly clear, how much of it, and for which amplitudes over noise.
 DENSE = {
-    "_FEW": Lattice.fibonacci(89, 55, 1.5),
-    "_MANY": Lattice.fibonacci(610, 377, 1.5),
+    "_FEW": Lattice.fibonacci(89, 55),
+    "_MANY": Lattice.fibonacci(233, 144),
     "LEAST_SPLIT": fresnelzone.LEAST_SPLIT / 10,
 }
 #: Hz, over the sweep.
@@ -38,10 +38,14 @@ TONES = CONFIG.center_frequency + CONFIG.bandwidth * np.linspace(-0.5, 0.5, 9)
 
 
 def field(echoes: Paths, scenario: Scenario, time: float) -> Complex[np.ndarray, "virtual tone"]:
-    """What the antennas receive of echoes at the middle of the frame that starts then, over the sweep."""
+    """What is left of echoes behind the IF filters at the middle of the frame that starts then, over the sweep.
+
+    The filters close where echoes are no longer looked for: one that leaves that range is no step for the radar.
+    """
     paths = echoes.lengths(CONFIG, scenario.motion, time)[:, :, 0]
+    received = echoes.amplitude * scenario.board.if_response(paths[:, 0] + 2 * CONFIG.range_bias)
     cycles = paths[..., None] * TONES / SPEED_OF_LIGHT
-    return np.einsum("e,evt->vt", echoes.amplitude, np.exp(2j * np.pi * cycles))
+    return np.einsum("e,evt->vt", received, np.exp(2j * np.pi * cycles))
 
 
 def changes(scenario: Scenario, times: Float[np.ndarray, "frame"]) -> Float[np.ndarray, "frame-1"]:

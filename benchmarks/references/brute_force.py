@@ -1,9 +1,11 @@
 """Independent float64 references. `beat`: the beat signal of world points sample by sample, from the motion itself.
 
-`transfer_matrix`: layers. `kirchhoff_mirror`: what a mirror of any size passes on. `past_pole`: what a pole leaves.
+`transfer_matrix`: layers. `kirchhoff_mirror`: what a mirror of any size passes on. `past_pole`, `past_edge`: what poles
+and half planes leave.
 """
 
 import numpy as np
+from scipy.special import erfc
 
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
@@ -114,6 +116,27 @@ def past_pole(offset, width, places, path, wavelength, nodes=200):
     turn = x[:, None] ** 2 / there + (x[:, None] - x) ** 2 / between + x**2 / back
     both = np.sum(np.exp(0.5j * wavenumber * turn)) * step**2
     return value + both * np.sqrt(path / gaps.prod()) / (1j * wavelength)
+
+
+def past_edge(offset, places, path, wavelength, nodes=400):
+    """Share of a wave's amplitude that passes an opaque half plane which it meets twice on a path, by Kirchhoff.
+
+    The double Fresnel integral over u_1, u_2 < a, a complex normal distribution of some correlation: the inner one in
+    closed form, the outer one along a contour turned by 45 deg from the edge on, where the phase decays; float64.
+
+    Args:
+        offset: how far the edge leaves the path clear, m; negative in its shadow.
+        places: where on the path it is met, from one end, m.
+        path: its length, m.
+    """
+    one, two = places
+    a, b = (offset / np.sqrt(wavelength * d * (path - d) / (2 * path)) for d in places)
+    rho = np.sqrt(one * (path - two) / (two * (path - one)))
+    y, weight = np.polynomial.legendre.leggauss(nodes)
+    last, turn = 6 + 3 * abs(a), np.exp(0.25j * np.pi)
+    x = a - last * (y + 1) / 2 * turn
+    inner = erfc(-(b - rho * x) / np.sqrt(1 - rho**2) * np.sqrt(np.pi / 2) / turn) / 2
+    return np.sum(weight * np.exp(0.5j * np.pi * x * x) * inner) * last / 2 * turn / (1 + 1j)
 
 
 def bounced(scene, position, up, axis, spread, bounces, wavelength, across=700):

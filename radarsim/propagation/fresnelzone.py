@@ -1,20 +1,31 @@
-"""How much of a stretch of a mirrored path is clear: obstacles over its first Fresnel zones, not on one ray.
+"""How much of a mirrored path is clear: obstacles over its first Fresnel zones, not on one ray.
 
 What a screen with openings leaves of a wave is Fresnel's integral over them, (1 / 2j) int exp(j pi r^2 / 2) dA in units
-of sqrt(lambda d (L - d) / 2L). It is summed over the nodes of a Fibonacci lattice on a square of these units that ends
-smoothly; such a lattice shows a thin pole as many nodes whichever way it stands (Niederreiter, Random Number Generation
-and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes tell whether a stretch is partly clear, and only then more are
-looked at. Against strips it is good to half a dB (RMS); what they diffract from beyond the square is left out.
+of sqrt(lambda d (L - d) / 2L), d along a path of length L. It is summed over the nodes of a Fibonacci lattice on a
+square of these units that ends smoothly; such a lattice shows a thin pole as many nodes whichever way it stands
+(Niederreiter, Random Number Generation and Quasi-Monte Carlo Methods, 1992, ch. 5). A few nodes show whether a stretch
+is partly clear, and only then more are looked at. What obstacles diffract from beyond the square is left out.
 
-The rays of a stretch are straight, from its begin to its end: half as far apart at the radar as at the first mirror.
+An echo meets an obstacle twice, on the way out at d_1 and on the way back at d_2. Two screens on one path multiply
+only if they are far apart; in general (Vogler, Radio Science 17(6), 1982, of knife edges) the field is the double
+integral over both of
+
+    exp(j pi (u_1^2 + u_2^2 - 2 rho u_1 . u_2) / (2 (1 - rho^2))),  rho = sqrt(d_1 (L - d_2) / (d_2 (L - d_1))),
+
+a complex normal distribution of correlation rho: one screen for rho = 1, an obstacle at the mirror, two that multiply
+for rho = 0, an obstacle at the radar. A half plane half way to a mirror that just touches the path leaves
+1/4 + asin(1/3) / (2 pi) = -10.3 dB. What echoes like a point has rho = 0 wherever the obstacle is, since a point sends
+its own wave back: the ways to it and back multiply; an edge or a cylinder does so across its line. For the same reason
+the single rays to scatterers (`paths`), which count twice, have the right mean power in the shadow of an edge.
 """
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
+from scipy.special import erfc
 
 from radarsim.propagation.fields import cross, dot, minus
 from radarsim.propagation.fields import vector as vec
@@ -33,41 +44,98 @@ AT_RADAR = 0.5
 _FEWEST = 4
 #: No slit passes more than this of an amplitude.
 _MOST = 1.17
+#: Correlations of two screens in steps of 1 / `_RHOS`.
+_RHOS = 10
+#: Where an obstacle stands is known to this many halvings of a stretch.
+_HALVINGS = 4
+#: Rays to a point spread no wider than for an obstacle at this share of the way to it.
+_BESIDE = 0.7
+#: Half the side of the lattice's square, Fresnel units.
+_HALF = 1.5
+#: What changes of the nodes' weights cost in the fit of these, beside errors of half planes.
+_STIFF = 0.4
+#: How much more errors of upright and level half planes count in it.
+_SQUARE = 8.0
 
 
-class Lattice(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Lattice:
     """Nodes over the first Fresnel zones, Fresnel units, and their weights."""
 
     nodes: Float[np.ndarray, "node 2"]
     weight: Complex[np.ndarray, "node"]
 
     @classmethod
-    def fibonacci(cls, count: int, before: int, half: float) -> "Lattice":
-        """So many nodes, a Fibonacci number, and the one before; half the side of the square, Fresnel units."""
+    def fibonacci(cls, count: int, before: int) -> "Lattice":
+        """So many nodes, a Fibonacci number, and the one before.
+
+        Weights are those of a square that ends smoothly, corrected (least squares) so that half planes, however they
+        stand, leave what Fresnel's integral says; else the square's borders would diffract. Near these what half planes
+        do fades, so that it does not begin with a step.
+        """
         k = np.arange(count)
-        nodes = half * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
-        weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.sqrt(
-            np.cos(np.pi * nodes / (2 * half)).prod(axis=1)
-        )
+        nodes = _HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
+        weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.cos(np.pi * nodes / (2 * _HALF)).prod(axis=1)
+        weight /= weight.sum()
+        angle, edge = (x.ravel() for x in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(-1.5, 1.5, 31)))
+        clear = np.cos(angle)[:, None] * nodes[:, 0] + np.sin(angle)[:, None] * nodes[:, 1] < edge[:, None]
+        lit = edge > 0
+        inner = np.clip((_HALF - np.abs(edge)) / 0.45, 0, 1)
+        truth = erfc(-edge * np.sqrt(np.pi / 2) * np.exp(-0.25j * np.pi)) / 2
+        truth = lit + (truth - lit) * inner**2 * (3 - 2 * inner)
+        # As exact in the shadow as in the light, and more so for upright and level edges.
+        share = np.where(np.abs(np.sin(2 * angle)) < 1e-9, _SQUARE, 1) / np.maximum(np.abs(truth), 0.1)
+        off, keep = (truth - clear @ weight) * share, _STIFF * count * np.eye(count)
+        rows = np.concatenate([clear * share[:, None], keep])
+        weight += np.linalg.lstsq(rows, np.append(off, np.zeros(count)), rcond=None)[0]
         return cls(nodes, weight / weight.sum())
 
+    @cached_property
+    def couplings(self) -> Complex[np.ndarray, "kind rho node node"]:
+        """Weights of pairs of nodes for two screens of correlation 0, 1 / `_RHOS`, ... 1, along both axes (kind 0), or
+        along the first one alone (1)."""
+        count = len(self.nodes)
+        out = np.empty((2, _RHOS + 1, count, count), complex)
+        out[:, 0], out[0, -1] = np.outer(self.weight, self.weight), np.diag(self.weight)
+        taper = self.weight * np.exp(-0.5j * np.pi * np.sum(self.nodes**2, axis=1))
+        # The kernel is averaged over cells, which it varies within where rho is near 1.
+        cell = 2 * _HALF / np.sqrt(count) * np.array([-0.25, 0.25])
+        place = self.nodes[:, None] + np.stack(np.meshgrid(cell, cell), axis=-1).reshape(-1, 2)
+        for kind, step in [(0, k) for k in range(1, _RHOS)] + [(1, k) for k in range(1, _RHOS + 1)]:
+            rho = min(step / _RHOS, 0.95) * np.array([1, 1 - kind])
+            scaled = place.reshape(-1, 2) / np.sqrt(1 - rho**2)
+            own = np.exp(0.5j * np.pi * np.sum(scaled**2, axis=1)) * np.repeat(taper, 4)
+            pair = np.exp(-1j * np.pi * (scaled * rho) @ scaled.T) * own[:, None] * own
+            pair = pair.reshape(count, 4, count, 4).sum(axis=(1, 3))
+            pair /= pair.sum()
+            for _ in range(3):  # where the second screen is clear, the first one alone counts
+                scale = np.sqrt(self.weight / pair.sum(axis=1))
+                pair *= scale[:, None] * scale
+            out[kind, step] = pair / pair.sum()
+        return out
 
-_FEW, _MANY = Lattice.fibonacci(21, 13, 1.5), Lattice.fibonacci(55, 34, 1.5)
+
+_FEW, _MANY = Lattice.fibonacci(21, 13), Lattice.fibonacci(89, 55)
 
 
 @dataclass(frozen=True)
 class Stretches(Table):
-    """Straight stretches of mirrored paths.
+    """Straight stretches of mirrored paths, in their order.
 
     Attributes:
+        path: which path each is part of, ascending.
         frame: index.
         begin, end: m.
         before, after: how far a Fresnel unit along either transverse axis moves begin and end, m.
         mirrors: of the whole path, in order, within whose outlines its rays are reflected; -1: none.
         stops: where on these, m.
         apart: how far a Fresnel unit along either transverse axis moves the stops, m.
+        span: where on the whole path they begin and end, as shares of its length; the path comes back on the same
+            stretch if it ends in its middle.
+        mirroring: along either axis, whether its end mirrors, 1, or echoes like a point, 0.
     """
 
+    path: Int[np.ndarray, "stretch"]
     frame: Int[np.ndarray, "stretch"]
     begin: Float[np.ndarray, "stretch 3"]
     end: Float[np.ndarray, "stretch 3"]
@@ -76,46 +144,142 @@ class Stretches(Table):
     mirrors: Int[np.ndarray, "stretch 3"]
     stops: Float[np.ndarray, "stretch 3 3"]
     apart: Float[np.ndarray, "stretch 3 2 3"]
+    span: Float[np.ndarray, "stretch 2"]
+    mirroring: Float[np.ndarray, "stretch 2"]
 
 
 def passage(
-    observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, size: Float[np.ndarray, "stretch"]
+    observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, size: Float[np.ndarray, "path"]
 ) -> Passage:
-    """What is left of waves along stretches.
+    """What is left of waves along whole paths, out and back.
 
     Args:
         observation, flat, obstacles: the frames, the mirrors, and what is in the way.
-        stretches: of paths.
+        stretches: of the paths. A path of one stretch comes back on it.
         size: amplitude of each path if all of it were clear. Slabs are looked for, and more than one ray, where it is
             so much above the threshold that it matters.
     """
-    worth = size > LEAST_LOSS * observation.threshold
+    path, strength = stretches.path, size[stretches.path]
+    worth = strength > LEAST_LOSS * observation.threshold
     found = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
-    rows = np.flatnonzero(size > LEAST_SPLIT * observation.threshold)
+    rows, place = _partly(observation, flat, obstacles, stretches, strength, found.factor)
+    fans, some = _fans(observation, flat, obstacles, stretches[rows], place)
+    for column, new in zip(found.columns, some.columns, strict=True):
+        column[rows] = new
+    returns = np.bincount(path, minlength=len(size)) == 1
+    # Two screens: one that is met again on the way back, or on several stretches the first and the last one.
+    owner, first, count = np.unique(path[rows], return_index=True, return_counts=True)
+    last = first + count - 1
+    two = returns[owner] | (count > 1)
+    owner, first, last = owner[two], first[two], last[two]
+    near, far = place[first], np.where(returns[owner], 1 - place[last], place[last])
+    rho = np.sqrt(near * (1 - far) / (far * (1 - near)))
+    both = _coupled(fans[first], fans[last], rho, stretches.mirroring[rows[first]], _MANY.couplings)
+    single = some.factor[first] * some.factor[last]
+    both = np.where(np.isnan(both), single, _bounded(both, _MOST**2))
+    factor = found.factor ** (1 + returns[path])
+    factor[rows[last]] = 1
+    factor[rows[first]] = both
+    whole, clear = np.ones(len(size), complex), np.ones(len(size))
+    np.multiply.at(whole, path, factor)
+    np.multiply.at(clear, path, 1 - found.blocked)
+    delay = _sums(path, found.delay, len(size)) * (1 + returns)
+    return Passage(whole, delay, _sums(path, found.through, len(size)) > 0, 1 - clear)
+
+
+def _partly(observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, strength, factor):
+    """Which stretches are partly clear, and where what is in the way stands, as a share of the whole path."""
+    long = np.any(stretches.begin != stretches.end, axis=1)
+    rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
     few, begin, end, inside = _rays(flat, stretches[rows], _FEW)
     clear = obstacles.clear(observation, stretches.frame[rows[few]], begin, end)
     # Alike are all that are as the ray in the middle; then what that met is all there is.
-    unlike = np.zeros(len(rows), int)
-    np.add.at(unlike, few, clear != (found.factor[rows[few]] == 1))
-    rows = rows[(unlike > 0) & (inside.sum(axis=1) >= _FEWEST)]
-    many, begin, end, inside = _rays(flat, stretches[rows], _MANY)
-    passed = obstacles.passage(observation, stretches.frame[rows[many]], begin, end, np.ones(len(many), bool))
-    late, strength = passed.delay, np.abs(passed.factor) ** 2
-    weight = np.where(inside, _MANY.weight, 0)
-    weight /= weight.sum(axis=1, keepdims=True)
-    wavenumber = 2j * np.pi / observation.wavelength
-    field, clear = np.zeros(len(rows), complex), np.zeros(len(rows), complex)
-    power, later, slabs = np.full(len(rows), 1e-30), np.zeros(len(rows)), np.zeros(len(rows))
-    np.add.at(field, many, weight[inside] * passed.factor * np.exp(wavenumber * late))
-    np.add.at(clear, many, weight[inside] * (passed.blocked == 0))
-    np.add.at(power, many, strength)
-    np.add.at(later, many, strength * late)
-    np.add.at(slabs, many, strength * passed.through)
-    later /= power
-    field *= np.minimum(1, _MOST / np.maximum(np.abs(field), 1e-12)) * np.exp(-wavenumber * later)
-    found.factor[rows], found.delay[rows], found.through[rows] = field, later, slabs > power / 2
-    found.blocked[rows] = 1 - np.minimum(np.abs(clear), 1)
-    return found
+    unlike = _sums(few, clear != (factor[rows[few]] == 1), len(rows))
+    partly = (unlike > 0) & (inside.sum(axis=1) >= _FEWEST)
+    # Up to where rays come that meet something, of each stretch its first and last such.
+    hidden = np.flatnonzero(~clear & partly[few])
+    number = np.arange(len(hidden)) - np.searchsorted(few[hidden], few[hidden])
+    hidden = hidden[(number == 0) | (np.append(number[1:], 0) == 0)]
+    owner, begin, way = few[hidden], begin[hidden], (end - begin)[hidden]
+    reach = np.zeros(len(hidden))
+    for step in 0.5 ** np.arange(1, _HALVINGS + 1):
+        target = begin + (reach + step)[:, None] * way
+        reach += step * obstacles.clear(observation, stretches.frame[rows[owner]], begin, target)
+    reach += 0.5 ** (_HALVINGS + 1)
+    met = np.bincount(owner, minlength=len(rows))
+    share = (_sums(owner, reach, len(rows)) / np.maximum(met, 1))[partly]
+    rows = rows[partly]
+    low, high = stretches.span[rows].T
+    return rows, low + share * (high - low)
+
+
+def _fans(observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, place):
+    """What passes of many rays, zero beyond the mirrors' outlines; which are within; and delays, m.
+
+    Rays are straight and zones are not: they are spread so as to be right where the obstacle is.
+    """
+    low, high = stretches.span.T
+    share = (place - low) / (high - low)
+    wide = np.sqrt(stretches.span * (1 - stretches.span))
+    wide = np.where(wide > 0, wide, AT_RADAR * wide[:, ::-1])
+    mirror = np.sqrt(place * (1 - place)) / ((1 - share) * wide[:, 0] + share * wide[:, 1])
+    point = np.sqrt(2 * share / (1 - np.minimum(share, _BESIDE)))
+    spread = mirror[:, None] + (point - mirror)[:, None] * (1 - stretches.mirroring)
+    spread = np.maximum(spread, 0.25)[..., None]
+    shown = replace(stretches, before=stretches.before * spread, after=stretches.after * spread)
+    many, begin, end, inside = _rays(flat, shown, _MANY)
+    passed = obstacles.passage(observation, stretches.frame[many], begin, end, np.ones(len(many), bool))
+    wavenumber, count = 2j * np.pi / observation.wavelength, len(share)
+    power = np.abs(passed.factor) ** 2
+    total = np.maximum(_sums(many, power, count), 1e-30)
+    later = _sums(many, power * passed.delay, count) / total
+    fans, clear = np.zeros((count, 2, inside.shape[1]), complex), np.zeros(inside.shape)
+    fans[:, 0][inside] = passed.factor * np.exp(wavenumber * (passed.delay - later[many]))
+    fans[:, 1][inside] = 1
+    clear[inside] = passed.blocked == 0
+    whole = fans[:, 1] @ _MANY.weight
+    factor = _bounded(fans[:, 0] @ _MANY.weight / whole, _MOST)
+    through = _sums(many, power * passed.through, count) > total / 2
+    return fans, Passage(factor, later, through, 1 - np.minimum(np.abs(clear @ _MANY.weight / whole), 1))
+
+
+def _sums(index: Int[np.ndarray, "n"], values: np.ndarray, count: int) -> Float[np.ndarray, "count"]:
+    out = np.zeros(count)
+    np.add.at(out, index, values)
+    return out
+
+
+def _bounded(value: Complex[np.ndarray, "n"], most: float) -> Complex[np.ndarray, "n"]:
+    return value * np.minimum(1, most / np.maximum(np.abs(value), 1e-12))
+
+
+def _coupled(one, two, rho, mirroring, couplings) -> Complex[np.ndarray, "pair"]:
+    """What two screens leave, of correlation rho along axes that mirror; nan: too little lies within the outlines."""
+    out = np.empty(len(rho), complex)
+    _couple(np.ascontiguousarray(one), np.ascontiguousarray(two), rho, mirroring, couplings, out)
+    return out
+
+
+@njit(cache=True)
+def _couple(one, two, rho, mirroring, couplings, out):
+    steps, count = couplings.shape[1] - 1, couplings.shape[2]
+    for p in range(len(out)):
+        k = min(int(rho[p] * steps), steps - 1)
+        t = rho[p] * steps - k
+        along, across = mirroring[p]
+        passed, clear = 0j, 0j
+        for i in range(count):
+            if one[p, 1, i] == 0:
+                continue
+            for j in range(count):
+                if two[p, 1, j] == 0:
+                    continue
+                full = (1 - t) * couplings[0, k, i, j] + t * couplings[0, k + 1, i, j]
+                line = (1 - t) * couplings[1, k, i, j] + t * couplings[1, k + 1, i, j]
+                weight = along * (across * full + (1 - across) * line) + (1 - along) * couplings[0, 0, i, j]
+                passed += weight * one[p, 0, i] * two[p, 0, j]
+                clear += weight
+        out[p] = passed / clear if abs(clear) > 0.05 else np.nan
 
 
 def _rays(flat: Flat, stretches: Stretches, lattice: Lattice) -> tuple[np.ndarray, ...]:

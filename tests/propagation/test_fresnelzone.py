@@ -3,11 +3,17 @@
 import numpy as np
 import pytest
 
-from benchmarks.references.brute_force import past_pole
-from benchmarks.references.poles import LAMBDA, OFFSETS, WALL, left, pole, wall_past_pole
+from benchmarks.references.brute_force import past_edge, past_pole
+from benchmarks.references.poles import CONFIG, LAMBDA, OFFSETS, WALL, left, pole, wall_past_pole
+from benchmarks.references.rigs import field
+from radarsim.propagation.antenna import ISOTROPIC
+from radarsim.propagation.finder import PathFinder
+from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject
+from radarsim.world.scene import Scene
 
 #: Two sides of a wedge of 60 deg about (3, -0.5), and a way into it: over the first one square onto the second.
 SLOPE, RISE = np.cos(np.pi / 6), np.sin(np.pi / 6)
@@ -46,11 +52,55 @@ def test_a_pole_within_a_chain(offset):
     assert left(WEDGE, [pole(x, y)], 6.0) == pytest.approx(truth, abs=1.5)
 
 
+def board(x, y):
+    """A screen beside the way that leaves it clear up to y, m; negative: it hides the way."""
+    return SceneObject("board", shapes.rectangle((x, y + 0.5, 0), (1.0, 3.0), (-1, 0, 0)), MATERIALS["metal"])
+
+
+def test_half_a_plane_by_closed_forms():
+    """The reference itself: at grazing 1 / 4 + asin(rho) / (2 pi), where rho is 1 / 3 half way to the mirror."""
+    grazing = past_edge(0.0, (1.0, 3.0), 4.0, LAMBDA)
+    assert grazing == pytest.approx(0.25 + np.arcsin(1 / 3) / (2 * np.pi), abs=1e-6)
+    wide = past_pole(0.22, 0.4, (1.0, 3.0), 4.0, LAMBDA, nodes=2000)  # a strip whose other edge is far
+    assert past_edge(0.02, (1.0, 3.0), 4.0, LAMBDA) == pytest.approx(wide, abs=0.05)
+
+
+@pytest.mark.parametrize("distance", [0.5, 1.0, 1.5, 1.8])
+def test_the_shadow_of_an_edge(distance):
+    """A wall's flash, 2 m away, behind a screen at a distance: the way out and back meets two edges that are one."""
+    zone = np.sqrt(LAMBDA * distance * (4 - distance) / 8)
+    offsets = np.array([-0.8, -0.5, -0.25, 0.0, 0.25, 0.5, 0.8]) * zone
+    truth = [20 * np.log10(abs(past_edge(y, (distance, 4 - distance), 4.0, LAMBDA))) for y in offsets]
+    found = [left([WALL], [board(distance, y)], 4.0) for y in offsets]
+    assert found == pytest.approx(np.array(truth), abs=3.0)
+    assert np.sqrt(np.mean(np.square(np.subtract(found, truth)))) < 1.3
+
+
+@pytest.mark.parametrize("offset, level", [(0.0, -10.3), (-0.01, -14.1), (-0.03, -21.0)])
+def test_an_edge_half_way(offset, level):
+    """At the way, 10 and 30 mm into the shadow: 1.7 to 3.8 dB more than two edges of which each is alone."""
+    assert 20 * np.log10(abs(past_edge(offset, (1.0, 3.0), 4.0, LAMBDA))) == pytest.approx(level, abs=0.1)
+    assert left([WALL], [board(1.0, offset)], 4.0) == pytest.approx(level, abs=1.5)
+
+
 def test_an_edge_that_covers_the_flash_bit_by_bit():
-    """Half a plane: half the field, -6 dB either way, where its edge meets the way, and no step on either side."""
+    """Half a plane at 1 m, from 50 mm beside the way to 50 mm over it: no step on either side."""
     steps = np.arange(-10, 11) * 0.005
-    board = [shapes.rectangle((1.0, y - 0.5, 0), (1.0, 3.0), (-1, 0, 0)) for y in steps]
-    found = np.array([left([WALL], [SceneObject("board", mesh, MATERIALS["metal"])], 4.0) for mesh in board])
-    assert np.interp(0.0, steps, found) == pytest.approx(-12, abs=1.5)
+    found = np.array([left([WALL], [board(1.0, -y)], 4.0) for y in steps])
+    assert np.interp(0.0, steps, found) == pytest.approx(-10.3, abs=1.5)
     assert abs(found[0]) < 1 and found[-1] < -25
     assert np.abs(np.diff(10 ** (found / 20))).max() < 0.25
+
+
+def test_an_edge_that_goes_behind_a_pillar_bit_by_bit():
+    """The edge of a plate beside which the radar passes, in steps of 3 mm: no step, as by one ray (0.53)."""
+    plate = SceneObject("plate", shapes.rectangle((2, -0.5, 0), (1, 1), (-1, 0, 0)), MATERIALS["metal"])
+    nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
+    reflectors, scene = Reflectors.of(Scene("plate", [plate]), CONFIG), Scene("all", [plate, board(1.0, 0.15)])
+    finder = PathFinder(scene, nothing, reflectors, CONFIG, antenna=ISOTROPIC)
+    places = np.stack([np.zeros(81), np.arange(81) * 0.003 + 0.18, np.zeros(81)], axis=1)
+    found = finder.batch(places, np.tile(np.eye(3), (81, 1, 1)), np.zeros(81))
+    before = np.array([field(e, p, LAMBDA) for e, p in zip(found[:-1], places[1:], strict=True)])
+    now = np.array([field(e, p, LAMBDA) for e, p in zip(found[1:], places[1:], strict=True)])
+    assert abs(now[-1]) < 0.1 * abs(now[0])
+    assert np.abs(now - before).max() < 0.3 * np.abs(now).max()

@@ -82,8 +82,7 @@ def find(view: View) -> Paths:
     every = Chains.joined(found)
     two = every.mirrors[:, 1] == every.mirrors[:, 2]
     stretches = _stretches(observation, flat, frame, every)
-    size = np.abs(every.amplitude).repeat(4)
-    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, size).after_one_another(4)
+    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(every.amplitude))
     directions = []
     for reverse, rows in (
         (False, np.arange(len(every))),
@@ -126,10 +125,13 @@ def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "cha
     apart[:, 4] = AT_RADAR * unit[:, 2, None, None] * axes
     two = chains.mirrors[:, 1] == chains.mirrors[:, 2]
     mirrors = np.where(two[:, None] & (np.arange(3) == 2), -1, chains.mirrors)
+    along = np.concatenate([np.zeros_like(whole), there, whole], axis=1) / whole
     return Stretches(
-        np.repeat(frame, 4), stops[:, :-1].reshape(-1, 3), stops[:, 1:].reshape(-1, 3),
+        np.repeat(np.arange(len(frame)), 4), np.repeat(frame, 4),
+        stops[:, :-1].reshape(-1, 3), stops[:, 1:].reshape(-1, 3),
         apart[:, :-1].reshape(-1, 2, 3), apart[:, 1:].reshape(-1, 2, 3),
         *(np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4])),
+        np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2), np.ones((4 * len(frame), 2)),
     )  # fmt: skip
 
 

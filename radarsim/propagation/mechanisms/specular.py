@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from radarsim.propagation import fresnelzone, patches, plates
-from radarsim.propagation.curved import Arcs
+from radarsim.propagation.curved import LINE, Arcs
 from radarsim.propagation.environment import View
 from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
 from radarsim.propagation.observation import Observation
@@ -29,7 +29,7 @@ def find(view: View) -> Paths:
         if reflectors.heights is not None:
             uneven = _uneven(observation, frame, flat[parts.facet], parts.aim, reflectors.heights)
             parts = replace(parts, amplitude=parts.amplitude * uneven)
-        ways += [_to_parts(observation, frame, flat, parts), _to_bodies(observation, frame, arcs.aim)]
+        ways += [_to_parts(observation, frame, flat, parts), _to_bodies(observation, frame, arcs)]
         mirrors = np.full((len(parts), 4), -1)
         mirrors[:, 0] = parts.facet
         shape = np.pad(arcs.shape, ((0, 0), (0, GEOMETRY - arcs.shape.shape[1])))
@@ -41,37 +41,67 @@ def find(view: View) -> Paths:
             Paths.of(Kind.CURVED, shape, arcs.amplitude, frame=frame),
         ]  # fmt: skip
     paths = Paths.joined(found)
-    passed = fresnelzone.passage(observation, flat, view.obstacles, Stretches.joined(ways), np.abs(paths.amplitude))
+    stretches = replace(Stretches.joined(ways), path=np.arange(len(paths)))
+    passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(paths.amplitude))
     lag = np.append(flat.lag, 0.0)[paths.mirrors[:, 0]]  # at the centre of the sweep, amplitudes know it
     paths = replace(paths, amplitude=paths.amplitude * np.exp(-2j * np.pi * lag / observation.wavelength))
-    twice = replace(passed, factor=passed.factor**2, delay=2 * passed.delay + lag)  # there and back
-    return paths.behind(observation, twice)
+    return paths.behind(observation, replace(passed, delay=passed.delay + lag))
 
 
 def _to_parts(observation: Observation, frame: int, flat: Flat, parts: plates.Parts) -> Stretches:
-    """The ways to parts of plates; edges and corners are seen by one ray."""
-    here = observation.position[frame]
-    flash = np.trace(parts.isometry[:, :, :3], axis1=1, axis2=2) > 0  # a reflection, no half turn or inversion
-    unit = np.sqrt(observation.wavelength * np.linalg.norm(parts.aim - here, axis=1) / 4) * flash
-    after = unit[:, None, None] * np.stack([flat.u[parts.facet], flat.v[parts.facet]], axis=1)
-    mirrors = np.where(np.arange(3) == 0, np.where(flash, parts.facet, -1)[:, None], -1)
-    begin, stops = np.broadcast_to(here, parts.aim.shape), np.repeat(parts.aim[:, None], 3, axis=1)
-    ends = begin, parts.aim, AT_RADAR * after, after
-    return Stretches(np.full(len(parts), frame), *ends, mirrors, stops, np.repeat(after[:, None], 3, axis=1))
+    """The ways to parts of plates: a flash mirrors, an edge mirrors along its line, a corner echoes like a point.
+
+    Across an edge that is near the flash, in Fresnel units, it is a part of the same zone and goes over into it.
+    """
+    here, n = observation.position[frame], len(parts)
+    way = parts.aim - here
+    turn = parts.isometry[:, :, :3]
+    kind = np.trace(turn, axis1=1, axis2=2).round().astype(int)  # 1: reflection, -1: half turn, -3: inversion
+    unit = np.sqrt(observation.wavelength * np.linalg.norm(way, axis=1) / 4)
+    u, normal = flat.u[parts.facet], flat.normal[parts.facet]
+    # (M + 1) / 2 of a half turn projects on its axis
+    line = np.einsum("pii->pi", turn).argmax(axis=1)
+    u = np.where((kind == -1)[:, None], (turn + np.eye(3))[np.arange(n), line], u)
+    u = u / np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(normal, u)
+    beside = np.abs(np.einsum("pd,pd->p", way, v)) / unit
+    mirroring = np.ones((n, 2))
+    mirroring[:, 1] = np.where(kind == -1, 1 / (1 + beside**2), 1)
+    mirroring[kind == -3] = 0
+    axes = unit[:, None, None] * np.stack([u, v], axis=1)
+    before, after = _spread(mirroring, axes)
+    mirrors = np.where(np.arange(3) == 0, np.where(kind == -3, -1, parts.facet)[:, None], -1)
+    stops = np.repeat(parts.aim[:, None], 3, axis=1), np.repeat(after[:, None], 3, axis=1)
+    span = np.tile([0.0, 0.5], (n, 1))
+    begin = np.broadcast_to(here, parts.aim.shape)
+    return Stretches(
+        np.zeros(n, int), np.full(n, frame), begin, parts.aim, before, after, mirrors, *stops, span, mirroring
+    )  # fmt: skip
 
 
-def _to_bodies(observation: Observation, frame: int, aim: Float[np.ndarray, "part 3"]) -> Stretches:
-    """The ways to round bodies, whose zones end in a point, or nearly so: a cone, as wide as they are half way."""
-    begin = np.broadcast_to(observation.position[frame], aim.shape)
-    way = aim - begin
+def _spread(mirroring, axes):
+    """How far a Fresnel unit moves both ends of ways: to a mirror, and to a point, which is the tip of a cone."""
+    mirroring = mirroring[..., None]
+    return (1 - (1 - AT_RADAR) * mirroring) * axes, mirroring * axes
+
+
+def _to_bodies(observation: Observation, frame: int, arcs: Arcs) -> Stretches:
+    """The ways to round bodies, which echo like points, and cylinders along their axis like mirrors."""
+    begin, n = np.broadcast_to(observation.position[frame], arcs.aim.shape), len(arcs)
+    way = arcs.aim - begin
     size = np.linalg.norm(way, axis=1, keepdims=True)
-    aside = np.cross(way / size, observation.rotation[frame, :, 2])
+    line = arcs.shape[:, :1] == LINE
+    aside = np.where(line, arcs.shape[:, 4:7], np.cross(way / size, observation.rotation[frame, :, 2]))
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
-    before = np.sqrt(observation.wavelength * size / 8)[:, None] * np.stack(
+    axes = np.sqrt(observation.wavelength * size / 4)[..., None] * np.stack(
         [aside, np.cross(way / size, aside)], axis=1
     )
-    none = np.full((len(aim), 3), -1), np.zeros((len(aim), 3, 3)), np.zeros((len(aim), 3, 2, 3))
-    return Stretches(np.full(len(aim), frame), begin, aim, before, 0 * before, *none)
+    mirroring = np.column_stack([line, np.zeros(n)]).astype(float)
+    before, after = _spread(mirroring, axes)
+    none, span = (np.full((n, 3), -1), np.zeros((n, 3, 3)), np.zeros((n, 3, 2, 3))), np.tile([0.0, 0.5], (n, 1))
+    return Stretches(
+        np.zeros(n, int), np.full(n, frame), begin, arcs.aim, before, after, *none, span, mirroring
+    )  # fmt: skip
 
 
 def _uneven(

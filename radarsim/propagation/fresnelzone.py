@@ -187,7 +187,10 @@ def passage(
     return Passage(whole, delay, _sums(path, found.through, len(size)) > 0, 1 - clear)
 
 
-def _partly(observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, strength, factor):
+def _partly(
+    observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches,
+    strength: Float[np.ndarray, "stretch"], factor: Complex[np.ndarray, "stretch"],
+) -> tuple[Int[np.ndarray, "partly"], Float[np.ndarray, "partly"]]:  # fmt: skip
     """Which stretches are partly clear, and where what is in the way stands, as a share of the whole path."""
     long = np.any(stretches.begin != stretches.end, axis=1)
     rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
@@ -213,7 +216,13 @@ def _partly(observation, flat: Flat, obstacles: Obstacles, stretches: Stretches,
     return rows, low + share * (high - low)
 
 
-def _fans(observation, flat: Flat, obstacles: Obstacles, stretches: Stretches, place):
+def _fans(
+    observation: Observation,
+    flat: Flat,
+    obstacles: Obstacles,
+    stretches: Stretches,
+    place: Float[np.ndarray, "stretch"],
+) -> tuple[Complex[np.ndarray, "stretch 2 node"], Passage]:
     """What passes of many rays, zero beyond the mirrors' outlines; which are within; and delays, m.
 
     Rays are straight and zones are not: they are spread so as to be right where the obstacle is.
@@ -253,7 +262,10 @@ def _bounded(value: Complex[np.ndarray, "n"], most: float) -> Complex[np.ndarray
     return value * np.minimum(1, most / np.maximum(np.abs(value), 1e-12))
 
 
-def _coupled(one, two, rho, mirroring, couplings) -> Complex[np.ndarray, "pair"]:
+def _coupled(
+    one: Complex[np.ndarray, "pair 2 node"], two: Complex[np.ndarray, "pair 2 node"], rho: Float[np.ndarray, "pair"],
+    mirroring: Float[np.ndarray, "pair 2"], couplings: Complex[np.ndarray, "kind rho node node"],
+) -> Complex[np.ndarray, "pair"]:  # fmt: skip
     """What two screens leave, of correlation rho along axes that mirror; nan: too little lies within the outlines."""
     out = np.empty(len(rho), complex)
     _couple(np.ascontiguousarray(one), np.ascontiguousarray(two), rho, mirroring, couplings, out)

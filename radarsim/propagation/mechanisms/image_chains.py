@@ -126,12 +126,14 @@ def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "cha
     two = chains.mirrors[:, 1] == chains.mirrors[:, 2]
     mirrors = np.where(two[:, None] & (np.arange(3) == 2), -1, chains.mirrors)
     along = np.concatenate([np.zeros_like(whole), there, whole], axis=1) / whole
+    whole_path = (np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4]))
+    mirrors, reflections, aside = whole_path
     return Stretches(
-        np.repeat(np.arange(len(frame)), 4), np.repeat(frame, 4),
-        stops[:, :-1].reshape(-1, 3), stops[:, 1:].reshape(-1, 3),
-        apart[:, :-1].reshape(-1, 2, 3), apart[:, 1:].reshape(-1, 2, 3),
-        *(np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4])),
-        np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2), np.ones((4 * len(frame), 2)),
+        path=np.repeat(np.arange(len(frame)), 4), frame=np.repeat(frame, 4),
+        begin=stops[:, :-1].reshape(-1, 3), end=stops[:, 1:].reshape(-1, 3),
+        before=apart[:, :-1].reshape(-1, 2, 3), after=apart[:, 1:].reshape(-1, 2, 3),
+        mirrors=mirrors, stops=reflections, apart=aside,
+        span=np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2), mirroring=np.ones((4 * len(frame), 2)),
     )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ def walk(tmp_path_factory) -> Path:
     [
         ("claims", ["--data", "{walk.parent}"]),
         ("motion_statistics", ["--buildings", "1"]),
+        ("path_types", ["--frames", "2"]),
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )

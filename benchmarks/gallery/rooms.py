@@ -60,9 +60,9 @@ def thin_pole(axis) -> str:
     off = (found - theory)[np.abs(offsets) < 0.032]
     return (
         f"While the pole is in the first Fresnel zone: off by {np.abs(off).max():.1f} dB at worst, {np.std(off):.1f} "
-        "dB RMS. What it diffracts from farther off is left out. Visibility is measured like this, by a lattice of "
-        "rays, for flashes and mirror images that are 16 dB above the noise. Edges, corners and scatterers have one "
-        "ray each."
+        "dB RMS. What it diffracts from farther off is left out. The visibility of specular reflections, of edges and "
+        "corners of plates, and of chains of mirrors that are 16 dB above the noise is measured like this, by a "
+        "lattice of rays. Scatterers have one ray each."
     )
 
 

@@ -92,7 +92,7 @@ def show(found: dict) -> None:
     if found["effort"]:
         print(found["effort"])
     config = dict(found["config"])
-    config["channel_calibration"] = config["channel_calibration"] or "nominal"
+    config["channel_calibration"] = config.get("channel_calibration") or "nominal"
     if isinstance(config["board"], dict):
         config["board"] = config["board"]["name"]
     print_table(("configuration", "value"), config.items())

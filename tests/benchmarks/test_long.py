@@ -25,7 +25,7 @@ def test_a_quarter_of_an_hour_at_a_blow():
 
 
 def test_a_killed_run_and_a_killed_capture(tmp_path, monkeypatch):
-    monkeypatch.setattr(kills, "LIVES", (0.5, 1.0))
+    monkeypatch.setattr(kills, "LIVES", (2.0, 3.0))
     noise = tmp_path / "noise.h5"
     record(noise, PRESETS["radarize"], 12)
     methods = ["--odometry", "doppler", "--scans", "first-echo"]

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
+from radarize.errors import DiskFull, InputError
 from radarize.mapping.scans import BEARINGS
 from radarize.odometry.claims import Claims
 from radarize.pipeline import Result
@@ -101,7 +101,7 @@ def test_a_run_that_fails_leaves_the_old_one_as_it_was(tmp_path, monkeypatch, er
             with monkeypatch.context() as patch:
                 patch.setattr("radarize.runfolder.writer.json.dumps", fail)
                 writer.finish(session([result(0, 16)]), {})
-        assert met.type is (InputError if isinstance(error, OSError) else type(error))
+        assert met.type is (DiskFull if isinstance(error, OSError) else type(error))
     assert {path.name: path.read_bytes() for path in (tmp_path / "old").iterdir()} == before
     assert [path.name for path in tmp_path.iterdir()] == ["old"]
     with RunWriter(tmp_path / "new", RADAR) as writer:

@@ -93,7 +93,7 @@ def show(found: dict) -> None:
         print(found["effort"])
     config = dict(found["config"])
     config["channel_calibration"] = config.get("channel_calibration") or "nominal"
-    if isinstance(config["board"], dict):
+    if isinstance(config.get("board"), dict):
         config["board"] = config["board"]["name"]
     print_table(("configuration", "value"), config.items())
     derived = [(name, *_readable(value, DERIVED[name])) for name, value in found["derived"].items()]

@@ -28,6 +28,7 @@ send there (`interferers`); levels change and add them, too.
 """
 
 import re
+from abc import ABC, abstractmethod
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
@@ -98,7 +99,7 @@ class CustomMaterial(_Strict):
     custom: Custom
 
 
-class Shape(_Strict):
+class Shape(_Strict, ABC):
     """An object of a scene file. A subclass with a `shape` of its own and `mesh(folder)` can be named there."""
 
     name: Annotated[str, Field(min_length=1)]
@@ -106,9 +107,9 @@ class Shape(_Strict):
     position: Vector = (0.0, 0.0, 0.0)
     solid: bool = False  # part of the surface of a body, though open: seen from its outside only
 
+    @abstractmethod
     def mesh(self, folder: Path) -> trimesh.Trimesh:
         """In world coordinates; files that it names are relative to a folder."""
-        raise NotImplementedError
 
 
 class TurnedShape(Shape):

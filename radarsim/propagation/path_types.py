@@ -16,7 +16,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Complex, Float, Int, UInt8
 
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import RadarConfig
@@ -93,19 +93,24 @@ class PathTypes:
         return found
 
     @cached_property
-    def _row(self):
-        return azimuth_row(self.config)
+    def _row(self) -> tuple[Int[np.ndarray, "antenna"], Float[np.ndarray, "antenna"]]:
+        """The antenna row, and how far to the left its antennas are, m."""
+        row = azimuth_row(self.config)
+        return row, virtual_positions(self.config).reshape(-1, 3)[row, 1]
+
+    @cached_property
+    def _steering(self) -> Complex[np.ndarray, "antenna beam"]:
+        left = self._row[1]
+        return np.exp(2j * np.pi / self.config.wavelength * left[:, None] * BEAMS).astype(np.complex64)
 
     def apparent(
         self, paths: Paths, lengths: Float[np.ndarray, "path virtual"], position: Float[np.ndarray, "3"],
         rotation: Float[np.ndarray, "3 3"],
     ) -> Float[np.ndarray, "path 3"]:  # fmt: skip
         """Where the radar puts paths of one frame, m; arguments as for a call."""
-        y = virtual_positions(self.config).reshape(-1, 3)[self._row, 1]
-        row = lengths[:, self._row] / self.config.wavelength
+        row = lengths[:, self._row[0]] / self.config.wavelength
         waves = np.exp(2j * np.pi * (row - row[:, :1])).astype(np.complex64)
-        steering = np.exp(2j * np.pi / self.config.wavelength * y[:, None] * BEAMS).astype(np.complex64)
-        sine = BEAMS[np.argmax(np.abs(waves @ steering), axis=1)] if len(paths) else np.zeros(0)
+        sine = BEAMS[np.argmax(np.abs(waves @ self._steering), axis=1)] if len(paths) else np.zeros(0)
         way = paths.apparent(position) - position
         way /= np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-9)
         rise = np.clip(RISE * np.rint(way.mean(axis=1) @ rotation[:, 2] / RISE), -0.999, 0.999)
@@ -141,8 +146,8 @@ class PathTypes:
         radial = away / range_[:, None]
         lateral = np.stack([-radial[:, 1], radial[:, 0], np.zeros(len(away))], axis=1)
         lateral /= np.maximum(np.linalg.norm(lateral, axis=1, keepdims=True), 1e-9)
-        y = virtual_positions(self.config).reshape(-1, 3)[self._row, 1]
-        aperture = (y.max() - y.min()) * len(y) / max(len(y) - 1, 1)
+        left = self._row[1]
+        aperture = np.ptp(left) * len(left) / max(len(left) - 1, 1)
         beam = 0.443 * self.config.wavelength / aperture  # half-power half width of a uniform row, sine
         strong = self.pattern.elevation_gain > self.pattern.elevation_gain[0] / np.sqrt(2)
         rise = np.tan(np.deg2rad(0.5 * np.argmin(strong)) if not strong.all() else np.pi / 4)

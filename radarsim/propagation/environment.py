@@ -76,7 +76,7 @@ class View:
     def _reflectors(self) -> tuple[Flat, Flat]:
         reflectors, observation, plates = self.environment.reflectors, self.observation, self.obstacles.plates
         if reflectors is None:
-            return Flat.none(), Flat.none()
+            return Flat.zeros(0), Flat.zeros(0)
         flat = reflectors.near(observation.position, observation.range)
         inner = reflectors.inner_near(observation.position, observation.range)
         if len(plates):

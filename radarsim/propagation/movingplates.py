@@ -53,7 +53,7 @@ class MovingPlates:
 
     def faces(self, observation: Observation) -> tuple[Flat, Flat]:
         """Their faces in every frame, and the inner faces of hollow ones."""
-        outer, inner = [Flat.none()], [Flat.none()]
+        outer, inner = [Flat.zeros(0)], [Flat.zeros(0)]
         for frame, (turns, centers) in enumerate(zip(*self._places(observation.time), strict=True)):
             for plate, (turn, center, own) in enumerate(zip(turns, centers, self._reflectors, strict=True)):
                 outer.append(_placed(own.flat, turn, center, plate, frame))

@@ -7,6 +7,8 @@ one). Ghosts of movers go over one mirror or out and back over one each; legs ov
 Parts of a material scatter as its surfaces do, and are plates besides (`movingplates`).
 """
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit, prange
@@ -29,7 +31,7 @@ class MovingTargets:
         parts: rigid parts of all movers.
         opaque: indices of those that nothing passes.
         part: (scatterer,) index of the part that carries it.
-        sigma, phase: (scatterer,) m^2, rad.
+        sigma: (scatterer,) radar cross sections, m^2.
     """
 
     def __init__(self, movers: list[Mover], rng: np.random.Generator, density: float = 150.0):
@@ -37,9 +39,7 @@ class MovingTargets:
         own = [mover.parts() for mover in movers]
         self.parts = [part for parts in own for part in parts]
         self.opaque = np.array([k for k, part in enumerate(self.parts) if part.material is None], int)
-        place, normal, part, sigma = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, int)], [np.zeros(0)]
-        lobe = [np.zeros((0, 4))]
-        number = 0
+        found = [Scatterers.zeros(0)]
         for mover, parts in zip(movers, own, strict=True):
             area = sum(each.area for each in parts)
             for each in parts:
@@ -50,16 +50,15 @@ class MovingTargets:
                     per_area = each.material.sigma0
                 count = max(int(round(density * each.area)), 4) if per_area else 0
                 points, normals = each.sample(count, rng)
-                place.append(points)
-                normal.append(normals)
-                part.append(np.full(count, number))
-                sigma.append(np.full(count, per_area * each.area / max(count, 1)))
-                lobe.append(np.tile(LAMBERT if each.material is None else weights(each.material), (count, 1)))
-                number += 1
-        self._place, self._normal = np.concatenate(place), np.concatenate(normal)
-        self.part, self.sigma = np.concatenate(part), np.concatenate(sigma)
-        self._lobe = np.concatenate(lobe)
-        self.phase = rng.uniform(0, 2 * np.pi, len(self.part))
+                some = Scatterers.points(points, per_area * each.area / max(count, 1))
+                lobe = np.tile(LAMBERT if each.material is None else weights(each.material), (count, 1))
+                found.append(replace(some, normal=normals, lobe=lobe))
+        self.part = np.repeat(np.arange(len(self.parts)), np.array([len(some) for some in found[1:]], int))
+        once, twice = (np.where(np.arange(len(self.part)) % n == 0, float(n), 0.0)
+                       for n in (BOUNCE_STRIDE, BOUNCE_STRIDE**2))  # fmt: skip
+        phase = rng.uniform(0, 2 * np.pi, len(self.part))
+        self._own = replace(Scatterers.joined(found), phase=phase, bounces=once, bounces_twice=twice)
+        self.sigma = self._own.sigma
         self._half = np.array([p.half for p in self.parts]).reshape(-1, 3)
         self._capsule = np.array([p.capsule for p in self.parts], bool)
 
@@ -73,29 +72,13 @@ class MovingTargets:
     def positions(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n scatterer 3"]:
         """Places of the scatterers at times t (s), m."""
         turn, center = self.poses(t)
-        return np.einsum("nsij,sj->nsi", turn[:, self.part], self._place) + center[:, self.part]
-
-    def normals(self, t: float) -> Float[np.ndarray, "scatterer 3"]:
-        """Outward unit normals at a time, s."""
-        turn, _ = self.poses(np.array([t]))
-        return np.einsum("sij,sj->si", turn[0, self.part], self._normal)
+        return np.einsum("nsij,sj->nsi", turn[:, self.part], self._own.position) + center[:, self.part]
 
     def scatterers(self, t: float) -> Scatterers:
         """The scatterers as they are at time t, s."""
-        n = len(self)
-        every = np.arange(n)
-        return Scatterers(
-            position=self.positions(np.array([t]))[0],
-            normal=self.normals(t),
-            sigma=self.sigma,
-            phase=self.phase,
-            two_sided=np.zeros(n, bool),
-            horizontal=np.zeros(n, bool),
-            bounces=np.where(every % BOUNCE_STRIDE == 0, float(BOUNCE_STRIDE), 0.0),
-            bounces_twice=np.where(every % BOUNCE_STRIDE**2 == 0, float(BOUNCE_STRIDE**2), 0.0),
-            lobe=self._lobe,
-            rank=np.full(n, -1.0),
-        )
+        now = np.array([t])
+        normal = np.einsum("sij,sj->si", self.poses(now)[0][0, self.part], self._own.normal)
+        return replace(self._own, position=self.positions(now)[0], normal=normal)
 
     def occluded(
         self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float, margin: float = 0.01,

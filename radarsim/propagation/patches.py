@@ -25,9 +25,8 @@ from jaxtyping import Bool, Complex, Float, Int
 from numba import njit
 
 from radarsim.propagation.apertures import FAR, diffracted, side
-from radarsim.propagation.curved import QUADRIC, SHAPE, Arcs, stationary
-from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, unit, write
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.curved import QUADRIC, SpecularPoints, grazes, stationary
+from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, unit, vec, write
 from radarsim.propagation.media import HEAD_ON, LAYER
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.smooth import Piece
@@ -71,36 +70,37 @@ class Patches(NamedTuple):
         pieces = [row[0] for row in rows]
         sizes = [(len(p.place), len(p.faces), len(p.border)) for p in pieces]
         begin = np.cumsum([(0, 0, 0), *sizes], axis=0)
-        none = np.zeros((0, 3))
-        place, normal = (np.concatenate([none, *(getattr(p, k) for p in pieces)]) for k in ("place", "normal"))
-        curvature = np.concatenate([np.zeros((0, 6)), *(p.curvature for p in pieces)])
-        whole = np.zeros((0, 3), int)
-        faces = np.concatenate([whole, *(p.faces + b[0] for p, b in zip(pieces, begin, strict=False))])
-        across = np.concatenate([whole, *(np.where(p.across < 0, -1, p.across + b[1])
-                                          for p, b in zip(pieces, begin, strict=False))])  # fmt: skip
-        border = np.concatenate([whole[:, :2], *(p.border + b[0] for p, b in zip(pieces, begin, strict=False))])
         middle = [(p.place.min(axis=0) + p.place.max(axis=0)) / 2 for p in pieces]
         ball = [(*m, np.linalg.norm(p.place - m, axis=1).max()) for p, m in zip(pieces, middle, strict=True)]
+
+        def joined(name: str, width: int, of: int | None = None) -> np.ndarray:
+            """A column of all pieces; indices of corners (`of` 0) or triangles (1) become those of all."""
+            parts = [getattr(p, name) for p in pieces]
+            if of is not None:
+                parts = [np.where(part < 0, -1, part + first[of]) for part, first in zip(parts, begin, strict=False)]
+            return np.concatenate([np.zeros((0, width), float if of is None else int), *parts])
+
+        place, faces = joined("place", 3), joined("faces", 3, 0)
         home = np.zeros(len(place), int)
         home[faces] = np.arange(len(faces))[:, None]
         return cls(
-            place, normal, curvature, home, faces, across, border, begin, np.reshape(ball, (-1, 4)),
-            np.array([row[1] for row in rows], bool),
+            place, joined("normal", 3), joined("curvature", 6), home, faces, joined("across", 3, 1),
+            joined("border", 2, 0), begin, np.reshape(ball, (-1, 4)), np.array([row[1] for row in rows], bool),
             np.reshape([row[2] for row in rows], (-1, LAYER)).astype(complex),
         )  # fmt: skip
 
 
-def flashes(observation: Observation, frame: int, patches: Patches) -> Arcs:
+def specular_points(observation: Observation, frame: int, patches: Patches) -> SpecularPoints:
     """Those of all pieces above the threshold in one frame."""
     return filled(
-        lambda n: Arcs(np.empty((n, 3)), np.zeros((n, 3, 4)), np.empty(n, complex), np.zeros((n, SHAPE))),
-        lambda found: _flashes(observation, frame, patches, found.columns),
+        SpecularPoints,
+        lambda found: _specular_points(observation, frame, patches, found.columns),
         2 * len(patches.ball) + 1,
     )
 
 
 @njit(cache=True)
-def _flashes(observation, frame, patches, found):
+def _specular_points(observation, frame, patches, found):
     """Returns how many there are, of which as many as fit are written."""
     p, rotation, count = vec(observation.position[frame]), observation.rotation[frame], 0
     for k in range(len(patches.ball)):
@@ -113,13 +113,11 @@ def _flashes(observation, frame, patches, found):
             value *= patches.layer[k, HEAD_ON] * gain_towards(minus(place, p), rotation, observation) ** 2
             if abs(value) <= observation.threshold:
                 continue
+            found.facet[count], found.amplitude[count] = -1, value
             write(aim, found.aim[count])
-            for d in range(3):
-                found.isometry[count, d, d], found.isometry[count, d, 3] = -1.0, 2 * place[d]
-            found.amplitude[count] = value
-            point, axis, normal, bend1, bend2 = quadric
-            shape = found.shape[count]
-            shape[0], shape[11], shape[12] = QUADRIC, bend1, bend2
+            shape = found.geometry[count]
+            point, axis, normal, shape[11], shape[12] = quadric
+            shape[0] = QUADRIC
             write(point, shape[1:4])
             write(axis, shape[4:7])
             write(normal, shape[8:11])
@@ -145,16 +143,15 @@ def strength(observation, patches, of, one, two):
     aim, quadric = _surface(patches, face, turn, weights)
     place, way, hessian, plane = stationary(quadric, one, two)
     size = patches.ball[k, 3]
-    if way > 2 * observation.range or _grazes(quadric, place, one, two):
+    if way > 2 * observation.range or grazes((place, quadric[2]), one, two, 0.05):
         return aim, quadric, place, 0j
-    # Principal values of the Hessian; Fresnel zones are no larger than the piece
-    h11, h22, h12 = hessian
-    mean, apart = (h11 + h22) / 2, np.hypot((h11 - h22) / 2, h12)
-    angle, least = 0.5 * np.arctan2(h12, (h11 - h22) / 2), observation.wavelength / (2 * size * size)
-    high, low = _away(mean + apart, least), _away(mean - apart, least)
-    across, elliptic = cross(quadric[2], quadric[1]), high * low > 0
-    first = _mixed(np.cos(angle), quadric[1], np.sin(angle), across, np.sqrt(2 * abs(high) / observation.wavelength))
-    second = _mixed(-np.sin(angle), quadric[1], np.cos(angle), across, np.sqrt(2 * abs(low) / observation.wavelength))
+    # Fresnel zones are no larger than the piece
+    (high, first), (low, second) = _principal(hessian, quadric[1], cross(quadric[2], quadric[1]))
+    least = observation.wavelength / (2 * size * size)
+    high, low = _clamped(high, least), _clamped(low, least)
+    elliptic = high * low > 0
+    first = _scaled(np.sqrt(2 * abs(high) / observation.wavelength), first)
+    second = _scaled(np.sqrt(2 * abs(low) / observation.wavelength), second)
     value = _fresnel(patches, of, (place, first, second, elliptic, inside), (one, two, way, observation.wavelength))
     if not elliptic:
         value = -1j * abs(value)
@@ -165,20 +162,24 @@ def strength(observation, patches, of, one, two):
 
 
 @njit
-def _away(value, least):
-    """A number that is not nearer to nought than so."""
+def _clamped(value, least):
+    """Clamp the magnitude away from zero."""
     return value if abs(value) > least else (least if value >= 0 else -least)
 
 
 @njit
-def _mixed(a, one, b, two, scale):
-    return along(along((0.0, 0.0, 0.0), a * scale, one), b * scale, two)
+def _scaled(scale, a):
+    return scale * a[0], scale * a[1], scale * a[2]
 
 
 @njit
-def _grazes(quadric, place, one, two):
-    there, back, normal = unit(minus(one, place)), unit(minus(two, place)), quadric[2]
-    return dot(there, normal) < 0.05 or dot(back, normal) < 0.05
+def _principal(tensor, one, two):
+    """The principal values, the larger one first, of a symmetric tensor (11, 22, 12) over two directions at right
+    angles, each with its direction."""
+    mean, half = (tensor[0] + tensor[1]) / 2, (tensor[0] - tensor[1]) / 2
+    apart, angle = np.hypot(half, tensor[2]), 0.5 * np.arctan2(tensor[2], half)
+    c, s = np.cos(angle), np.sin(angle)
+    return (mean + apart, along(_scaled(c, one), s, two)), (mean - apart, along(_scaled(-s, one), c, two))
 
 
 @njit
@@ -197,25 +198,20 @@ def _foot(patches, k, turn, one, two):
         off = _off(patches, corner, turn, one, two)
         if dot(off, off) < nearest:
             nearest, best = dot(off, off), corner
-    face = patches.home[best]
-    least, weights, shares = _nearest(patches, face, turn, one, two)
-    holds, came = face, -1
-    circles = False
+    face, came = patches.home[best], -1
+    holds, least, weights, circles = face, 9.0, (1.0, 0.0, 0.0), False
     for step in range(STEPS):
-        low, to, back = 0.0, -1, False
-        for corner in range(3):  # across the side beyond which it is, most of all
-            other = patches.across[face, corner]
-            if shares[corner] < low and other >= 0:
-                low, to, back = shares[corner], other, other == came
-        if to < 0:
-            break
-        circles = back or step == STEPS - 1
-        if circles:
-            break
-        came, face = face, to
         off, others, shares = _nearest(patches, face, turn, one, two)
         if off < least:
             least, weights, holds = off, others, face
+        low, to = 0.0, -1
+        for corner in range(3):  # across the side beyond which it is, most of all
+            if shares[corner] < low and patches.across[face, corner] >= 0:
+                low, to = shares[corner], patches.across[face, corner]
+        circles = to >= 0 and (to == came or step == STEPS - 1)
+        if to < 0 or circles:
+            break
+        came, face = face, to
     if circles and least > 0:
         for face in range(patches.begin[k, 1], patches.begin[k + 1, 1]):
             off, others, _ = _nearest(patches, face, turn, one, two)
@@ -274,23 +270,20 @@ def _surface(patches, face, turn, weights):
         n = along(n, turn * weights[i], vec(patches.normal[corner]))
         middle = along(middle, 1 / 3, vec(patches.place[corner]))
     n = unit(n)
-    axis = unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.7 else (1.0, 0.0, 0.0)))
-    across = cross(n, axis)
+    one = unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.7 else (1.0, 0.0, 0.0)))
+    two = cross(n, one)
     height, c11, c22, c12 = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
         corner = patches.faces[face, i]
         normal, c = vec(patches.normal[corner]), patches.curvature[corner]
         over = dot(minus(q, vec(patches.place[corner])), normal) * turn
         height -= weights[i] * over / (1 + turn * dot(normal, n))
-        rows = (c[0], c[1], c[2]), (c[1], c[3], c[4]), (c[2], c[4], c[5])
-        on = dot(rows[0], axis), dot(rows[1], axis), dot(rows[2], axis)
-        beside = dot(rows[0], across), dot(rows[1], across), dot(rows[2], across)
-        c11 += turn * weights[i] * dot(on, axis)
-        c12 += turn * weights[i] * dot(on, across)
-        c22 += turn * weights[i] * dot(beside, across)
-    angle, apart = 0.5 * np.arctan2(c12, (c11 - c22) / 2), np.hypot((c11 - c22) / 2, c12)
-    axis = _mixed(np.cos(angle), axis, np.sin(angle), across, 1.0)
-    quadric = along(q, height, n), axis, n, (c11 + c22) / 2 + apart, (c11 + c22) / 2 - apart
+        rows, share = ((c[0], c[1], c[2]), (c[1], c[3], c[4]), (c[2], c[4], c[5])), turn * weights[i]
+        on = dot(rows[0], one), dot(rows[1], one), dot(rows[2], one)
+        beside = dot(rows[0], two), dot(rows[1], two), dot(rows[2], two)
+        c11, c22, c12 = c11 + share * dot(on, one), c22 + share * dot(beside, two), c12 + share * dot(on, two)
+    (bend1, axis), (bend2, _) = _principal((c11, c22, c12), one, two)
+    quadric = along(q, height, n), axis, n, bend1, bend2
     return along(q, 0.02, minus(middle, q)), quadric
 
 

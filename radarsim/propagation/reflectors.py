@@ -11,7 +11,7 @@ from radarsim.propagation.bodies import recognise
 from radarsim.propagation.clutter import uncovered
 from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.hashgrid import Grid
-from radarsim.propagation.media import LAYER, as_slab, covered, lag, layer
+from radarsim.propagation.media import as_slab, covered, lag, layer
 from radarsim.propagation.patches import Patches
 from radarsim.propagation.smooth import pieces
 from radarsim.propagation.table import Table
@@ -56,14 +56,6 @@ class Flat(Table):
         """Which are there in a frame."""
         return (self.frame < 0) | (self.frame == frame)
 
-    @classmethod
-    def none(cls) -> "Flat":
-        """No facet."""
-        no, empty, still = np.zeros(0, bool), np.zeros((0, 3)), np.zeros(0, int)
-        table = np.zeros((0, LAYER), complex)
-        shape = np.zeros((0, 4, 3)), empty, empty, empty, empty, np.zeros((0, 2))
-        return cls(*shape, no, no, table, np.zeros(0), np.zeros(0), still, still)
-
 
 @dataclass(frozen=True)
 class Reflectors:
@@ -79,7 +71,7 @@ class Reflectors:
 
     flat: Flat
     round: RoundBodies
-    inner: Flat = Flat.none()
+    inner: Flat = Flat.zeros(0)
     smooth: Patches = Patches.of([])
     heights: Heights | None = None
 
@@ -128,11 +120,7 @@ class Reflectors:
                     inwards = -deep * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
-        outer = _table(flat)
+        outer = Flat.from_rows(flat)
         seen = np.sqrt(uncovered(scene, outer.corners.mean(axis=1), outer.normal))
         outer = replace(outer, layer=covered(outer.layer, seen))
-        return cls(outer, RoundBodies.of(bodies), _table(inner), Patches.of(smooth), heights)
-
-
-def _table(rows: list[tuple]) -> Flat:
-    return Flat(*(np.array(column) for column in zip(*rows, strict=True))) if rows else Flat.none()
+        return cls(outer, RoundBodies.from_rows(bodies), Flat.from_rows(inner), Patches.of(smooth), heights)

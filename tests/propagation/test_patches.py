@@ -184,7 +184,7 @@ def test_path_by_antenna(kind, gap, speed):
         mesh, deep = half_cylinder(0.15, 1.0, 24), 0.15
     center = np.array([gap + deep, 0.03, 0.05])
     scene = Scene("body", [SceneObject("body", shapes.placed(mesh, center), MATERIALS["metal"])])
-    smooth = replace(Reflectors.of(scene, CONFIG), flat=Flat.none())
+    smooth = replace(Reflectors.of(scene, CONFIG), flat=Flat.zeros(0))
     echoes = PathFinder(scene, NOTHING, smooth, CONFIG, antenna=ISOTROPIC)(np.zeros(3), np.eye(3))
     fit = echoes.lengths(CONFIG, Rig((0, speed, 0)), -CONFIG.burst_center)[np.abs(echoes.amplitude).argmax()]
 

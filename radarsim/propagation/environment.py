@@ -77,8 +77,7 @@ class View:
         reflectors, observation, plates = self.environment.reflectors, self.observation, self.obstacles.plates
         if reflectors is None:
             return Flat.zeros(0), Flat.zeros(0)
-        flat = reflectors.near(observation.position, observation.range)
-        inner = reflectors.inner_near(observation.position, observation.range)
+        flat, inner = reflectors.near(observation.position, observation.range)
         if len(plates):
             moving, hollow = plates.faces(observation)
             flat, inner = Flat.joined([flat, moving]), Flat.joined([inner, hollow])

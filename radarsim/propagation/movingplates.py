@@ -1,4 +1,4 @@
-"""Plates that move, such as leaves of doors: they flash, mirror and let through as the same plates that stand.
+"""Plates that move, such as leaves of doors: they reflect, mirror and let through as the same plates at rest.
 
 Each is a scene of its own, in whose frame it stands. Its faces join the flat reflectors of every frame where it is in
 the middle of the burst, and rays that it is in the way of are traced in its own frame. Over the burst it moves on by a
@@ -13,7 +13,7 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.burst import NODES, BurstClock
-from radarsim.propagation.isometry import after, inverse
+from radarsim.propagation.isometry import after, image, inverse
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat, Reflectors
@@ -33,9 +33,9 @@ class MovingPlates:
     def __init__(self, moving: MovingTargets, config: RadarConfig, margin: float):
         self._moving, self._margin = moving, margin
         self._offsets = BurstClock.of(config).half * np.append(NODES, 0.0)
-        things = {k: thing for k, part in enumerate(moving.parts) if (thing := part.object)}
-        self._part = np.array([*things], int)
-        scenes = [Scene("part", [thing]) for thing in things.values()]
+        objects = {k: each for k, part in enumerate(moving.parts) if (each := part.object)}
+        self._part = np.array([*objects], int)
+        scenes = [Scene("part", [each]) for each in objects.values()]
         self._reflectors = [Reflectors.of(scene, config) for scene in scenes]
         self._transmission = [Transmission(scene, config, margin) for scene in scenes]
 
@@ -81,9 +81,9 @@ class MovingPlates:
         factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
         turns, centers = self._places(observation.time)
         for plate, (part, own) in enumerate(zip(self._part, self._transmission, strict=True)):
-            met = self._met(observation, frame, begin, end, part)
-            factor[met[~allowed[met]]] = 0
-            met = met[allowed[met]]
+            hidden = self._moving.occluded(begin, end, observation.time[frame], self._margin, np.array([part]))
+            factor[hidden & ~allowed] = 0
+            met = np.flatnonzero(hidden & allowed)
             if len(met):
                 turn, center = turns[frame[met], plate], centers[frame[met], plate]
                 start, stop = (np.einsum("nij,ni->nj", turn, x[met] - center) for x in (begin, end))
@@ -92,18 +92,6 @@ class MovingPlates:
                 factor[met] *= passed
                 delay[met] += late
         return factor, delay
-
-    def _met(
-        self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
-        end: Float[np.ndarray, "ray 3"], part: int,
-    ) -> Int[np.ndarray, "met"]:  # fmt: skip
-        """Rays that one of them stands in the way of."""
-        found = [np.zeros(0, int)]
-        for k in np.unique(frame):
-            now = np.flatnonzero(frame == k)
-            hidden = self._moving.occluded(begin[now], end[now], observation.time[k], self._margin, np.array([part]))
-            found.append(now[hidden])
-        return np.concatenate(found)
 
 
 def _placed(flat: Flat, turn: Float[np.ndarray, "3 3"], center: Float[np.ndarray, "3"], plate: int, frame: int) -> Flat:
@@ -138,7 +126,7 @@ def isometries(
         m = column[rows]
         rigid = moves[flat.frame[m], flat.plate[m]]
         normal = np.einsum("ntij,nj->nti", rigid[..., :3], flat.normal[m])
-        center = np.einsum("ntij,nj->nti", rigid[..., :3], flat.center[m]) + rigid[..., 3]
+        center = image(rigid, flat.center[m, None])
         along = np.einsum("nti,ntij->ntj", normal, out[rows])
         along[..., 3] -= np.einsum("nti,nti->nt", normal, center)
         out[rows] -= 2 * normal[..., None] * along[..., None, :]
@@ -149,7 +137,7 @@ def moved(
     flat: Flat, place: Float[np.ndarray, "n 3"], own: Float[np.ndarray, "n 3 3"], mirrors: Int[np.ndarray, "n mirror"],
     moves: Float[np.ndarray, "frame plate 4 3 4"],
 ) -> Float[np.ndarray, "n 3 3"]:  # fmt: skip
-    """How far virtual points have moved at a burst's nodes, m.
+    """Virtual points at a burst's nodes, m.
 
     Args:
         flat, mirrors, moves: as `isometries` has them.
@@ -157,10 +145,7 @@ def moved(
         own: how far what is seen there has moved itself, by node, m.
     """
     chain = isometries(flat, mirrors, moves)
-    chain, middle = chain[:, :3], chain[:, 3:]
-    step = after(chain, inverse(middle))
-    steps = np.einsum("ntij,nj->nti", step[..., :3], place) + step[..., 3] - place[:, None]
-    return steps + np.einsum("ntij,ntj->nti", chain[..., :3], own)
+    return image(chain[:, :3], image(inverse(chain[:, 3]), place)[:, None] + own)
 
 
 def turned(
@@ -172,7 +157,7 @@ def turned(
     Args:
         flat, moves: as `isometries` has them.
         image: in the middle of the burst.
-        mirrors: one that it is a part of, its flash, an edge or a corner; or several that it is seen in.
+        mirrors: one that it is a part of: specular point, edge or corner; or several that it is seen in.
     """
     first = mirrors[:, 0]
     rigid = moves[flat.frame[first], flat.plate[first]][:, :3]

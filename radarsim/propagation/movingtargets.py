@@ -2,7 +2,7 @@
 
 Over a burst a scatterer's path is a parabola through three nodes. Limbs jerk: against every chirp's own place a
 walker's echoes are wrong by -40 to -60 dB for most of the step cycle and by -25 dB where shins turn (measured over
-one). Ghosts of movers go over one mirror or out and back over one each; legs over two are left out.
+one). Ghosts of movers go over one mirror or out and back over one each; path segments over two are left out.
 
 Parts of a material scatter as its surfaces do, and are plates besides (`movingplates`).
 """
@@ -81,23 +81,26 @@ class MovingTargets:
         return replace(self._own, position=self.positions(now)[0], normal=normal)
 
     def occluded(
-        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float, margin: float = 0.01,
-        parts: Int[np.ndarray, "some"] | None = None,
+        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float | Float[np.ndarray, "n"],
+        margin: float = 0.01, parts: Int[np.ndarray, "some"] | None = None,
     ) -> Bool[np.ndarray, "n"]:  # fmt: skip
-        """Whether a part, of some or of all, stands in a segment at time t, both ends shortened by `margin`, m."""
+        """Whether a part, of some or of all, stands in a segment at its time t, s; ends shortened by `margin`, m."""
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
-        hidden = np.zeros(len(origins), bool)
-        some = np.arange(len(self.parts)) if parts is None else parts
-        if len(some) and len(origins):
-            turn, center = self.poses(np.array([t]))
-            shape = self._half[some], self._capsule[some]
-            _hide(origins, targets, turn[0, some], center[0, some], *shape, margin, hidden)
+        hidden, some = np.zeros(len(origins), bool), np.arange(len(self.parts)) if parts is None else parts
+        if not len(some):
+            return hidden
+        times, which = np.unique(np.broadcast_to(t, len(origins)), return_inverse=True)
+        for k in range(len(times)):
+            (turn, center), now = self.poses(times[k : k + 1]), which == k
+            bodies = turn[0, some], center[0, some], self._half[some], self._capsule[some]
+            hidden[now] = _hidden(origins[now], targets[now], *bodies, margin)
         return hidden
 
 
 @njit(parallel=True, cache=True)
-def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
+def _hidden(origins, targets, turn, center, half, capsule, margin):
     """Whether segments, shortened at both ends, are anywhere inside a part."""
+    hidden = np.zeros(len(origins), np.bool_)
     for i in prange(len(origins)):
         way = targets[i] - origins[i]
         length = np.sqrt(np.dot(way, way))
@@ -109,3 +112,4 @@ def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
             if enters <= length - margin and leaves >= margin:
                 hidden[i] = True
                 break
+    return hidden

@@ -40,25 +40,19 @@ BESIDE = 1e-4
 
 
 class Patches(NamedTuple):
-    """Pieces of smooth surfaces, see `smooth.Piece`; corners and triangles are numbered through.
+    """Pieces of smooth surfaces.
 
     Attributes:
-        place, normal, curvature: by corner.
+        mesh: all of them as one; corners and triangles are numbered through.
         home: a triangle that a corner is of.
-        faces, across, border: by triangle and by side.
         begin: first corner, triangle and side of each piece, and of none.
         ball: centre and radius of a sphere around each, m.
         two_sided: sheets show both sides.
         layer: as of flat reflectors (`reflectors.Flat`).
     """
 
-    place: Float[np.ndarray, "corner 3"]
-    normal: Float[np.ndarray, "corner 3"]
-    curvature: Float[np.ndarray, "corner 6"]
+    mesh: Piece
     home: Int[np.ndarray, "corner"]
-    faces: Int[np.ndarray, "face 3"]
-    across: Int[np.ndarray, "face 3"]
-    border: Int[np.ndarray, "side 2"]
     begin: Int[np.ndarray, "piece+1 3"]
     ball: Float[np.ndarray, "piece 4"]
     two_sided: Bool[np.ndarray, "piece"]
@@ -68,24 +62,22 @@ class Patches(NamedTuple):
     def of(cls, rows: list[tuple[Piece, bool, Complex[np.ndarray, "5"]]]) -> "Patches":
         """All of some pieces, each with whether it shows both sides and how it reflects."""
         pieces = [row[0] for row in rows]
-        sizes = [(len(p.place), len(p.faces), len(p.border)) for p in pieces]
-        begin = np.cumsum([(0, 0, 0), *sizes], axis=0)
+        begin = np.cumsum([(0, 0, 0), *((len(p.place), len(p.faces), len(p.border)) for p in pieces)], axis=0)
+        place, corners = np.zeros((0, 3)), np.zeros((0, 3), int)
+        none = Piece(place, place, np.zeros((0, 6)), corners, corners, corners[:, :2])
+        numbered = [
+            p._replace(
+                faces=p.faces + corner, across=np.where(p.across < 0, -1, p.across + face), border=p.border + corner
+            )
+            for p, (corner, face, _) in zip(pieces, begin, strict=False)
+        ]
+        mesh = Piece(*(np.concatenate(column) for column in zip(none, *numbered, strict=True)))
         middle = [(p.place.min(axis=0) + p.place.max(axis=0)) / 2 for p in pieces]
         ball = [(*m, np.linalg.norm(p.place - m, axis=1).max()) for p, m in zip(pieces, middle, strict=True)]
-
-        def joined(name: str, width: int, of: int | None = None) -> np.ndarray:
-            """A column of all pieces; indices of corners (`of` 0) or triangles (1) become those of all."""
-            parts = [getattr(p, name) for p in pieces]
-            if of is not None:
-                parts = [np.where(part < 0, -1, part + first[of]) for part, first in zip(parts, begin, strict=False)]
-            return np.concatenate([np.zeros((0, width), float if of is None else int), *parts])
-
-        place, faces = joined("place", 3), joined("faces", 3, 0)
-        home = np.zeros(len(place), int)
-        home[faces] = np.arange(len(faces))[:, None]
+        home = np.zeros(len(mesh.place), int)
+        home[mesh.faces] = np.arange(len(mesh.faces))[:, None]
         return cls(
-            place, joined("normal", 3), joined("curvature", 6), home, faces, joined("across", 3, 1),
-            joined("border", 2, 0), begin, np.reshape(ball, (-1, 4)), np.array([row[1] for row in rows], bool),
+            mesh, home, begin, np.reshape(ball, (-1, 4)), np.array([row[1] for row in rows], bool),
             np.reshape([row[2] for row in rows], (-1, LAYER)).astype(complex),
         )  # fmt: skip
 
@@ -140,7 +132,7 @@ def strength(observation, patches, of, one, two):
     """
     k, turn = of
     face, weights, inside = _foot(patches, k, turn, one, two)
-    aim, quadric = _surface(patches, face, turn, weights)
+    aim, quadric = _surface(patches.mesh, face, turn, weights)
     place, way, hessian, plane = stationary(quadric, one, two)
     size = patches.ball[k, 3]
     if way > 2 * observation.range or grazes((place, quadric[2]), one, two, 0.05):
@@ -183,9 +175,9 @@ def _principal(tensor, one, two):
 
 
 @njit
-def _off(patches, corner, turn, one, two):
+def _off(mesh, corner, turn, one, two):
     """How the direction that halves the angle differs from the normal at a corner."""
-    place, normal = vec(patches.place[corner]), vec(patches.normal[corner])
+    place, normal = vec(mesh.place[corner]), vec(mesh.normal[corner])
     return along(unit(along(unit(minus(one, place)), 1.0, unit(minus(two, place)))), -turn, normal)
 
 
@@ -193,41 +185,41 @@ def _off(patches, corner, turn, one, two):
 def _foot(patches, k, turn, one, two):
     """The triangle of a piece, and the weights of its corners, where the normal best halves the angle, and whether it
     does: from the best of some corners on, across sides."""
-    nearest, best, begin, end = 9.0, 0, patches.begin[k, 0], patches.begin[k + 1, 0]
+    mesh, nearest, best, begin, end = patches.mesh, 9.0, 0, patches.begin[k, 0], patches.begin[k + 1, 0]
     for corner in range(begin, end, (end - begin) // STARTS + 1):
-        off = _off(patches, corner, turn, one, two)
+        off = _off(mesh, corner, turn, one, two)
         if dot(off, off) < nearest:
             nearest, best = dot(off, off), corner
     face, came = patches.home[best], -1
     holds, least, weights, circles = face, 9.0, (1.0, 0.0, 0.0), False
     for step in range(STEPS):
-        off, others, shares = _nearest(patches, face, turn, one, two)
+        off, others, shares = _nearest(mesh, face, turn, one, two)
         if off < least:
             least, weights, holds = off, others, face
         low, to = 0.0, -1
         for corner in range(3):  # across the side beyond which it is, most of all
-            if shares[corner] < low and patches.across[face, corner] >= 0:
-                low, to = shares[corner], patches.across[face, corner]
+            if shares[corner] < low and mesh.across[face, corner] >= 0:
+                low, to = shares[corner], mesh.across[face, corner]
         circles = to >= 0 and (to == came or step == STEPS - 1)
         if to < 0 or circles:
             break
         came, face = face, to
     if circles and least > 0:
         for face in range(patches.begin[k, 1], patches.begin[k + 1, 1]):
-            off, others, _ = _nearest(patches, face, turn, one, two)
+            off, others, _ = _nearest(mesh, face, turn, one, two)
             if off < least:
                 least, weights, holds = off, others, face
     return holds, weights, least < BESIDE
 
 
 @njit(cache=True)
-def _nearest(patches, face, turn, one, two):
+def _nearest(mesh, face, turn, one, two):
     """Where on a triangle the normal best halves the angle: the square of what it is off; weights of corners; and those
     where it would halve it if the triangle went on for ever."""
-    a, b, c = patches.faces[face]
-    m = unit(along(along(vec(patches.normal[a]), 1.0, vec(patches.normal[b])), 1.0, vec(patches.normal[c])))
+    a, b, c = mesh.faces[face]
+    m = unit(along(along(vec(mesh.normal[a]), 1.0, vec(mesh.normal[b])), 1.0, vec(mesh.normal[c])))
     wa, wb, wc = (
-        _off(patches, a, turn, one, two), _off(patches, b, turn, one, two), _off(patches, c, turn, one, two)
+        _off(mesh, a, turn, one, two), _off(mesh, b, turn, one, two), _off(mesh, c, turn, one, two)
     )  # fmt: skip
     seen = dot(wa, m) * turn > -1  # from behind, it is halved as well
     wa, wb, wc = along(wa, -dot(wa, m), m), along(wb, -dot(wb, m), m), along(wc, -dot(wc, m), m)
@@ -257,7 +249,7 @@ def _on_side(one, two):
 
 
 @njit(cache=True)
-def _surface(patches, face, turn, weights):
+def _surface(mesh, face, turn, weights):
     """A point of a triangle for rays to aim at, m, and the surface there, as `curved.stationary` takes it.
 
     The surface lies over the triangle as an arc lies over its chord: by (q - p_i) . n_i / (1 + n_i . n) from each
@@ -265,18 +257,18 @@ def _surface(patches, face, turn, weights):
     """
     q, n, middle = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for i in range(3):
-        corner = patches.faces[face, i]
-        q = along(q, weights[i], vec(patches.place[corner]))
-        n = along(n, turn * weights[i], vec(patches.normal[corner]))
-        middle = along(middle, 1 / 3, vec(patches.place[corner]))
+        corner = mesh.faces[face, i]
+        q = along(q, weights[i], vec(mesh.place[corner]))
+        n = along(n, turn * weights[i], vec(mesh.normal[corner]))
+        middle = along(middle, 1 / 3, vec(mesh.place[corner]))
     n = unit(n)
     one = unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.7 else (1.0, 0.0, 0.0)))
     two = cross(n, one)
     height, c11, c22, c12 = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        corner = patches.faces[face, i]
-        normal, c = vec(patches.normal[corner]), patches.curvature[corner]
-        over = dot(minus(q, vec(patches.place[corner])), normal) * turn
+        corner = mesh.faces[face, i]
+        normal, c = vec(mesh.normal[corner]), mesh.curvature[corner]
+        over = dot(minus(q, vec(mesh.place[corner])), normal) * turn
         height -= weights[i] * over / (1 + turn * dot(normal, n))
         rows, share = ((c[0], c[1], c[2]), (c[1], c[3], c[4]), (c[2], c[4], c[5])), turn * weights[i]
         on = dot(rows[0], one), dot(rows[1], one), dot(rows[2], one)
@@ -297,16 +289,16 @@ def _fresnel(patches, of, zones, way):
             or longest there; and whether it is inside, where no border is near.
         way: from where, to where, how long, and the wavelength, m.
     """
-    k, turn = of
+    (k, turn), mesh = of, patches.mesh
     total, nearest, left = 0j, FAR * FAR, 1.0 if zones[4] else -1.0
     for edge in range(patches.begin[k, 2], patches.begin[k + 1, 2]):
-        a, b = patches.border[edge]
+        a, b = mesh.border[edge]
         if turn < 0:
             a, b = b, a
-        if _hidden(patches, a, turn, way) and _hidden(patches, b, turn, way):
+        if _hidden(mesh, a, turn, way) and _hidden(mesh, b, turn, way):
             continue  # round the corner
-        x0, y0 = _units(vec(patches.place[a]), zones, way)
-        x1, y1 = _units(vec(patches.place[b]), zones, way)
+        x0, y0 = _units(vec(mesh.place[a]), zones, way)
+        x1, y1 = _units(vec(mesh.place[b]), zones, way)
         size = np.hypot(x1 - x0, y1 - y0)
         if size < 1e-12:
             continue
@@ -325,8 +317,8 @@ def _fresnel(patches, of, zones, way):
 
 
 @njit
-def _hidden(patches, corner, turn, way):
-    return turn * dot(minus(way[0], vec(patches.place[corner])), vec(patches.normal[corner])) < 0
+def _hidden(mesh, corner, turn, way):
+    return turn * dot(minus(way[0], vec(mesh.place[corner])), vec(mesh.normal[corner])) < 0
 
 
 @njit

@@ -26,7 +26,7 @@ from radarsim.motion.trajectory import Motion
 from radarsim.propagation.burst import BurstClock, parabola
 from radarsim.propagation.curved import SHAPE, facing_point, path_over
 from radarsim.propagation.fields import dot, length, minus, vec
-from radarsim.propagation.isometry import inverse
+from radarsim.propagation.isometry import image, inverse
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Passage
 from radarsim.propagation.table import Table
@@ -132,7 +132,7 @@ class Paths(Table):
         rows = self.kind == Kind.IMAGE
         there = self.images
         for end, isometry in enumerate((there, inverse(there))):
-            places[rows, end] = (position + isometry[..., :3] @ position + isometry[..., 3]) / 2
+            places[rows, end] = (position + image(isometry, position)) / 2
         for row in np.flatnonzero(self.kind == Kind.CURVED):
             places[row] = facing_point(self.geometry[row], tuple(position))
         return places
@@ -144,7 +144,7 @@ class Paths(Table):
         paths, passed, geometry = self[kept], passed[kept], self.geometry[kept].copy()
         rows, begin = paths.kind == Kind.IMAGE, observation.position[paths.frame]
         isometry = geometry[rows, :12].reshape(-1, 3, 4)
-        away = np.einsum("pij,pj->pi", isometry[:, :, :3], begin[rows]) + isometry[:, :, 3] - begin[rows]
+        away = image(isometry, begin[rows]) - begin[rows]
         isometry[:, :, 3] += (passed.delay[rows] / np.linalg.norm(away, axis=1))[:, None] * away
         geometry[rows, :12] = isometry.reshape(-1, 12)
         geometry[paths.kind == Kind.CURVED, SHAPE] = passed.delay[paths.kind == Kind.CURVED]

@@ -4,8 +4,8 @@ The physical-optics integral of a plate under a point source at height h over it
 
     I = int cos exp(2jk rho) / rho^2 dA = h int dphi int exp(2jk rho) / rho^2 drho,
 
-polar about the foot of the perpendicular, has an end at the foot, the wall's flash, and one along the outline. Over the
-echo of the endless plane, lambda / (8 pi h), it is to the leading order in 1 / (k rho)
+polar about the foot of the perpendicular, has an end at the foot, the specular point, and one along the outline. Over
+the echo of the endless plane, lambda / (8 pi h), it is to the leading order in 1 / (k rho)
 
     F = inside - h^2 / (2 pi) closed int exp(2jk (rho - h)) / rho^2 dphi,
 

@@ -65,7 +65,7 @@ class Reflectors:
         flat: quadrilaterals that cover its flat regions.
         round: its spheres and cylinders.
         smooth: pieces of its other curved surfaces.
-        inner: the inner faces of hollow bodies, which are seen through outer ones: they flash, but mirror nothing else.
+        inner: the inner faces of hollow bodies, seen through outer ones: they reflect, but mirror nothing else.
         heights: how uneven the flat ones are; None: not at all.
     """
 
@@ -76,17 +76,12 @@ class Reflectors:
     heights: Heights | None = None
 
     @cached_property
-    def _grids(self) -> tuple[Grid, Grid]:
-        outer, inner = (Grid(some.corners.min(axis=1), some.corners.max(axis=1)) for some in (self.flat, self.inner))
-        return outer, inner
+    def _grids(self) -> list[tuple[Flat, Grid]]:
+        return [(some, Grid(some.corners.min(axis=1), some.corners.max(axis=1))) for some in (self.flat, self.inner)]
 
-    def near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> Flat:
-        """Flat ones within a distance (m) of any of the positions, in the same order."""
-        return self.flat[self._grids[0].near(positions, distance)[0]]
-
-    def inner_near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> Flat:
-        """The same of inner faces."""
-        return self.inner[self._grids[1].near(positions, distance)[0]] if len(self.inner) else self.inner
+    def near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> list[Flat]:
+        """Flat ones, and inner faces, within a distance (m) of any of the positions, in the same order."""
+        return [some[grid.near(positions, distance)[0]] for some, grid in self._grids]
 
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig, heights: Heights | None = None) -> "Reflectors":

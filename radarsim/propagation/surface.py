@@ -102,7 +102,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Cluttered:
-    """A surface and the small things on it, as one set of scatterers."""
+    """A surface and the small objects on it, as one set of scatterers."""
 
     surface: Surface
     clutter: Clutter

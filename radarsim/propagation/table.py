@@ -20,7 +20,7 @@ class Table:
     SHARED: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls):
-        # numba tells named tuples by their names alone
+        # numba tells named tuples apart by their names alone
         columns = [name for name in cls.__annotations__ if name not in cls.SHARED]
         cls.Columns = namedtuple(f"{cls.__name__}Columns", columns)
         cls.Columns.__module__, cls.Columns.__qualname__ = cls.__module__, f"{cls.__qualname__}.Columns"

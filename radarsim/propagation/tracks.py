@@ -26,8 +26,7 @@ def followed(view: View, config: RadarConfig, paths: Paths) -> Paths:
     own, points = _own(view, config, some[point]), some.points
     for end in range(2):
         mirrors = some.mirrors[point, 2 * end : 2 * end + 2]
-        places = points[:, None, end] + movingplates.moved(flat, points[:, end], own, mirrors, moves)
-        found[point, :, 3 * end : 3 * end + 3] = places
+        found[point, :, 3 * end : 3 * end + 3] = movingplates.moved(flat, points[:, end], own, mirrors, moves)
     turned = movingplates.turned(flat, some.images, some.mirrors[image, :3], moves)
     found[image, :, :12] = turned.reshape(len(turned), 3, 12)
     return replace(paths, moving=moving, track=track, tracks=found)

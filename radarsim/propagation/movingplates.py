@@ -13,7 +13,6 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.burst import NODES, BurstClock
-from radarsim.propagation.isometry import after, image, inverse
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat, Reflectors
@@ -102,66 +101,3 @@ def _placed(flat: Flat, turn: Float[np.ndarray, "3 3"], center: Float[np.ndarray
         normal=flat.normal @ turn.T, u=flat.u @ turn.T, v=flat.v @ turn.T, plate=np.full(n, plate),
         frame=np.full(n, frame),
     )  # fmt: skip
-
-
-def carried(flat: Flat, mirrors: Int[np.ndarray, "n mirror"]) -> Bool[np.ndarray, "n"]:
-    """Whether any of the mirrors (-1: none) of some paths moves."""
-    return (np.append(flat.plate, -1)[mirrors] >= 0).any(axis=1)
-
-
-def isometries(
-    flat: Flat, mirrors: Int[np.ndarray, "n mirror"], moves: Float[np.ndarray, "frame plate 4 3 4"]
-) -> Float[np.ndarray, "n 4 3 4"]:
-    """Products of the reflections in some mirrors (-1: none) at a burst's nodes and in its middle.
-
-    Args:
-        flat: all mirrors.
-        mirrors: in order from the sensor on.
-        moves: as `MovingPlates.moves` has them.
-    """
-    out = np.zeros((len(mirrors), 4, 3, 4))
-    out[..., :3] = np.eye(3)
-    for column in mirrors.T[::-1]:
-        rows = np.flatnonzero(column >= 0)
-        m = column[rows]
-        rigid = moves[flat.frame[m], flat.plate[m]]
-        normal = np.einsum("ntij,nj->nti", rigid[..., :3], flat.normal[m])
-        center = image(rigid, flat.center[m, None])
-        along = np.einsum("nti,ntij->ntj", normal, out[rows])
-        along[..., 3] -= np.einsum("nti,nti->nt", normal, center)
-        out[rows] -= 2 * normal[..., None] * along[..., None, :]
-    return out
-
-
-def moved(
-    flat: Flat, place: Float[np.ndarray, "n 3"], own: Float[np.ndarray, "n 3 3"], mirrors: Int[np.ndarray, "n mirror"],
-    moves: Float[np.ndarray, "frame plate 4 3 4"],
-) -> Float[np.ndarray, "n 3 3"]:  # fmt: skip
-    """Virtual points at a burst's nodes, m.
-
-    Args:
-        flat, mirrors, moves: as `isometries` has them.
-        place: of the points in the middle, m.
-        own: how far what is seen there has moved itself, by node, m.
-    """
-    chain = isometries(flat, mirrors, moves)
-    return image(chain[:, :3], image(inverse(chain[:, 3]), place)[:, None] + own)
-
-
-def turned(
-    flat: Flat, image: Float[np.ndarray, "n 3 4"], mirrors: Int[np.ndarray, "n mirror"],
-    moves: Float[np.ndarray, "frame plate 4 3 4"],
-) -> Float[np.ndarray, "n 3 3 4"]:  # fmt: skip
-    """Images of the receiver at a burst's nodes.
-
-    Args:
-        flat, moves: as `isometries` has them.
-        image: in the middle of the burst.
-        mirrors: one that it is a part of: specular point, edge or corner; or several that it is seen in.
-    """
-    first = mirrors[:, 0]
-    rigid = moves[flat.frame[first], flat.plate[first]][:, :3]
-    part = after(after(rigid, image[:, None]), inverse(rigid))
-    chain = isometries(flat, mirrors, moves)
-    chain = after(after(chain[:, :3], inverse(chain[:, 3:])), image[:, None])
-    return np.where((mirrors[:, 1] < 0)[:, None, None, None], part, chain)

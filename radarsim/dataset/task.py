@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from radarize import __version__
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.radar.presets import load_config
 from radarize.recording import Recording
 from radarsim.dataset import physics
@@ -99,23 +100,25 @@ class Task:
         Raises:
             Stale: it is, but was made with other parameters, or is no recording of a data set.
         """
-        path = self.path(folder)
-        if not path.is_file():
-            return False
+        return self._lacking(folder) == []
+
+    def _lacking(self, folder: Path) -> list[str] | None:
+        """Sensors that the recording has yet to get; None where there is no whole one. Raises as `is_finished`."""
         try:
-            with Recording(path) as recording:
-                frames, made = len(recording), recording.attributes.get(ATTRIBUTE)
+            with Recording(self.path(folder)) as recording:
+                frames, text = len(recording), recording.attributes.get(ATTRIBUTE)
         except InputError:
-            return False  # cut short or damaged
-        if made is None:
+            return None  # not there, cut short or damaged
+        if text is None:
             raise Stale(f"{self.name} does not come from a data set")
-        made, complete = json.loads(str(made)), True
-        for key, wanted in json.loads(self.identity).items():
-            if key == "sensors" and set(made.get(key)) < set(wanted):
-                complete = False
-            elif made.get(key) != wanted:
-                raise Stale(f"{self.name} has {key} {_short(made.get(key))}, now {_short(wanted)}")
-        return complete and frames == self.frames
+        made, wanted = json.loads(str(text)), json.loads(self.identity)
+        lacking = [name for name in self.sensors if name not in made["sensors"]]
+        if set(made["sensors"]) < set(self.sensors):
+            made["sensors"] = wanted["sensors"]
+        for key, value in wanted.items():
+            if made.get(key) != value:
+                raise Stale(f"{self.name} has {key} {_short(made.get(key))}, now {_short(value)}")
+        return lacking if frames == self.frames else None
 
     def make(self, folder: Path, progress: Callable[[int, int], None] | None = None) -> str:
         """Simulate the recording, or what it lacks of sensors beside the radar; it appears under its name when it is
@@ -139,7 +142,9 @@ class Task:
         from radarsim.recording.simulate import record
 
         share_with_drjit()
-        final, late = self.path(folder), self._late(folder)
+        final, late = self.path(folder), None
+        with suppress(Stale):
+            late = self._lacking(folder)
         about = {"platform": self.platform, **self.attributes, ATTRIBUTE: self.identity}
         try:
             scenario, cfg_text = self._scenario()
@@ -179,17 +184,6 @@ class Task:
         scene = crowded(scene, motion, self.people, self.seed)
         return Scenario(scene, motion, config, front_end, self.seed, self.sensors), cfg_text
 
-    def _late(self, folder: Path) -> list[str]:
-        """Sensors that a recording of this task, otherwise finished, has yet to get."""
-        try:
-            if not self.path(folder).is_file() or self.is_finished(folder):
-                return []
-            with Recording(self.path(folder)) as recording:
-                made = json.loads(str(recording.attributes[ATTRIBUTE]))["sensors"]
-                return [name for name in self.sensors if name not in made] if len(recording) == self.frames else []
-        except InputError:
-            return []
-
     def clear(self, folder: Path) -> None:
         """Remove what is left of making the recording, by this run or by one that was killed."""
         path = self.path(folder)
@@ -215,10 +209,8 @@ def content(scene: dict | str) -> dict[str, object] | None:
 
 
 def _digest(path: Path) -> str:
-    try:
+    with explained(f"{path}: cannot be read", OSError):
         return sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
 
 
 def _short(value: object) -> str:

@@ -1,10 +1,8 @@
 """How many echoes there are and how strong, by cause, and the I/Q split by cause."""
 
 import numpy as np
-from jaxtyping import Complex, Float, UInt8
 
 from radarize.recording import Stream
-from radarsim.machine.threads import one_blas_thread
 from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
@@ -43,17 +41,11 @@ class AdcByCause(Sensor):
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The parts."""
         others = [frames.interference] if self.scenario.scene.interferers else []
-        each = zip(frames.lengths, frames.received, frames.types, *others, strict=True)
-        parts = np.stack([self._split(*one) for one in each])
+        found = []
+        for lengths, amplitudes, types, *signals in zip(
+            frames.lengths, frames.received, frames.types, *others, strict=True
+        ):
+            echoes = [self.scenario.synthesize(lengths[types == each], amplitudes[types == each]) for each in PathType]
+            found.append(np.stack(self.scenario.board.by_cause([*echoes, *signals])))
+        parts = np.stack(found)
         return {"truth/adc_by_cause": np.stack([parts.real, parts.imag], axis=-1).astype(np.float32)}
-
-    @one_blas_thread
-    def _split(
-        self, lengths: Float[np.ndarray, "path virtual 3"], amplitudes: Complex[np.ndarray, "path"],
-        types: UInt8[np.ndarray, "path"],
-        *others: Complex[np.ndarray, "loop tx rx sample"],
-    ) -> Complex[np.ndarray, "cause loop tx rx sample"]:  # fmt: skip
-        """Counts of each cause in a frame, and of signals that are no echoes."""
-        masks = [types == each for each in PathType]
-        signals = [self.scenario.synthesize(lengths[mask], amplitudes[mask]) for mask in masks]
-        return np.stack(self.scenario.board.by_cause([*signals, *others]))

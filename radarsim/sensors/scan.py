@@ -29,12 +29,17 @@ class Cell(IntEnum):
     UNKNOWN = 2  #: behind it
 
 
+def headings(motion: Motion, times: Float[np.ndarray, "frame"]) -> Float[np.ndarray, "frame"]:
+    """Directions in which the boresight points on the plan, rad."""
+    forward = turned(motion.rotation(times), (1.0, 0.0, 0.0))
+    return np.arctan2(forward[:, 1], forward[:, 0])
+
+
 def level_rays(
     motion: Motion, times: Float[np.ndarray, "frame"], azimuths: Float[np.ndarray, "ray"]
 ) -> tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame ray 3"]]:
     """Origins and horizontal unit directions of rays at bearings against the boresight's on the plan."""
-    forward = turned(motion.rotation(times), (1.0, 0.0, 0.0))
-    bearing = np.arctan2(forward[:, 1], forward[:, 0])[:, None] + azimuths
+    bearing = headings(motion, times)[:, None] + azimuths
     return motion.position(times), np.stack([np.cos(bearing), np.sin(bearing), np.zeros_like(bearing)], axis=-1)
 
 

@@ -2,10 +2,11 @@
 
 import json
 from collections.abc import Callable
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
-import plotly.graph_objects as go
+from plotly.colors import qualitative
 from plotly.subplots import make_subplots
 
 from radarize.heatmaps import Heatmaps
@@ -14,6 +15,7 @@ from radarize.recording import Recording
 from radarize.replacing import write_whole
 from radarize.report.drawings import canvas, draw_doppler, draw_fan, draw_profiles, draw_scan
 from radarize.report.page import COLORS, INK, Page
+from radarize.report.plots import line, panels
 from radarsim.twin.comparison import FIGURES, Comparison, compare
 
 #: Range profiles over time: a picture has no room for more.
@@ -159,12 +161,9 @@ def _profiles(page: Page, found: Comparison) -> None:
             draw_profiles(axis, found.times[shown], found.ranges, power[shown])
             axis.set_title(who)
         page.picture(figure, "Range profiles over time")
-    figure = go.Figure()
+    figure = panels("mean level, dB re 1 count²", x="range, m")
     for (who, color), power in zip(_WHO, found.profiles.swapaxes(0, 1), strict=False):
-        level = 10 * np.log10(np.maximum(power, 1e-9)).mean(axis=0)
-        figure.add_scatter(x=found.ranges.round(4).tolist(), y=level.round(2).tolist(), name=who, line={"color": color})
-    figure.update_xaxes(title="range, m")
-    figure.update_yaxes(title="mean level, dB re 1 count²")
+        line(figure, (found.ranges, 10 * np.log10(np.maximum(power, 1e-9)).mean(axis=0)), who, color)
     page.plot(figure, height=340)
 
 
@@ -204,16 +203,10 @@ def _reach(found: Comparison) -> float:
 
 def _velocities(page: Page, found: Comparison) -> None:
     page.section("Velocity", "From single frames, by Doppler least squares.")
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
-    for column, label in enumerate(("forward, m/s", "left, m/s")):
-        for k, (who, color) in enumerate(_WHO):
-            y = [None if np.isnan(v) else v for v in found.velocity[:, k, column].round(4).tolist()]
-            figure.add_scatter(
-                x=found.times.round(3).tolist(), y=y, name=who, legendgroup=who, showlegend=column == 0,
-                line={"color": color, "width": 1.3}, row=1 + column, col=1,
-            )  # fmt: skip
-        figure.update_yaxes(title=label, row=1 + column, col=1)
-    figure.update_xaxes(title="time, s", row=2, col=1)
+    figure = panels("forward, m/s", "left, m/s")
+    for k, (who, color) in enumerate(_WHO):
+        for axis in range(2):
+            line(figure, (found.times, found.velocity[:, k, axis]), who, color, 1.3, row=axis + 1)
     page.plot(figure, height=420)
 
 
@@ -222,13 +215,9 @@ def _over_time(page: Page, found: Comparison) -> None:
     if len(found.times) < 2 or not shown:
         return
     page.section("Figures over time", "Click a name to show or hide it.")
-    figure = go.Figure()
+    figure = panels("")
     default = ("correlation_range_azimuth", "correlation_doppler_azimuth", "profile_correlation")
-    for name in shown:
-        y = [None if np.isnan(v) else v for v in found.figures[name].round(4).tolist()]
-        figure.add_scatter(
-            x=found.times.round(3).tolist(), y=y, name=name.replace("_", " "), line={"width": 1.2},
-            visible=True if name in default else "legendonly",
-        )  # fmt: skip
-    figure.update_xaxes(title="time, s")
+    for name, color in zip(shown, cycle(qualitative.Plotly)):
+        visible = True if name in default else "legendonly"
+        line(figure, (found.times, found.figures[name]), name.replace("_", " "), color, 1.2, visible=visible)
     page.plot(figure, height=420)

@@ -42,7 +42,7 @@ def simulate(
     duration: Annotated[
         float | None, typer.Option(min=0.0, help="Length, s; else 40 of a tour, all of a trajectory or way-points.")
     ] = None,
-    people: Annotated[int, typer.Option(min=0, max=50, help="Who walk about near the radar's way.")] = 0,
+    people: Annotated[int, typer.Option(min=0, max=50, help="Pedestrians near the radar's path.")] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
     frontend: Annotated[
@@ -129,7 +129,7 @@ def twin(
     calibrate: Annotated[
         bool, typer.Option("--calibrate", help="Fit the front end to the recording first; kept beside, as .yaml.")
     ] = False,
-    every: Annotated[int, typer.Option(min=1, help="Simulate every so manieth frame.")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="Simulate every N-th frame.")] = 1,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Of the recording, s; else all of it.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of speckle and noise.")] = 0,
 ) -> None:
@@ -155,7 +155,7 @@ def twin(
 
 @scene_app.command()
 def info(scene: SceneName) -> None:
-    """Say what SCENE is made of."""
+    """Print extent, objects and materials of SCENE."""
     from radarsim.world.scene import Scene
 
     with working("loading the scene"):
@@ -320,7 +320,7 @@ def emulate(
 def doctor(
     report: Annotated[bool, typer.Option("--report", help="Print text for a bug report instead.")] = False,
 ) -> None:
-    """Say what is missing on this machine and how to get it."""
+    """List what is missing on this machine and how to get it."""
     from radarsim.doctor import describe, examine
 
     if report:

@@ -68,7 +68,7 @@ class Recordings(Frozen):
         count: recordings per platform.
         duration: s, each.
         waypoints: to go through instead of a tour, m.
-        people: who walk about near the radar's way in each.
+        people: pedestrians near the radar's path in each.
         variants: some of `Specification.variants`; all if none is named.
         attributes: of the recordings.
     """

@@ -48,7 +48,7 @@ class Task:
         content: of the scene's file, see `content`; None: it has none.
         variant: what differs from other recordings of the same walk.
         attributes: of the recording.
-        people: who walk about near the radar's way.
+        people: pedestrians near the radar's path.
     """
 
     name: str
@@ -169,20 +169,19 @@ class Task:
 
     def _scenario(self):
         """The `Scenario` to record, and the radar's original configuration text."""
-        from radarsim.motion.pedestrians import crowded
-        from radarsim.motion.walk import Walk
-        from radarsim.scenario import Scenario
+        from radarsim.recording.simulate import planned
         from radarsim.world.scene import Scene
 
         scene = Scene.load(self.scene) if isinstance(self.scene, str) else Scene.of(self.scene, self._place)
         mild = Scene.load(split_level(self.scene)[0]) if self.variant.level else scene
-        places = None if self.waypoints is None else np.array(self.waypoints)
-        walk = Walk(self.platform, self.duration, waypoints=places, mounting=self.variant.mounted)
-        config, cfg_text = load_config(self.variant.radar_of(self.radar))
-        front_end = self.variant.frontend_of(self.frontend, config.board)
-        motion = walk.through(mild, self.seed)
-        scene = crowded(scene, motion, self.people, self.seed)
-        return Scenario(scene, motion, config, front_end, self.seed, self.sensors), cfg_text
+        radar = self.variant.radar_of(self.radar)
+        scenario, cfg_text, _ = planned(
+            scene, walk_in=mild, seed=self.seed, radar=radar, sensors=self.sensors, people=self.people,
+            frontend=self.variant.frontend_of(self.frontend, load_config(radar)[0].board),
+            platform=self.platform, duration=self.duration, mounting=self.variant.mounted,
+            waypoints=None if self.waypoints is None else np.array(self.waypoints),
+        )  # fmt: skip
+        return scenario, cfg_text
 
     def clear(self, folder: Path) -> None:
         """Remove what is left of making the recording, by this run or by one that was killed."""

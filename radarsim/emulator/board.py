@@ -34,7 +34,7 @@ class Board:
     Args:
         link: data side.
         reset_radar: reboots the radar on the board.
-        say: tells the user what happened.
+        say: shows the user a line.
     """
 
     def __init__(self, link: Link, reset_radar: Callable[[], None], say: Callable[[str], None]):
@@ -99,7 +99,7 @@ class BoardSockets:
     Args:
         at: requests are taken at its `board` and `command_port`; packets go to its `computer` and `data_port`, replies
             to its `command_port`.
-        say: tells the user what happened.
+        say: shows the user a line.
 
     Raises:
         InputError: the address is in use, or not one of this machine.

@@ -1,4 +1,4 @@
-"""How many echoes there are and how strong, by cause, and the I/Q split by cause."""
+"""Number and power of the echoes of each path type, and the I/Q split by path type."""
 
 import numpy as np
 
@@ -7,17 +7,18 @@ from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 
-_NAMES = ", ".join(p.name.lower() for p in PathType)
-#: Parts of /truth/adc_by_cause, in this order; where other radars send, interference comes before the leakage.
-CAUSES = (*(p.name.lower() for p in PathType), "leakage")
+#: Path types in the order of their numbers.
+TYPES = tuple(p.name.lower() for p in PathType)
+#: Parts of /truth/adc_by_cause, in this order; with other radars in the scene, interference stands before leakage.
+CAUSES = (*TYPES, "leakage")
 
 
 class CauseCounts(Sensor):
-    """Number and total power of the echoes of each cause."""
+    """Number and total power of the echoes of each path type."""
 
     streams = {
-        "truth/echoes": Stream((len(PathType),), "i4", "", f"echoes per cause: {_NAMES}"),
-        "truth/echo_power": Stream((len(PathType),), "f4", "1", f"received over transmitted power: {_NAMES}"),
+        "truth/echoes": Stream((len(TYPES),), "i4", "", f"echoes per cause: {', '.join(TYPES)}"),
+        "truth/echo_power": Stream((len(TYPES),), "f4", "1", f"received over transmitted power: {', '.join(TYPES)}"),
     }
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
@@ -29,7 +30,7 @@ class CauseCounts(Sensor):
 
 
 class AdcByCause(Sensor):
-    """I/Q of each cause before noise and converter, of which a part may exceed what either that or a float16 holds."""
+    """I/Q of each path type before noise and converter; parts may exceed what the converter and a float16 hold."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)

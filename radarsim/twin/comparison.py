@@ -1,4 +1,4 @@
-"""How alike a recording and its twin are, frame by frame: the same radar on the same walk, in the real place and in a
+"""Comparison of a recording with its twin, frame by frame: the same radar on the same walk, in the real place and in a
 model of it (`radarsim twin`).
 
 Maps are those that networks see (`radarize.features.maps`), in dB over their own median, so that the receiver's gain,
@@ -43,11 +43,11 @@ FIGURES = {
 SHIFTS = {"time": 1.5, "azimuth": np.radians(18.0), "range": 0.5}
 #: Frames that shifts are tried on, spread over the recording.
 _TRIED = 200
-#: A shift is told if maps correlate so much better with it, at least so well, and in so many frames.
+#: A shift is reported from this gain in correlation, this correlation and this number of frames on.
 BETTER, WELL, FEWEST = 0.05, 0.3, 5
 #: s by which stamps of the same frame may differ.
 _SAME = 1e-4
-#: Loops that noise and velocity are told from, at least.
+#: Fewest loops of which noise and velocity are estimated.
 _LOOPS = 8
 _BATCH = 16
 
@@ -105,7 +105,7 @@ class Comparison:
 
     @property
     def noise_counts(self) -> Float[np.ndarray, "2"]:
-        """Noise of recording and twin, counts; NaN where it cannot be told."""
+        """Noise of recording and twin, counts; NaN where it is unknown."""
         known = self.noise[np.isfinite(self.noise).all(axis=1)]
         return np.sqrt(np.median(known, axis=0)) if len(known) else np.full(2, np.nan)
 
@@ -200,7 +200,7 @@ def _pairs(one: Recording, other: Recording) -> Int[np.ndarray, "frame 2"]:
 
 
 class _Analysis:
-    """What is compared of frames: range profile, noise, and, of more than one antenna, maps, velocity and scan."""
+    """Compared quantities of frames: range profile, noise, and, with several antennas, maps, velocity and scan."""
 
     def __init__(self, config: RadarConfig):
         self.config, self._signal = config, Signal(config)

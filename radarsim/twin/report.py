@@ -21,7 +21,12 @@ from radarsim.twin.comparison import FIGURES, Comparison, compare
 #: Range profiles over time: a picture has no room for more.
 _PROFILES = 400
 _WHO = (("recording", COLORS["slam"]), ("twin", COLORS["odometry"]), ("poses", COLORS["truth"]))
-_SHIFTED = {"time": ("s", 1.0), "azimuth": ("deg", 180 / np.pi), "range": ("m", 1.0)}
+#: Unit, factor to it, and probable reason of a shift.
+_SHIFTED = {
+    "time": ("s", 1.0, "the clocks of poses and radar differ"),
+    "azimuth": ("deg", 180 / np.pi, "the poses' heading, the mounting or the scene is turned"),
+    "range": ("m", 1.0, "the radar's range bias, a lever arm or the scene's size is off"),
+}
 
 
 def report_twin(
@@ -87,21 +92,16 @@ def _headline(figures: dict) -> list[tuple[str, str]]:
 
 def _doubts(found: Comparison, warnings: str) -> list[str]:
     """Sentences on what may make the comparison meaningless."""
-    told = [warnings[0].upper() + warnings[1:] + "."] if warnings else []
+    doubts = [warnings[0].upper() + warnings[1:] + "."] if warnings else []
     for name, (shift, gain) in found.misfits().items():
-        unit, factor = _SHIFTED[name]
-        cause = {
-            "time": "the clocks of poses and radar differ",
-            "azimuth": "the poses' heading, the mounting or the scene is turned",
-            "range": "the radar's range bias, a lever arm or the scene's size is off",
-        }[name]
-        told.append(
+        unit, factor, reason = _SHIFTED[name]
+        doubts.append(
             f"Maps correlate by {gain:.2f} better with the twin shifted by {factor * shift:+.3g} {unit} in {name}: "
-            f"probably {cause}."
+            f"probably {reason}."
         )
     if not len(found.scans):
-        told.append("A single virtual antenna tells no direction: no maps, velocities or scans to compare.")
-    return told
+        doubts.append("A single virtual antenna gives no direction: no maps, velocities or scans to compare.")
+    return doubts
 
 
 def _table(page: Page, summary: dict) -> None:
@@ -143,7 +143,7 @@ def _alignment(page: Page, found: Comparison) -> None:
     )
     figure = make_subplots(rows=1, cols=len(found.alignment))
     for column, (name, (shifts, values)) in enumerate(found.alignment.items(), 1):
-        unit, factor = _SHIFTED[name]
+        unit, factor, _ = _SHIFTED[name]
         x, y = np.round(factor * shifts, 4).tolist(), np.round(values, 4).tolist()
         figure.add_scatter(x=x, y=y, line={"color": COLORS["slam"]}, showlegend=False, row=1, col=column)
         figure.add_vline(x=0, line={"color": INK, "dash": "dot", "width": 1}, row=1, col=column)

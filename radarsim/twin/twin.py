@@ -1,8 +1,7 @@
-"""The twin of a recording: what the simulator makes of the same walk, in a model of the same place.
+"""The twin of a recording: the same walk, simulated in a model of the same place.
 
-Frame by frame the twin has the recording's stamps, lost chirps, radar configuration and poses; what it has of its own
-is the world: surfaces of the scene in place of the real ones, and other speckle and noise. `radarsim.twin.comparison`
-tells how alike the two are.
+Each frame of the twin has the recording's stamp, lost chirps, radar configuration and pose. The world differs: surfaces
+of the scene in place of the real ones, other speckle and other noise. `radarsim.twin.comparison` compares the two.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,7 +26,7 @@ from radarsim.scenario import Scenario
 from radarsim.sensors.suite import chosen
 from radarsim.world.scene import Scene
 
-#: s between two poses: over a longer gap nobody knows where the radar was, and frames there have no twin.
+#: Longest time between two poses, s; frames in a longer gap have no twin.
 GAP = 0.5
 
 
@@ -42,7 +41,7 @@ class Options:
         frontend: front-end file (see `FrontEndConfig`); default: the board's, with channels that the recording's
             channel calibration makes equal.
         fit: fit the front end to the recording instead (`calibrate`), and keep it beside the output as ``.yaml``.
-        every: simulate every so manieth frame.
+        every: simulate every N-th frame.
         duration: s of the recording, from its first frame; default: all of it.
         seed: of speckle, noise and whatever differs from board to board.
         sensors: see `simulate`.

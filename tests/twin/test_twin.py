@@ -250,6 +250,7 @@ def test_what_is_missing_is_said_in_a_sentence(real, tmp_path):
     assert "lie outside scene place (-2.5...2.5" in refused(origin=Mounting.of((50, 0, 0), (0, 0, 0)))
     assert "expected one of the two" in refused(frontend=tmp_path / "board.yaml", fit=True)
     assert "every is 0" in refused(every=0)
+    assert "duration is 0 s, expected more than 0" in refused(duration=0.0)
 
     def other_clock(poses, file):
         file["truth/time"][:] += 1e6

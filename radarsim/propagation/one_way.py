@@ -39,7 +39,7 @@ class OneWay(Table):
     @property
     def bounces(self) -> Int[np.ndarray, "path"]:
         """Number of mirrors, 0 to 2."""
-        return (self.mirrors >= 0).sum(axis=1)
+        return (self.mirrors[:, 0] >= 0) + (self.mirrors[:, 1] >= 0).astype(int)
 
     @classmethod
     def straight(

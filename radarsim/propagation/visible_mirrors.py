@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from numba import njit, prange
 
 from radarsim.propagation.apertures import outlines
@@ -62,7 +62,9 @@ def couples(
 def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[Int[np.ndarray, "n"]]:
     """Per frame, the reflectors in range that turn a face to the radar and of which something can be seen: slabs are
     clear, here, what stands behind too many of them costs less than rays that count them."""
-    index = [_turned(flat, observation, frame) for frame in range(observation.frames)]
+    turned = np.zeros((observation.frames, len(flat)), np.bool_)
+    _turned(flat.columns, observation, turned)
+    index = [np.flatnonzero(some) for some in turned]
     opaque = None if obstacles.transmission is None else obstacles.transmission.opaque
     if opaque is None:
         return index
@@ -76,16 +78,25 @@ def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[In
     return [every[(frame == k) & found] for k in range(observation.frames)]
 
 
-def _turned(flat: Flat, observation: Observation, frame: int) -> Int[np.ndarray, "n"]:
-    """Those of a frame with a part within range and in front that turn their face to the radar."""
-    position, forward = observation.position[frame], observation.rotation[frame, :, 0]
-    height = np.einsum("md,md->m", position - flat.center, flat.normal)
-    axes = np.stack([flat.u, flat.v], axis=1)
-    at = np.einsum("mkd,mad->mka", flat.corners - position, axes)
-    away = np.linalg.norm(np.maximum(np.maximum(at.min(axis=1), -at.max(axis=1)), 0), axis=1)
-    faced = (np.abs(height) > 0.01) & (flat.two_sided | (height > 0))
-    ahead = (flat.corners @ forward).max(axis=1) > position @ forward
-    return np.flatnonzero(faced & ahead & (np.hypot(height, away) < observation.range) & flat.present(frame))
+@njit(parallel=True, cache=True)
+def _turned(flat, observation, found):
+    """Which reflectors of each frame have a part within range and in front, and turn their face to the radar."""
+    for frame in prange(len(observation.position)):
+        p, rotation = vec(observation.position[frame]), observation.rotation[frame]
+        forward = rotation[0, 0], rotation[1, 0], rotation[2, 0]
+        for m in range(len(flat.center)):
+            height = dot(minus(p, vec(flat.center[m])), vec(flat.normal[m]))
+            if abs(height) <= 0.01 or (height < 0 and not flat.two_sided[m]) or 0 <= flat.frame[m] != frame:
+                continue
+            u, v, ahead = vec(flat.u[m]), vec(flat.v[m]), -np.inf
+            low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
+            for k in range(4):
+                way = minus(vec(flat.corners[m, k]), p)
+                x, y, ahead = dot(way, u), dot(way, v), max(ahead, dot(way, forward))
+                low_u, high_u, low_v, high_v = min(low_u, x), max(high_u, x), min(low_v, y), max(high_v, y)
+            aside, above = max(low_u, -high_u, 0.0), max(low_v, -high_v, 0.0)
+            square = height * height + aside * aside + above * above
+            found[frame, m] = ahead > 0 and square < observation.range**2
 
 
 def _spread(
@@ -107,9 +118,22 @@ def _spread(
 @njit(parallel=True, cache=True)
 def _couple(flat, observation, frame, firsts, found):
     """Which reflectors (columns) can follow the first ones (rows)."""
-    radius, edges = _radius(flat.corners, flat.center), outlines(flat)
+    edges = outlines(flat)
+    balls = _Balls(flat.center.T.copy(), flat.normal.T.copy(), _radius(flat.corners, flat.center), flat.two_sided)
     for i in prange(len(firsts)):
-        _follow(flat, radius, observation, frame, firsts[i], edges[firsts[i]], found[i])
+        _before(flat, balls, observation, frame, firsts[i], found[i])
+        for b in range(len(found[i])):
+            if found[i, b]:
+                found[i, b] = _overlap(flat, vec(observation.position[frame]), firsts[i], edges[firsts[i]], b)
+
+
+class _Balls(NamedTuple):
+    """Balls around reflectors, by coordinate."""
+
+    center: Float[np.ndarray, "3 mirror"]
+    normal: Float[np.ndarray, "3 mirror"]
+    radius: Float[np.ndarray, "mirror"]
+    two_sided: Bool[np.ndarray, "mirror"]
 
 
 @njit(cache=True)
@@ -122,50 +146,65 @@ def _radius(corners, center):
     return out
 
 
-@njit(cache=True)
-def _follow(flat, radius, observation, frame, a, window, found):
-    """Either must stand before the other, and seen from the radar's image in the first, the second must overlap it, as
-    a window."""
-    p, ca, na = vec(observation.position[frame]), vec(flat.center[a]), vec(flat.normal[a])
-    ua, va = vec(flat.u[a]), vec(flat.v[a])
-    height = dot(minus(p, ca), na)
-    image = along(p, -2 * height, na)
-    side = 1.0 if height > 0 else -1.0
-    height = abs(height)
-    for b in range(len(radius)):
-        if b == a:
-            continue
-        cb = vec(flat.center[b])
-        way = minus(cb, image)
-        if side * dot(minus(cb, ca), na) < -radius[b]:
-            continue
-        facing = dot(way, vec(flat.normal[b]))
-        if facing > -0.01 and (facing < 0.01 or not flat.two_sided[b]):
-            continue
-        if length(way) + length(minus(cb, p)) - 2 * radius[b] > 2 * observation.range:
-            continue
-        nb, highest, farthest = vec(flat.normal[b]), -1e9, -1e9
-        for k in range(4):
-            highest = max(highest, side * dot(minus(vec(flat.corners[b, k]), ca), na))
-            over = dot(minus(vec(flat.corners[a, k]), cb), nb)
-            farthest = max(farthest, over if facing < 0 else -over)
-        if highest < BEFORE or farthest < BEFORE:
-            continue
-        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9
-        for k in range(4):
-            corner, after = vec(flat.corners[b, k]), vec(flat.corners[b, (k + 1) % 4])
-            up, then = side * dot(minus(corner, ca), na), side * dot(minus(after, ca), na)
-            for end in range(2):
-                # a corner before the first, and where an edge passes through its plane
-                if end == 0 and up >= 0:
-                    at = along(image, height / (height + up), minus(corner, image))
-                elif end == 1 and up * then < 0:
-                    at = along(corner, up / (up - then), minus(after, corner))
-                else:
-                    continue
-                x, y = dot(minus(at, ca), ua), dot(minus(at, ca), va)
-                low_u, high_u, low_v, high_v = min(low_u, x), max(high_u, x), min(low_v, y), max(high_v, y)
+@njit
+def _image(flat, p, a):
+    """The radar's image in a mirror, which side of it the radar is on, and how far from its plane."""
+    center, normal = vec(flat.center[a]), vec(flat.normal[a])
+    height = dot(minus(p, center), normal)
+    return along(p, -2 * height, normal), (1.0 if height > 0 else -1.0), abs(height)
+
+
+@njit(cache=True, error_model="numpy")
+def _before(flat, balls, observation, frame, a, found):
+    """A quick look at all in whole arrays: which stand before the first one, at least in part, turn a face to the
+    radar's image in it, and are within range."""
+    p, (cx, cy, cz), (nx, ny, nz) = vec(observation.position[frame]), vec(flat.center[a]), vec(flat.normal[a])
+    (ix, iy, iz), side, _ = _image(flat, p, a)
+    x, y, z = balls.center
+    u, v, w = balls.normal
+    for b in range(len(found)):
+        dx, dy, dz = x[b] - ix, y[b] - iy, z[b] - iz
+        facing = dx * u[b] + dy * v[b] + dz * w[b]
+        way = np.sqrt(dx * dx + dy * dy + dz * dz)
+        dx, dy, dz = x[b] - p[0], y[b] - p[1], z[b] - p[2]
+        way += np.sqrt(dx * dx + dy * dy + dz * dz)
+        above = side * ((x[b] - cx) * nx + (y[b] - cy) * ny + (z[b] - cz) * nz)
         found[b] = (
-            low_u < window[1] + MARGIN and high_u > window[0] - MARGIN
-            and low_v < window[3] + MARGIN and high_v > window[2] - MARGIN
+            (above >= -balls.radius[b]) & ((facing <= -0.01) | ((facing >= 0.01) & balls.two_sided[b]))
+            & (way - 2 * balls.radius[b] <= 2 * observation.range)
         )  # fmt: skip
+    found[a] = False
+
+
+@njit(cache=True)
+def _overlap(flat, p, a, window, b):
+    """Whether either stands before the other, and seen from the radar's image in the first, the second overlaps it, as
+    a window."""
+    ca, na, cb, nb = vec(flat.center[a]), vec(flat.normal[a]), vec(flat.center[b]), vec(flat.normal[b])
+    image, side, height = _image(flat, p, a)
+    turn = 1.0 if dot(minus(cb, image), nb) < 0 else -1.0
+    highest, farthest = -1e9, -1e9
+    for k in range(4):
+        highest = max(highest, side * dot(minus(vec(flat.corners[b, k]), ca), na))
+        farthest = max(farthest, turn * dot(minus(vec(flat.corners[a, k]), cb), nb))
+    if highest < BEFORE or farthest < BEFORE:
+        return False
+    ua, va = vec(flat.u[a]), vec(flat.v[a])
+    low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9
+    for k in range(4):
+        corner, after = vec(flat.corners[b, k]), vec(flat.corners[b, (k + 1) % 4])
+        up, then = side * dot(minus(corner, ca), na), side * dot(minus(after, ca), na)
+        for end in range(2):
+            # a corner before the first, and where an edge passes through its plane
+            if end == 0 and up >= 0:
+                at = along(image, height / (height + up), minus(corner, image))
+            elif end == 1 and up * then < 0:
+                at = along(corner, up / (up - then), minus(after, corner))
+            else:
+                continue
+            x, y = dot(minus(at, ca), ua), dot(minus(at, ca), va)
+            low_u, high_u, low_v, high_v = min(low_u, x), max(high_u, x), min(low_v, y), max(high_v, y)
+    return (
+        low_u < window[1] + MARGIN and high_u > window[0] - MARGIN
+        and low_v < window[3] + MARGIN and high_v > window[2] - MARGIN
+    )  # fmt: skip

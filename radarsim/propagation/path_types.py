@@ -200,8 +200,8 @@ def _beams(lengths, row, wavelength, step, steering, cells):
         cells[i, 0] = np.rint(lengths[i].mean() / (2 * step))
         re[:], im[:] = real[0], imaginary[0]
         for a in range(1, antennas):
-            phase = 2 * np.pi / wavelength * (lengths[i, row[a]] - lengths[i, row[0]])
-            c, s = np.float32(np.cos(phase)), np.float32(np.sin(phase))
+            phase = np.float32(2 * np.pi / wavelength * (lengths[i, row[a]] - lengths[i, row[0]]))
+            c, s = np.cos(phase), np.sin(phase)
             for b in range(beams):
                 re[b] += c * real[a, b] - s * imaginary[a, b]
                 im[b] += c * imaginary[a, b] + s * real[a, b]

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from numba import njit, prange
 
 from radarsim.propagation.apertures import outlines
@@ -118,22 +118,12 @@ def _spread(
 @njit(parallel=True, cache=True)
 def _couple(flat, observation, frame, firsts, found):
     """Which reflectors (columns) can follow the first ones (rows)."""
-    edges = outlines(flat)
-    balls = _Balls(flat.center.T.copy(), flat.normal.T.copy(), _radius(flat.corners, flat.center), flat.two_sided)
+    edges, radius, p = outlines(flat), _radius(flat.corners, flat.center), vec(observation.position[frame])
+    reach = np.empty(len(radius))  # from an image of the radar to the nearest point of a reflector, at most
+    for b in range(len(reach)):
+        reach[b] = 2 * (observation.range + radius[b]) - length(minus(vec(flat.center[b]), p))
     for i in prange(len(firsts)):
-        _before(flat, balls, observation, frame, firsts[i], found[i])
-        for b in range(len(found[i])):
-            if found[i, b]:
-                found[i, b] = _overlap(flat, vec(observation.position[frame]), firsts[i], edges[firsts[i]], b)
-
-
-class _Balls(NamedTuple):
-    """Balls around reflectors, by coordinate."""
-
-    center: Float[np.ndarray, "3 mirror"]
-    normal: Float[np.ndarray, "3 mirror"]
-    radius: Float[np.ndarray, "mirror"]
-    two_sided: Bool[np.ndarray, "mirror"]
+        _follow(flat, (radius, reach), p, firsts[i], edges[firsts[i]], found[i])
 
 
 @njit(cache=True)
@@ -146,54 +136,57 @@ def _radius(corners, center):
     return out
 
 
+@njit(cache=True)
+def _follow(flat, balls, p, a, window, found):
+    """Which reflectors can follow one: each must stand before the other, and seen from the radar's image in the first,
+    the second must overlap it, as a window. A quick look at the balls around them leaves few to look at closely."""
+    radius, reach = balls
+    ca, na, ua, va = vec(flat.center[a]), vec(flat.normal[a]), vec(flat.u[a]), vec(flat.v[a])
+    height = dot(minus(p, ca), na)
+    image, side, height = along(p, -2 * height, na), 1.0 if height > 0 else -1.0, abs(height)
+    before, foot = (side * na[0], side * na[1], side * na[2]), minus(image, ca)
+    x, y = dot(foot, ua), dot(foot, va)
+    low_u, low_v = (
+        _border(before, ua, height, window[0] - MARGIN - x),
+        _border(before, va, height, window[2] - MARGIN - y),
+    )
+    high_u = _border(before, ua, height, window[1] + MARGIN - x)
+    high_v = _border(before, va, height, window[3] + MARGIN - y)
+    for b in range(len(radius)):
+        way, r = minus(vec(flat.center[b]), image), radius[b]
+        if dot(way, before) - height < -r or dot(way, way) > reach[b] * abs(reach[b]):
+            continue
+        if dot(way, high_u) > r or dot(way, low_u) < -r or dot(way, high_v) > r or dot(way, low_v) < -r:
+            continue
+        facing = dot(way, vec(flat.normal[b]))
+        if b == a or (facing > -0.01 and (facing < 0.01 or not flat.two_sided[b])):
+            continue
+        found[b] = _overlap(flat, a, b, (image, before, height), facing, window)
+
+
 @njit
-def _image(flat, p, a):
-    """The radar's image in a mirror, which side of it the radar is on, and how far from its plane."""
-    center, normal = vec(flat.center[a]), vec(flat.normal[a])
-    height = dot(minus(p, center), normal)
-    return along(p, -2 * height, normal), (1.0 if height > 0 else -1.0), abs(height)
-
-
-@njit(cache=True, error_model="numpy")
-def _before(flat, balls, observation, frame, a, found):
-    """A quick look at all in whole arrays: which stand before the first one, at least in part, turn a face to the
-    radar's image in it, and are within range."""
-    p, (cx, cy, cz), (nx, ny, nz) = vec(observation.position[frame]), vec(flat.center[a]), vec(flat.normal[a])
-    (ix, iy, iz), side, _ = _image(flat, p, a)
-    x, y, z = balls.center
-    u, v, w = balls.normal
-    for b in range(len(found)):
-        dx, dy, dz = x[b] - ix, y[b] - iy, z[b] - iz
-        facing = dx * u[b] + dy * v[b] + dz * w[b]
-        way = np.sqrt(dx * dx + dy * dy + dz * dz)
-        dx, dy, dz = x[b] - p[0], y[b] - p[1], z[b] - p[2]
-        way += np.sqrt(dx * dx + dy * dy + dz * dz)
-        above = side * ((x[b] - cx) * nx + (y[b] - cy) * ny + (z[b] - cz) * nz)
-        found[b] = (
-            (above >= -balls.radius[b]) & ((facing <= -0.01) | ((facing >= 0.01) & balls.two_sided[b]))
-            & (way - 2 * balls.radius[b] <= 2 * observation.range)
-        )  # fmt: skip
-    found[a] = False
+def _border(before, axis, height, aside):
+    """Unit normal of the plane through the radar's image and a line across an axis, so far aside in the mirror."""
+    size = np.hypot(height, aside)
+    return along((-aside / size * before[0], -aside / size * before[1], -aside / size * before[2]), height / size, axis)
 
 
 @njit(cache=True)
-def _overlap(flat, p, a, window, b):
-    """Whether either stands before the other, and seen from the radar's image in the first, the second overlaps it, as
-    a window."""
-    ca, na, cb, nb = vec(flat.center[a]), vec(flat.normal[a]), vec(flat.center[b]), vec(flat.normal[b])
-    image, side, height = _image(flat, p, a)
-    turn = 1.0 if dot(minus(cb, image), nb) < 0 else -1.0
+def _overlap(flat, a, b, radar, facing, window):
+    """The same of one reflector, by its corners."""
+    ca, ua, va, cb, nb = vec(flat.center[a]), vec(flat.u[a]), vec(flat.v[a]), vec(flat.center[b]), vec(flat.normal[b])
+    image, before, height = radar
     highest, farthest = -1e9, -1e9
     for k in range(4):
-        highest = max(highest, side * dot(minus(vec(flat.corners[b, k]), ca), na))
-        farthest = max(farthest, turn * dot(minus(vec(flat.corners[a, k]), cb), nb))
+        highest = max(highest, dot(minus(vec(flat.corners[b, k]), ca), before))
+        over = dot(minus(vec(flat.corners[a, k]), cb), nb)
+        farthest = max(farthest, over if facing < 0 else -over)
     if highest < BEFORE or farthest < BEFORE:
         return False
-    ua, va = vec(flat.u[a]), vec(flat.v[a])
     low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9
     for k in range(4):
         corner, after = vec(flat.corners[b, k]), vec(flat.corners[b, (k + 1) % 4])
-        up, then = side * dot(minus(corner, ca), na), side * dot(minus(after, ca), na)
+        up, then = dot(minus(corner, ca), before), dot(minus(after, ca), before)
         for end in range(2):
             # a corner before the first, and where an edge passes through its plane
             if end == 0 and up >= 0:

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, Int
 
 from radarsim.propagation import fresnelzone, patches, plates
 from radarsim.propagation.curved import LINE, Arcs
@@ -20,27 +20,28 @@ def find(view: View) -> Paths:
     observation, flat, reflectors = view.observation, view.facing, view.environment.reflectors
     if reflectors is None:
         return Paths.none()
-    found, ways = [], []
+    found, bodies = [], []
     for frame in range(observation.frames):
-        parts = plates.parts(flat, observation, frame)
-        parts = parts[flat.present(frame)[parts.facet]]
-        bodies = reflectors.round.flashes(observation, frame), patches.flashes(observation, frame, reflectors.smooth)
-        arcs = Arcs.joined(list(bodies))
+        some = plates.parts(flat, observation, frame)
+        some = some[flat.present(frame)[some.facet]]
         if reflectors.heights is not None:
-            uneven = _uneven(observation, frame, flat[parts.facet], parts.aim, reflectors.heights)
-            parts = replace(parts, amplitude=parts.amplitude * uneven)
-        ways += [_to_parts(observation, frame, flat, parts), _to_bodies(observation, frame, arcs)]
-        mirrors = np.full((len(parts), 4), -1)
-        mirrors[:, 0] = parts.facet
-        shape = np.pad(arcs.shape, ((0, 0), (0, GEOMETRY - arcs.shape.shape[1])))
-        found += [
-            Paths.of(
-                Kind.IMAGE, parts.isometry, parts.amplitude, frame=frame, level=flat.horizontal[parts.facet],
-                mirrors=mirrors,
-            ),
-            Paths.of(Kind.CURVED, shape, arcs.amplitude, frame=frame),
-        ]  # fmt: skip
-    paths = Paths.joined(found)
+            uneven = _uneven(observation, frame, flat[some.facet], some.aim, reflectors.heights)
+            some = replace(some, amplitude=some.amplitude * uneven)
+        found.append(some)
+        bodies += [reflectors.round.flashes(observation, frame), patches.flashes(observation, frame, reflectors.smooth)]
+    parts, arcs = plates.Parts.joined(found), Arcs.joined(bodies)
+    frames = np.arange(observation.frames)
+    of_part = np.repeat(frames, [len(some) for some in found])
+    of_arc = np.repeat(np.repeat(frames, 2), [len(some) for some in bodies])
+    mirrors = np.full((len(parts), 4), -1)
+    mirrors[:, 0] = parts.facet
+    shape = np.pad(arcs.shape, ((0, 0), (0, GEOMETRY - arcs.shape.shape[1])))
+    paths = Paths.joined([
+        Paths.of(Kind.IMAGE, parts.isometry, parts.amplitude, frame=of_part, level=flat.horizontal[parts.facet],
+                 mirrors=mirrors),
+        Paths.of(Kind.CURVED, shape, arcs.amplitude, frame=of_arc),
+    ])  # fmt: skip
+    ways = [_to_parts(observation, of_part, flat, parts), _to_bodies(observation, of_arc, arcs)]
     stretches = replace(Stretches.joined(ways), path=np.arange(len(paths)))
     passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(paths.amplitude))
     lag = np.append(flat.lag, 0.0)[paths.mirrors[:, 0]]  # at the centre of the sweep, amplitudes know it
@@ -48,7 +49,7 @@ def find(view: View) -> Paths:
     return paths.behind(observation, replace(passed, delay=passed.delay + lag))
 
 
-def _to_parts(observation: Observation, frame: int, flat: Flat, parts: plates.Parts) -> Stretches:
+def _to_parts(observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: plates.Parts) -> Stretches:
     """The ways to parts of plates: a flash mirrors, an edge mirrors along its line, a corner echoes like a point.
 
     Across an edge that is near the flash, in Fresnel units, it is a part of the same zone and goes over into it.
@@ -73,9 +74,8 @@ def _to_parts(observation: Observation, frame: int, flat: Flat, parts: plates.Pa
     mirrors = np.where(np.arange(3) == 0, np.where(kind == -3, -1, parts.facet)[:, None], -1)
     stops = np.repeat(parts.aim[:, None], 3, axis=1), np.repeat(after[:, None], 3, axis=1)
     span = np.tile([0.0, 0.5], (n, 1))
-    begin = np.broadcast_to(here, parts.aim.shape)
     return Stretches(
-        np.zeros(n, int), np.full(n, frame), begin, parts.aim, before, after, mirrors, *stops, span, mirroring
+        np.zeros(n, int), frame, here, parts.aim, before, after, mirrors, *stops, span, mirroring
     )  # fmt: skip
 
 
@@ -85,9 +85,9 @@ def _spread(mirroring, axes):
     return (1 - (1 - AT_RADAR) * mirroring) * axes, mirroring * axes
 
 
-def _to_bodies(observation: Observation, frame: int, arcs: Arcs) -> Stretches:
+def _to_bodies(observation: Observation, frame: Int[np.ndarray, "arc"], arcs: Arcs) -> Stretches:
     """The ways to round bodies, which echo like points, and cylinders along their axis like mirrors."""
-    begin, n = np.broadcast_to(observation.position[frame], arcs.aim.shape), len(arcs)
+    begin, n = observation.position[frame], len(arcs)
     way = arcs.aim - begin
     size = np.linalg.norm(way, axis=1, keepdims=True)
     line = arcs.shape[:, :1] == LINE
@@ -100,7 +100,7 @@ def _to_bodies(observation: Observation, frame: int, arcs: Arcs) -> Stretches:
     before, after = _spread(mirroring, axes)
     none, span = (np.full((n, 3), -1), np.zeros((n, 3, 3)), np.zeros((n, 3, 2, 3))), np.tile([0.0, 0.5], (n, 1))
     return Stretches(
-        np.zeros(n, int), np.full(n, frame), begin, arcs.aim, before, after, *none, span, mirroring
+        np.zeros(n, int), frame, begin, arcs.aim, before, after, *none, span, mirroring
     )  # fmt: skip
 
 

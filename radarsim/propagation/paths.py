@@ -152,7 +152,8 @@ class Paths(Table):
         """What is left of paths of which this much passes obstacles; delays move images and curved paths away."""
         amplitude = self.amplitude * passed.factor
         kept = np.abs(amplitude) > observation.threshold
-        paths, passed, geometry = self[kept], passed[kept], self.geometry[kept].copy()
+        paths, passed = self[kept], passed[kept]
+        geometry = paths.geometry
         rows, begin = paths.kind == Kind.IMAGE, observation.position[paths.frame]
         isometry = geometry[rows, :12].reshape(-1, 3, 4)
         away = np.einsum("pij,pj->pi", isometry[:, :, :3], begin[rows]) + isometry[:, :, 3] - begin[rows]

@@ -35,7 +35,10 @@ class Table:
 
     def __getitem__(self, index: slice | np.ndarray) -> Self:
         shared = (getattr(self, name) for name in self.SHARED)
-        return type(self)(*(column[index] for column in self.columns), *shared)
+        if isinstance(index, slice):
+            return type(self)(*(column[index] for column in self.columns), *shared)
+        rows = np.flatnonzero(index) if index.dtype == bool else index  # once for all columns
+        return type(self)(*(column.take(rows, axis=0) for column in self.columns), *shared)
 
     @classmethod
     def joined(cls, parts: list[Self]) -> Self:

@@ -146,10 +146,8 @@ def _follow(flat, balls, p, a, window, found):
     image, side, height = along(p, -2 * height, na), 1.0 if height > 0 else -1.0, abs(height)
     before, foot = (side * na[0], side * na[1], side * na[2]), minus(image, ca)
     x, y = dot(foot, ua), dot(foot, va)
-    low_u, low_v = (
-        _border(before, ua, height, window[0] - MARGIN - x),
-        _border(before, va, height, window[2] - MARGIN - y),
-    )
+    low_u = _border(before, ua, height, window[0] - MARGIN - x)
+    low_v = _border(before, va, height, window[2] - MARGIN - y)
     high_u = _border(before, ua, height, window[1] + MARGIN - x)
     high_v = _border(before, va, height, window[3] + MARGIN - y)
     for b in range(len(radius)):

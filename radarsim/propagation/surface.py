@@ -98,8 +98,8 @@ class Surface:
         position, triangle, phase, rank, bounces = drawn
         owner = np.repeat(self._owner[tiles], counts)
         return Scatterers(
-            position, self._normals[triangle], self._sigma[triangle], phase, self._two_sided[owner],
-            self._horizontal[triangle], bounces[0], bounces[1], self._lobe[owner], rank,
+            position, self._normals.take(triangle, axis=0), self._sigma[triangle], phase, self._two_sided[owner],
+            self._horizontal[triangle], bounces[0], bounces[1], self._lobe.take(owner, axis=0), rank,
         )  # fmt: skip
 
 

@@ -43,6 +43,9 @@ class Table:
     @classmethod
     def joined(cls, parts: list[Self]) -> Self:
         """All rows of several tables; nothing is shared."""
+        some = [part for part in parts if len(part)]
+        if len(some) == 1 and not cls.SHARED:
+            return some[0]
         return cls(*(np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True)))
 
 

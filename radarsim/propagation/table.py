@@ -37,6 +37,7 @@ class Table:
         shared = (getattr(self, name) for name in self.SHARED)
         if isinstance(index, slice):
             return type(self)(*(column[index] for column in self.columns), *shared)
+        index = np.asarray(index)
         rows = np.flatnonzero(index) if index.dtype == bool else index  # once for all columns
         return type(self)(*(column.take(rows, axis=0) for column in self.columns), *shared)
 

@@ -18,7 +18,7 @@ from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
 from radarsim.motion.walk import Walk
 from radarsim.propagation import fresnelzone
-from radarsim.propagation.fresnelzone import Lattice
+from radarsim.propagation.lattice import Lattice
 from radarsim.propagation.paths import Paths
 from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
@@ -29,8 +29,8 @@ CONFIG = PRESETS["radarize"]
 LIMIT = -10.0
 #: Rays of the reference: to see whether a path is partly clear, how much of it, and for which amplitudes over noise.
 DENSE = {
-    "_FEW": Lattice.fibonacci(89, 55),
-    "_MANY": Lattice.fibonacci(233, 144),
+    "FEW": Lattice.fibonacci(89, 55),
+    "MANY": Lattice.fibonacci(233, 144),
     "LEAST_SPLIT": fresnelzone.LEAST_SPLIT / 10,
 }
 #: Hz, over the sweep.
@@ -86,7 +86,7 @@ def main(options: argparse.Namespace) -> Page:
             "most beside dense rays dB": np.max(np.maximum(own, LIMIT) - np.maximum(dense, LIMIT)),
         })  # fmt: skip
     few, many = (
-        f"{len(DENSE[name].nodes)} instead of {len(getattr(fresnelzone, name).nodes)}" for name in ("_FEW", "_MANY")
+        f"{len(DENSE[name].nodes)} instead of {len(getattr(fresnelzone, name).nodes)}" for name in ("FEW", "MANY")
     )
     return Page(
         rows,

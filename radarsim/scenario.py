@@ -15,6 +15,7 @@ from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.machine.threads import one_blas_thread
 from radarsim.motion.trajectory import Motion
 from radarsim.propagation.antenna import gain_pattern
+from radarsim.propagation.burst import BurstClock
 from radarsim.propagation.clutter import Clutter
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.movingtargets import MovingTargets
@@ -159,7 +160,9 @@ class Frames:
     def lengths(self) -> list[Float[np.ndarray, "path virtual 3"]]:
         """Path lengths of each frame's paths, see `Paths.lengths`."""
         config, motion = self.scenario.config, self.scenario.motion
-        found = [p.lengths(config, motion, t) for t, p in zip(self.times, self.paths, strict=True)]
+        times = np.ravel(self.times[:, None] + BurstClock.of(config).nodes)
+        poses = motion.position(times).reshape(-1, 3, 3), motion.rotation(times).as_matrix().reshape(-1, 3, 3, 3)
+        found = [p.lengths_from(*pose, config) for p, *pose in zip(self.paths, *poses, strict=True)]
         for each in found:
             each[..., 0] += 2 * config.range_bias  # a board's own delay, which the pipeline takes off again
         return found

@@ -88,6 +88,7 @@ class PathFinder:
         """
         view = self.view(positions, rotations, times)
         paths = Paths.joined([find(view) for find in MECHANISMS])
-        paths = tracks.followed(view, self.config, paths[np.argsort(paths.frame, kind="stable")])
+        order = np.argsort(paths.frame.astype(np.uint16), kind="stable")  # of 16 bits in linear time
+        paths = tracks.followed(view, self.config, paths[order])
         edges = np.searchsorted(paths.frame, np.arange(view.observation.frames + 1))
         return [paths[begin:end] for begin, end in zip(edges, edges[1:], strict=False)]

@@ -20,14 +20,13 @@ the single rays to scatterers (`paths`), which count twice, have the right mean 
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
-from scipy.special import erfc
 
 from radarsim.propagation.fields import cross, dot, minus, vec
+from radarsim.propagation.lattice import FEW, MANY, Lattice, coupled
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Obstacles, Passage
 from radarsim.propagation.reflectors import Flat
@@ -43,78 +42,10 @@ AT_RADAR = 0.5
 _FEWEST = 4
 #: No slit passes more than this of an amplitude.
 _MOST = 1.17
-#: Correlations of two screens in steps of 1 / `_RHOS`.
-_RHOS = 10
 #: Where an obstacle stands is known to this many halvings of a stretch.
 _HALVINGS = 4
 #: Rays to a point spread no wider than for an obstacle at this share of the way to it.
 _BESIDE = 0.7
-#: Half the side of the lattice's square, Fresnel units.
-_HALF = 1.5
-#: What changes of the nodes' weights cost in the fit of these, beside errors of half planes.
-_STIFF = 0.4
-#: How much more errors of upright and level half planes count in it.
-_SQUARE = 8.0
-
-
-@dataclass(frozen=True, eq=False)
-class Lattice:
-    """Nodes over the first Fresnel zones, Fresnel units, and their weights."""
-
-    nodes: Float[np.ndarray, "node 2"]
-    weight: Complex[np.ndarray, "node"]
-
-    @classmethod
-    def fibonacci(cls, count: int, before: int) -> "Lattice":
-        """So many nodes, a Fibonacci number, and the one before.
-
-        Weights are those of a square that ends smoothly, corrected (least squares) so that half planes, however they
-        stand, leave what Fresnel's integral says; else the square's borders would diffract. Near these what half planes
-        do fades, so that it does not begin with a step.
-        """
-        k = np.arange(count)
-        nodes = _HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
-        weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.cos(np.pi * nodes / (2 * _HALF)).prod(axis=1)
-        weight /= weight.sum()
-        angle, edge = (x.ravel() for x in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(-1.5, 1.5, 31)))
-        clear = np.cos(angle)[:, None] * nodes[:, 0] + np.sin(angle)[:, None] * nodes[:, 1] < edge[:, None]
-        lit = edge > 0
-        inner = np.clip((_HALF - np.abs(edge)) / 0.45, 0, 1)
-        truth = erfc(-edge * np.sqrt(np.pi / 2) * np.exp(-0.25j * np.pi)) / 2
-        truth = lit + (truth - lit) * inner**2 * (3 - 2 * inner)
-        # As exact in the shadow as in the light, and more so for upright and level edges.
-        share = np.where(np.abs(np.sin(2 * angle)) < 1e-9, _SQUARE, 1) / np.maximum(np.abs(truth), 0.1)
-        off, keep = (truth - clear @ weight) * share, _STIFF * count * np.eye(count)
-        rows = np.concatenate([clear * share[:, None], keep])
-        weight += np.linalg.lstsq(rows, np.append(off, np.zeros(count)), rcond=None)[0]
-        return cls(nodes, weight / weight.sum())
-
-    @cached_property
-    def couplings(self) -> Complex[np.ndarray, "kind rho node node"]:
-        """Weights of pairs of nodes for two screens of correlation 0, 1 / `_RHOS`, ... 1, along both axes (kind 0), or
-        along the first one alone (1)."""
-        count = len(self.nodes)
-        out = np.empty((2, _RHOS + 1, count, count), complex)
-        out[:, 0], out[0, -1] = np.outer(self.weight, self.weight), np.diag(self.weight)
-        taper = self.weight * np.exp(-0.5j * np.pi * np.sum(self.nodes**2, axis=1))
-        # The kernel is averaged over cells, which it varies within where rho is near 1.
-        cell = 2 * _HALF / np.sqrt(count) * np.array([-0.25, 0.25])
-        place = self.nodes[:, None] + np.stack(np.meshgrid(cell, cell), axis=-1).reshape(-1, 2)
-        for kind, step in [(0, k) for k in range(1, _RHOS)] + [(1, k) for k in range(1, _RHOS + 1)]:
-            rho = min(step / _RHOS, 0.95) * np.array([1, 1 - kind])
-            scaled = place.reshape(-1, 2) / np.sqrt(1 - rho**2)
-            own = np.exp(0.5j * np.pi * np.sum(scaled**2, axis=1)) * np.repeat(taper, 4)
-            pair = np.exp(-1j * np.pi * (scaled * rho) @ scaled.T) * own[:, None] * own
-            pair = pair.reshape(count, 4, count, 4).sum(axis=(1, 3))
-            pair /= pair.sum()
-            for _ in range(3):  # where the second screen is clear, the first one alone counts
-                scale = np.sqrt(self.weight / pair.sum(axis=1))
-                pair *= scale[:, None] * scale
-            out[kind, step] = pair / pair.sum()
-        return out
-
-
-_FEW, _MANY = Lattice.fibonacci(21, 13), Lattice.fibonacci(89, 55)
 
 
 @dataclass(frozen=True)
@@ -173,7 +104,7 @@ def passage(
     owner, first, last = owner[two], first[two], last[two]
     near, far = place[first], np.where(returns[owner], 1 - place[last], place[last])
     rho = np.sqrt(near * (1 - far) / (far * (1 - near)))
-    both = _coupled(fans[first], fans[last], rho, stretches.mirroring[rows[first]], _MANY.couplings)
+    both = coupled(fans[first], fans[last], rho, stretches.mirroring[rows[first]], MANY.couplings)
     single = some.factor[first] * some.factor[last]
     both = np.where(np.isnan(both), single, _bounded(both, _MOST**2))
     factor = found.factor ** (1 + returns[path])
@@ -193,7 +124,7 @@ def _partly(
     """Which stretches are partly clear, and where what is in the way stands, as a share of the whole path."""
     long = np.any(stretches.begin != stretches.end, axis=1)
     rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
-    few, begin, end, inside = _rays(flat, stretches[rows], _FEW)
+    few, begin, end, inside = _rays(flat, stretches[rows], FEW)
     clear = obstacles.clear(observation, stretches.frame[rows[few]], begin, end)
     # Alike are all that are as the ray in the middle; then what that met is all there is.
     unlike = _sums(few, clear != (factor[rows[few]] == 1), len(rows))
@@ -235,7 +166,7 @@ def _fans(
     spread = mirror[:, None] + (point - mirror)[:, None] * (1 - stretches.mirroring)
     spread = np.maximum(spread, 0.25)[..., None]
     shown = replace(stretches, before=stretches.before * spread, after=stretches.after * spread)
-    many, begin, end, inside = _rays(flat, shown, _MANY)
+    many, begin, end, inside = _rays(flat, shown, MANY)
     passed = obstacles.passage(observation, stretches.frame[many], begin, end, np.ones(len(many), bool))
     wavenumber, count = 2j * np.pi / observation.wavelength, len(share)
     power = np.abs(passed.factor) ** 2
@@ -245,10 +176,10 @@ def _fans(
     fans[:, 0][inside] = passed.factor * np.exp(wavenumber * (passed.delay - later[many]))
     fans[:, 1][inside] = 1
     clear[inside] = passed.blocked == 0
-    whole = fans[:, 1] @ _MANY.weight
-    factor = _bounded(fans[:, 0] @ _MANY.weight / whole, _MOST)
+    whole = fans[:, 1] @ MANY.weight
+    factor = _bounded(fans[:, 0] @ MANY.weight / whole, _MOST)
     through = _sums(many, power * passed.through, count) > total / 2
-    return fans, Passage(factor, later, through, 1 - np.minimum(np.abs(clear @ _MANY.weight / whole), 1))
+    return fans, Passage(factor, later, through, 1 - np.minimum(np.abs(clear @ MANY.weight / whole), 1))
 
 
 def _sums(index: Int[np.ndarray, "n"], values: np.ndarray, count: int) -> Float[np.ndarray, "count"]:
@@ -259,38 +190,6 @@ def _sums(index: Int[np.ndarray, "n"], values: np.ndarray, count: int) -> Float[
 
 def _bounded(value: Complex[np.ndarray, "n"], most: float) -> Complex[np.ndarray, "n"]:
     return value * np.minimum(1, most / np.maximum(np.abs(value), 1e-12))
-
-
-def _coupled(
-    one: Complex[np.ndarray, "pair 2 node"], two: Complex[np.ndarray, "pair 2 node"], rho: Float[np.ndarray, "pair"],
-    mirroring: Float[np.ndarray, "pair 2"], couplings: Complex[np.ndarray, "kind rho node node"],
-) -> Complex[np.ndarray, "pair"]:  # fmt: skip
-    """What two screens leave, of correlation rho along axes that mirror; nan: too little lies within the outlines."""
-    out = np.empty(len(rho), complex)
-    _couple(np.ascontiguousarray(one), np.ascontiguousarray(two), rho, mirroring, couplings, out)
-    return out
-
-
-@njit(cache=True)
-def _couple(one, two, rho, mirroring, couplings, out):
-    steps, count = couplings.shape[1] - 1, couplings.shape[2]
-    for p in range(len(out)):
-        k = min(int(rho[p] * steps), steps - 1)
-        t = rho[p] * steps - k
-        along, across = mirroring[p]
-        passed, clear = 0j, 0j
-        for i in range(count):
-            if one[p, 1, i] == 0:
-                continue
-            for j in range(count):
-                if two[p, 1, j] == 0:
-                    continue
-                full = (1 - t) * couplings[0, k, i, j] + t * couplings[0, k + 1, i, j]
-                line = (1 - t) * couplings[1, k, i, j] + t * couplings[1, k + 1, i, j]
-                weight = along * (across * full + (1 - across) * line) + (1 - along) * couplings[0, 0, i, j]
-                passed += weight * one[p, 0, i] * two[p, 0, j]
-                clear += weight
-        out[p] = passed / clear if abs(clear) > 0.05 else np.nan
 
 
 def _rays(flat: Flat, stretches: Stretches, lattice: Lattice) -> tuple[np.ndarray, ...]:

@@ -33,11 +33,11 @@ class Passage(Table):
     through: Bool[np.ndarray, "way"]
     blocked: Float[np.ndarray, "way"]
 
-    def after_one_another(self, stretches: int) -> "Passage":
-        """Of ways of so many stretches each, which follow one another."""
-        rows = (column.reshape(-1, stretches) for column in self.columns)
-        factor, delay, through, blocked = rows
-        return Passage(factor.prod(axis=1), delay.sum(axis=1), through.any(axis=1), 1 - (1 - blocked).prod(axis=1))
+    def after_one_another(self, first: Int[np.ndarray, "whole"]) -> "Passage":
+        """Of whole ways, each from its first row to before the next one's."""
+        factor, delay = np.multiply.reduceat(self.factor, first), np.add.reduceat(self.delay, first)
+        clear = np.multiply.reduceat(1 - self.blocked, first)
+        return Passage(factor, delay, np.logical_or.reduceat(self.through, first), 1 - clear)
 
 
 class Obstacles:
@@ -110,11 +110,11 @@ class Obstacles:
             stops: m; the last of a way may be followed by others that do not count.
             stretches: how many of each way's stops count.
         """
-        begins = np.concatenate([observation.position[frame, None], stops[:, :-1]], axis=1)
-        way, stop = np.nonzero(np.arange(stops.shape[1]) < stretches[:, None])
-        passed = self.passage(observation, frame[way], begins[way, stop], stops[way, stop], allowed[way])
-        size = stops.shape[0] * stops.shape[1]
-        every = Passage(np.ones(size, complex), np.zeros(size), np.zeros(size, bool), np.zeros(size))
-        for column, found in zip(every.columns, passed.columns, strict=True):
-            column[way * stops.shape[1] + stop] = found
-        return every.after_one_another(stops.shape[1])
+        first = np.cumsum(stretches) - stretches
+        way = np.repeat(np.arange(len(stretches)), stretches)
+        stop = np.arange(len(way)) - first[way]
+        end = stops[way, stop]
+        begin = np.roll(end, 1, axis=0)
+        begin[first] = observation.position[frame]
+        passed = self.passage(observation, frame[way], begin, end, allowed[way])
+        return passed.after_one_another(first)

@@ -30,13 +30,14 @@ from radarsim.propagation.fields import (
     vec,
     write,
 )
+from radarsim.propagation.media import mirror
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table
 from radarsim.propagation.targets import Targets
 
-#: No two rectangular apertures pass more than this: Fresnel's integral over a slit is below 1.17.
-_MOST = 1.17**4
+#: No rectangular aperture passes more than this: Fresnel's integral over a slit is below 1.17.
+_MOST = 1.17**2
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,7 @@ class OneWay(Table):
     @property
     def bounces(self) -> Int[np.ndarray, "path"]:
         """Number of mirrors, 0 to 2."""
-        return (self.mirrors >= 0).sum(axis=1)
+        return (self.mirrors[:, 0] >= 0) + (self.mirrors[:, 1] >= 0).astype(int)
 
     @classmethod
     def straight(
@@ -170,7 +171,8 @@ def _reaches(observation, flat, chains, aims, count):
         last, _, image, h = _image(vec(observation.position[chains.frame[k]]), flat, chains.mirrors[k])
         if abs(h) >= 0.01:
             lit = chains.lit[chains.begin[k] : chains.begin[k + 1]]
-            _reach(observation, image, h, aperture(flat, last), aims, chains.aims[k], lit)
+            most = observation.peak_gain * (_MOST if chains.mirrors[k, 1] < 0 else _MOST**2)
+            _reach(observation, image, h, most, aperture(flat, last), aims, chains.aims[k], lit)
             count[k] = len(_lit(lit))
 
 
@@ -188,8 +190,8 @@ def _lit(lit):
 
 
 @njit(cache=True, error_model="numpy")
-def _reach(observation, image, h, window, aims, which, lit):
-    """Which aims light may reach from an image through its mirror, at height h over the image.
+def _reach(observation, image, h, most, window, aims, which, lit):
+    """Which aims light may reach from an image through its mirror, at height h over the image, `most` over distance.
 
     A quick look at all of them, in arrays of single precision: it leaves out what `misses` does, what is too far, and
     what is too weak.
@@ -206,7 +208,7 @@ def _reach(observation, image, h, window, aims, which, lit):
     begin_u, begin_v = f(dot(minus(image, center), u)), f(dot(minus(image, center), v))
     half_u, half_v = f(half_u), f(half_v)
     zone = f(STRIP_FAR * STRIP_FAR * 0.5 * observation.wavelength)
-    most = f(_MOST * observation.peak_gain)
+    most = f(most)
     for i in range(len(x)):
         dx, dy, dz = x[i] - ox, y[i] - oy, z[i] - oz
         square = dx * dx + dy * dy + dz * dz
@@ -245,7 +247,7 @@ def _over(observation, flat, chains, k, aims, scatterers, out):
     c1, n1, cl, nl = vec(flat.center[one]), vec(flat.normal[one]), vec(flat.center[last]), vec(flat.normal[last])
     window = aperture(flat, last)
     before, h1 = aperture(flat, one), dot(minus(p, c1), n1)
-    n = slots[k]
+    n, most = slots[k], 1.001 * (_MOST if two < 0 else _MOST**2)
     for i in chains.aims[k, 0] + _lit(chains.lit[chains.begin[k] : chains.begin[k + 1]]):
         s = vec(scatterers.position[aims.scatterer[i]])
         way = minus(s, image)
@@ -273,7 +275,8 @@ def _over(observation, flat, chains, k, aims, scatterers, out):
         leaving = minus(bounce, p)
         size = gain_towards(leaving, rotation, observation) / full
         least = aims.weakest[i] / np.sqrt(cosine)
-        if _MOST * size <= least:
+        te, tm = mirror(flat.layer[last], min(abs(dot(way, nl)), 1.0))
+        if most * size * max(abs(te), abs(tm)) <= least:
             continue
         passed = passes(stop, way, square, window)
         if two >= 0:

@@ -17,6 +17,7 @@ from itertools import product
 
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int, UInt8
+from numba import njit
 
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import RadarConfig
@@ -29,13 +30,14 @@ BEAMS = np.linspace(-0.95, 0.95, 96)
 #: Apparent places are rounded to so many steps a range bin, and to sines of elevation of this step: many paths, those
 #: out and back in either order among them, then share a place.
 STEPS, RISE = 4, 1 / 64
-#: Probes of a cell, in halves of its extent: lateral position, or all of it, radial, upward.
+#: Probes of a cell, in halves of its extent: lateral position, or all of it, radial, upward; first those that meet a
+#: surface most often.
 _ALL = None
-_CENTRAL = ((_ALL, 0, 0), (0, _ALL, 0))
-_OTHERS = (
-    *((_ALL, radial, up) for radial, up in product((-1, 0, 1), (-1, 0, 1)) if radial or up),
-    *((lateral, _ALL, up) for lateral, up in product((-1, 0, 1), (-1, 0, 1)) if lateral or up),
-)
+_PROBES = (
+    (_ALL, 0, 0), (0, _ALL, 0),
+    *((_ALL, radial, up) for up, radial in product((1, -1, 0), (-1, 1, 0)) if radial or up),
+    *((lateral, _ALL, up) for up, lateral in product((1, -1, 0), (-1, 1, 0)) if lateral or up),
+)  # fmt: skip
 
 
 class PathType(IntEnum):
@@ -74,22 +76,25 @@ class PathTypes:
             paths, lengths: of each frame, and how long they are in the middle of the burst, m.
             positions, rotations: of the sensor then, m, sensor to world.
         """
-        found, mirrored = [], []
-        for some in paths:
+        found, mirrored, cells = [], [], []
+        for some, length, position, rotation in zip(paths, lengths, positions, rotations, strict=True):
             types = np.where(some.level, PathType.FLOOR_CEILING, PathType.DIRECT).astype(np.uint8)
             types[some.through] = PathType.THROUGH_SLAB
             types[some.moving] = PathType.MOVING
+            rows = np.flatnonzero((some.bounces > 0) & ~some.moving)
             found.append(types)
-            mirrored.append(np.flatnonzero((some.bounces > 0) & ~some.moving))
-        poses = zip(paths, lengths, mirrored, positions, rotations, strict=True)
-        places = [self.apparent(p[rows], length[rows], *pose) for p, length, rows, *pose in poses]
-        shared = [np.unique(each, axis=0, return_inverse=True) for each in places]
-        each = [len(some) for some, _ in shared]
-        real = self._near_surface(np.concatenate([some for some, _ in shared]), np.repeat(positions, each, axis=0))
-        for types, rows, (_, which), near in zip(
-            found, mirrored, shared, np.split(real, np.cumsum(each)), strict=False
-        ):
-            types[rows[~near[which.ravel()]]] = PathType.GHOST
+            mirrored.append(rows)
+            cells.append(self._cells(some[rows], length[rows], position, rotation))
+        frame = np.repeat(np.arange(len(cells)), [len(some) for some in cells])
+        cell = np.concatenate(cells)
+        size = cell.max(axis=0, initial=0) + 1
+        _, first, which = np.unique(
+            np.ravel_multi_index((frame, *cell.T), (len(cells), *size)), return_index=True, return_inverse=True
+        )
+        places = self._places(cell[first], positions[frame[first]], rotations[frame[first]])
+        ghosts = ~self._near_surface(places, positions[frame[first]])[which]
+        for k, (types, rows) in enumerate(zip(found, mirrored, strict=True)):
+            types[rows[ghosts[frame == k]]] = PathType.GHOST
         return found
 
     @cached_property
@@ -108,17 +113,33 @@ class PathTypes:
         rotation: Float[np.ndarray, "3 3"],
     ) -> Float[np.ndarray, "path 3"]:  # fmt: skip
         """Where the radar puts paths of one frame, m; arguments as for a call."""
-        row = lengths[:, self._row[0]] / self.config.wavelength
-        waves = np.exp(2j * np.pi * (row - row[:, :1])).astype(np.complex64)
-        sine = BEAMS[np.argmax(np.abs(waves @ self._steering), axis=1)] if len(paths) else np.zeros(0)
-        way = paths.apparent(position) - position
-        way /= np.maximum(np.linalg.norm(way, axis=2, keepdims=True), 1e-9)
-        rise = np.clip(RISE * np.rint(way.mean(axis=1) @ rotation[:, 2] / RISE), -0.999, 0.999)
-        sine = np.clip(sine, -np.sqrt(1 - rise**2), np.sqrt(1 - rise**2))
-        ahead = np.sqrt(np.maximum(1 - rise**2 - sine**2, 0))
+        n = len(paths)
+        cells = self._cells(paths, lengths, position, rotation)
+        return self._places(cells, np.broadcast_to(position, (n, 3)), np.broadcast_to(rotation, (n, 3, 3)))
+
+    def _cells(
+        self, paths: Paths, lengths: Float[np.ndarray, "path virtual"], position: Float[np.ndarray, "3"],
+        rotation: Float[np.ndarray, "3 3"],
+    ) -> Int[np.ndarray, "path 3"]:  # fmt: skip
+        """The same as numbers of the step in range, the beam, and the step in elevation from straight down."""
+        cells, way = np.empty((len(paths), 3), np.int64), paths.apparent(position) - position
+        rise = way @ rotation[:, 2] / np.maximum(np.linalg.norm(way, axis=2), 1e-9)
+        cells[:, 2] = np.rint((rise.mean(axis=1) + 1) / RISE)
         step = self.config.range_resolution / STEPS
-        range_ = step * np.rint(lengths.mean(axis=1) / 2 / step)
-        return position + range_[:, None] * (np.stack([ahead, sine, rise], axis=1) @ rotation.T)
+        _beams(lengths, self._row[0], self.config.wavelength, step, self._steering, cells)
+        return cells
+
+    def _places(
+        self, cells: Int[np.ndarray, "cell 3"], positions: Float[np.ndarray, "cell 3"],
+        rotations: Float[np.ndarray, "cell 3 3"],
+    ) -> Float[np.ndarray, "cell 3"]:  # fmt: skip
+        """Middles of cells, m."""
+        range_ = self.config.range_resolution / STEPS * cells[:, 0]
+        rise = np.clip(RISE * cells[:, 2] - 1, -0.999, 0.999)
+        most = np.sqrt(1 - rise**2)
+        sine = np.clip(BEAMS[cells[:, 1]], -most, most)
+        ahead = np.sqrt(np.maximum(1 - rise**2 - sine**2, 0))
+        return positions + range_[:, None] * np.einsum("nij,nj->ni", rotations, np.stack([ahead, sine, rise], axis=1))
 
     def _near_surface(
         self, places: Float[np.ndarray, "place 3"], positions: Float[np.ndarray, "place 3"]
@@ -130,14 +151,15 @@ class PathTypes:
         extent = self._extents(places - positions)
         bin_ = np.array([0.0, 0.0, self.config.range_resolution])
         real |= self.scene.occluded(places - bin_, places + bin_, margin=0.0)
-        for probes in (_CENTRAL, _OTHERS):
-            rows = np.flatnonzero(~real)
-            for probe in probes:
-                here = np.array([0.0 if part is _ALL else part for part in probe])
-                along = np.array([1.0 if part is _ALL else 0.0 for part in probe])
-                middle, half = (places[rows] + np.einsum("k,nkd->nd", here, extent[rows]),
-                                np.einsum("k,nkd->nd", along, extent[rows]))  # fmt: skip
-                real[rows] |= self.scene.occluded(middle - half, middle + half, margin=0.0)
+        rows = np.flatnonzero(~real)
+        for probe in _PROBES:
+            here = np.array([0.0 if part is _ALL else part for part in probe])
+            along = np.array([1.0 if part is _ALL else 0.0 for part in probe])
+            begin, end = np.empty((2, len(rows), 3))
+            _ends(places, extent, rows, (here - along, here + along), (begin, end))
+            met = self.scene.occluded(begin, end, margin=0.0)
+            real[rows[met]] = True
+            rows = rows[~met]
         return real
 
     def _extents(self, away: Float[np.ndarray, "place 3"]) -> Float[np.ndarray, "place 3 3"]:
@@ -155,3 +177,34 @@ class PathTypes:
         return np.stack([
             (range_ * beam)[:, None] * lateral, self.config.range_resolution * radial, (range_ * rise)[:, None] * up
         ], axis=1)  # fmt: skip
+
+
+@njit(cache=True)
+def _ends(places, extents, rows, probe, ends):
+    """Both ends of a probe of some cells, which it is given in halves of their extent."""
+    for k in range(2):
+        for i, row in enumerate(rows):
+            for d in range(3):
+                ends[k][i, d] = places[row, d]
+                for axis in range(3):
+                    ends[k][i, d] += probe[k][axis] * extents[row, axis, d]
+
+
+@njit(cache=True, fastmath=True)
+def _beams(lengths, row, wavelength, step, steering, cells):
+    """Writes the step in range and the beam in which a row of antennas sees each path strongest."""
+    antennas, beams = steering.shape
+    real, imaginary = steering.real.copy(), steering.imag.copy()
+    re, im = np.empty(beams, np.float32), np.empty(beams, np.float32)
+    for i in range(len(cells)):
+        cells[i, 0] = np.rint(lengths[i].mean() / (2 * step))
+        re[:], im[:] = real[0], imaginary[0]
+        for a in range(1, antennas):
+            phase = np.float32(2 * np.pi / wavelength * (lengths[i, row[a]] - lengths[i, row[0]]))
+            c, s = np.cos(phase), np.sin(phase)
+            for b in range(beams):
+                re[b] += c * real[a, b] - s * imaginary[a, b]
+                im[b] += c * imaginary[a, b] + s * real[a, b]
+        for b in range(beams):
+            re[b] = re[b] * re[b] + im[b] * im[b]
+        cells[i, 1] = np.argmax(re)

@@ -141,7 +141,8 @@ class Paths(Table):
         """What is left of paths of which this much passes obstacles; delays move images and curved paths away."""
         amplitude = self.amplitude * passed.factor
         kept = np.abs(amplitude) > observation.threshold
-        paths, passed, geometry = self[kept], passed[kept], self.geometry[kept].copy()
+        paths, passed = self[kept], passed[kept]
+        geometry = paths.geometry
         rows, begin = paths.kind == Kind.IMAGE, observation.position[paths.frame]
         isometry = geometry[rows, :12].reshape(-1, 3, 4)
         away = image(isometry, begin[rows]) - begin[rows]
@@ -163,7 +164,12 @@ class Paths(Table):
             parabolas in the burst's normalised time (`burst`), m.
         """
         times = time + BurstClock.of(config).nodes
-        position, rotation = motion.position(times), motion.rotation(times).as_matrix()
+        return self.lengths_from(motion.position(times), motion.rotation(times).as_matrix(), config)
+
+    def lengths_from(
+        self, position: Float[np.ndarray, "node 3"], rotation: Float[np.ndarray, "node 3 3"], config: RadarConfig
+    ) -> Float[np.ndarray, "path virtual 3"]:
+        """The same from the sensor's poses at the burst's nodes, m, sensor to world."""
         tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1)
         rx = position[:, None] + rx_positions(config) @ rotation.transpose(0, 2, 1)
         out = np.empty((len(self), tx.shape[1] * rx.shape[1], 3))

@@ -95,8 +95,9 @@ class Surface:
         _place(self.seed, tiles, totals, counts, ends, (self._first, self._areas, self._triangles), columns)
         owner = np.repeat(self._owner[tiles], counts)
         return replace(
-            drawn, normal=self._normals[triangle], sigma=self._sigma[triangle], two_sided=self._two_sided[owner],
-            horizontal=self._horizontal[triangle], lobe=self._lobe[owner],
+            drawn, normal=self._normals.take(triangle, axis=0), sigma=self._sigma[triangle],
+            two_sided=self._two_sided[owner], horizontal=self._horizontal[triangle],
+            lobe=self._lobe.take(owner, axis=0),
         )  # fmt: skip
 
 

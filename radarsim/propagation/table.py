@@ -35,7 +35,11 @@ class Table:
 
     def __getitem__(self, index: slice | np.ndarray) -> Self:
         shared = (getattr(self, name) for name in self.SHARED)
-        return type(self)(*(column[index] for column in self.columns), *shared)
+        if isinstance(index, slice):
+            return type(self)(*(column[index] for column in self.columns), *shared)
+        index = np.asarray(index)
+        rows = np.flatnonzero(index) if index.dtype == bool else index  # once for all columns
+        return type(self)(*(column.take(rows, axis=0) for column in self.columns), *shared)
 
     @classmethod
     def zeros(cls, n: int) -> Self:
@@ -51,7 +55,10 @@ class Table:
 
     @classmethod
     def joined(cls, parts: list[Self]) -> Self:
-        """All rows of several tables; nothing is shared."""
+        """All rows of several tables."""
+        some = [part for part in parts if len(part)]
+        if len(some) == 1 and not cls.SHARED:
+            return some[0]
         return cls(*(np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True)))
 
 

@@ -61,7 +61,9 @@ def couples(
 def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[Int[np.ndarray, "n"]]:
     """Per frame, the reflectors in range that turn a face to the radar and of which something can be seen: slabs are
     clear, here, what stands behind too many of them costs less than rays that count them."""
-    index = [_turned(flat, observation, frame) for frame in range(observation.frames)]
+    turned = np.zeros((observation.frames, len(flat)), np.bool_)
+    _turned(flat.columns, observation, turned)
+    index = [np.flatnonzero(some) for some in turned]
     opaque = None if obstacles.transmission is None else obstacles.transmission.opaque
     if opaque is None:
         return index
@@ -75,16 +77,25 @@ def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[In
     return [every[(frame == k) & found] for k in range(observation.frames)]
 
 
-def _turned(flat: Flat, observation: Observation, frame: int) -> Int[np.ndarray, "n"]:
-    """Those of a frame with a part within range and in front that turn their face to the radar."""
-    position, forward = observation.position[frame], observation.rotation[frame, :, 0]
-    height = np.einsum("md,md->m", position - flat.center, flat.normal)
-    axes = np.stack([flat.u, flat.v], axis=1)
-    at = np.einsum("mkd,mad->mka", flat.corners - position, axes)
-    away = np.linalg.norm(np.maximum(np.maximum(at.min(axis=1), -at.max(axis=1)), 0), axis=1)
-    faced = (np.abs(height) > 0.01) & (flat.two_sided | (height > 0))
-    ahead = (flat.corners @ forward).max(axis=1) > position @ forward
-    return np.flatnonzero(faced & ahead & (np.hypot(height, away) < observation.range) & flat.present(frame))
+@njit(parallel=True, cache=True)
+def _turned(flat, observation, found):
+    """Which reflectors of each frame have a part within range and in front, and turn their face to the radar."""
+    for frame in prange(len(observation.position)):
+        p, rotation = vec(observation.position[frame]), observation.rotation[frame]
+        forward = rotation[0, 0], rotation[1, 0], rotation[2, 0]
+        for m in range(len(flat.center)):
+            height = dot(minus(p, vec(flat.center[m])), vec(flat.normal[m]))
+            if abs(height) <= 0.01 or (height < 0 and not flat.two_sided[m]) or 0 <= flat.frame[m] != frame:
+                continue
+            u, v, ahead = vec(flat.u[m]), vec(flat.v[m]), -np.inf
+            low_u, high_u, low_v, high_v = np.inf, -np.inf, np.inf, -np.inf
+            for k in range(4):
+                way = minus(vec(flat.corners[m, k]), p)
+                x, y, ahead = dot(way, u), dot(way, v), max(ahead, dot(way, forward))
+                low_u, high_u, low_v, high_v = min(low_u, x), max(high_u, x), min(low_v, y), max(high_v, y)
+            aside, above = max(low_u, -high_u, 0.0), max(low_v, -high_v, 0.0)
+            square = height * height + aside * aside + above * above
+            found[frame, m] = ahead > 0 and square < observation.range**2
 
 
 def _spread(
@@ -106,9 +117,12 @@ def _spread(
 @njit(parallel=True, cache=True)
 def _couple(flat, observation, frame, firsts, found):
     """Which reflectors (columns) can follow the first ones (rows)."""
-    radius, edges = _radius(flat.corners, flat.center), outlines(flat)
+    edges, radius, p = outlines(flat), _radius(flat.corners, flat.center), vec(observation.position[frame])
+    reach = np.empty(len(radius))  # from an image of the radar to the nearest point of a reflector, at most
+    for b in range(len(reach)):
+        reach[b] = 2 * (observation.range + radius[b]) - length(minus(vec(flat.center[b]), p))
     for i in prange(len(firsts)):
-        _follow(flat, radius, observation, frame, firsts[i], edges[firsts[i]], found[i])
+        _follow(flat, (radius, reach), p, firsts[i], edges[firsts[i]], found[i])
 
 
 @njit(cache=True)
@@ -122,49 +136,65 @@ def _radius(corners, center):
 
 
 @njit(cache=True)
-def _follow(flat, radius, observation, frame, a, window, found):
-    """Either must stand before the other, and seen from the radar's image in the first, the second must overlap it, as
-    a window."""
-    p, ca, na = vec(observation.position[frame]), vec(flat.center[a]), vec(flat.normal[a])
-    ua, va = vec(flat.u[a]), vec(flat.v[a])
+def _follow(flat, balls, p, a, window, found):
+    """Which reflectors can follow one: each must stand before the other, and seen from the radar's image in the first,
+    the second must overlap it, as a window. A quick look at the balls around them leaves few to look at closely."""
+    radius, reach = balls
+    ca, na, ua, va = vec(flat.center[a]), vec(flat.normal[a]), vec(flat.u[a]), vec(flat.v[a])
     height = dot(minus(p, ca), na)
-    image = along(p, -2 * height, na)
-    side = 1.0 if height > 0 else -1.0
-    height = abs(height)
+    image, side, height = along(p, -2 * height, na), 1.0 if height > 0 else -1.0, abs(height)
+    before, foot = (side * na[0], side * na[1], side * na[2]), minus(image, ca)
+    x, y = dot(foot, ua), dot(foot, va)
+    low_u = _border(before, ua, height, window[0] - MARGIN - x)
+    low_v = _border(before, va, height, window[2] - MARGIN - y)
+    high_u = _border(before, ua, height, window[1] + MARGIN - x)
+    high_v = _border(before, va, height, window[3] + MARGIN - y)
     for b in range(len(radius)):
-        if b == a:
+        way, r = minus(vec(flat.center[b]), image), radius[b]
+        if dot(way, before) - height < -r or dot(way, way) > reach[b] * abs(reach[b]):
             continue
-        cb = vec(flat.center[b])
-        way = minus(cb, image)
-        if side * dot(minus(cb, ca), na) < -radius[b]:
+        if dot(way, high_u) > r or dot(way, low_u) < -r or dot(way, high_v) > r or dot(way, low_v) < -r:
             continue
         facing = dot(way, vec(flat.normal[b]))
-        if facing > -0.01 and (facing < 0.01 or not flat.two_sided[b]):
+        if b == a or (facing > -0.01 and (facing < 0.01 or not flat.two_sided[b])):
             continue
-        if length(way) + length(minus(cb, p)) - 2 * radius[b] > 2 * observation.range:
-            continue
-        nb, highest, farthest = vec(flat.normal[b]), -1e9, -1e9
-        for k in range(4):
-            highest = max(highest, side * dot(minus(vec(flat.corners[b, k]), ca), na))
-            over = dot(minus(vec(flat.corners[a, k]), cb), nb)
-            farthest = max(farthest, over if facing < 0 else -over)
-        if highest < BEFORE or farthest < BEFORE:
-            continue
-        low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9
-        for k in range(4):
-            corner, after = vec(flat.corners[b, k]), vec(flat.corners[b, (k + 1) % 4])
-            up, then = side * dot(minus(corner, ca), na), side * dot(minus(after, ca), na)
-            for end in range(2):
-                # a corner before the first, and where an edge passes through its plane
-                if end == 0 and up >= 0:
-                    at = along(image, height / (height + up), minus(corner, image))
-                elif end == 1 and up * then < 0:
-                    at = along(corner, up / (up - then), minus(after, corner))
-                else:
-                    continue
-                x, y = dot(minus(at, ca), ua), dot(minus(at, ca), va)
-                low_u, high_u, low_v, high_v = min(low_u, x), max(high_u, x), min(low_v, y), max(high_v, y)
-        found[b] = (
-            low_u < window[1] + MARGIN and high_u > window[0] - MARGIN
-            and low_v < window[3] + MARGIN and high_v > window[2] - MARGIN
-        )  # fmt: skip
+        found[b] = _overlap(flat, a, b, (image, before, height), facing, window)
+
+
+@njit
+def _border(before, axis, height, aside):
+    """Unit normal of the plane through the radar's image and a line across an axis, so far aside in the mirror."""
+    size = np.hypot(height, aside)
+    return along((-aside / size * before[0], -aside / size * before[1], -aside / size * before[2]), height / size, axis)
+
+
+@njit(cache=True)
+def _overlap(flat, a, b, radar, facing, window):
+    """The same of one reflector, by its corners."""
+    ca, ua, va, cb, nb = vec(flat.center[a]), vec(flat.u[a]), vec(flat.v[a]), vec(flat.center[b]), vec(flat.normal[b])
+    image, before, height = radar
+    highest, farthest = -1e9, -1e9
+    for k in range(4):
+        highest = max(highest, dot(minus(vec(flat.corners[b, k]), ca), before))
+        over = dot(minus(vec(flat.corners[a, k]), cb), nb)
+        farthest = max(farthest, over if facing < 0 else -over)
+    if highest < BEFORE or farthest < BEFORE:
+        return False
+    low_u, high_u, low_v, high_v = 1e9, -1e9, 1e9, -1e9
+    for k in range(4):
+        corner, after = vec(flat.corners[b, k]), vec(flat.corners[b, (k + 1) % 4])
+        up, then = dot(minus(corner, ca), before), dot(minus(after, ca), before)
+        for end in range(2):
+            # a corner before the first, and where an edge passes through its plane
+            if end == 0 and up >= 0:
+                at = along(image, height / (height + up), minus(corner, image))
+            elif end == 1 and up * then < 0:
+                at = along(corner, up / (up - then), minus(after, corner))
+            else:
+                continue
+            x, y = dot(minus(at, ca), ua), dot(minus(at, ca), va)
+            low_u, high_u, low_v, high_v = min(low_u, x), max(high_u, x), min(low_v, y), max(high_v, y)
+    return (
+        low_u < window[1] + MARGIN and high_u > window[0] - MARGIN
+        and low_v < window[3] + MARGIN and high_v > window[2] - MARGIN
+    )  # fmt: skip

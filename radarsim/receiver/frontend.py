@@ -156,7 +156,7 @@ class FrontEnd:
             noise = self._bin_noise if self.settings.noise else 0.0
             delay = self.settings.leakage.delay if self.settings.leakage else 0.0
             extra += self._skirts(bins, (self.scale * self.leakage).astype(np.complex64), delay, noise, rng)
-        leakage = self._couple()
+        leakage = self._coupled
         if (rejection := self.settings.image_rejection_db) is not None:
             extra += self._image(bins + scipy.fft.fft(leakage, axis=-1, norm="forward") + extra, rejection)
         return echoes + leakage + scipy.fft.ifft(extra, axis=-1, norm="forward")
@@ -176,7 +176,7 @@ class FrontEnd:
         Their sum is what `receive` returns for the sum of the signals with thermal and phase noise off.
         """
         shape = self.config.frame_shape[:-1]
-        parts = [self._amplify(s) for s in signals] + [np.broadcast_to(self._couple(), shape)]
+        parts = [self._amplify(s) for s in signals] + [np.broadcast_to(self._coupled, shape)]
         if (rejection := self.settings.image_rejection_db) is None:
             return parts
         images = (self._image(scipy.fft.fft(p, axis=-1, norm="forward"), rejection) for p in parts)
@@ -190,7 +190,8 @@ class FrontEnd:
     def _amplify(self, signal: Complex[np.ndarray, "loop tx rx sample"]) -> Complex[np.ndarray, "loop tx rx sample"]:
         return np.asarray(signal, np.complex64) * (self.scale * self.channel).astype(np.complex64)[:, :, None]
 
-    def _couple(self) -> Complex[np.ndarray, "tx rx sample"]:
+    @cached_property
+    def _coupled(self) -> Complex[np.ndarray, "tx rx sample"]:
         """The leakage: an echo of its delay, the same in every chirp."""
         delay = self.settings.leakage.delay if self.settings.leakage else 0.0
         n = self.config.samples

@@ -72,7 +72,7 @@ class _Files(Mapping[str, Board]):
     def __getitem__(self, name: str) -> Board:
         if name not in _names():
             raise KeyError(name)
-        return _read(_FOLDER / f"{name}.yaml")
+        return _read(name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(_names())
@@ -110,7 +110,9 @@ def load_board(board: str | Path | Board) -> Board:
         raise InputError(f"{board}: {complaint(error)}") from error
 
 
-_read = cache(load_board)  # of files that nobody changes
+@cache
+def _read(name: str) -> Board:
+    return load_board(_FOLDER / f"{name}.yaml")  # a file that nobody changes
 
 
 def expected() -> str:

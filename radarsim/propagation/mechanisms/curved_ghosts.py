@@ -89,7 +89,7 @@ def find(view: View) -> Paths:
     mirrors = np.full((len(every), 4), -1)
     mirrors[:, [0, 2]] = every.mirrors
     paths = Paths.of(Kind.POINT, points, every.amplitude, frame=frame, bounces=every.bounces, mirrors=mirrors)
-    return paths.behind(observation, passed.after_one_another(2))
+    return paths.behind(observation, passed.after_one_another(np.arange(0, n, 2)))
 
 
 def ghosts(

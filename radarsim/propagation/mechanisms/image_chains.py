@@ -25,14 +25,13 @@ from jaxtyping import Complex, Float, Int
 from numba import njit
 
 from radarsim.propagation import fresnelzone
-from radarsim.propagation.apertures import CORNERS, FAR, depth, kirchhoff, outlines, overlap
+from radarsim.propagation.apertures import FAR, kirchhoff, outlines, overlap
+from radarsim.propagation.chain_aperture import inside, scratch, window
 from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
     along,
-    cross,
     dot,
     gain_towards,
-    length,
     minus,
     mirrored,
     reflected,
@@ -144,14 +143,6 @@ class _Orders(NamedTuple):
     firsts: Int[np.ndarray, "pair"]
 
 
-class _Room(NamedTuple):
-    """Scratch for polygons."""
-
-    planes: Float[np.ndarray, "14 3"]
-    polygon: Float[np.ndarray, "corner 2"]
-    spare: Float[np.ndarray, "corner 3"]
-
-
 def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observation, frame: int) -> Chains:
     """Chains of two and three mirrors above the threshold.
 
@@ -169,50 +160,54 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observatio
 def _search(observation, frame, flat, orders, found):
     """Tries all chains whose mirrors can follow one another; returns how many lead back, of which as many as fit."""
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
-    room = _Room(np.empty((14, 3)), np.empty((CORNERS, 2)), np.empty((CORNERS, 3)))
-    edges = outlines(flat)
-    way = np.empty(3, np.int64)
+    up, wavelength, threshold = upwards(rotation), observation.wavelength, observation.threshold
+    room, edges = scratch(), outlines(flat)
+    images, way = np.empty((len(flat.center), 3)), np.empty(3, np.int64)
+    for m in range(len(images)):
+        write(mirrored(p, vec(flat.center[m]), vec(flat.normal[m])), images[m])
     count = 0
     for b in range(len(flat.center)):
         firsts = orders.firsts[orders.start[b] : orders.start[b + 1]]
         for i in range(len(firsts)):
             a = firsts[i]
-            image_a = mirrored(p, vec(flat.center[a]), vec(flat.normal[a]))
+            image_a = vec(images[a])
             image_b = mirrored(image_a, vec(flat.center[b]), vec(flat.normal[b]))
             for j in range(i - 1, len(firsts)):
                 order = 2 if j < i else 3
                 c = b if order == 2 else firsts[j]
                 if order == 2 and (b < a or not _after(orders, b, a)):  # the way back is not searched for
                     continue
-                # The sensor's image in the last mirror: seen from there, the way leads straight to the sensor.
-                image = image_b if order == 2 else mirrored(image_b, vec(flat.center[c]), vec(flat.normal[c]))
-                back = minus(p, image)
-                path = length(back)
-                if path > 2 * observation.range or path < 0.05:
+                # From the sensor's image in the first two mirrors straight to that in the last one, or to itself.
+                middle = minus(p if order == 2 else vec(images[c]), image_b)
+                path = dot(middle, middle)
+                if path > 4 * observation.range**2 or path < 0.05**2:
                     continue
-                back = (back[0] / path, back[1] / path, back[2] / path)
-                # Backwards over the mirrors, each with the radar's image behind it.
-                ray = back
-                if order == 3:
-                    if not _meets(image, ray, path, observation.wavelength, flat, edges, c):
-                        continue
-                    ray = _turned(ray, flat, c)
-                if not _meets(image_b, ray, path, observation.wavelength, flat, edges, b):
+                path = np.sqrt(path)
+                middle = (middle[0] / path, middle[1] / path, middle[2] / path)
+                # The last mirror is met by that ray, the others by what it was before them.
+                if order == 3 and not _meets(image_b, middle, -1.0, path, wavelength, flat, edges, c):
                     continue
-                ray = _turned(ray, flat, b)
-                if not _meets(image_a, ray, path, observation.wavelength, flat, edges, a):
+                if not _meets(image_b, middle, 1.0, path, wavelength, flat, edges, b):
+                    continue
+                ray = _turned(middle, flat, b)
+                if not _meets(image_a, ray, 1.0, path, wavelength, flat, edges, a):
                     continue
                 ray = _turned(ray, flat, a)
+                back = middle if order == 2 else _turned(middle, flat, c)
                 taken = gain_towards((-back[0], -back[1], -back[2]), rotation, observation)
-                strength = (
-                    observation.wavelength / (4 * np.pi * path) * taken * gain_towards(ray, rotation, observation)
-                )
-                if _MOST * strength <= observation.threshold:
+                strength = wavelength / (4 * np.pi * path) * taken * gain_towards(ray, rotation, observation)
+                if _MOST * strength <= threshold:
                     continue
                 way[0], way[1], way[2] = a, b, c
-                value, e1, e2, off = _chain(way[:order], p, path, ray, observation, frame, flat, room)
-                value *= strength
-                if abs(value) <= observation.threshold:
+                bounds, e1, e2 = window(way[:order], p, path, ray, wavelength, flat, room)
+                corners = overlap(room.planes, bounds, room.polygon, room.spare) if bounds >= 0 else 0
+                if corners < 3:
+                    continue
+                share = kirchhoff(room.polygon, corners)
+                if 1.001 * abs(share) * strength <= threshold:  # what mirrors reflect comes last: it costs the most
+                    continue
+                value = _reflected(way[:order], up, ray, flat) * share * strength
+                if abs(value) <= threshold:
                     continue
                 if count < len(found.amplitude):
                     for k in range(3):
@@ -220,8 +215,8 @@ def _search(observation, frame, flat, orders, found):
                     _isometry(way[:order], flat, found.isometry[count])
                     found.amplitude[count] = value
                     # A ray through the polygon, which misses the very edge of corners.
-                    zone = np.sqrt(observation.wavelength * path / 8)
-                    aim = along(along(along(p, path / 2, ray), zone * off[0], e1), zone * off[1], e2)
+                    zone, (x, y) = np.sqrt(wavelength * path / 8), inside(room, bounds, corners)
+                    aim = along(along(along(p, path / 2, ray), zone * x, e1), zone * y, e2)
                     _course(way[:order], p, aim, flat, found.stops[count])
                 count += 1
     return count
@@ -243,19 +238,19 @@ def _turned(ray, flat, m):
 
 
 @njit
-def _meets(image, ray, path, wavelength, flat, edges, m):
-    """Whether a straight path from the radar's image behind a mirror comes from near it: a quick test before `_chain`.
+def _meets(image, ray, side, path, wavelength, flat, edges, m):
+    """Whether a straight path from an image of the radar passes near a mirror: a quick test before `window`.
 
     Args:
         image: m.
-        ray: direction after the mirror.
+        ray, side: direction after the mirror, and 1, or before it, and -1.
         path: the whole way, m.
         edges: of all mirrors (`apertures.outlines`).
         m: the mirror.
     """
     n = vec(flat.normal[m])
     slope = dot(ray, n)
-    if slope < 0.02 and (slope > -0.02 or not flat.two_sided[m]):
+    if side * slope < 0.02 and (abs(slope) < 0.02 or not flat.two_sided[m]):
         return False
     center = vec(flat.center[m])
     t = dot(minus(center, image), n) / slope
@@ -272,114 +267,14 @@ def _meets(image, ray, path, wavelength, flat, edges, m):
 
 
 @njit(cache=True)
-def _chain(way, p, path, ray, observation, frame, flat, room):
-    """F times the reflection coefficients of a chain that sets out along a ray; axes across it, and aim in them."""
-    none = 0j, ray, ray, (0.0, 0.0)
-    normal, corners, planes, wavelength = flat.normal, flat.corners, room.planes, observation.wavelength
-    rotation = observation.rotation[frame]
-    up = upwards(rotation)
-    aside = (0.0, 0.0, 1.0) if abs(ray[2]) < 0.7 else (1.0, 0.0, 0.0)
-    e1 = unit(cross(aside, ray))
-    e2 = cross(ray, e1)
-    field = sent(up, ray)
-    # Instead of unfolding the mirrors, the path and its axes are folded; the start moves to its images.
-    start, now, f1, f2 = p, ray, e1, e2
-    count, before, last = 0, 0.0, ray
-    for k in range(len(way)):
-        m = way[k]
-        n, c = vec(normal[m]), vec(flat.center[m])
-        slope = dot(now, n)
-        if abs(slope) < 0.02 or (slope > 0 and not flat.two_sided[m]):
-            return none
-        t = dot(minus(c, start), n) / slope
-        if t <= 0.005 or t >= path - 0.005 or t < before - np.sqrt(wavelength * path):
-            return none
-        if k > 0:
-            count = _bounded(planes, count, _junction((now, f1, f2), (before, last), (t, n)), path, wavelength)
-            if count < 0:
-                return none
-        before = t
-        x, y = 0.0, 0.0  # the middle of the window
-        for side in range(4):
-            one = minus(vec(corners[m, side]), start)
-            x, y = x + dot(one, f1) / 4, y + dot(one, f2) / 4
-        middle = (x, y)
-        for side in range(4):
-            one, two = minus(vec(corners[m, side]), start), minus(vec(corners[m, (side + 1) % 4]), start)
-            x, y = dot(one, f1), dot(one, f2)
-            dx, dy = dot(two, f1) - x, dot(two, f2) - y
-            square = dx * dx + dy * dy
-            if square < 1e-8:
-                continue
-            turn = dx * (middle[1] - y) - dy * (middle[0] - x)
-            sign = (1.0 if turn < 0 else -1.0) / np.sqrt(square)
-            nx, ny = -dy * sign, dx * sign  # outward
-            share = min(max(-(x * dx + y * dy) / square, 0.0), 1.0)
-            at = dot(one, now) + share * (dot(two, now) - dot(one, now))
-            count = _bounded(planes, count, (nx, ny, nx * x + ny * y, at), path, wavelength)
-            if count < 0:
-                return none
-        after = along(now, -2 * slope, n)
-        field = reflected(field, now, after, n, flat.layer[m])
-        start = mirrored(start, c, n)
-        f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
-        now, last = after, n
-    taken = upright(up, now)
-    value = dot(field, taken)
-    corner = overlap(planes, count, room.polygon, room.spare)
-    if corner < 3:
-        return none
-    share = kirchhoff(room.polygon, corner)
-    # The ray aims at the path itself, or where an edge is near, a little inside the polygon.
-    mx, my = 0.0, 0.0
-    for k in range(corner):
-        mx += room.polygon[k, 0] / corner
-        my += room.polygon[k, 1] / corner
-    toward = 0.0
-    for step in (0.0, 0.02, 0.05, 0.1, 0.2, 0.4, 0.7, 1.0):
-        toward = step
-        if depth(planes, count, step * mx, step * my) > 0.25:
-            break
-    return value * share, e1, e2, (toward * mx, toward * my)
-
-
-@njit
-def _junction(axes, last, mirror):
-    """The line where the planes of two mirrors of a chain meet, as `_bounded` takes it: no ray meets the second mirror
-    before the first, however far either runs on behind the other.
-
-    Args:
-        axes: the path's direction between the mirrors, and across it.
-        last, mirror: distance along the path, and normal, of either.
-    """
-    (now, f1, f2), (before, a), (t, b) = axes, last, mirror
-    # at x, y across the path, a mirror is met t - (x f1 + y f2) . n / (now . n) along it
-    x1, y1, x2, y2 = dot(f1, a), dot(f2, a), dot(f1, b), dot(f2, b)
-    away, slope = dot(now, a), dot(now, b)
-    nx, ny = x2 / slope - x1 / away, y2 / slope - y1 / away
-    size = np.hypot(nx, ny) + 1e-9
-    nx, ny, offset = nx / size, ny / size, (t - before) / size
-    return nx, ny, offset, t - offset * (nx * x2 + ny * y2) / slope
-
-
-@njit
-def _bounded(planes, count, line, path, wavelength):
-    """Bounds the polygon by a line across the path; returns the number of bounds, -1 where nothing is left.
-
-    Args:
-        planes, count: bounds so far, outward normals and offsets in Fresnel units.
-        line: outward normal, offset (m), and how far along the path (m) it is nearest to it.
-        path, wavelength: m.
-    """
-    nx, ny, offset, at = line
-    d = at / path
-    if d < 0.02 or d > 0.98:  # beside or behind the radar
-        return -1 if offset < 0 else count
-    offset /= np.sqrt(wavelength * path * d * (1 - d) / 2)
-    if offset < -FAR:
-        return -1
-    planes[count, 0], planes[count, 1], planes[count, 2] = nx, ny, offset
-    return count + 1
+def _reflected(way, up, ray, flat):
+    """Product of the reflection coefficients of a chain that sets out along a ray, from an upright field to one."""
+    field, now = sent(up, ray), ray
+    for m in way:
+        after = _turned(now, flat, m)
+        field = reflected(field, now, after, vec(flat.normal[m]), flat.layer[m])
+        now = after
+    return dot(field, upright(up, now))
 
 
 @njit(cache=True)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Complex, Float, Int
 
 from radarsim.propagation import fresnelzone, patches, plates
 from radarsim.propagation.curved import LINE, SpecularPoints
@@ -20,28 +20,30 @@ def find(view: View) -> Paths:
     observation, flat, reflectors = view.observation, view.facing, view.environment.reflectors
     if reflectors is None:
         return Paths.zeros(0)
-    found, ways = [], []
+    found, bodies = [], []
     for frame in range(observation.frames):
-        parts = plates.specular_points(flat, observation, frame)
-        parts = parts[flat.present(frame)[parts.facet]]
-        curved = SpecularPoints.joined([
+        some = plates.specular_points(flat, observation, frame)
+        some = some[flat.present(frame)[some.facet]]
+        if reflectors.heights is not None:
+            uneven = _uneven(observation, frame, flat[some.facet], some.aim, reflectors.heights)
+            some = replace(some, amplitude=some.amplitude * uneven)
+        found.append(some)
+        bodies += [
             reflectors.round.specular_points(observation, frame),
             patches.specular_points(observation, frame, reflectors.smooth),
-        ])  # fmt: skip
-        if reflectors.heights is not None:
-            uneven = _uneven(observation, frame, flat[parts.facet], parts.aim, reflectors.heights)
-            parts = replace(parts, amplitude=parts.amplitude * uneven)
-        ways += [_to_parts(observation, frame, flat, parts), _to_bodies(observation, frame, curved)]
-        mirrors = np.full((len(parts), 4), -1)
-        mirrors[:, 0] = parts.facet
-        found += [
-            Paths.of(
-                Kind.IMAGE, parts.isometry, parts.amplitude, frame=frame, level=flat.horizontal[parts.facet],
-                mirrors=mirrors,
-            ),
-            Paths.of(Kind.CURVED, curved.geometry, curved.amplitude, frame=frame),
-        ]  # fmt: skip
-    paths = Paths.joined(found)
+        ]
+    parts, curved = SpecularPoints.joined(found), SpecularPoints.joined(bodies)
+    frames = np.arange(observation.frames)
+    of_part = np.repeat(frames, [len(some) for some in found])
+    of_curved = np.repeat(np.repeat(frames, 2), [len(some) for some in bodies])
+    mirrors = np.full((len(parts), 4), -1)
+    mirrors[:, 0] = parts.facet
+    paths = Paths.joined([
+        Paths.of(Kind.IMAGE, parts.isometry, parts.amplitude, frame=of_part, level=flat.horizontal[parts.facet],
+                 mirrors=mirrors),
+        Paths.of(Kind.CURVED, curved.geometry, curved.amplitude, frame=of_curved),
+    ])  # fmt: skip
+    ways = [_to_parts(observation, of_part, flat, parts), _to_bodies(observation, of_curved, curved)]
     stretches = replace(Stretches.joined(ways), path=np.arange(len(paths)))
     passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(paths.amplitude))
     lag = np.append(flat.lag, 0.0)[paths.mirrors[:, 0]]  # at the centre of the sweep, amplitudes know it
@@ -49,7 +51,7 @@ def find(view: View) -> Paths:
     return paths.behind(observation, replace(passed, delay=passed.delay + lag))
 
 
-def _to_parts(observation: Observation, frame: int, flat: Flat, parts: SpecularPoints) -> Stretches:
+def _to_parts(observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: SpecularPoints) -> Stretches:
     """The ways to parts of plates: a flash mirrors, an edge mirrors along its line, a corner echoes like a point.
 
     Across an edge that is near the flash, in Fresnel units, it is a part of the same zone and goes over into it.
@@ -74,9 +76,8 @@ def _to_parts(observation: Observation, frame: int, flat: Flat, parts: SpecularP
     mirrors = np.where(np.arange(3) == 0, np.where(kind == -3, -1, parts.facet)[:, None], -1)
     stops = np.repeat(parts.aim[:, None], 3, axis=1), np.repeat(after[:, None], 3, axis=1)
     span = np.tile([0.0, 0.5], (n, 1))
-    begin = np.broadcast_to(here, parts.aim.shape)
     return Stretches(
-        np.zeros(n, int), np.full(n, frame), begin, parts.aim, before, after, mirrors, *stops, span, mirroring
+        np.zeros(n, int), frame, here, parts.aim, before, after, mirrors, *stops, span, mirroring
     )  # fmt: skip
 
 
@@ -86,9 +87,9 @@ def _spread(mirroring, axes):
     return (1 - (1 - AT_RADAR) * mirroring) * axes, mirroring * axes
 
 
-def _to_bodies(observation: Observation, frame: int, curved: SpecularPoints) -> Stretches:
+def _to_bodies(observation: Observation, frame: Int[np.ndarray, "point"], curved: SpecularPoints) -> Stretches:
     """The ways to round bodies, which echo like points, and cylinders along their axis like mirrors."""
-    begin, n = np.broadcast_to(observation.position[frame], curved.aim.shape), len(curved)
+    begin, n = observation.position[frame], len(curved)
     way = curved.aim - begin
     size = np.linalg.norm(way, axis=1, keepdims=True)
     line = curved.geometry[:, :1] == LINE
@@ -101,7 +102,7 @@ def _to_bodies(observation: Observation, frame: int, curved: SpecularPoints) -> 
     before, after = _spread(mirroring, axes)
     none, span = (np.full((n, 3), -1), np.zeros((n, 3, 3)), np.zeros((n, 3, 2, 3))), np.tile([0.0, 0.5], (n, 1))
     return Stretches(
-        np.zeros(n, int), np.full(n, frame), begin, curved.aim, before, after, *none, span, mirroring
+        np.zeros(n, int), frame, begin, curved.aim, before, after, *none, span, mirroring
     )  # fmt: skip
 
 

@@ -34,7 +34,7 @@ def mesh(vertices: Float[np.ndarray, "v 3"], faces: ArrayLike) -> trimesh.Trimes
     return result
 
 
-def exact(vertices: Float[np.ndarray, "v 3"], faces: ArrayLike) -> trimesh.Trimesh:
+def exact(vertices: ArrayLike, faces: ArrayLike) -> trimesh.Trimesh:
     """A mesh of vertices that are known to be different."""
     return trimesh.Trimesh(np.asarray(vertices, float), np.array(faces), process=False)
 

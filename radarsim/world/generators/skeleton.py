@@ -41,12 +41,14 @@ class Block:
         axis: along which its rooms stand side by side, 0 or 1.
         use: ``rooms``, ``core``, ``stairs`` or ``toilet``.
         pitch: distance of the axes on which its walls and windows stand, m.
+        room: usual width of its rooms, m.
     """
 
     box: Box
     axis: int
     use: str
     pitch: float
+    room: float = 4.3
 
 
 @dataclass

@@ -41,8 +41,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
 from radarize.errors import InputError
 from radarize.files import within
 from radarize.yamlfile import read_yaml
-from radarsim import plugins
-from radarsim.world import shapes
+from radarsim.world import plugins, shapes
 from radarsim.world.generators.buildings import Building, Office
 from radarsim.world.generators.small_objects import small_objects
 from radarsim.world.interferers import Interferer

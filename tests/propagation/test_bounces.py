@@ -71,9 +71,9 @@ def test_corners_that_there_are(office, position, target, bounces):
     ("position", "edge", "spread"),
     [
         (HERE, (8.712, 6.48, 1.1985), 0.1),  # of the cabinet
-        (HERE, (11.14, 7.0, 1.1985), 0.1),  # of doorways
-        (THERE, (4.21, 7.0, 1.1822), 0.1),
-        (THERE, (1.72, 7.0, 1.1822), 0.05),
+        (HERE, (14.76, 7.0, 1.1985), 0.1),  # of doorways
+        (THERE, (14.76, 7.0, 1.1822), 0.1),
+        (THERE, (12.94, 7.0, 1.1822), 0.05),
     ],
 )
 def test_outer_edges_are_no_corners(office, position, edge, spread):

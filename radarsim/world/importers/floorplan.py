@@ -138,17 +138,9 @@ def clutter(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"], solid: shapely
 
 def upright(area: shapely.Geometry, height: float, lid: bool = False) -> trimesh.Trimesh:
     """The upright sides of an area from the floor to `height` (m), seen from outside; its top too if `lid`."""
-    pieces = []
-    for part in shapely.get_parts(area):
-        part = shapely.geometry.polygon.orient(part)
-        for ring in (part.exterior, *part.interiors):
-            at = np.asarray(ring.coords)[:, :2]
-            for a, b in zip(at[:-1], at[1:], strict=True):
-                corners = [(*a, 0.0), (*b, 0.0), (*b, height), (*a, height)]
-                pieces.append(trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False))
-        if lid:
-            pieces.append(shapes.polygon(part, (0, 0, height)))
-    return shapes.joined(*pieces)
+    whole = shapes.joined(*(trimesh.creation.extrude_polygon(part, height) for part in shapely.get_parts(area)))
+    whole.update_faces((whole.face_normals[:, 2] > -0.5) & (lid | (whole.face_normals[:, 2] < 0.5)))
+    return whole
 
 
 def _placed(area: shapely.Geometry, grid: OccupancyGrid) -> shapely.Geometry:

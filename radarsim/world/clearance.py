@@ -1,8 +1,6 @@
 """Where there is floor to move on, how far the nearest thing is, and what it is."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import trimesh
@@ -12,6 +10,7 @@ from PIL import Image, ImageDraw
 from scipy import ndimage
 
 from radarsim.world.scene import Scene
+from radarsim.world.shapes import closest
 
 RESOLUTION = 0.025  # m
 #: What rises less above the ground than this, m, is walked and rolled over: carpets, thresholds, unevenness.
@@ -108,27 +107,6 @@ def nearest(scene: Scene, points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.nd
         return np.full(len(points), np.inf), np.full(len(points), -1)
     distance, triangle = closest(scene.triangles[high], points)
     return distance, scene.triangle_object[high][triangle]
-
-
-def closest(
-    triangles: Float[np.ndarray, "t 3 3"], points: Float[np.ndarray, "n 3"]
-) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
-    """Distance from points to the nearest of some triangles, m, and which it is."""
-    world, tensor = tested(triangles)
-    query = np.asarray(points, np.float32)
-    found = world.compute_closest_points(tensor(query))
-    distance = np.linalg.norm(found["points"].numpy() - query, axis=1).astype(float)
-    return distance, found["primitive_ids"].numpy().astype(np.int64)
-
-
-def tested(triangles: Float[np.ndarray, "t 3 3"]) -> tuple[Any, Callable[[np.ndarray], Any]]:
-    """Open3D's ray and distance tests on triangles, and what makes tensors for them."""
-    import open3d
-
-    world, tensor = open3d.t.geometry.RaycastingScene(), open3d.core.Tensor.from_numpy
-    corners = np.ascontiguousarray(triangles.reshape(-1, 3), np.float32)
-    world.add_triangles(tensor(corners), tensor(np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)))
-    return world, tensor
 
 
 def _floor(scene: Scene, below: float) -> Bool[np.ndarray, "t"]:

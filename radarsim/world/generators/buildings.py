@@ -12,10 +12,11 @@ from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry import box as area
 
 from radarsim.world import shapes
+from radarsim.world.fields import Strict
 from radarsim.world.generators import walls
 from radarsim.world.generators.furnishing import furnish
 from radarsim.world.generators.furniture import make
@@ -27,10 +28,8 @@ from radarsim.world.generators.styles import STYLES, Style
 from radarsim.world.objects import SceneObject
 
 
-class Floor(BaseModel, ABC):
+class Floor(Strict, ABC):
     """One floor of a building. Same parameters, same objects to the last bit."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: str
     seed: Annotated[int, Field(ge=0)] = 0

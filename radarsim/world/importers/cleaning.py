@@ -7,8 +7,8 @@ import numpy as np
 import trimesh
 
 from radarize.errors import InputError
-from radarsim.world.clearance import closest
-from radarsim.world.importers.part import Part
+from radarsim.world.importers.part import Part, unreported
+from radarsim.world.shapes import closest
 
 #: Corners closer than this are one, decimals of a metre.
 _DIGITS = 5
@@ -49,7 +49,7 @@ def edges_of_many(mesh: trimesh.Trimesh) -> int:
 
 
 def decimate(
-    parts: list[Part], budget: int, source: str, progress: Callable[..., None] | None = None
+    parts: list[Part], budget: int, source: str, progress: Callable[..., object] = unreported
 ) -> tuple[list[Part], float]:
     """Parts with no more than about `budget` triangles together, and the deviation of 99 % of the surface, m.
 
@@ -65,8 +65,7 @@ def decimate(
         return parts, 0.0
     made, deviations = [], []
     for number, part in enumerate(parts):
-        if progress:
-            progress("decimating", number, len(parts))
+        progress("decimating", number, len(parts))
         target = max(12, int(budget * len(part.mesh.faces) / total))
         if len(part.mesh.faces) <= target:
             made.append(part)
@@ -82,8 +81,7 @@ def decimate(
         thin = clean(replace(part, mesh=mesh), source)
         if thin is not None:
             made.append(thin)
-    if progress:
-        progress("decimating", len(parts), len(parts))
+    progress("decimating", len(parts), len(parts))
     left = sum(len(part.mesh.faces) for part in made)
     moved = float(np.quantile(np.concatenate(deviations), 0.99))
     if moved > DEVIATION or left > 1.2 * budget:

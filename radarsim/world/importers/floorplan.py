@@ -13,7 +13,7 @@ from radarize.errors import InputError
 from radarsim.world import shapes
 from radarsim.world.importers.faces import Face, faces, rooms
 from radarsim.world.importers.occupancy import OccupancyGrid
-from radarsim.world.importers.part import Part
+from radarsim.world.importers.part import Part, unreported
 from radarsim.world.planes import trapezoids
 
 #: Things that are no walls (chair legs, boxes, people who stood still) are this high, m.
@@ -29,7 +29,7 @@ _COURT = 1.0
 
 
 def parts(
-    grid: OccupancyGrid, height: float, thickness: float, source: str, progress: Callable[..., None] | None = None
+    grid: OccupancyGrid, height: float, thickness: float, source: str, progress: Callable[..., object] = unreported
 ) -> list[Part]:
     """The parts of a building with the plan of a grid: ``walls``, ``clutter``, ``floor`` and ``ceiling``.
 
@@ -46,16 +46,15 @@ def parts(
     inside = rooms(grid)
     if not inside.any():
         raise InputError(f"{source}: has no square metre of free ground together, expected the map of a building")
-    step = progress or (lambda *_: None)
-    step("finding walls", 0, 3)
+    progress("finding walls", 0, 3)
     found = faces(grid, inside)
-    step("finding walls", 1, 3)
+    progress("finding walls", 1, 3)
     if not found:
         raise InputError(f"{source}: has no straight wall beside its free ground, expected the map of a building")
     solid = walls(found, thickness, grid, inside)
-    step("finding walls", 2, 3)
+    progress("finding walls", 2, 3)
     rest = clutter(grid, inside, solid)
-    step("finding walls", 3, 3)
+    progress("finding walls", 3, 3)
     built = [Part("walls", upright(_placed(solid, grid), height), "plasterboard", solid=True)]
     if rest:
         low = _placed(MultiPolygon(rest), grid)

@@ -45,6 +45,6 @@ def turned_to_rooms(parts: list[Part]) -> tuple[list[Part], list[str]]:
 def _shells(mesh: trimesh.Trimesh) -> Iterator[tuple[Int[np.ndarray, "face"], trimesh.Trimesh]]:
     """The closed surfaces of a mesh with space to stand in: their faces, and each by itself."""
     for faces in trimesh.graph.connected_components(mesh.face_adjacency, nodes=np.arange(len(mesh.faces)), min_len=4):
-        shell = mesh.submesh([faces], append=True, repair=False)
+        shell = trimesh.Trimesh(mesh.vertices, mesh.faces[faces], process=False)
         if np.ptp(shell.bounds[:, 2]) >= _HIGH and shell.is_watertight and 2 * abs(shell.volume) > _WIDE * shell.area:
             yield faces, shell

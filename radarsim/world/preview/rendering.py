@@ -1,7 +1,6 @@
 """A perspective picture of a scene by Sionna RT's path tracer: the building cut open below its ceilings."""
 
 import numpy as np
-import trimesh
 from jaxtyping import Float
 
 from radarsim.world import shapes
@@ -53,14 +52,10 @@ def cut_open(scene: Scene) -> list[SceneObject]:
     for item in scene.objects:
         if len(below := between(item.mesh.triangles, low - 1.0, level)):
             triangles.setdefault(item.material, []).append(below)
-    found = [SceneObject(what.name, _mesh(np.concatenate(some)), what) for what, some in triangles.items()]
+    found = [SceneObject(what.name, shapes.loose(np.concatenate(some)), what) for what, some in triangles.items()]
     areas = [area for area, _ in Section.of(scene, level - 2e-3).areas(scene) if area.area > 1e-3]
     caps = [shapes.polygon(area.buffer(0), (0, 0, level)) for area in areas]
     return [*found, SceneObject(CAP.name, shapes.joined(*caps), CAP)] if caps else found
-
-
-def _mesh(triangles: Float[np.ndarray, "t 3 3"]) -> trimesh.Trimesh:
-    return trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
 
 
 def _camera(

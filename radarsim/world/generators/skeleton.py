@@ -27,8 +27,8 @@ Box = tuple[float, float, float, float]  # x0 y0 x1 y1, m
 LONG = 21.0, 36.0
 #: A ring longer than this gets a cross corridor in its middle, m.
 LONGEST_RING = 78.0
-#: A core deeper than this holds two rows of rooms, m; rows in it are at least so deep.
-DEEP_CORE, CORE_ROW = 7.0, 3.9
+#: Rows of rooms in the core are at least so deep, m.
+CORE_ROW = 3.9
 STAIRS, TOILET, STUB = (5.6, 3.0, 1.9)  # sizes along the core, m
 
 

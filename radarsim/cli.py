@@ -1,7 +1,7 @@
 """`radarsim`: the simulator's command line. Heavy modules load inside the commands, so that --help is instant."""
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -17,6 +17,18 @@ SceneName = Annotated[
 ]
 
 
+def _pose(about: str) -> Any:
+    return typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help=about)
+
+
+def _print_warnings(recording: Path) -> None:
+    from radarize.recording import Recording
+
+    with Recording(recording) as opened:
+        if opened.attributes["warnings"]:
+            print(f"warning: {opened.attributes['warnings']}")
+
+
 @app.command()
 def simulate(
     scene: SceneName,
@@ -26,13 +38,11 @@ def simulate(
     waypoints: Annotated[
         Path | None, typer.Option(help="Places x y (YAML, CSV or TUM) to go through instead of a tour.")
     ] = None,
-    mounting: Annotated[
-        str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="Sensor on its carrier, m and degrees.")
-    ] = "",
+    mounting: Annotated[str, _pose("Sensor on its carrier, m and degrees.")] = "",
     duration: Annotated[
         float | None, typer.Option(min=0.0, help="Length, s; else 40 of a tour, all of a trajectory or way-points.")
     ] = None,
-    people: Annotated[int, typer.Option(min=0, max=50, help="Who walk about near the radar's way.")] = 0,
+    people: Annotated[int, typer.Option(min=0, max=50, help="Pedestrians near the radar's path.")] = 0,
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same bytes.")] = 0,
     radar: Annotated[str, typer.Option(help="A .cfg file or a preset's name.")] = "radarize",
     frontend: Annotated[
@@ -64,8 +74,7 @@ def simulate(
         )  # fmt: skip
     with Recording(written) as recording:
         print(Statistics.from_json(str(recording.attributes["motion"])))
-        if recording.attributes["warnings"]:
-            print(f"warning: {recording.attributes['warnings']}")
+    _print_warnings(written)
     print(written)
 
 
@@ -113,25 +122,19 @@ def twin(
     recording: Annotated[Path, typer.Argument(metavar="REAL.h5", help="Recording of a real radar, with poses.")],
     scene: Annotated[str, typer.Option(help="Model of the place: a scene of this project, or a .yaml file.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Twin to write (.h5), with .html and .json beside.")],
-    origin: Annotated[
-        str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="The poses' origin in the scene, m and degrees.")
-    ] = "",
-    mounting: Annotated[
-        str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="Radar on the body whose poses they are.")
-    ] = "",
-    at: Annotated[
-        str, typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help="Place of a radar at rest, instead of poses.")
-    ] = "",
+    origin: Annotated[str, _pose("The poses' origin in the scene, m and degrees.")] = "",
+    mounting: Annotated[str, _pose("Radar on the body whose poses they are.")] = "",
+    at: Annotated[str, _pose("Place of a radar at rest, instead of poses.")] = "",
     frontend: Annotated[Path | None, typer.Option(help="A front-end file (.yaml); else the board's own.")] = None,
     calibrate: Annotated[
         bool, typer.Option("--calibrate", help="Fit the front end to the recording first; kept beside, as .yaml.")
     ] = False,
-    every: Annotated[int, typer.Option(min=1, help="Simulate every so manieth frame.")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="Simulate every N-th frame.")] = 1,
     duration: Annotated[float | None, typer.Option(min=0.0, help="Of the recording, s; else all of it.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of speckle and noise.")] = 0,
 ) -> None:
     """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
-    from radarize.recording import Recording, keeping
+    from radarize.recording import keeping
     from radarsim.motion.trajectory import Mounting
     from radarsim.twin.report import report_twin
     from radarsim.twin.twin import Options, make_twin
@@ -144,9 +147,7 @@ def twin(
             progress=lambda *done: report("simulate", *done),
         )  # fmt: skip
         page, sentences = report_twin(recording, made, progress=lambda *done: report("compare", *done))
-    with Recording(made) as opened:
-        if opened.attributes["warnings"]:
-            print(f"warning: {opened.attributes['warnings']}")
+    _print_warnings(made)
     print("\n".join(sentences))
     for path in (made, page, page.with_suffix(".json")):
         print(path)
@@ -154,7 +155,7 @@ def twin(
 
 @scene_app.command()
 def info(scene: SceneName) -> None:
-    """Say what SCENE is made of."""
+    """Print extent, objects and materials of SCENE."""
     from radarsim.world.scene import Scene
 
     with working("loading the scene"):
@@ -319,7 +320,7 @@ def emulate(
 def doctor(
     report: Annotated[bool, typer.Option("--report", help="Print text for a bug report instead.")] = False,
 ) -> None:
-    """Say what is missing on this machine and how to get it."""
+    """List what is missing on this machine and how to get it."""
     from radarsim.doctor import describe, examine
 
     if report:

@@ -47,6 +47,7 @@ scene = mi.load_dict({"type": "scene", "wall": {"type": "rectangle"}})
 hit = scene.ray_intersect(mi.Ray3f(o=[0, 0, 2], d=[0, 0, -1]))
 assert abs(hit.t[0] - 2) < 1e-5, hit.t
 import sionna.rt
+print("Mitsuba's llvm_ad_mono_polarized variant hits a wall; Sionna RT imports")
 """
 
 
@@ -125,15 +126,20 @@ def _library(library: str) -> Finding:
     return Finding(library, "missing", "not found (open3d needs it)", f"apt-get install {LIBRARIES[library]}")
 
 
-def _ray_test() -> Finding:
+def _tried(what: str, arguments: list[str], longest: float | None = None) -> Finding:
+    """What Python in a process of its own prints; no answer within `longest` s is as bad as a failure."""
     try:
-        done = subprocess.run([sys.executable, "-c", _RAY_TEST], capture_output=True, text=True, timeout=120)
+        done = subprocess.run([sys.executable, *arguments], capture_output=True, text=True, timeout=longest)
     except subprocess.TimeoutExpired:
-        return Finding("ray test", "missing", "no answer within two minutes", REPAIR)
+        return Finding(what, "missing", f"no answer within {longest:g} s", REPAIR)
     if done.returncode == 0:
-        return Finding("ray test", "ok", "Mitsuba's llvm_ad_mono_polarized variant hits a wall; Sionna RT imports")
+        return Finding(what, "ok", done.stdout.strip())
     reason = (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1]
-    return Finding("ray test", "missing", reason, llvm.INSTALL if "LLVM" in done.stderr else REPAIR)
+    return Finding(what, "missing", reason, llvm.INSTALL if "LLVM" in done.stderr else REPAIR)
+
+
+def _ray_test() -> Finding:
+    return _tried("ray test", ["-c", _RAY_TEST], 120)
 
 
 def first_frame() -> float:
@@ -152,12 +158,7 @@ def first_frame() -> float:
 
 
 def _first_frame() -> Finding:
-    command = [sys.executable, "-m", "radarsim.doctor", "--first-frame"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    if done.returncode == 0:
-        return Finding("first frame", "ok", done.stdout.strip())
-    reason = (done.stderr.strip().splitlines() or [f"ended with {done.returncode}"])[-1]
-    return Finding("first frame", "missing", reason, REPAIR)
+    return _tried("first frame", ["-m", "radarsim.doctor", "--first-frame"])
 
 
 def _cuda() -> Finding:

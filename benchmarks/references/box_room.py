@@ -18,7 +18,7 @@ CONFIG = PRESETS["radarize"]
 def images_of_a_room(observation):
     """Images of a radar in a box room, by walls and chains of them: isometries, amplitudes, orders."""
     flat = Reflectors.of(Scene.load("physics/room"), CONFIG).flat
-    parts = plates.parts(flat, observation, 0)
+    parts = plates.specular_points(flat, observation, 0)
     single = parts.isometry
     walls = (
         np.abs(np.linalg.det(single[:, :, :3]) + 1 + np.abs(np.trace(single[:, :, :3], axis1=1, axis2=2) - 1)) < 1e-6

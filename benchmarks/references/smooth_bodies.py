@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 from benchmarks.references.rigs import isotropic
 from radarize.radar.presets import PRESETS
 from radarsim.propagation import patches
+from radarsim.propagation.curved import path_over
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
@@ -31,9 +32,13 @@ def ahead(position):
 def field(found, position):
     """Echo of smooth surfaces, isotropic antenna."""
     position = np.asarray(position, float)
-    arcs = patches.flashes(isotropic(position, LAMBDA, ahead(position)), 0, found.smooth)
-    mirrored = np.einsum("pij,j->pi", arcs.isometry[:, :, :3], position) + arcs.isometry[:, :, 3]
-    return np.sum(arcs.amplitude * np.exp(2j * np.pi * np.linalg.norm(position - mirrored, axis=1) / LAMBDA))
+    return summed(patches.specular_points(isotropic(position, LAMBDA, ahead(position)), 0, found.smooth), position)
+
+
+def summed(points, position):
+    """Sum of the echoes of curved reflectors at a position, each with its path's phase."""
+    path = [path_over(geometry, tuple(position), tuple(position)) for geometry in points.geometry]
+    return np.sum(points.amplitude * np.exp(2j * np.pi * np.array(path) / LAMBDA))
 
 
 def physical_optics(surface, position, soft=0.3):

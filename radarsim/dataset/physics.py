@@ -1,4 +1,4 @@
-"""Which physics a recording was made with: a digest of the sources that decide its samples and its truth."""
+"""Version of the physics: a digest of the sources that decide a recording's samples and truth."""
 
 from functools import cache
 from hashlib import sha256

@@ -39,13 +39,14 @@ from pydantic import Field, ValidationError, model_validator
 
 from radarize.errors import InputError
 from radarize.files import within
+from radarize.plain import Frozen
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
 from radarize.yamlfile import read_yaml
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task, content
-from radarsim.dataset.variant import Attributes, Strict, Variant
+from radarsim.dataset.variant import Attributes, Variant
 from radarsim.world.description import described, description_model, find, shipped, split_level
 from radarsim.world.validation import format_validation_error
 
@@ -57,7 +58,7 @@ Platform = Literal["handheld", "cart", "robot"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 
 
-class Recordings(Strict):
+class Recordings(Frozen):
     """Some recordings of one building.
 
     Attributes:
@@ -67,7 +68,7 @@ class Recordings(Strict):
         count: recordings per platform.
         duration: s, each.
         waypoints: to go through instead of a tour, m.
-        people: who walk about near the radar's way in each.
+        people: pedestrians near the radar's path in each.
         variants: some of `Specification.variants`; all if none is named.
         attributes: of the recordings.
     """
@@ -96,7 +97,7 @@ class Recordings(Strict):
                 count[place, platform] += 1
 
 
-class Specification(Strict):
+class Specification(Frozen):
     """A data set's specification; see the head of this file."""
 
     name: Name

@@ -7,14 +7,14 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from radarize.errors import InputError
+from radarize.plain import Frozen
 from radarsim.dataset.task import Task
-from radarsim.dataset.variant import Strict
 
 Members = dict[str, list[str]]
 Share = Annotated[float, Field(ge=0, le=1)]
 
 
-class RandomSplit(Strict):
+class RandomSplit(Frozen):
     """Drawn anew for each of `folds` splits, called NAME-0, NAME-1, ..."""
 
     kind: Literal["random"]
@@ -42,7 +42,7 @@ class RandomSplit(Strict):
         return found
 
 
-class PlatformSplit(Strict):
+class PlatformSplit(Frozen):
     """Trained on some platforms, tested on others (all others by default)."""
 
     kind: Literal["platform"]
@@ -59,15 +59,14 @@ class PlatformSplit(Strict):
         present = sorted({task.platform for task in tasks})
         tested = tuple(p for p in present if p not in self.train) if self.test is None else self.test
         for field, chosen in (("train", self.train), ("test", tested)):
-            if unknown := [p for p in chosen if p not in present]:
-                raise InputError(f"{field} names {unknown[0]!r}, expected some of: {', '.join(present)}")
+            _require_known(field, chosen, present)
         if both := set(self.train) & set(tested):
             raise InputError(f"{sorted(both)[0]!r} is in train and in test, expected it in one of them")
         training = [task for task in tasks if task.platform in self.train]
         return {name: _parts(training, [t for t in tasks if t.platform in tested], self.validation, rng)}
 
 
-class BuildingSplit(Strict):
+class BuildingSplit(Frozen):
     """Leave one building out: for each of `held_out` a split NAME-BUILDING, trained on all others."""
 
     kind: Literal["building"]
@@ -81,9 +80,7 @@ class BuildingSplit(Strict):
             InputError: a building that no recording has, or none that is left to train on.
         """
         present = sorted({task.building for task in tasks})
-        for building in self.held_out or ():
-            if building not in present:
-                raise InputError(f"held_out names {building!r}, expected some of: {', '.join(present)}")
+        _require_known("held_out", self.held_out or (), present)
         if len(present) < 2:
             raise InputError(f"there is only building {present[0]}, expected another one to train on")
         return {
@@ -92,6 +89,12 @@ class BuildingSplit(Strict):
             )
             for out in self.held_out or present
         }
+
+
+def _require_known(field: str, names: Sequence[str], present: Sequence[str]) -> None:
+    for name in names:
+        if name not in present:
+            raise InputError(f"{field} names {name!r}, expected some of: {', '.join(present)}")
 
 
 def _parts(training: Sequence[Task], tested: Sequence[Task], share: float, rng: np.random.Generator) -> Members:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from pathlib import Path
@@ -9,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from radarize import __version__
-from radarize.errors import InputError
+from radarize.errors import InputError, explained
 from radarize.radar.presets import load_config
 from radarize.recording import Recording
 from radarsim.dataset import physics
@@ -47,7 +48,7 @@ class Task:
         content: of the scene's file, see `content`; None: it has none.
         variant: what differs from other recordings of the same walk.
         attributes: of the recording.
-        people: who walk about near the radar's way.
+        people: pedestrians near the radar's path.
     """
 
     name: str
@@ -99,23 +100,25 @@ class Task:
         Raises:
             Stale: it is, but was made with other parameters, or is no recording of a data set.
         """
-        path = self.path(folder)
-        if not path.is_file():
-            return False
+        return self._lacking(folder) == []
+
+    def _lacking(self, folder: Path) -> list[str] | None:
+        """Sensors that the recording has yet to get; None where there is no whole one. Raises as `is_finished`."""
         try:
-            with Recording(path) as recording:
-                frames, made = len(recording), recording.attributes.get(ATTRIBUTE)
+            with Recording(self.path(folder)) as recording:
+                frames, text = len(recording), recording.attributes.get(ATTRIBUTE)
         except InputError:
-            return False  # cut short or damaged
-        if made is None:
+            return None  # not there, cut short or damaged
+        if text is None:
             raise Stale(f"{self.name} does not come from a data set")
-        made, complete = json.loads(str(made)), True
-        for key, wanted in json.loads(self.identity).items():
-            if key == "sensors" and set(made.get(key)) < set(wanted):
-                complete = False
-            elif made.get(key) != wanted:
-                raise Stale(f"{self.name} has {key} {_short(made.get(key))}, now {_short(wanted)}")
-        return complete and frames == self.frames
+        made, wanted = json.loads(str(text)), json.loads(self.identity)
+        lacking = [name for name in self.sensors if name not in made["sensors"]]
+        if set(made["sensors"]) < set(self.sensors):
+            made["sensors"] = wanted["sensors"]
+        for key, value in wanted.items():
+            if made.get(key) != value:
+                raise Stale(f"{self.name} has {key} {_short(made.get(key))}, now {_short(value)}")
+        return lacking if frames == self.frames else None
 
     def make(self, folder: Path, progress: Callable[[int, int], None] | None = None) -> str:
         """Simulate the recording, or what it lacks of sensors beside the radar; it appears under its name when it is
@@ -139,7 +142,9 @@ class Task:
         from radarsim.recording.simulate import record
 
         share_with_drjit()
-        final, late = self.path(folder), self._late(folder)
+        final, late = self.path(folder), None
+        with suppress(Stale):
+            late = self._lacking(folder)
         about = {"platform": self.platform, **self.attributes, ATTRIBUTE: self.identity}
         try:
             scenario, cfg_text = self._scenario()
@@ -164,31 +169,19 @@ class Task:
 
     def _scenario(self):
         """The `Scenario` to record, and the radar's original configuration text."""
-        from radarsim.motion.pedestrians import crowded
-        from radarsim.motion.walk import Walk
-        from radarsim.scenario import Scenario
+        from radarsim.recording.simulate import planned
         from radarsim.world.scene import Scene
 
         scene = Scene.load(self.scene) if isinstance(self.scene, str) else Scene.of(self.scene, self._place)
         mild = Scene.load(split_level(self.scene)[0]) if self.variant.level else scene
-        places = None if self.waypoints is None else np.array(self.waypoints)
-        walk = Walk(self.platform, self.duration, waypoints=places, mounting=self.variant.mounted)
-        config, cfg_text = load_config(self.variant.radar_of(self.radar))
-        front_end = self.variant.frontend_of(self.frontend, config.board)
-        motion = walk.through(mild, self.seed)
-        scene = crowded(scene, motion, self.people, self.seed)
-        return Scenario(scene, motion, config, front_end, self.seed, self.sensors), cfg_text
-
-    def _late(self, folder: Path) -> list[str]:
-        """Sensors that a recording of this task, otherwise finished, has yet to get."""
-        try:
-            if not self.path(folder).is_file() or self.is_finished(folder):
-                return []
-            with Recording(self.path(folder)) as recording:
-                made = json.loads(str(recording.attributes[ATTRIBUTE]))["sensors"]
-                return [name for name in self.sensors if name not in made] if len(recording) == self.frames else []
-        except InputError:
-            return []
+        radar = self.variant.radar_of(self.radar)
+        scenario, cfg_text, _ = planned(
+            scene, walk_in=mild, seed=self.seed, radar=radar, sensors=self.sensors, people=self.people,
+            frontend=self.variant.frontend_of(self.frontend, load_config(radar)[0].board),
+            platform=self.platform, duration=self.duration, mounting=self.variant.mounted,
+            waypoints=None if self.waypoints is None else np.array(self.waypoints),
+        )  # fmt: skip
+        return scenario, cfg_text
 
     def clear(self, folder: Path) -> None:
         """Remove what is left of making the recording, by this run or by one that was killed."""
@@ -215,10 +208,8 @@ def content(scene: dict | str) -> dict[str, object] | None:
 
 
 def _digest(path: Path) -> str:
-    try:
+    with explained(f"{path}: cannot be read", OSError):
         return sha256(path.read_bytes()).hexdigest()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from error
 
 
 def _short(value: object) -> str:

@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 
+from radarize.plain import Frozen
 from radarize.radar.boards import BOARDS, Board, load_board
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS, load_config
@@ -15,13 +16,7 @@ from radarsim.receiver.frontend_config import FrontEndConfig
 Attributes = dict[str, str | float | int | bool]
 
 
-class Strict(BaseModel):
-    """What a specification is made of: no unknown keys, no changes."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Variant(Strict):
+class Variant(Frozen):
     """Changes against what the specification says.
 
     Attributes:

@@ -34,7 +34,7 @@ class Board:
     Args:
         link: data side.
         reset_radar: reboots the radar on the board.
-        say: tells the user what happened.
+        say: shows the user a line.
     """
 
     def __init__(self, link: Link, reset_radar: Callable[[], None], say: Callable[[str], None]):
@@ -43,54 +43,41 @@ class Board:
 
     def execute(self, request: Request) -> int:
         """Status of the reply to `request`."""
-        match request.command:
+        try:
+            return self._execute(request.command, request.body)
+        except InputError as error:
+            self._say(f"board: {error}")
+            return _FAILED
+
+    def _execute(self, command: int, body: bytes) -> int:
+        match command:
             case Command.ALIVE | Command.STATUS | Command.RADAR_MODE:
-                return _DONE
+                pass
             case Command.VERSION:
                 return VERSION_2_8
             case Command.RESET_FPGA:
                 self._link.stop()
                 self._packets = _DEFAULT
-                return _DONE
             case Command.RESET_RADAR:
                 self._say("board: radar reset")
                 self._reset_radar()
-                return _DONE
             case Command.CONFIGURE:
-                return self._configure(request.body)
+                if body[:5] != RAW_TWO_LANES[:5] or len(body) != len(RAW_TWO_LANES):  # the last is a timer
+                    wanted = f"{RAW_TWO_LANES.hex(' ')} (raw, 2 lanes, 16 bit)"
+                    raise InputError(f"settings {body.hex(' ')} fail, expected {wanted}")
             case Command.PACKETS:
-                return self._set_packets(request.body)
+                self._packets = read_packet_settings(body)
             case Command.EEPROM:
                 self._say("board: EEPROM written; the emulator keeps its addresses")
-                return _DONE
             case Command.START:
-                return self._start()
+                if self._link.recording:
+                    raise InputError("start fails, it is recording")
+                self._link.start(*self._packets)
+                self._say(f"board: recording, {self._packets[0] * 1e6:g} us between packets")
             case Command.STOP:
                 self._link.stop()
-                return _DONE
-        self._say(f"board: request {request.command} fails, the emulator cannot do it")
-        return _FAILED
-
-    def _configure(self, body: bytes) -> int:
-        if body[:5] != RAW_TWO_LANES[:5] or len(body) != len(RAW_TWO_LANES):  # the last is a timer
-            self._say(f"board: settings {body.hex(' ')} fail, expected {RAW_TWO_LANES.hex(' ')} (raw, 2 lanes, 16 bit)")
-            return _FAILED
-        return _DONE
-
-    def _set_packets(self, body: bytes) -> int:
-        try:
-            self._packets = read_packet_settings(body)
-        except InputError as error:
-            self._say(f"board: {error}")
-            return _FAILED
-        return _DONE
-
-    def _start(self) -> int:
-        if self._link.recording:
-            self._say("board: start fails, it is recording")
-            return _FAILED
-        self._link.start(*self._packets)
-        self._say(f"board: recording, {self._packets[0] * 1e6:g} us between packets")
+            case _:
+                raise InputError(f"request {command} fails, the emulator cannot do it")
         return _DONE
 
 
@@ -112,7 +99,7 @@ class BoardSockets:
     Args:
         at: requests are taken at its `board` and `command_port`; packets go to its `computer` and `data_port`, replies
             to its `command_port`.
-        say: tells the user what happened.
+        say: shows the user a line.
 
     Raises:
         InputError: the address is in use, or not one of this machine.

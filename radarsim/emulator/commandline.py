@@ -35,6 +35,18 @@ _OPENING = ("channelCfg", "adcCfg", "lowPower")
 _MOST_FRAMES = 65535
 _FRAMES = ("profileCfg", "chirpCfg", "frameCfg")
 _USAGE = "Error: Invalid usage of the CLI command\n"
+_STARTED = "Ignored: This command is not allowed after sensor has started\n"
+_RECONFIGURE = (
+    "Error: Reconfig is not supported, only argument of 0 is\n(do not reconfig, just re-start the sensor) valid\n"
+)
+_NOTHING_NEW = (
+    'Error: You have provided no configuration, issue "sensorStart 0" OR provide full configuration and issue '
+    '"sensorStart"\n'
+)
+_ALL_NEW = (
+    'Error: You have provided complete new configuration, issue "sensorStart" (without argument) if you want it to '
+    "take effect\n"
+)
 _PARTIAL = (
     "Error: You have provided partial configuration between stop and this command and partial configuration cannot be "
     'undone.Issue the full configuration and do "sensorStart" \n'
@@ -70,65 +82,53 @@ class CommandLine:
         if not words:
             return ""
         name, *values = words
-        if name in self._OWN:
-            text, status = self._OWN[name](self, values)
-        elif name in _COUNTS:
-            text, status = self._configure(name, values)
-        else:
+        if name not in self._OWN | _COUNTS:
             return f"'{name}' is not recognized as a CLI command\n"
-        return text + ("Done\n" if status == 0 else f"Error {status}\n")
+        text = self._OWN[name](self, values) if name in self._OWN else self._configure(name, values)
+        return text + ("Error -1\n" if "Error: " in text else "Done\n")
 
-    def _configure(self, name: str, values: list[str]) -> tuple[str, int]:
+    def _configure(self, name: str, values: list[str]) -> str:
         if self._started and name != "configDataPort":
-            return "Ignored: This command is not allowed after sensor has started\n", 0
+            return _STARTED
         if len(values) != _COUNTS[name]:
-            return _USAGE, -1
+            return _USAGE
         modes = [line[1] for line in self._lines if line[0] == "dfeDataOutputMode"]
         if name in _FRAMES and modes[-1:] not in (["1"], ["3"]):
             mode = "Frame or Advanced Frame" if name == "profileCfg" else "Chirp"
-            return f"Error: Configuration is valid only if the DFE Output Mode is {mode}\n", -1
+            return f"Error: Configuration is valid only if the DFE Output Mode is {mode}\n"
         if name == "dfeDataOutputMode" and values[0] not in ("1", "2", "3"):
-            return "Error: Invalid mode.\n", -1
+            return "Error: Invalid mode.\n"
         self._lines.append((name, *values))
         if name in DEMO:
             self._pending.add(name)
-        return "", 0
+        return ""
 
-    def _flush(self, values: list[str]) -> tuple[str, int]:
+    def _flush(self, values: list[str]) -> str:
         if self._started:
-            return "Ignored: This command is not allowed after sensor has started\n", 0
+            return _STARTED
         self._lines = [line for line in self._lines if line[0] not in RF]
-        return "", 0
+        return ""
 
-    def _start(self, values: list[str]) -> tuple[str, int]:
+    def _start(self, values: list[str]) -> str:
         anew = not values
         if len(values) == 1 and values[0] != "0":
-            return (
-                "Error: Reconfig is not supported, only argument of 0 is\n"
-                "(do not reconfig, just re-start the sensor) valid\n"
-            ), -1
+            return _RECONFIGURE
         if len(values) > 1:
-            return _USAGE, -1
+            return _USAGE
         whole = self._pending == set(DEMO)
         if self._last is None and not whole:
-            return "Error: Full configuration must be provided before sensor can be started the first time\n", -1
+            return "Error: Full configuration must be provided before sensor can be started the first time\n"
         if self._started:
-            return "Ignored: Sensor is already started\n", 0
+            return "Ignored: Sensor is already started\n"
         if anew and not self._pending:
-            return (
-                'Error: You have provided no configuration, issue "sensorStart 0" OR provide full configuration and '
-                'issue "sensorStart"\n'
-            ), -1
+            return _NOTHING_NEW
         if not whole and self._pending:
-            return _PARTIAL, -1
+            return _PARTIAL
         if not anew and whole and self._last is not None:
-            return (
-                'Error: You have provided complete new configuration, issue "sensorStart" (without argument) if you '
-                "want it to take effect\n"
-            ), -1
+            return _ALL_NEW
         return self._run(anew)
 
-    def _run(self, anew: bool) -> tuple[str, int]:
+    def _run(self, anew: bool) -> str:
         debug = "" if self._opened is not None else "Debug: Init Calibration Status = 0x1ffe\n"
         try:
             if anew or self._last is None:
@@ -138,9 +138,9 @@ class CommandLine:
                 config, frames = self._last
             self._radar.start(config, frames)
         except InputError as error:
-            return f"{debug}Error: mmWave Config failed: {error}\n", -1
+            return f"{debug}Error: mmWave Config failed: {error}\n"
         self._last, self._started = (config, frames), True
-        return debug, 0
+        return debug
 
     def _check_opening(self) -> None:
         """Real firmware stops dead here, in an assertion."""
@@ -162,30 +162,30 @@ class CommandLine:
             raise InputError(f"frameCfg numFrames is {frames}, expected 0 (without end) to {_MOST_FRAMES}")
         return config, int(frames)
 
-    def _stop(self, values: list[str]) -> tuple[str, int]:
+    def _stop(self, values: list[str]) -> str:
         if not self._started:
-            return "Ignored: Sensor is already stopped\n", 0
+            return "Ignored: Sensor is already stopped\n"
         self._radar.stop()
         self._started = False
         self._pending.clear()
-        return "", 0
+        return ""
 
-    def _version(self, values: list[str]) -> tuple[str, int]:
+    def _version(self, values: list[str]) -> str:
         return (
             "Platform                : xWR18xx\n"
             "mmWave SDK Version      : 03.06.00.00\n"
             "Device Info             : IWR18xx non-secure ES 01.00\n"
-        ), 0
+        )
 
-    def _status(self, values: list[str]) -> tuple[str, int]:
+    def _status(self, values: list[str]) -> str:
         state = 2 if self._started else 3 if self._last else 0
-        return f"Sensor State: {state}\nData port baud rate: 921600\n", 0
+        return f"Sensor State: {state}\nData port baud rate: 921600\n"
 
-    def _help(self, values: list[str]) -> tuple[str, int]:
+    def _help(self, values: list[str]) -> str:
         names = "\n".join(sorted(self._OWN | _COUNTS))
-        return f"Help: This will display the usage of the CLI commands\n{names}\n", 0
+        return f"Help: This will display the usage of the CLI commands\n{names}\n"
 
-    _OWN: dict[str, Callable[["CommandLine", list[str]], tuple[str, int]]] = {
+    _OWN: dict[str, Callable[["CommandLine", list[str]], str]] = {
         "sensorStart": _start, "sensorStop": _stop, "flushCfg": _flush, "version": _version,
         "queryDemoStatus": _status, "help": _help,
     }  # fmt: skip

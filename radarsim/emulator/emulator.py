@@ -37,7 +37,7 @@ class Emulator:
         port_link: symbolic link to the serial port.
         disturbance: of the packets on their way.
         ahead: s, how much of the source is made ahead of time.
-        say: tells the user what happened.
+        say: shows the user a line.
 
     Attributes:
         port: the serial port's path.

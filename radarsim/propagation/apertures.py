@@ -4,8 +4,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from numba import njit
 
-from radarsim.propagation.fields import dot, minus
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fields import dot, minus, vec
 
 #: Edges this far off the path, in units of the Fresnel integral, begin to fade from the sum, and those are left out:
 #: what they diffract comes on a path of its own, longer by s^2 lambda / 4.

@@ -1,7 +1,7 @@
 """Spheres and cylinders in a tessellated mesh, known by their normals and corners.
 
-As plates, the facets of a pipe or a lamp would flash one after the other; as a round body it has one steady echo. Only
-whole bodies count: closed spheres, and cylinders that go all the way round, with caps or without.
+As plates, the facets of a pipe or a lamp would reflect one after the other; as a round body it has one steady echo.
+Only whole bodies count: closed spheres, and cylinders that go all the way round, with caps or without.
 """
 
 from dataclasses import dataclass

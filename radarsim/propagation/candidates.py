@@ -6,8 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from numba import njit, prange
 
-from radarsim.propagation.fields import dot, facing, gain_towards, minus
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fields import dot, facing, gain_towards, minus, vec
 from radarsim.propagation.level_of_detail import FULL_DETAIL, detail, share
 from radarsim.propagation.media import scattering
 from radarsim.propagation.observation import Observation

@@ -1,4 +1,4 @@
-"""The small things that a room is full of, as points: on desks and shelves, on walls and under ceilings.
+"""The small objects that a room is full of, as points: on desks and shelves, on walls and under ceilings.
 
 Objects down to 2 cm are drawn (`radarsim.world.generators.small_objects`). What is smaller, and parts of larger ones
 (handles, edges, screws, plugs), is a Poisson process with a density per square metre of the surface that they stand or
@@ -11,7 +11,7 @@ have tails of that length. Densities and the mean were chosen beside the picture
 Energy is conserved. A point and the surface behind it scatter as Lambert has it, sigma cos(in) cos(out) with sigma the
 radar cross section head-on: it takes sigma / 4 of what falls on the surface from anywhere, while an isotropic point
 takes the same from grazing waves, of which hardly anything falls on the surface. Cross sections a square metre, over 4,
-add up to the share s that would be scattered if no point were in another's shadow. A Poisson field of things covers
+add up to the share s that would be scattered if no point were in another's shadow. A Poisson field of objects covers
 1 - exp(-s) (Chiu, Stoyan, Kendall, Mecke, Stochastic Geometry and its Applications, 3rd ed., section 3.1), so each has
 (1 - exp(-s)) / s of its cross section, and the surface reflects, scatters and lets through exp(-s) of the power that it
 would without them (`uncovered`).
@@ -33,11 +33,11 @@ from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import scattered
 
-#: Things a square metre at level 1: on walls (plugs, handles, screws, cables), on what stands at the height of desks
+#: Objects a square metre at level 1: on walls (plugs, handles, screws, cables), on what stands at the height of desks
 #: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
 #: drawn it was 4, 16 and 3; of those there are some 0.2, 3 and 0.1.
 ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
-#: Mean radar cross section of a lone thing head-on, m^2 (half of it at 45 deg), and exponent of its distribution
+#: Mean radar cross section of a lone object head-on, m^2 (half of it at 45 deg), and exponent of its distribution
 #: P(sigma > s) = exp(-(s / scale)^exponent).
 CROSS_SECTION, EXPONENT = 0.2, 0.7
 #: Points of a scene, some 200 bytes each: a floor of the largest buildings has ten thousand.
@@ -49,7 +49,7 @@ LOW, HIGH = 0.15, 2.0
 
 
 class Clutter:
-    """All small things of a scene.
+    """All small objects of a scene.
 
     Args:
         scene: the world; its `life.clutter` scales the densities.
@@ -97,7 +97,7 @@ class Clutter:
 def densities(
     scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n"]:
-    """Things a square metre of surface at level 1, by where it faces and how high its place (m) is.
+    """Objects a square metre of surface at level 1, by where it faces and how high its place (m) is.
 
     Undersides below a ceiling have none, and sheets have theirs on the side of their normal.
     """
@@ -112,7 +112,7 @@ def densities(
 
 
 def crowding(scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
-    """Share of what falls on surfaces that their things would scatter if none were in another's shadow: above 1 where
+    """Share of what falls on surfaces that their objects would scatter if none were in another's shadow: above 1 where
     they are many."""
     return scene.surface_settings.clutter * densities(scene, place, normal) * CROSS_SECTION / 4
 
@@ -120,12 +120,12 @@ def crowding(scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.nda
 def uncovered(
     scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]
 ) -> Float[np.ndarray, "n"]:
-    """Share of the power that falls on surfaces, at places (m) on them, that things leave for the surface itself."""
+    """Share of the power that falls on surfaces, at places (m) on them, that objects leave for the surface itself."""
     return np.exp(-crowding(scene, place, normal))
 
 
 def in_the_open(crowding: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
-    """What is left of each thing's cross section on average, with the shadows of the others."""
+    """What is left of each object's cross section on average, with the shadows of the others."""
     return -np.expm1(-crowding) / np.maximum(crowding, 1e-12)
 
 

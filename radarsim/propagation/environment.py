@@ -76,9 +76,8 @@ class View:
     def _reflectors(self) -> tuple[Flat, Flat]:
         reflectors, observation, plates = self.environment.reflectors, self.observation, self.obstacles.plates
         if reflectors is None:
-            return Flat.none(), Flat.none()
-        flat = reflectors.near(observation.position, observation.range)
-        inner = reflectors.inner_near(observation.position, observation.range)
+            return Flat.zeros(0), Flat.zeros(0)
+        flat, inner = reflectors.near(observation.position, observation.range)
         if len(plates):
             moving, hollow = plates.faces(observation)
             flat, inner = Flat.joined([flat, moving]), Flat.joined([inner, hollow])

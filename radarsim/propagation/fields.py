@@ -11,7 +11,7 @@ from radarsim.propagation.media import mirror
 
 
 @njit
-def vector(array):
+def vec(array):
     """The three numbers of an array."""
     return array[0], array[1], array[2]
 
@@ -83,17 +83,6 @@ def facing(normal, towards, two_sided):
         return 1.0
     cosine = normal[0] * towards[0] + normal[1] * towards[1] + normal[2] * towards[2]
     return abs(cosine) if two_sided else cosine
-
-
-@njit
-def ramp(inside, zone):
-    """0 ... 1 as a point moves from `zone` outside an edge to `zone` inside; two abutting mirrors add up to one."""
-    x = inside / zone
-    if x <= -1:
-        return 0.0
-    if x >= 1:
-        return 1.0
-    return 0.5 + 0.25 * x * (3 - x * x)
 
 
 @njit

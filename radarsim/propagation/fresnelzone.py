@@ -27,8 +27,7 @@ from jaxtyping import Complex, Float, Int
 from numba import njit
 from scipy.special import erfc
 
-from radarsim.propagation.fields import cross, dot, minus
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fields import cross, dot, minus, vec
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Obstacles, Passage
 from radarsim.propagation.reflectors import Flat

@@ -1,5 +1,7 @@
 """A hash grid: which of many boxes are near, at a cost that does not grow with the world."""
 
+from itertools import product
+
 import numpy as np
 from jaxtyping import Float, Int
 
@@ -35,9 +37,4 @@ class Grid:
 
 
 def _cells(first, last):
-    return [
-        (i, j, k)
-        for i in range(first[0], last[0] + 1)
-        for j in range(first[1], last[1] + 1)
-        for k in range(first[2], last[2] + 1)
-    ]
+    return product(*(range(a, b + 1) for a, b in zip(first, last, strict=True)))

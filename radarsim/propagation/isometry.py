@@ -11,6 +11,11 @@ def after(second: Float[np.ndarray, "*n 3 4"], first: Float[np.ndarray, "*m 3 4"
     return out
 
 
+def image(isometry: Float[np.ndarray, "*n 3 4"], place: Float[np.ndarray, "*m 3"]) -> Float[np.ndarray, "*k 3"]:
+    """Where places (m) are taken."""
+    return np.einsum("...ij,...j->...i", isometry[..., :3], place) + isometry[..., 3]
+
+
 def inverse(isometry: Float[np.ndarray, "*n 3 4"]) -> Float[np.ndarray, "*n 3 4"]:
     """What undoes it: of a chain of mirrors, the chain taken the other way round."""
     back = np.swapaxes(isometry[..., :3], -1, -2)

@@ -3,7 +3,7 @@
 A resolution cell grows with range, so fewer scatterers a square metre make the same speckle; and where the antenna
 hardly looks (floor and ceiling near by), a few stand for many. So of the scatterers at distance r in a direction of
 amplitude gain g a share p = `FULL_DETAIL` / r sqrt(g / g_peak) is used, which keeps the number in a cell as it is. Each
-scatterer has a rank, drawn once, uniform in 0...1, and counts with the amplitude cos(pi rank / 4 p), nought from rank
+scatterer has a rank, drawn once, uniform in 0...1, and counts with the amplitude cos(pi rank / 4 p), zero from rank
 2 p on, over the root of its mean square over all ranks. So mean power is that of all of them, whatever p, and a
 scatterer comes and goes smoothly over a doubling of range: nothing pops, and speckle stays coherent along a walk
 (changing p by dp costs a share of about (dp / p)^2 of the power: 0.25 % for 10 cm at 2 m).

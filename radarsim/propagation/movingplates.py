@@ -1,4 +1,4 @@
-"""Plates that move, such as leaves of doors: they flash, mirror and let through as the same plates that stand.
+"""Plates that move, such as leaves of doors: they reflect, mirror and let through as the same plates at rest.
 
 Each is a scene of its own, in whose frame it stands. Its faces join the flat reflectors of every frame where it is in
 the middle of the burst, and rays that it is in the way of are traced in its own frame. Over the burst it moves on by a
@@ -13,7 +13,6 @@ from jaxtyping import Bool, Complex, Float, Int
 
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.burst import NODES, BurstClock
-from radarsim.propagation.isometry import after, inverse
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat, Reflectors
@@ -33,9 +32,9 @@ class MovingPlates:
     def __init__(self, moving: MovingTargets, config: RadarConfig, margin: float):
         self._moving, self._margin = moving, margin
         self._offsets = BurstClock.of(config).half * np.append(NODES, 0.0)
-        things = {k: thing for k, part in enumerate(moving.parts) if (thing := part.object)}
-        self._part = np.array([*things], int)
-        scenes = [Scene("part", [thing]) for thing in things.values()]
+        objects = {k: each for k, part in enumerate(moving.parts) if (each := part.object)}
+        self._part = np.array([*objects], int)
+        scenes = [Scene("part", [each]) for each in objects.values()]
         self._reflectors = [Reflectors.of(scene, config) for scene in scenes]
         self._transmission = [Transmission(scene, config, margin) for scene in scenes]
 
@@ -53,7 +52,7 @@ class MovingPlates:
 
     def faces(self, observation: Observation) -> tuple[Flat, Flat]:
         """Their faces in every frame, and the inner faces of hollow ones."""
-        outer, inner = [Flat.none()], [Flat.none()]
+        outer, inner = [Flat.zeros(0)], [Flat.zeros(0)]
         for frame, (turns, centers) in enumerate(zip(*self._places(observation.time), strict=True)):
             for plate, (turn, center, own) in enumerate(zip(turns, centers, self._reflectors, strict=True)):
                 outer.append(_placed(own.flat, turn, center, plate, frame))
@@ -81,9 +80,9 @@ class MovingPlates:
         factor, delay = np.ones(len(frame), complex), np.zeros(len(frame))
         turns, centers = self._places(observation.time)
         for plate, (part, own) in enumerate(zip(self._part, self._transmission, strict=True)):
-            met = self._met(observation, frame, begin, end, part)
-            factor[met[~allowed[met]]] = 0
-            met = met[allowed[met]]
+            hidden = self._moving.occluded(begin, end, observation.time[frame], self._margin, np.array([part]))
+            factor[hidden & ~allowed] = 0
+            met = np.flatnonzero(hidden & allowed)
             if len(met):
                 turn, center = turns[frame[met], plate], centers[frame[met], plate]
                 start, stop = (np.einsum("nij,ni->nj", turn, x[met] - center) for x in (begin, end))
@@ -92,18 +91,6 @@ class MovingPlates:
                 factor[met] *= passed
                 delay[met] += late
         return factor, delay
-
-    def _met(
-        self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
-        end: Float[np.ndarray, "ray 3"], part: int,
-    ) -> Int[np.ndarray, "met"]:  # fmt: skip
-        """Rays that one of them stands in the way of."""
-        found = [np.zeros(0, int)]
-        for k in np.unique(frame):
-            now = np.flatnonzero(frame == k)
-            hidden = self._moving.occluded(begin[now], end[now], observation.time[k], self._margin, np.array([part]))
-            found.append(now[hidden])
-        return np.concatenate(found)
 
 
 def _placed(flat: Flat, turn: Float[np.ndarray, "3 3"], center: Float[np.ndarray, "3"], plate: int, frame: int) -> Flat:
@@ -114,69 +101,3 @@ def _placed(flat: Flat, turn: Float[np.ndarray, "3 3"], center: Float[np.ndarray
         normal=flat.normal @ turn.T, u=flat.u @ turn.T, v=flat.v @ turn.T, plate=np.full(n, plate),
         frame=np.full(n, frame),
     )  # fmt: skip
-
-
-def carried(flat: Flat, mirrors: Int[np.ndarray, "n mirror"]) -> Bool[np.ndarray, "n"]:
-    """Whether any of the mirrors (-1: none) of some paths moves."""
-    return (np.append(flat.plate, -1)[mirrors] >= 0).any(axis=1)
-
-
-def isometries(
-    flat: Flat, mirrors: Int[np.ndarray, "n mirror"], moves: Float[np.ndarray, "frame plate 4 3 4"]
-) -> Float[np.ndarray, "n 4 3 4"]:
-    """Products of the reflections in some mirrors (-1: none) at a burst's nodes and in its middle.
-
-    Args:
-        flat: all mirrors.
-        mirrors: in order from the sensor on.
-        moves: as `MovingPlates.moves` has them.
-    """
-    out = np.zeros((len(mirrors), 4, 3, 4))
-    out[..., :3] = np.eye(3)
-    for column in mirrors.T[::-1]:
-        rows = np.flatnonzero(column >= 0)
-        m = column[rows]
-        rigid = moves[flat.frame[m], flat.plate[m]]
-        normal = np.einsum("ntij,nj->nti", rigid[..., :3], flat.normal[m])
-        center = np.einsum("ntij,nj->nti", rigid[..., :3], flat.center[m]) + rigid[..., 3]
-        along = np.einsum("nti,ntij->ntj", normal, out[rows])
-        along[..., 3] -= np.einsum("nti,nti->nt", normal, center)
-        out[rows] -= 2 * normal[..., None] * along[..., None, :]
-    return out
-
-
-def moved(
-    flat: Flat, place: Float[np.ndarray, "n 3"], own: Float[np.ndarray, "n 3 3"], mirrors: Int[np.ndarray, "n mirror"],
-    moves: Float[np.ndarray, "frame plate 4 3 4"],
-) -> Float[np.ndarray, "n 3 3"]:  # fmt: skip
-    """How far virtual points have moved at a burst's nodes, m.
-
-    Args:
-        flat, mirrors, moves: as `isometries` has them.
-        place: of the points in the middle, m.
-        own: how far what is seen there has moved itself, by node, m.
-    """
-    chain = isometries(flat, mirrors, moves)
-    chain, middle = chain[:, :3], chain[:, 3:]
-    step = after(chain, inverse(middle))
-    steps = np.einsum("ntij,nj->nti", step[..., :3], place) + step[..., 3] - place[:, None]
-    return steps + np.einsum("ntij,ntj->nti", chain[..., :3], own)
-
-
-def turned(
-    flat: Flat, image: Float[np.ndarray, "n 3 4"], mirrors: Int[np.ndarray, "n mirror"],
-    moves: Float[np.ndarray, "frame plate 4 3 4"],
-) -> Float[np.ndarray, "n 3 3 4"]:  # fmt: skip
-    """Images of the receiver at a burst's nodes.
-
-    Args:
-        flat, moves: as `isometries` has them.
-        image: in the middle of the burst.
-        mirrors: one that it is a part of, its flash, an edge or a corner; or several that it is seen in.
-    """
-    first = mirrors[:, 0]
-    rigid = moves[flat.frame[first], flat.plate[first]][:, :3]
-    part = after(after(rigid, image[:, None]), inverse(rigid))
-    chain = isometries(flat, mirrors, moves)
-    chain = after(after(chain[:, :3], inverse(chain[:, 3:])), image[:, None])
-    return np.where((mirrors[:, 1] < 0)[:, None, None, None], part, chain)

@@ -2,10 +2,12 @@
 
 Over a burst a scatterer's path is a parabola through three nodes. Limbs jerk: against every chirp's own place a
 walker's echoes are wrong by -40 to -60 dB for most of the step cycle and by -25 dB where shins turn (measured over
-one). Ghosts of movers go over one mirror or out and back over one each; legs over two are left out.
+one). Ghosts of movers go over one mirror or out and back over one each; path segments over two are left out.
 
 Parts of a material scatter as its surfaces do, and are plates besides (`movingplates`).
 """
+
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -29,7 +31,7 @@ class MovingTargets:
         parts: rigid parts of all movers.
         opaque: indices of those that nothing passes.
         part: (scatterer,) index of the part that carries it.
-        sigma, phase: (scatterer,) m^2, rad.
+        sigma: (scatterer,) radar cross sections, m^2.
     """
 
     def __init__(self, movers: list[Mover], rng: np.random.Generator, density: float = 150.0):
@@ -37,9 +39,7 @@ class MovingTargets:
         own = [mover.parts() for mover in movers]
         self.parts = [part for parts in own for part in parts]
         self.opaque = np.array([k for k, part in enumerate(self.parts) if part.material is None], int)
-        place, normal, part, sigma = [np.zeros((0, 3))], [np.zeros((0, 3))], [np.zeros(0, int)], [np.zeros(0)]
-        lobe = [np.zeros((0, 4))]
-        number = 0
+        found = [Scatterers.zeros(0)]
         for mover, parts in zip(movers, own, strict=True):
             area = sum(each.area for each in parts)
             for each in parts:
@@ -50,16 +50,15 @@ class MovingTargets:
                     per_area = each.material.sigma0
                 count = max(int(round(density * each.area)), 4) if per_area else 0
                 points, normals = each.sample(count, rng)
-                place.append(points)
-                normal.append(normals)
-                part.append(np.full(count, number))
-                sigma.append(np.full(count, per_area * each.area / max(count, 1)))
-                lobe.append(np.tile(LAMBERT if each.material is None else weights(each.material), (count, 1)))
-                number += 1
-        self._place, self._normal = np.concatenate(place), np.concatenate(normal)
-        self.part, self.sigma = np.concatenate(part), np.concatenate(sigma)
-        self._lobe = np.concatenate(lobe)
-        self.phase = rng.uniform(0, 2 * np.pi, len(self.part))
+                some = Scatterers.points(points, per_area * each.area / max(count, 1))
+                lobe = np.tile(LAMBERT if each.material is None else weights(each.material), (count, 1))
+                found.append(replace(some, normal=normals, lobe=lobe))
+        self.part = np.repeat(np.arange(len(self.parts)), np.array([len(some) for some in found[1:]], int))
+        once, twice = (np.where(np.arange(len(self.part)) % n == 0, float(n), 0.0)
+                       for n in (BOUNCE_STRIDE, BOUNCE_STRIDE**2))  # fmt: skip
+        phase = rng.uniform(0, 2 * np.pi, len(self.part))
+        self._own = replace(Scatterers.joined(found), phase=phase, bounces=once, bounces_twice=twice)
+        self.sigma = self._own.sigma
         self._half = np.array([p.half for p in self.parts]).reshape(-1, 3)
         self._capsule = np.array([p.capsule for p in self.parts], bool)
 
@@ -73,48 +72,35 @@ class MovingTargets:
     def positions(self, t: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n scatterer 3"]:
         """Places of the scatterers at times t (s), m."""
         turn, center = self.poses(t)
-        return np.einsum("nsij,sj->nsi", turn[:, self.part], self._place) + center[:, self.part]
-
-    def normals(self, t: float) -> Float[np.ndarray, "scatterer 3"]:
-        """Outward unit normals at a time, s."""
-        turn, _ = self.poses(np.array([t]))
-        return np.einsum("sij,sj->si", turn[0, self.part], self._normal)
+        return np.einsum("nsij,sj->nsi", turn[:, self.part], self._own.position) + center[:, self.part]
 
     def scatterers(self, t: float) -> Scatterers:
         """The scatterers as they are at time t, s."""
-        n = len(self)
-        every = np.arange(n)
-        return Scatterers(
-            position=self.positions(np.array([t]))[0],
-            normal=self.normals(t),
-            sigma=self.sigma,
-            phase=self.phase,
-            two_sided=np.zeros(n, bool),
-            horizontal=np.zeros(n, bool),
-            bounces=np.where(every % BOUNCE_STRIDE == 0, float(BOUNCE_STRIDE), 0.0),
-            bounces_twice=np.where(every % BOUNCE_STRIDE**2 == 0, float(BOUNCE_STRIDE**2), 0.0),
-            lobe=self._lobe,
-            rank=np.full(n, -1.0),
-        )
+        now = np.array([t])
+        normal = np.einsum("sij,sj->si", self.poses(now)[0][0, self.part], self._own.normal)
+        return replace(self._own, position=self.positions(now)[0], normal=normal)
 
     def occluded(
-        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float, margin: float = 0.01,
-        parts: Int[np.ndarray, "some"] | None = None,
+        self, origins: Float[np.ndarray, "n 3"], targets: Float[np.ndarray, "n 3"], t: float | Float[np.ndarray, "n"],
+        margin: float = 0.01, parts: Int[np.ndarray, "some"] | None = None,
     ) -> Bool[np.ndarray, "n"]:  # fmt: skip
-        """Whether a part, of some or of all, stands in a segment at time t, both ends shortened by `margin`, m."""
+        """Whether a part, of some or of all, stands in a segment at its time t, s; ends shortened by `margin`, m."""
         origins, targets = np.broadcast_arrays(np.asarray(origins, float), np.asarray(targets, float))
-        hidden = np.zeros(len(origins), bool)
-        some = np.arange(len(self.parts)) if parts is None else parts
-        if len(some) and len(origins):
-            turn, center = self.poses(np.array([t]))
-            shape = self._half[some], self._capsule[some]
-            _hide(origins, targets, turn[0, some], center[0, some], *shape, margin, hidden)
+        hidden, some = np.zeros(len(origins), bool), np.arange(len(self.parts)) if parts is None else parts
+        if not len(some):
+            return hidden
+        times, which = np.unique(np.broadcast_to(t, len(origins)), return_inverse=True)
+        for k in range(len(times)):
+            (turn, center), now = self.poses(times[k : k + 1]), which == k
+            bodies = turn[0, some], center[0, some], self._half[some], self._capsule[some]
+            hidden[now] = _hidden(origins[now], targets[now], *bodies, margin)
         return hidden
 
 
 @njit(parallel=True, cache=True)
-def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
+def _hidden(origins, targets, turn, center, half, capsule, margin):
     """Whether segments, shortened at both ends, are anywhere inside a part."""
+    hidden = np.zeros(len(origins), np.bool_)
     for i in prange(len(origins)):
         way = targets[i] - origins[i]
         length = np.sqrt(np.dot(way, way))
@@ -126,3 +112,4 @@ def _hide(origins, targets, turn, center, half, capsule, margin, hidden):
             if enters <= length - margin and leaves >= margin:
                 hidden[i] = True
                 break
+    return hidden

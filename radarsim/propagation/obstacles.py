@@ -61,24 +61,13 @@ class Obstacles:
         transmission = None if scene is None else Transmission(scene, config, CLEARANCE)
         return cls(scene, transmission, moving, MovingPlates(moving, config, CLEARANCE))
 
-    def _shadowed(
-        self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
-        end: Float[np.ndarray, "ray 3"],
-    ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
-        """Whether an opaque part of a mover stands in the way."""
-        hidden = np.zeros(len(frame), bool)
-        for k in np.unique(frame) if len(self.moving.opaque) else ():
-            now = frame == k
-            hidden[now] = self.moving.occluded(begin[now], end[now], observation.time[k], parts=self.moving.opaque)
-        return hidden
-
     def clear(
         self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
         end: Float[np.ndarray, "ray 3"],
     ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
         """Whether nothing is in the way, slabs included; frames and ends as `passage` has them."""
         blocked = np.zeros(len(frame), bool) if self.scene is None else self.scene.occluded(begin, end, CLEARANCE)
-        blocked |= self._shadowed(observation, frame, begin, end)
+        blocked |= self.moving.occluded(begin, end, observation.time[frame], parts=self.moving.opaque)
         if len(self.plates):
             blocked |= self.plates.passage(observation, frame, begin, end, np.zeros(len(frame), bool))[0] == 0
         return ~blocked
@@ -104,7 +93,7 @@ class Obstacles:
             if len(through):
                 up = observation.rotation[frame[through], :, 2]
                 factor[through], delay[through] = self.transmission.passage(begin[through], end[through], up)
-        factor[self._shadowed(observation, frame, begin, end)] = 0
+        factor[self.moving.occluded(begin, end, observation.time[frame], parts=self.moving.opaque)] = 0
         if len(self.plates):
             passed, late = self.plates.passage(observation, frame, begin, end, allowed & (factor != 0))
             factor, delay = factor * passed, delay + late

@@ -25,9 +25,8 @@ from jaxtyping import Bool, Complex, Float, Int
 from numba import njit
 
 from radarsim.propagation.apertures import FAR, diffracted, side
-from radarsim.propagation.curved import QUADRIC, SHAPE, Arcs, stationary
-from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, unit, write
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.curved import QUADRIC, SpecularPoints, grazes, stationary
+from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, unit, vec, write
 from radarsim.propagation.media import HEAD_ON, LAYER
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.smooth import Piece
@@ -41,25 +40,19 @@ BESIDE = 1e-4
 
 
 class Patches(NamedTuple):
-    """Pieces of smooth surfaces, see `smooth.Piece`; corners and triangles are numbered through.
+    """Pieces of smooth surfaces.
 
     Attributes:
-        place, normal, curvature: by corner.
+        mesh: all of them as one; corners and triangles are numbered through.
         home: a triangle that a corner is of.
-        faces, across, border: by triangle and by side.
         begin: first corner, triangle and side of each piece, and of none.
         ball: centre and radius of a sphere around each, m.
         two_sided: sheets show both sides.
         layer: as of flat reflectors (`reflectors.Flat`).
     """
 
-    place: Float[np.ndarray, "corner 3"]
-    normal: Float[np.ndarray, "corner 3"]
-    curvature: Float[np.ndarray, "corner 6"]
+    mesh: Piece
     home: Int[np.ndarray, "corner"]
-    faces: Int[np.ndarray, "face 3"]
-    across: Int[np.ndarray, "face 3"]
-    border: Int[np.ndarray, "side 2"]
     begin: Int[np.ndarray, "piece+1 3"]
     ball: Float[np.ndarray, "piece 4"]
     two_sided: Bool[np.ndarray, "piece"]
@@ -69,38 +62,37 @@ class Patches(NamedTuple):
     def of(cls, rows: list[tuple[Piece, bool, Complex[np.ndarray, "5"]]]) -> "Patches":
         """All of some pieces, each with whether it shows both sides and how it reflects."""
         pieces = [row[0] for row in rows]
-        sizes = [(len(p.place), len(p.faces), len(p.border)) for p in pieces]
-        begin = np.cumsum([(0, 0, 0), *sizes], axis=0)
-        none = np.zeros((0, 3))
-        place, normal = (np.concatenate([none, *(getattr(p, k) for p in pieces)]) for k in ("place", "normal"))
-        curvature = np.concatenate([np.zeros((0, 6)), *(p.curvature for p in pieces)])
-        whole = np.zeros((0, 3), int)
-        faces = np.concatenate([whole, *(p.faces + b[0] for p, b in zip(pieces, begin, strict=False))])
-        across = np.concatenate([whole, *(np.where(p.across < 0, -1, p.across + b[1])
-                                          for p, b in zip(pieces, begin, strict=False))])  # fmt: skip
-        border = np.concatenate([whole[:, :2], *(p.border + b[0] for p, b in zip(pieces, begin, strict=False))])
+        begin = np.cumsum([(0, 0, 0), *((len(p.place), len(p.faces), len(p.border)) for p in pieces)], axis=0)
+        place, corners = np.zeros((0, 3)), np.zeros((0, 3), int)
+        none = Piece(place, place, np.zeros((0, 6)), corners, corners, corners[:, :2])
+        numbered = [
+            p._replace(
+                faces=p.faces + corner, across=np.where(p.across < 0, -1, p.across + face), border=p.border + corner
+            )
+            for p, (corner, face, _) in zip(pieces, begin, strict=False)
+        ]
+        mesh = Piece(*(np.concatenate(column) for column in zip(none, *numbered, strict=True)))
         middle = [(p.place.min(axis=0) + p.place.max(axis=0)) / 2 for p in pieces]
         ball = [(*m, np.linalg.norm(p.place - m, axis=1).max()) for p, m in zip(pieces, middle, strict=True)]
-        home = np.zeros(len(place), int)
-        home[faces] = np.arange(len(faces))[:, None]
+        home = np.zeros(len(mesh.place), int)
+        home[mesh.faces] = np.arange(len(mesh.faces))[:, None]
         return cls(
-            place, normal, curvature, home, faces, across, border, begin, np.reshape(ball, (-1, 4)),
-            np.array([row[1] for row in rows], bool),
+            mesh, home, begin, np.reshape(ball, (-1, 4)), np.array([row[1] for row in rows], bool),
             np.reshape([row[2] for row in rows], (-1, LAYER)).astype(complex),
         )  # fmt: skip
 
 
-def flashes(observation: Observation, frame: int, patches: Patches) -> Arcs:
+def specular_points(observation: Observation, frame: int, patches: Patches) -> SpecularPoints:
     """Those of all pieces above the threshold in one frame."""
     return filled(
-        lambda n: Arcs(np.empty((n, 3)), np.zeros((n, 3, 4)), np.empty(n, complex), np.zeros((n, SHAPE))),
-        lambda found: _flashes(observation, frame, patches, found.columns),
+        SpecularPoints,
+        lambda found: _specular_points(observation, frame, patches, found.columns),
         2 * len(patches.ball) + 1,
     )
 
 
 @njit(cache=True)
-def _flashes(observation, frame, patches, found):
+def _specular_points(observation, frame, patches, found):
     """Returns how many there are, of which as many as fit are written."""
     p, rotation, count = vec(observation.position[frame]), observation.rotation[frame], 0
     for k in range(len(patches.ball)):
@@ -113,13 +105,11 @@ def _flashes(observation, frame, patches, found):
             value *= patches.layer[k, HEAD_ON] * gain_towards(minus(place, p), rotation, observation) ** 2
             if abs(value) <= observation.threshold:
                 continue
+            found.facet[count], found.amplitude[count] = -1, value
             write(aim, found.aim[count])
-            for d in range(3):
-                found.isometry[count, d, d], found.isometry[count, d, 3] = -1.0, 2 * place[d]
-            found.amplitude[count] = value
-            point, axis, normal, bend1, bend2 = quadric
-            shape = found.shape[count]
-            shape[0], shape[11], shape[12] = QUADRIC, bend1, bend2
+            shape = found.geometry[count]
+            point, axis, normal, shape[11], shape[12] = quadric
+            shape[0] = QUADRIC
             write(point, shape[1:4])
             write(axis, shape[4:7])
             write(normal, shape[8:11])
@@ -142,19 +132,18 @@ def strength(observation, patches, of, one, two):
     """
     k, turn = of
     face, weights, inside = _foot(patches, k, turn, one, two)
-    aim, quadric = _surface(patches, face, turn, weights)
+    aim, quadric = _surface(patches.mesh, face, turn, weights)
     place, way, hessian, plane = stationary(quadric, one, two)
     size = patches.ball[k, 3]
-    if way > 2 * observation.range or _grazes(quadric, place, one, two):
+    if way > 2 * observation.range or grazes((place, quadric[2]), one, two, 0.05):
         return aim, quadric, place, 0j
-    # Principal values of the Hessian; Fresnel zones are no larger than the piece
-    h11, h22, h12 = hessian
-    mean, apart = (h11 + h22) / 2, np.hypot((h11 - h22) / 2, h12)
-    angle, least = 0.5 * np.arctan2(h12, (h11 - h22) / 2), observation.wavelength / (2 * size * size)
-    high, low = _away(mean + apart, least), _away(mean - apart, least)
-    across, elliptic = cross(quadric[2], quadric[1]), high * low > 0
-    first = _mixed(np.cos(angle), quadric[1], np.sin(angle), across, np.sqrt(2 * abs(high) / observation.wavelength))
-    second = _mixed(-np.sin(angle), quadric[1], np.cos(angle), across, np.sqrt(2 * abs(low) / observation.wavelength))
+    # Fresnel zones are no larger than the piece
+    (high, first), (low, second) = _principal(hessian, quadric[1], cross(quadric[2], quadric[1]))
+    least = observation.wavelength / (2 * size * size)
+    high, low = _clamped(high, least), _clamped(low, least)
+    elliptic = high * low > 0
+    first = _scaled(np.sqrt(2 * abs(high) / observation.wavelength), first)
+    second = _scaled(np.sqrt(2 * abs(low) / observation.wavelength), second)
     value = _fresnel(patches, of, (place, first, second, elliptic, inside), (one, two, way, observation.wavelength))
     if not elliptic:
         value = -1j * abs(value)
@@ -165,26 +154,30 @@ def strength(observation, patches, of, one, two):
 
 
 @njit
-def _away(value, least):
-    """A number that is not nearer to nought than so."""
+def _clamped(value, least):
+    """Clamp the magnitude away from zero."""
     return value if abs(value) > least else (least if value >= 0 else -least)
 
 
 @njit
-def _mixed(a, one, b, two, scale):
-    return along(along((0.0, 0.0, 0.0), a * scale, one), b * scale, two)
+def _scaled(scale, a):
+    return scale * a[0], scale * a[1], scale * a[2]
 
 
 @njit
-def _grazes(quadric, place, one, two):
-    there, back, normal = unit(minus(one, place)), unit(minus(two, place)), quadric[2]
-    return dot(there, normal) < 0.05 or dot(back, normal) < 0.05
+def _principal(tensor, one, two):
+    """The principal values, the larger one first, of a symmetric tensor (11, 22, 12) over two directions at right
+    angles, each with its direction."""
+    mean, half = (tensor[0] + tensor[1]) / 2, (tensor[0] - tensor[1]) / 2
+    apart, angle = np.hypot(half, tensor[2]), 0.5 * np.arctan2(tensor[2], half)
+    c, s = np.cos(angle), np.sin(angle)
+    return (mean + apart, along(_scaled(c, one), s, two)), (mean - apart, along(_scaled(-s, one), c, two))
 
 
 @njit
-def _off(patches, corner, turn, one, two):
+def _off(mesh, corner, turn, one, two):
     """How the direction that halves the angle differs from the normal at a corner."""
-    place, normal = vec(patches.place[corner]), vec(patches.normal[corner])
+    place, normal = vec(mesh.place[corner]), vec(mesh.normal[corner])
     return along(unit(along(unit(minus(one, place)), 1.0, unit(minus(two, place)))), -turn, normal)
 
 
@@ -192,46 +185,41 @@ def _off(patches, corner, turn, one, two):
 def _foot(patches, k, turn, one, two):
     """The triangle of a piece, and the weights of its corners, where the normal best halves the angle, and whether it
     does: from the best of some corners on, across sides."""
-    nearest, best, begin, end = 9.0, 0, patches.begin[k, 0], patches.begin[k + 1, 0]
+    mesh, nearest, best, begin, end = patches.mesh, 9.0, 0, patches.begin[k, 0], patches.begin[k + 1, 0]
     for corner in range(begin, end, (end - begin) // STARTS + 1):
-        off = _off(patches, corner, turn, one, two)
+        off = _off(mesh, corner, turn, one, two)
         if dot(off, off) < nearest:
             nearest, best = dot(off, off), corner
-    face = patches.home[best]
-    least, weights, shares = _nearest(patches, face, turn, one, two)
-    holds, came = face, -1
-    circles = False
+    face, came = patches.home[best], -1
+    holds, least, weights, circles = face, 9.0, (1.0, 0.0, 0.0), False
     for step in range(STEPS):
-        low, to, back = 0.0, -1, False
-        for corner in range(3):  # across the side beyond which it is, most of all
-            other = patches.across[face, corner]
-            if shares[corner] < low and other >= 0:
-                low, to, back = shares[corner], other, other == came
-        if to < 0:
-            break
-        circles = back or step == STEPS - 1
-        if circles:
-            break
-        came, face = face, to
-        off, others, shares = _nearest(patches, face, turn, one, two)
+        off, others, shares = _nearest(mesh, face, turn, one, two)
         if off < least:
             least, weights, holds = off, others, face
+        low, to = 0.0, -1
+        for corner in range(3):  # across the side beyond which it is, most of all
+            if shares[corner] < low and mesh.across[face, corner] >= 0:
+                low, to = shares[corner], mesh.across[face, corner]
+        circles = to >= 0 and (to == came or step == STEPS - 1)
+        if to < 0 or circles:
+            break
+        came, face = face, to
     if circles and least > 0:
         for face in range(patches.begin[k, 1], patches.begin[k + 1, 1]):
-            off, others, _ = _nearest(patches, face, turn, one, two)
+            off, others, _ = _nearest(mesh, face, turn, one, two)
             if off < least:
                 least, weights, holds = off, others, face
     return holds, weights, least < BESIDE
 
 
 @njit(cache=True)
-def _nearest(patches, face, turn, one, two):
+def _nearest(mesh, face, turn, one, two):
     """Where on a triangle the normal best halves the angle: the square of what it is off; weights of corners; and those
     where it would halve it if the triangle went on for ever."""
-    a, b, c = patches.faces[face]
-    m = unit(along(along(vec(patches.normal[a]), 1.0, vec(patches.normal[b])), 1.0, vec(patches.normal[c])))
+    a, b, c = mesh.faces[face]
+    m = unit(along(along(vec(mesh.normal[a]), 1.0, vec(mesh.normal[b])), 1.0, vec(mesh.normal[c])))
     wa, wb, wc = (
-        _off(patches, a, turn, one, two), _off(patches, b, turn, one, two), _off(patches, c, turn, one, two)
+        _off(mesh, a, turn, one, two), _off(mesh, b, turn, one, two), _off(mesh, c, turn, one, two)
     )  # fmt: skip
     seen = dot(wa, m) * turn > -1  # from behind, it is halved as well
     wa, wb, wc = along(wa, -dot(wa, m), m), along(wb, -dot(wb, m), m), along(wc, -dot(wc, m), m)
@@ -261,7 +249,7 @@ def _on_side(one, two):
 
 
 @njit(cache=True)
-def _surface(patches, face, turn, weights):
+def _surface(mesh, face, turn, weights):
     """A point of a triangle for rays to aim at, m, and the surface there, as `curved.stationary` takes it.
 
     The surface lies over the triangle as an arc lies over its chord: by (q - p_i) . n_i / (1 + n_i . n) from each
@@ -269,28 +257,25 @@ def _surface(patches, face, turn, weights):
     """
     q, n, middle = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for i in range(3):
-        corner = patches.faces[face, i]
-        q = along(q, weights[i], vec(patches.place[corner]))
-        n = along(n, turn * weights[i], vec(patches.normal[corner]))
-        middle = along(middle, 1 / 3, vec(patches.place[corner]))
+        corner = mesh.faces[face, i]
+        q = along(q, weights[i], vec(mesh.place[corner]))
+        n = along(n, turn * weights[i], vec(mesh.normal[corner]))
+        middle = along(middle, 1 / 3, vec(mesh.place[corner]))
     n = unit(n)
-    axis = unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.7 else (1.0, 0.0, 0.0)))
-    across = cross(n, axis)
+    one = unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.7 else (1.0, 0.0, 0.0)))
+    two = cross(n, one)
     height, c11, c22, c12 = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        corner = patches.faces[face, i]
-        normal, c = vec(patches.normal[corner]), patches.curvature[corner]
-        over = dot(minus(q, vec(patches.place[corner])), normal) * turn
+        corner = mesh.faces[face, i]
+        normal, c = vec(mesh.normal[corner]), mesh.curvature[corner]
+        over = dot(minus(q, vec(mesh.place[corner])), normal) * turn
         height -= weights[i] * over / (1 + turn * dot(normal, n))
-        rows = (c[0], c[1], c[2]), (c[1], c[3], c[4]), (c[2], c[4], c[5])
-        on = dot(rows[0], axis), dot(rows[1], axis), dot(rows[2], axis)
-        beside = dot(rows[0], across), dot(rows[1], across), dot(rows[2], across)
-        c11 += turn * weights[i] * dot(on, axis)
-        c12 += turn * weights[i] * dot(on, across)
-        c22 += turn * weights[i] * dot(beside, across)
-    angle, apart = 0.5 * np.arctan2(c12, (c11 - c22) / 2), np.hypot((c11 - c22) / 2, c12)
-    axis = _mixed(np.cos(angle), axis, np.sin(angle), across, 1.0)
-    quadric = along(q, height, n), axis, n, (c11 + c22) / 2 + apart, (c11 + c22) / 2 - apart
+        rows, share = ((c[0], c[1], c[2]), (c[1], c[3], c[4]), (c[2], c[4], c[5])), turn * weights[i]
+        on = dot(rows[0], one), dot(rows[1], one), dot(rows[2], one)
+        beside = dot(rows[0], two), dot(rows[1], two), dot(rows[2], two)
+        c11, c22, c12 = c11 + share * dot(on, one), c22 + share * dot(beside, two), c12 + share * dot(on, two)
+    (bend1, axis), (bend2, _) = _principal((c11, c22, c12), one, two)
+    quadric = along(q, height, n), axis, n, bend1, bend2
     return along(q, 0.02, minus(middle, q)), quadric
 
 
@@ -304,16 +289,16 @@ def _fresnel(patches, of, zones, way):
             or longest there; and whether it is inside, where no border is near.
         way: from where, to where, how long, and the wavelength, m.
     """
-    k, turn = of
+    (k, turn), mesh = of, patches.mesh
     total, nearest, left = 0j, FAR * FAR, 1.0 if zones[4] else -1.0
     for edge in range(patches.begin[k, 2], patches.begin[k + 1, 2]):
-        a, b = patches.border[edge]
+        a, b = mesh.border[edge]
         if turn < 0:
             a, b = b, a
-        if _hidden(patches, a, turn, way) and _hidden(patches, b, turn, way):
+        if _hidden(mesh, a, turn, way) and _hidden(mesh, b, turn, way):
             continue  # round the corner
-        x0, y0 = _units(vec(patches.place[a]), zones, way)
-        x1, y1 = _units(vec(patches.place[b]), zones, way)
+        x0, y0 = _units(vec(mesh.place[a]), zones, way)
+        x1, y1 = _units(vec(mesh.place[b]), zones, way)
         size = np.hypot(x1 - x0, y1 - y0)
         if size < 1e-12:
             continue
@@ -332,8 +317,8 @@ def _fresnel(patches, of, zones, way):
 
 
 @njit
-def _hidden(patches, corner, turn, way):
-    return turn * dot(minus(way[0], vec(patches.place[corner])), vec(patches.normal[corner])) < 0
+def _hidden(mesh, corner, turn, way):
+    return turn * dot(minus(way[0], vec(mesh.place[corner])), vec(mesh.normal[corner])) < 0
 
 
 @njit

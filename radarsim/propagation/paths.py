@@ -25,14 +25,14 @@ from radarize.radar.config import RadarConfig
 from radarsim.motion.trajectory import Motion
 from radarsim.propagation.burst import BurstClock, parabola
 from radarsim.propagation.curved import SHAPE, facing_point, path_over
-from radarsim.propagation.fields import dot, length, minus
-from radarsim.propagation.fields import vector as vec
-from radarsim.propagation.isometry import inverse
+from radarsim.propagation.fields import dot, length, minus, vec
+from radarsim.propagation.isometry import image, inverse
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Passage
 from radarsim.propagation.table import Table
 
-#: Numbers that describe a path's geometry: a and b; matrix | offset by rows; or `curved.Arcs.shape` and a delay, m.
+#: Numbers that describe a path's geometry: a and b; matrix | offset by rows; a curved surface's
+#: (`curved.SpecularPoints`) and a delay, m.
 GEOMETRY = SHAPE + 1
 #: Mirrors on a path at most: two out and two back, or a chain of three.
 MIRRORS = 4
@@ -92,26 +92,15 @@ class Paths(Table):
 
         Args:
             kind: of all of them.
-            geometry: (path, 2, 3) of points, (path, 3, 4) of images, (path, 14) of curved surfaces.
+            geometry: (path, 2, 3) of points, (path, 3, 4) of images, (path, 13) or (path, 14) of curved surfaces.
             amplitude: with phase.
             columns: others, arrays or one value for all.
         """
-        n = len(amplitude)
-        numbers = np.zeros((n, GEOMETRY))
-        size = int(np.prod(geometry.shape[1:]))
-        numbers[:, :size] = geometry.reshape(n, size)
-        none = {
-            "frame": np.zeros(n, int), "bounces": np.zeros(n, np.uint8), "through": np.zeros(n, bool),
-            "blocked": np.zeros(n, np.float32), "level": np.zeros(n, bool), "moving": np.zeros(n, bool),
-            "mirrors": np.full((n, MIRRORS), -1), "scatterer": np.full(n, -1), "track": np.full(n, -1),
-        }  # fmt: skip
-        given = {k: np.broadcast_to(v, none[k].shape).astype(none[k].dtype) for k, v in columns.items()}
-        return cls(kind=np.full(n, kind, np.uint8), geometry=numbers, amplitude=amplitude, **(none | given))
-
-    @classmethod
-    def none(cls) -> Self:
-        """No path."""
-        return cls.of(Kind.POINT, np.zeros((0, 2, 3)), np.zeros(0, complex))
+        found, size = replace(cls.zeros(len(amplitude)), amplitude=amplitude), int(np.prod(geometry.shape[1:]))
+        found.geometry[:, :size] = geometry.reshape(-1, size)
+        for name, value in ({"kind": kind, "mirrors": -1, "scatterer": -1, "track": -1} | columns).items():
+            getattr(found, name)[:] = value
+        return found
 
     def where(self, **columns: object) -> Self:
         """Rows that have some values: ``paths.where(bounces=1, moving=False)``."""
@@ -143,7 +132,7 @@ class Paths(Table):
         rows = self.kind == Kind.IMAGE
         there = self.images
         for end, isometry in enumerate((there, inverse(there))):
-            places[rows, end] = (position + isometry[..., :3] @ position + isometry[..., 3]) / 2
+            places[rows, end] = (position + image(isometry, position)) / 2
         for row in np.flatnonzero(self.kind == Kind.CURVED):
             places[row] = facing_point(self.geometry[row], tuple(position))
         return places
@@ -155,7 +144,7 @@ class Paths(Table):
         paths, passed, geometry = self[kept], passed[kept], self.geometry[kept].copy()
         rows, begin = paths.kind == Kind.IMAGE, observation.position[paths.frame]
         isometry = geometry[rows, :12].reshape(-1, 3, 4)
-        away = np.einsum("pij,pj->pi", isometry[:, :, :3], begin[rows]) + isometry[:, :, 3] - begin[rows]
+        away = image(isometry, begin[rows]) - begin[rows]
         isometry[:, :, 3] += (passed.delay[rows] / np.linalg.norm(away, axis=1))[:, None] * away
         geometry[rows, :12] = isometry.reshape(-1, 12)
         geometry[paths.kind == Kind.CURVED, SHAPE] = passed.delay[paths.kind == Kind.CURVED]

@@ -4,8 +4,8 @@ The physical-optics integral of a plate under a point source at height h over it
 
     I = int cos exp(2jk rho) / rho^2 dA = h int dphi int exp(2jk rho) / rho^2 drho,
 
-polar about the foot of the perpendicular, has an end at the foot, the wall's flash, and one along the outline. Over the
-echo of the endless plane, lambda / (8 pi h), it is to the leading order in 1 / (k rho)
+polar about the foot of the perpendicular, has an end at the foot, the specular point, and one along the outline. Over
+the echo of the endless plane, lambda / (8 pi h), it is to the leading order in 1 / (k rho)
 
     F = inside - h^2 / (2 pi) closed int exp(2jk (rho - h)) / rho^2 dphi,
 
@@ -21,18 +21,15 @@ about edges, inversions in corners. So Doppler, angle and range of edges and cor
 adjoining coplanar plates cancel along their seam.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
-from jaxtyping import Complex, Float, Int
 from numba import njit
 
-from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, write
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.curved import SpecularPoints
+from radarsim.propagation.fields import along, cross, dot, gain_towards, length, minus, vec, write
 from radarsim.propagation.media import HEAD_ON
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
-from radarsim.propagation.table import Table, filled
+from radarsim.propagation.table import filled
 
 #: The foot moves this far inwards, m: on a seam it is inside both plates, which adds up.
 NUDGE = 1e-8
@@ -40,36 +37,15 @@ NUDGE = 1e-8
 _FEW, _MANY = ((np.polynomial.legendre.leggauss(n) + np.array([[1.0], [0.0]])) / 2 for n in (8, 28))
 
 
-@dataclass(frozen=True)
-class Parts(Table):
-    """Flashes, edges and corners of facets as the radar sees them.
-
-    Attributes:
-        facet: index.
-        aim: a point for a ray to it to aim at, m.
-        isometry: of the receiver.
-        amplitude: square root of received over transmitted power, with phase.
-    """
-
-    facet: Int[np.ndarray, "part"]
-    aim: Float[np.ndarray, "part 3"]
-    isometry: Float[np.ndarray, "part 3 4"]
-    amplitude: Complex[np.ndarray, "part"]
-
-
-def parts(flat: Flat, observation: Observation, frame: int) -> Parts:
-    """Those of all facets above the threshold in one frame."""
-    return filled(
-        lambda n: Parts(np.empty(n, np.int64), np.empty((n, 3)), np.empty((n, 3, 4)), np.empty(n, complex)),
-        lambda found: _parts(flat.columns, observation, frame, found.columns),
-        1024,
-    )
+def specular_points(flat: Flat, observation: Observation, frame: int) -> SpecularPoints:
+    """Specular points, edges and corners of all facets above the threshold in one frame."""
+    return filled(SpecularPoints, lambda found: _specular_points(flat.columns, observation, frame, found.columns), 1024)
 
 
 @njit(cache=True)
-def _parts(flat, observation, frame, found):
-    """Returns how many parts there are, of which as many as fit are written."""
-    corners, facet, amplitude, isometry, aim = flat.corners, found.facet, found.amplitude, found.isometry, found.aim
+def _specular_points(flat, observation, frame, found):
+    """Returns how many there are, of which as many as fit are written."""
+    corners, zero = flat.corners, (0.0, 0.0, 0.0)
     p, rotation, reach = vec(observation.position[frame]), observation.rotation[frame], observation.range
     wavelength, weakest = observation.wavelength, observation.threshold
     sides, count = corners.shape[1], 0
@@ -81,13 +57,16 @@ def _parts(flat, observation, frame, found):
             continue
         if h < 0:
             n, h = (-n[0], -n[1], -n[2]), -h
-        middle = (0.0, 0.0, 0.0)
+        middle = zero
         for k in range(sides):
             middle = along(middle, 1 / sides, vec(corners[f, k]))
         foot = along(p, -h, n)
         inwards = minus(middle, foot)
         foot = along(foot, NUDGE / (length(inwards) + NUDGE), inwards)
         mirror = wavelength / (8 * np.pi * h) * abs(flat.layer[f, HEAD_ON])
+        if mirror == 0:
+            continue
+        turn = flat.layer[f, HEAD_ON] / abs(flat.layer[f, HEAD_ON])
         inside = True
         value[:] = 0
         for k in range(sides):
@@ -101,13 +80,13 @@ def _parts(flat, observation, frame, found):
             out = cross(side, n)
             if dot(minus(middle, one), out) > 0:
                 out = (-out[0], -out[1], -out[2])
-            outward[k, 0], outward[k, 1], outward[k, 2] = out
+            write(out, outward[k])
             s = dot(minus(one, foot), out)
             inside = inside and s > 0
             low = dot(minus(one, foot), side)
             high = low + size
             slant = np.hypot(h, s)
-            # Ends of the edge: worth a thought if the leading term, far from the flash, is.
+            # Ends of the edge: worth a thought if the leading term, far from the specular point, is.
             for end, x, sign in ((k, low, 1.0), ((k + 1) % sides, high, -1.0)):
                 rho = np.hypot(slant, x)
                 if rho >= reach:
@@ -124,35 +103,46 @@ def _parts(flat, observation, frame, found):
                 if min(least, 0.5) * scale > weakest:
                     own = -2 * _beyond(h, s, slant, 0.0, wavelength)
                     if abs(own) * scale > weakest:
-                        if count < len(facet):
-                            facet[count], amplitude[count] = f, own * scale
-                            _turn(n, out, False, point, isometry[count])
-                            write(along(along(point, -0.01, out), 0.002, n), aim[count])
-                        count += 1
+                        aim = along(along(point, -0.01, out), 0.002, n)
+                        count = _add(found, count, f, own * scale * turn, aim, (1.0, n, out, point))
         for k in range(sides):
             if value[k] == 0:
                 continue
             point = vec(corners[f, k])
             scale = mirror * gain_towards(minus(point, p), rotation, observation) ** 2
             if abs(value[k]) * scale > weakest:
-                if count < len(facet):
-                    facet[count], amplitude[count] = f, value[k] * scale
-                    _turn(n, n, True, point, isometry[count])
-                    before, after = vec(outward[(k - 1) % sides]), vec(outward[k])
-                    write(along(along(along(point, -0.01, before), -0.01, after), 0.002, n), aim[count])
-                count += 1
+                before, after = vec(outward[(k - 1) % sides]), vec(outward[k])
+                aim = along(along(along(point, -0.01, before), -0.01, after), 0.002, n)
+                count = _add(found, count, f, value[k] * scale * turn, aim, (-1.0, zero, zero, point))
         if inside:
             scale = mirror * gain_towards(minus(foot, p), rotation, observation) ** 2
             if scale > weakest:
-                if count < len(facet):
-                    facet[count], amplitude[count] = f, scale
-                    _turn(n, (0.0, 0.0, 0.0), False, foot, isometry[count])
-                    write(along(foot, 0.002, n), aim[count])
-                count += 1
-    for i in range(min(count, len(facet))):
-        head_on = flat.layer[facet[i], HEAD_ON]
-        amplitude[i] *= head_on / abs(head_on)
+                count = _add(found, count, f, scale * turn, along(foot, 0.002, n), (1.0, n, zero, foot))
     return count
+
+
+@njit
+def _add(found, count, facet, amplitude, aim, image):
+    """Write a part if there is room; returns how many there are.
+
+    Args:
+        found, count: parts so far.
+        facet, amplitude, aim: of `SpecularPoints`.
+        image: the isometry s (1 - 2 a a' - 2 b b') about a point: a reflection in a plane of normal a (b zero), a half
+            turn about an edge at right angles to a and b, an inversion in a corner (s = -1, both zero).
+    """
+    sign, a, b, point = image
+    if count < len(found.facet):
+        found.facet[count], found.amplitude[count] = facet, amplitude
+        write(aim, found.aim[count])
+        for i in range(3):
+            shift = point[i]
+            for j in range(3):
+                m = sign * ((1.0 if i == j else 0.0) - 2 * a[i] * a[j] - 2 * b[i] * b[j])
+                found.geometry[count, 4 * i + j] = m
+                shift -= m * point[j]
+            found.geometry[count, 4 * i + 3] = shift
+    return count + 1
 
 
 @njit(cache=True)
@@ -179,17 +169,3 @@ def _beyond(h, s, slant, x, wavelength):
         phase = np.exp(0.5j * np.pi * y * (2 * begin + y))
         total += weights[i] * np.cosh(u) * phase / (rho * below * (rho + h) * np.sqrt(rho + slant))
     return total * turn * around * end * h * h * s * np.sqrt(wavelength / 2) / (2 * np.pi)
-
-
-@njit
-def _turn(n, out, all_axes, point, isometry):
-    """Reflection in a plane (out zero), half turn about an edge, or inversion in a corner."""
-    for i in range(3):
-        shift = point[i]
-        for j in range(3):
-            m = (1.0 if i == j else 0.0) - 2 * n[i] * n[j] - 2 * out[i] * out[j]
-            if all_axes:
-                m = -1.0 if i == j else 0.0
-            isometry[i, j] = m
-            shift -= m * point[j]
-        isometry[i, 3] = shift

@@ -11,7 +11,7 @@ from radarsim.propagation.bodies import recognise
 from radarsim.propagation.clutter import uncovered
 from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.hashgrid import Grid
-from radarsim.propagation.media import LAYER, as_slab, covered, lag, layer
+from radarsim.propagation.media import as_slab, covered, lag, layer
 from radarsim.propagation.patches import Patches
 from radarsim.propagation.smooth import pieces
 from radarsim.propagation.table import Table
@@ -56,14 +56,6 @@ class Flat(Table):
         """Which are there in a frame."""
         return (self.frame < 0) | (self.frame == frame)
 
-    @classmethod
-    def none(cls) -> "Flat":
-        """No facet."""
-        no, empty, still = np.zeros(0, bool), np.zeros((0, 3)), np.zeros(0, int)
-        table = np.zeros((0, LAYER), complex)
-        shape = np.zeros((0, 4, 3)), empty, empty, empty, empty, np.zeros((0, 2))
-        return cls(*shape, no, no, table, np.zeros(0), np.zeros(0), still, still)
-
 
 @dataclass(frozen=True)
 class Reflectors:
@@ -73,28 +65,23 @@ class Reflectors:
         flat: quadrilaterals that cover its flat regions.
         round: its spheres and cylinders.
         smooth: pieces of its other curved surfaces.
-        inner: the inner faces of hollow bodies, which are seen through outer ones: they flash, but mirror nothing else.
+        inner: the inner faces of hollow bodies, seen through outer ones: they reflect, but mirror nothing else.
         heights: how uneven the flat ones are; None: not at all.
     """
 
     flat: Flat
     round: RoundBodies
-    inner: Flat = Flat.none()
+    inner: Flat = Flat.zeros(0)
     smooth: Patches = Patches.of([])
     heights: Heights | None = None
 
     @cached_property
-    def _grids(self) -> tuple[Grid, Grid]:
-        outer, inner = (Grid(some.corners.min(axis=1), some.corners.max(axis=1)) for some in (self.flat, self.inner))
-        return outer, inner
+    def _grids(self) -> list[tuple[Flat, Grid]]:
+        return [(some, Grid(some.corners.min(axis=1), some.corners.max(axis=1))) for some in (self.flat, self.inner)]
 
-    def near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> Flat:
-        """Flat ones within a distance (m) of any of the positions, in the same order."""
-        return self.flat[self._grids[0].near(positions, distance)[0]]
-
-    def inner_near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> Flat:
-        """The same of inner faces."""
-        return self.inner[self._grids[1].near(positions, distance)[0]] if len(self.inner) else self.inner
+    def near(self, positions: Float[np.ndarray, "position 3"], distance: float) -> list[Flat]:
+        """Flat ones, and inner faces, within a distance (m) of any of the positions, in the same order."""
+        return [some[grid.near(positions, distance)[0]] for some, grid in self._grids]
 
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig, heights: Heights | None = None) -> "Reflectors":
@@ -128,11 +115,7 @@ class Reflectors:
                     inwards = -deep * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
                     inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
-        outer = _table(flat)
+        outer = Flat.from_rows(flat)
         seen = np.sqrt(uncovered(scene, outer.corners.mean(axis=1), outer.normal))
         outer = replace(outer, layer=covered(outer.layer, seen))
-        return cls(outer, RoundBodies.of(bodies), _table(inner), Patches.of(smooth), heights)
-
-
-def _table(rows: list[tuple]) -> Flat:
-    return Flat(*(np.array(column) for column in zip(*rows, strict=True))) if rows else Flat.none()
+        return cls(outer, RoundBodies.from_rows(bodies), Flat.from_rows(inner), Patches.of(smooth), heights)

@@ -4,7 +4,7 @@ Each has its place, normal, cross section and random phase in the world. So spec
 coherent while the sensor moves over it, as on a real wall. `Surface` draws those of a scene.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -47,28 +47,14 @@ class Scatterers(Table):
     rank: Float[np.ndarray, "scatterer"]
 
     @classmethod
-    def points(
-        cls,
-        position: ArrayLike,
-        sigma: ArrayLike,
-        phase: Float[np.ndarray, "n"] | None = None,
-    ) -> "Scatterers":
+    def points(cls, position: ArrayLike, sigma: ArrayLike, phase: Float[np.ndarray, "n"] | None = None) -> "Scatterers":
         """Isotropic scatterers at (n, 3) or (3,) places, m, of given cross sections, m^2."""
         position = np.atleast_2d(np.asarray(position, float))
-        n = len(position)
-        zeros = np.zeros(n, bool)
-        return cls(
-            position,
-            np.zeros((n, 3)),
-            np.broadcast_to(np.asarray(sigma, float), n).copy(),
-            np.zeros(n) if phase is None else phase,
-            zeros,
-            zeros,
-            np.ones(n),
-            np.ones(n),
-            np.tile(LAMBERT, (n, 1)),
-            np.full(n, -1.0),
-        )
+        n, one = len(position), np.ones(len(position))
+        return replace(
+            cls.zeros(n), position=position, sigma=one * np.asarray(sigma), phase=0 * one if phase is None else phase,
+            bounces=one, bounces_twice=one, lobe=np.tile(LAMBERT, (n, 1)), rank=-one,
+        )  # fmt: skip
 
     def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> "Scatterers":
         """All of them: a given set is taken as it is, a `Surface` draws what is needed."""

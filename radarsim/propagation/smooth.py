@@ -11,7 +11,7 @@ Triangles that hardly bend stay flat. A piece ends at creases, and where curvatu
 its rounded end there is an end of the pipe and one of the rounding, which cancel but for what physical optics leaves.
 """
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse
@@ -39,8 +39,7 @@ WRONG, ROUNDS = 0.005, 6
 NEIGHBOURS, NOISY = 32, 1e-5
 
 
-@dataclass(frozen=True)
-class Piece:
+class Piece(NamedTuple):
     """A smooth surface over some triangles of a mesh.
 
     Attributes:

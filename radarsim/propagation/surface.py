@@ -8,7 +8,6 @@ and speckle is still a property of the world. Within a tile, scatterers follow a
 """
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -91,21 +90,19 @@ class Surface:
         totals, counts = _counts(self.seed, tiles, self._tile_areas * self.density, highest)
         ends = np.cumsum(counts)
         total = int(ends[-1]) if len(ends) else 0
-        drawn = _Drawn(
-            np.empty((total, 3)), np.empty(total, np.int64), np.empty(total), np.empty(total), np.empty((2, total))
-        )
-        _place(self.seed, tiles, totals, counts, ends, _Ground(self._first, self._areas, self._triangles), drawn)
-        position, triangle, phase, rank, bounces = drawn
+        drawn, triangle = Scatterers.zeros(total), np.empty(total, np.int64)
+        columns = drawn.position, triangle, drawn.phase, drawn.rank, drawn.bounces, drawn.bounces_twice
+        _place(self.seed, tiles, totals, counts, ends, (self._first, self._areas, self._triangles), columns)
         owner = np.repeat(self._owner[tiles], counts)
-        return Scatterers(
-            position, self._normals[triangle], self._sigma[triangle], phase, self._two_sided[owner],
-            self._horizontal[triangle], bounces[0], bounces[1], self._lobe[owner], rank,
+        return replace(
+            drawn, normal=self._normals[triangle], sigma=self._sigma[triangle], two_sided=self._two_sided[owner],
+            horizontal=self._horizontal[triangle], lobe=self._lobe[owner],
         )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Cluttered:
-    """A surface and the small things on it, as one set of scatterers."""
+    """A surface and the small objects on it, as one set of scatterers."""
 
     surface: Surface
     clutter: Clutter
@@ -136,24 +133,6 @@ def _split(triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "m 3 3"]:
     return np.concatenate(done) if done else triangles
 
 
-class _Ground(NamedTuple):
-    """Triangles by tile: the first one of each, areas up to each one's end (m^2), corners."""
-
-    first: Int[np.ndarray, "tile"]
-    areas: Float[np.ndarray, "n"]
-    triangles: Float[np.ndarray, "n 3 3"]
-
-
-class _Drawn(NamedTuple):
-    """Scatterers: places, triangles that they lie on, phases, ranks, and weights over one mirror and two."""
-
-    position: Float[np.ndarray, "scatterer 3"]
-    triangle: Int[np.ndarray, "scatterer"]
-    phase: Float[np.ndarray, "scatterer"]
-    rank: Float[np.ndarray, "scatterer"]
-    bounces: Float[np.ndarray, "2 scatterer"]
-
-
 @njit(inline="always")
 def _hash(a, b):
     """Two 64-bit words to one, mixed by the finaliser of splitmix64 (Steele, Lea, Flood, OOPSLA 2014)."""
@@ -181,9 +160,17 @@ def _counts(seed, tiles, expected, highest):
 
 
 @njit(parallel=True, cache=True)
-def _place(seed, tiles, totals, counts, ends, ground, drawn):
+def _place(seed, tiles, totals, counts, ends, ground, columns):
+    """Place the scatterers of some tiles.
+
+    Args:
+        seed, tiles, totals, counts: of `_counts`.
+        ends: one after the last scatterer of each tile.
+        ground: the first triangle of each tile, areas up to each triangle's end (m^2), corners (m).
+        columns: places, triangles, phases, ranks, weights over one mirror and over two of scatterers: filled in.
+    """
     first, areas, triangles = ground
-    position, triangle, phase, rank, bounces = drawn
+    position, triangle, phase, rank, once, twice = columns
     for i in prange(len(tiles)):
         tile = tiles[i]
         key = _hash(seed, np.uint64(tile))
@@ -208,5 +195,5 @@ def _place(seed, tiles, totals, counts, ends, ground, drawn):
             triangle[j] = t
             phase[j] = 2 * np.pi * _uniform(word)
             rank[j] = (k + _uniform(_hash(word, np.uint64(1)))) / totals[i]
-            bounces[0, j] = BOUNCE_STRIDE if (k + bouncing) % BOUNCE_STRIDE == 0 else 0.0
-            bounces[1, j] = BOUNCE_STRIDE**2 if (k + bouncing) % BOUNCE_STRIDE**2 == 0 else 0.0
+            once[j] = BOUNCE_STRIDE if (k + bouncing) % BOUNCE_STRIDE == 0 else 0.0
+            twice[j] = BOUNCE_STRIDE**2 if (k + bouncing) % BOUNCE_STRIDE**2 == 0 else 0.0

@@ -20,7 +20,7 @@ class Table:
     SHARED: ClassVar[tuple[str, ...]] = ()
 
     def __init_subclass__(cls):
-        # numba tells named tuples by their names alone
+        # numba tells named tuples apart by their names alone
         columns = [name for name in cls.__annotations__ if name not in cls.SHARED]
         cls.Columns = namedtuple(f"{cls.__name__}Columns", columns)
         cls.Columns.__module__, cls.Columns.__qualname__ = cls.__module__, f"{cls.__qualname__}.Columns"
@@ -38,6 +38,18 @@ class Table:
         return type(self)(*(column[index] for column in self.columns), *shared)
 
     @classmethod
+    def zeros(cls, n: int) -> Self:
+        """Rows of zeros, of the types and shapes that the columns are annotated with."""
+        kinds = [cls.__annotations__[name] for name in cls.Columns._fields]
+        shapes = [(n, *map(int, kind.dim_str.split()[1:])) for kind in kinds]
+        return cls(*(np.zeros(s, kind.dtypes[-1].rstrip("_")) for s, kind in zip(shapes, kinds, strict=True)))
+
+    @classmethod
+    def from_rows(cls, rows: list[tuple]) -> Self:
+        """A table of the values of each row, in the order of the columns."""
+        return cls(*(np.array(column) for column in zip(*rows, strict=True))) if rows else cls.zeros(0)
+
+    @classmethod
     def joined(cls, parts: list[Self]) -> Self:
         """All rows of several tables; nothing is shared."""
         return cls(*(np.concatenate(column) for column in zip(*(part.columns for part in parts), strict=True)))
@@ -46,16 +58,16 @@ class Table:
 Rows = TypeVar("Rows", bound=Table)
 
 
-def filled(room: Callable[[int], Rows], fill: Callable[[Rows], int], size: int) -> Rows:
+def filled(table: type[Rows], fill: Callable[[Rows], int], size: int) -> Rows:
     """A table of as many rows as there turn out to be.
 
     Args:
-        room: makes a table of so many rows.
+        table: its type.
         fill: writes as many rows as fit; returns how many there are.
         size: rows to begin with.
     """
     while True:
-        found = room(size)
+        found = table.zeros(size)
         count = fill(found)
         if count <= size:
             return found[:count]

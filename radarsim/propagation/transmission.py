@@ -8,8 +8,7 @@ from numba import njit
 
 from radarize.radar.config import RadarConfig
 from radarsim.propagation.clutter import uncovered
-from radarsim.propagation.fields import cross, dot, unit, upright
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fields import cross, dot, unit, upright, vec
 from radarsim.propagation.media import LAYER, as_slab, layer, sweep_share, window
 from radarsim.world import shapes
 from radarsim.world.objects import SceneObject

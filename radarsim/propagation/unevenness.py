@@ -1,4 +1,4 @@
-"""Walls that are not quite flat: what unevenness makes of their flash.
+"""Walls that are not quite flat: what unevenness makes of their specular reflection.
 
 A plastered wall keeps within some millimetres of its plane: DIN 18202, table 3, row 6, allows 3 mm between points 10 cm
 apart, 5 mm at 1 m, 10 mm at 4 m. Here its height z over the plane is a smooth random field of the world, with a
@@ -6,7 +6,7 @@ Gaussian correlation exp(-r^2 / L^2) at two scales: waves of the float over half
 a millimetre within a Fresnel zone. It is a sum of plane waves (`Heights`), so it costs nothing to keep, and
 neighbouring parts of one wall share it.
 
-The flash of a wall at distance h is Kirchhoff's integral over it. Over that of the flat wall it is
+The specular reflection of a wall at distance h is Kirchhoff's integral over it. Over that of the flat wall it is
 
     F = k / (j pi h) int exp(jk x^2 / h - 2jk z(x)) d^2x,
 
@@ -15,7 +15,7 @@ the radar. Free space is an all-pass filter, so moving along the wall by d, F ha
 
     <F F*'> = exp(-(2k)^2 (<z^2> - <z z'>)):   <F> = exp(-(2k)^2 <z^2> / 2),   <|F|^2> = 1
 
-(Beckmann and Spizzichino 1963, chapter 5, without the paraxial terms). So unevenness does not dim a flash on average:
+(Beckmann and Spizzichino 1963, chapter 5, without the paraxial terms). So unevenness does not dim it on average:
 it makes it fade and shine from place to place, as slopes of a degree scatter within any beam of a small array.
 
 A plate's edges near the foot take the same factor, so that nothing jumps where the foot leaves the plate; far from it
@@ -116,7 +116,7 @@ def _factors(start, along, across, size, away, reach, count, wavelength):
         weight, flat = np.empty(n, np.complex128), 0j
         for i in range(n):
             x = (i - count[f]) * step
-            fade = min(max(2 * (1 - abs(x) / reach[f]), 0.0), 1.0)  # nought at the rim, one from half way on
+            fade = min(max(2 * (1 - abs(x) / reach[f]), 0.0), 1.0)  # zero at the rim, one from half way on
             weight[i] = fade * fade * (3 - 2 * fade) * np.exp(1j * k * x * x / away[f])
             flat += weight[i]
         waves = size.shape[1]

@@ -7,8 +7,7 @@ from jaxtyping import Float, Int
 from numba import njit, prange
 
 from radarsim.propagation.apertures import outlines
-from radarsim.propagation.fields import along, dot, length, minus
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fields import along, dot, length, minus, vec
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import CLEARANCE, Obstacles
 from radarsim.propagation.reflectors import Flat

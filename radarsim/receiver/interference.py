@@ -27,8 +27,7 @@ from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.motion.trajectory import Motion
 from radarsim.propagation.antenna import gain_pattern
-from radarsim.propagation.fields import dot, gain_towards, length, minus, unit, upright, upwards
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fields import dot, gain_towards, length, minus, unit, upright, upwards, vec
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Obstacles
 from radarsim.receiver.frontend import FrontEnd

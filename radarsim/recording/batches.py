@@ -18,7 +18,7 @@ from radarsim.sensors.suite import Suite
 
 #: Frames that are made together, which is quicker: ray tests and loops over scatterers go well in large numbers.
 TOGETHER = 16
-#: Batches that a process has to make for its start, some seconds, to pay where nobody has asked for it.
+#: Fewest batches a process for which its start, some seconds, pays; used where the user gives no number.
 _WORTH = 8
 
 
@@ -107,7 +107,7 @@ class Batches:
                 yield made.pop(awaited.popleft())
 
     def _require_echoes(self) -> None:
-        """Refuse a recording of nothing, as a look at some frames all over it tells."""
+        """Refuse a recording without echoes, by frames spread over all of it."""
         some = np.unique(np.linspace(0, len(self.times) - 1, TOGETHER).astype(int))
         if not any(map(len, self.scenario.frames(self.times[some]).paths)):
             raise InputError(
@@ -122,6 +122,6 @@ def _make(order: bytes, first: int, last: int, report: Report) -> Batch:
 
 @lru_cache(1)
 def _begun(order: bytes) -> Batches:
-    """What this process makes batches of, as its parent has sent it."""
+    """The parent's `Batches` in this process."""
     share_with_drjit()
     return pickle.loads(order)

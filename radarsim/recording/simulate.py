@@ -64,6 +64,7 @@ def planned(
     frontend: Path | FrontEndConfig | None = None,
     sensors: Sequence[str] = (),
     people: int = 0,
+    walk_in: Scene | None = None,
     **walk: Any,
 ) -> tuple[Scenario, str, dict[str, object]]:
     """What `simulate` simulates.
@@ -75,7 +76,8 @@ def planned(
         frontend: front end or file of one (see `FrontEndConfig`; `calibrate` writes them); default: the board's own.
         sensors: that accompany the radar: names from `radarsim.sensors.suite.SENSORS`, or ``all``. The radar's samples
             are the same whatever is chosen.
-        people: who walk about near the radar's way (see `crowd`).
+        people: pedestrians near the radar's path (see `crowded`).
+        walk_in: scene in which the walk is planned; default: `scene`.
         walk: how the radar goes, by the fields of `Walk`: platform, duration, trajectory, waypoints, mounting.
 
     Returns:
@@ -89,7 +91,7 @@ def planned(
     way, names = Walk(**walk), tuple(chosen(sensors))
     settings = FrontEndConfig.load(frontend, config.board) if isinstance(frontend, (str, Path)) else frontend
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
-    motion = way.through(world, seed)
+    motion = way.through(walk_in or world, seed)
     world = crowded(world, motion, people, seed)
     scenario = Scenario(world, motion, config, settings, seed, names)
     about = {"platform": "trajectory" if way.trajectory is not None else way.platform}

@@ -1,25 +1,24 @@
-"""How many echoes there are and how strong, by cause, and the I/Q split by cause."""
+"""Number and power of the echoes of each path type, and the I/Q split by path type."""
 
 import numpy as np
-from jaxtyping import Complex, Float, UInt8
 
 from radarize.recording import Stream
-from radarsim.machine.threads import one_blas_thread
 from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 
-_NAMES = ", ".join(p.name.lower() for p in PathType)
-#: Parts of /truth/adc_by_cause, in this order; where other radars send, interference comes before the leakage.
-CAUSES = (*(p.name.lower() for p in PathType), "leakage")
+#: Path types in the order of their numbers.
+TYPES = tuple(p.name.lower() for p in PathType)
+#: Parts of /truth/adc_by_cause, in this order; with other radars in the scene, interference stands before leakage.
+CAUSES = (*TYPES, "leakage")
 
 
 class CauseCounts(Sensor):
-    """Number and total power of the echoes of each cause."""
+    """Number and total power of the echoes of each path type."""
 
     streams = {
-        "truth/echoes": Stream((len(PathType),), "i4", "", f"echoes per cause: {_NAMES}"),
-        "truth/echo_power": Stream((len(PathType),), "f4", "1", f"received over transmitted power: {_NAMES}"),
+        "truth/echoes": Stream((len(TYPES),), "i4", "", f"echoes per cause: {', '.join(TYPES)}"),
+        "truth/echo_power": Stream((len(TYPES),), "f4", "1", f"received over transmitted power: {', '.join(TYPES)}"),
     }
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
@@ -31,7 +30,7 @@ class CauseCounts(Sensor):
 
 
 class AdcByCause(Sensor):
-    """I/Q of each cause before noise and converter, of which a part may exceed what either that or a float16 holds."""
+    """I/Q of each path type before noise and converter; parts may exceed what the converter and a float16 hold."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
@@ -43,17 +42,11 @@ class AdcByCause(Sensor):
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The parts."""
         others = [frames.interference] if self.scenario.scene.interferers else []
-        each = zip(frames.lengths, frames.received, frames.types, *others, strict=True)
-        parts = np.stack([self._split(*one) for one in each])
+        found = []
+        for lengths, amplitudes, types, *signals in zip(
+            frames.lengths, frames.received, frames.types, *others, strict=True
+        ):
+            echoes = [self.scenario.synthesize(lengths[types == each], amplitudes[types == each]) for each in PathType]
+            found.append(np.stack(self.scenario.board.by_cause([*echoes, *signals])))
+        parts = np.stack(found)
         return {"truth/adc_by_cause": np.stack([parts.real, parts.imag], axis=-1).astype(np.float32)}
-
-    @one_blas_thread
-    def _split(
-        self, lengths: Float[np.ndarray, "path virtual 3"], amplitudes: Complex[np.ndarray, "path"],
-        types: UInt8[np.ndarray, "path"],
-        *others: Complex[np.ndarray, "loop tx rx sample"],
-    ) -> Complex[np.ndarray, "cause loop tx rx sample"]:  # fmt: skip
-        """Counts of each cause in a frame, and of signals that are no echoes."""
-        masks = [types == each for each in PathType]
-        signals = [self.scenario.synthesize(lengths[mask], amplitudes[mask]) for mask in masks]
-        return np.stack(self.scenario.board.by_cause([*signals, *others]))

@@ -27,6 +27,12 @@ from radarsim.sensors.sensor import Sensor
 MOUNT = (0.0, 0.0, 0.06)
 
 
+def mount(sensor: str) -> Product:
+    """Pose of a sensor at `MOUNT`."""
+    place = np.array([*MOUNT, 0.0, 0.0, 0.0, 1.0])
+    return Product(place, "m, quaternion", f"x y z qx qy qz qw of the {sensor} in the radar's frame")
+
+
 @dataclass(frozen=True)
 class Intrinsics:
     """A pinhole camera.
@@ -121,12 +127,9 @@ class DepthCamera(Sensor):
         about = "depth along the optical axis in the middle of the burst, row by row from the upper left; 0: no value"
         self.streams = {"truth/depth": Stream((camera.height, camera.width), "u2", "mm", about)}
         pinhole = np.array([camera.fx, camera.fy, camera.cx, camera.cy])
-        place = np.array([*MOUNT, 0.0, 0.0, 0.0, 1.0])
         self.products = {
             "truth/depth_intrinsics": Product(pinhole, "pixels", "fx fy cx cy of the depth camera"),
-            "truth/depth_mount": Product(
-                place, "m, quaternion", "x y z qx qy qz qw of the depth camera (x forward, z up) in the radar's frame"
-            ),
+            "truth/depth_mount": mount("depth camera (x forward, z up)"),
         }
 
     def depth(self, times: Float[np.ndarray, "frame"]) -> Float[np.ndarray, "frame height width"]:

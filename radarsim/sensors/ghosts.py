@@ -1,7 +1,7 @@
-"""Which cause fills which cell of the range-azimuth map: direct echoes, ghosts, floor and ceiling, things that move.
+"""Path type of each cell of the range-azimuth map: direct echoes, ghosts, floor and ceiling, moving objects.
 
-The map of each cause is that of `radarize.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its part of the
-I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the window's
+The map of each path type is that of `radarize.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its part of
+the I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the window's
 transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; and of the burst's
 loops a few instants suffice, for the map sums over Doppler, which is the mean over loops. Without noise, converter and
 channel mismatch, which calibration removes; and without the smear over azimuth of echoes that close faster than
@@ -17,13 +17,13 @@ from numba import njit, prange
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.radar.windows import taylor
-from radarize.recording import Product, Stream
+from radarize.recording import Stream
 from radarsim.propagation.burst import BurstClock
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.synthesis import _sincos_cycles
 from radarsim.scenario import Frames, Scenario
-from radarsim.sensors.causes import CAUSES
-from radarsim.sensors.scan import AZIMUTHS
+from radarsim.sensors.causes import CAUSES, TYPES
+from radarsim.sensors.scan import AZIMUTHS, axes
 from radarsim.sensors.sensor import Sensor
 
 _INSTANTS = 3
@@ -31,12 +31,12 @@ _INSTANTS = 3
 _WIDTH, _FINE = 4, 64
 #: Powers are kept in steps of so many dB, and not below so many dB under the noise: that is what lets them be packed.
 STEP, DEPTH = 0.25, 10.0
-#: Label of cells in which no cause reaches the noise.
+#: Label of cells in which the echoes do not reach the noise.
 NOISE = 255
 
 
 class Ghosts(Sensor):
-    """Power by cause on the radar's range bins and the scan's bearings, and the strongest cause of every cell."""
+    """Power by path type on the radar's range bins and the scan's bearings, and the strongest type of every cell."""
 
     def __init__(self, scenario: Scenario):
         super().__init__(scenario)
@@ -49,22 +49,18 @@ class Ghosts(Sensor):
         leakage = np.fft.fft(front_end.by_cause([])[0][0] * window, axis=-1).reshape(-1, config.samples)
         self._leakage = self._maps.beams(leakage[self._maps.row].T[None])
         shape = (config.samples, len(AZIMUTHS))
-        names = ", ".join(p.name.lower() for p in PathType)
         labels = ", ".join(f"{i} {name}" for i, name in enumerate(CAUSES))
         self.streams = {
             "truth/cause_power": Stream(
                 (len(PathType), *shape), "f2", "dB of ADC counts^2",
-                f"range-azimuth power by cause ({names}), not below {DEPTH:g} dB under the noise",
+                f"range-azimuth power by cause ({', '.join(TYPES)}), not below {DEPTH:g} dB under the noise",
             ),
             "truth/cause": Stream(
                 shape, "u1", "", f"strongest cause of a range-azimuth cell: {labels}, {NOISE} noise",
                 labels=CAUSES,
             ),
         }  # fmt: skip
-        self.products = {
-            "truth/cause_ranges": Product(config.ranges - config.range_bias, "m", "range bins of /truth/cause"),
-            "truth/cause_azimuths": Product(AZIMUTHS, "rad", "bearings of /truth/cause, positive to the left"),
-        }
+        self.products = axes("truth/cause", config, "range bins")
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """Maps and labels."""
@@ -83,7 +79,7 @@ class Ghosts(Sensor):
 
 
 class _Tones(NamedTuple):
-    """What `_spread` puts echoes into spectra by.
+    """Constants of `_spread`.
 
     Attributes:
         row: antennas.
@@ -104,7 +100,7 @@ class _Tones(NamedTuple):
 
 
 class CauseMaps:
-    """Range-azimuth power of each cause straight from the echoes.
+    """Range-azimuth power of each path type, computed from the echoes.
 
     Args:
         config: radar configuration.
@@ -141,7 +137,7 @@ class CauseMaps:
         amplitudes: Complex[np.ndarray, "echo"],
         types: UInt8[np.ndarray, "echo"],
     ) -> Float[np.ndarray, "cause range azimuth"]:
-        """Power of each cause in the square of the amplitudes' unit."""
+        """Power of each path type in the square of the amplitudes' unit."""
         n = self.config.samples
         spectra = np.zeros((_INSTANTS, len(PathType), n, 2, len(self.row)), np.float32)
         polar = np.abs(amplitudes).astype(np.float32), np.angle(amplitudes) / (2 * np.pi)

@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 from radarize.recording import Product, Stream
 from radarsim.motion.trajectory import turned
 from radarsim.scenario import Frames, Scenario
-from radarsim.sensors.depth import MOUNT
+from radarsim.sensors.depth import MOUNT, mount
 from radarsim.sensors.sensor import Sensor
 
 RATE = 200.0
@@ -30,7 +30,7 @@ _PEAK, _FLOOR = 0.618, 0.664
 
 @dataclass(frozen=True)
 class Errors:
-    """What one triad (three accelerometers, or gyroscopes) does wrong, in its unit u: m/s^2 or rad/s.
+    """Errors of a triad of accelerometers or gyroscopes, in its unit u: m/s^2 or rad/s.
 
     Attributes:
         noise: density of the white noise, u / sqrt(Hz).
@@ -76,11 +76,11 @@ GYROSCOPE = Errors(
 
 
 class Triad:
-    """Three sensors at right angles, with errors laid down for all their samples at once.
+    """Three sensors at right angles, with errors drawn for all samples at once.
 
     Args:
         errors: of each.
-        rng: draws them; fewer samples have the errors of the first of more.
+        rng: draws them; a shorter series has the same errors as the start of a longer one.
         count: of samples, at `RATE`.
 
     Attributes:
@@ -104,7 +104,7 @@ class Triad:
     def measure(
         self, truth: Float[np.ndarray, "tick 3"], ticks: Int[np.ndarray, "tick"]
     ) -> Float[np.ndarray, "tick 3"]:
-        """What the sensors report as their samples number `ticks`."""
+        """Measured values of the samples with numbers `ticks`."""
         errors = self._errors
         value = np.rint((truth + self.bias[ticks] + self._noise[ticks]) / errors.step) * errors.step
         return np.clip(value, -errors.limit, errors.limit)
@@ -130,9 +130,8 @@ class Imu(Sensor):
         }
         specification = np.array([[e.noise, e.instability, e.walk] for e in (ACCELEROMETER, GYROSCOPE)])
         about = "noise density (1/sqrt(Hz)), bias instability, random walk (sqrt(Hz)) of accelerometer, gyroscope"
-        place = np.array([*MOUNT, 0.0, 0.0, 0.0, 1.0])
         self.products = {
-            "imu/mount": Product(place, "m, quaternion", "x y z qx qy qz qw of the IMU in the radar's frame"),
+            "imu/mount": mount("IMU"),
             "imu/specification": Product(specification, "m/s^2, rad/s", about),
         }
 

@@ -4,8 +4,8 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize import polar
-from radarsim.motion.trajectory import turned
 from radarsim.scenario import Frames, Scenario
+from radarsim.sensors.scan import headings
 from radarsim.sensors.sensor import Sensor
 
 #: rad: of the beams over and under the horizon that can meet something within the slab, as of a lidar of 64 beams
@@ -28,13 +28,8 @@ class Lidar(Sensor):
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The pictures."""
         motion, times = self.scenario.motion, frames.middles
-        forward = turned(motion.rotation(times), (1.0, 0.0, 0.0))
-        yaw = np.arctan2(forward[:, 1], forward[:, 0])
-        return {
-            "truth/lidar": np.stack(
-                [self._picture(*each) for each in zip(times, motion.position(times), yaw, strict=True)]
-            )
-        }
+        each = zip(times, motion.position(times), headings(motion, times), strict=True)
+        return {"truth/lidar": np.stack([self._picture(*one) for one in each])}
 
     def _picture(self, time: float, position: Float[np.ndarray, "3"], yaw: float) -> np.ndarray:
         cos, sin = np.cos(yaw), np.sin(yaw)

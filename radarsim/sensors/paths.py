@@ -1,4 +1,4 @@
-"""Every propagation path above the noise: where the radar sees it, how strong it is, and how it came about."""
+"""Every propagation path above the noise: apparent place, power, path type and mechanism."""
 
 import numpy as np
 

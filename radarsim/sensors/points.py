@@ -1,4 +1,4 @@
-"""The point cloud that the radar's own chip would make of its samples."""
+"""Point cloud as the radar's own chip makes it of the samples."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Where the radar is and how it moves, exactly, in the middle of every burst."""
+"""Exact pose and velocity of the radar in the middle of every burst."""
 
 import numpy as np
 

@@ -1,8 +1,8 @@
-"""What a perfect lidar in the radar's place would see in the horizontal plane: ranges, and labels on the radar's bins.
+"""Scan of a perfect lidar at the radar in the horizontal plane: ranges, and labels on the radar's range bins.
 
 Both are levelled: the plane is horizontal whatever the sensor's roll and pitch, and bearings count from the direction
 in which its boresight points on the plan. Rays start where the sensor is in the middle of the burst. Glass counts as a
-surface, for it is one to the radar; things that move count where they are at that moment.
+surface, as it does for the radar; moving objects are at their places of that instant.
 """
 
 from enum import IntEnum
@@ -10,6 +10,7 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from radarize.radar.config import RadarConfig
 from radarize.recording import Product, Stream
 from radarsim.motion.trajectory import Motion, turned
 from radarsim.scenario import Frames, Scenario
@@ -29,13 +30,26 @@ class Cell(IntEnum):
     UNKNOWN = 2  #: behind it
 
 
+def headings(motion: Motion, times: Float[np.ndarray, "frame"]) -> Float[np.ndarray, "frame"]:
+    """Directions in which the boresight points on the plan, rad."""
+    forward = turned(motion.rotation(times), (1.0, 0.0, 0.0))
+    return np.arctan2(forward[:, 1], forward[:, 0])
+
+
 def level_rays(
     motion: Motion, times: Float[np.ndarray, "frame"], azimuths: Float[np.ndarray, "ray"]
 ) -> tuple[Float[np.ndarray, "frame 3"], Float[np.ndarray, "frame ray 3"]]:
     """Origins and horizontal unit directions of rays at bearings against the boresight's on the plan."""
-    forward = turned(motion.rotation(times), (1.0, 0.0, 0.0))
-    bearing = np.arctan2(forward[:, 1], forward[:, 0])[:, None] + azimuths
+    bearing = headings(motion, times)[:, None] + azimuths
     return motion.position(times), np.stack([np.cos(bearing), np.sin(bearing), np.zeros_like(bearing)], axis=-1)
+
+
+def axes(name: str, config: RadarConfig, cells: str) -> dict[str, Product]:
+    """Ranges and bearings of a stream on the radar's range bins and the scan's bearings."""
+    return {
+        f"{name}_ranges": Product(config.ranges - config.range_bias, "m", f"{cells} of /{name}"),
+        f"{name}_azimuths": Product(AZIMUTHS, "rad", f"bearings of /{name}, positive to the left"),
+    }
 
 
 class PlanarScan(Sensor):
@@ -74,11 +88,7 @@ class Occupancy(Sensor):
         self.streams = {
             "truth/occupancy": Stream(cells, "u1", "", about, labels=tuple(cell.name.lower() for cell in Cell))
         }
-        ranges = scenario.config.ranges - scenario.config.range_bias
-        self.products = {
-            "truth/occupancy_ranges": Product(ranges, "m", "middles of the range cells of /truth/occupancy"),
-            "truth/occupancy_azimuths": Product(AZIMUTHS, "rad", "bearings of /truth/occupancy, positive to the left"),
-        }
+        self.products = axes("truth/occupancy", scenario.config, "middles of the range cells")
 
     def observe(self, frames: Frames) -> dict[str, np.ndarray]:
         """The label."""

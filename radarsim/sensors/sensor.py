@@ -1,4 +1,4 @@
-"""What every sensor of a recording is: streams and products, and rows for some frames."""
+"""Interface of a recording's sensors: streams, products, and rows for some frames."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -12,8 +12,8 @@ from radarsim.scenario import Frames, Scenario
 class Sensor(ABC):
     """A sensor beside the radar, or a truth that no sensor measures.
 
-    What it gives for some frames depends on nothing else than their instants: errors that drift are laid down for the
-    whole motion, noise is drawn by instant (`Scenario.rng`).
+    Rows of a frame depend on its instant alone: drifting errors are drawn for the whole motion, noise is keyed by the
+    instant (`Scenario.rng`).
 
     Args:
         scenario: that it is part of.

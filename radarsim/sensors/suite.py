@@ -1,4 +1,4 @@
-"""Which sensors a recording has."""
+"""Choice of a recording's sensors, and their joint rows."""
 
 from collections.abc import Iterable, Sequence
 

@@ -1,4 +1,4 @@
-"""How alike a recording and its twin are, frame by frame: the same radar on the same walk, in the real place and in a
+"""Comparison of a recording with its twin, frame by frame: the same radar on the same walk, in the real place and in a
 model of it (`radarsim twin`).
 
 Maps are those that networks see (`radarize.features.maps`), in dB over their own median, so that the receiver's gain,
@@ -6,14 +6,14 @@ which is a figure of its own, and the noise of empty cells drop out. Velocities 
 single frames (Doppler least squares; Capon's maps, first echo), so that any radar has them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from jaxtyping import Float, Int
-from numpy.typing import ArrayLike
 
 from radarize.batch import Batch, Signal
 from radarize.errors import InputError
@@ -43,11 +43,11 @@ FIGURES = {
 SHIFTS = {"time": 1.5, "azimuth": np.radians(18.0), "range": 0.5}
 #: Frames that shifts are tried on, spread over the recording.
 _TRIED = 200
-#: A shift is told if maps correlate so much better with it, at least so well, and in so many frames.
+#: A shift is reported from this gain in correlation, this correlation and this number of frames on.
 BETTER, WELL, FEWEST = 0.05, 0.3, 5
 #: s by which stamps of the same frame may differ.
 _SAME = 1e-4
-#: Loops that noise and velocity are told from, at least.
+#: Fewest loops of which noise and velocity are estimated.
 _LOOPS = 8
 _BATCH = 16
 
@@ -105,41 +105,34 @@ class Comparison:
 
     @property
     def noise_counts(self) -> Float[np.ndarray, "2"]:
-        """Noise of recording and twin, counts; NaN where it cannot be told."""
+        """Noise of recording and twin, counts; NaN where it is unknown."""
         known = self.noise[np.isfinite(self.noise).all(axis=1)]
         return np.sqrt(np.median(known, axis=0)) if len(known) else np.full(2, np.nan)
 
     def summary(self) -> dict[str, Any]:
         """All figures as plain data; not-a-number is None."""
-        spread = {
-            name: {
-                "median": _plain(np.nanmedian(values)),
-                "p10": _plain(np.nanpercentile(values, 10)),
-                "p90": _plain(np.nanpercentile(values, 90)),
-                "unrelated_frames": _plain(self.chance.get(name, np.nan)),
-            }
-            for name, values in self.figures.items()
-            if np.isfinite(values).any()
-        }
-        return {
+        spread = pd.DataFrame(self.figures).dropna(axis=1, how="all").quantile([0.5, 0.1, 0.9])
+        spread = spread.set_axis(["median", "p10", "p90"])
+        spread.loc["unrelated_frames"] = pd.Series(self.chance)
+        return _plain({
             "frames": len(self.frames),
-            "figures": spread,
-            "noise_counts": dict(zip(("recording", "twin"), map(_plain, self.noise_counts), strict=True)),
-            "frechet_db": {n: {"twin": _plain(a), "own_halves": _plain(b)} for n, (a, b) in self.frechet.items()},
-            "misfits": {n: {"shift": _plain(a), "gain": _plain(b)} for n, (a, b) in self.misfits().items()},
-            "alignment": {n: {"shift": _plain(a), "correlation": _plain(b)} for n, (a, b) in self.alignment.items()},
-            "per_frame": {
-                "frame": self.frames[:, 0].tolist(),
-                "time": _plain(self.times),
-                **{name: _plain(values) for name, values in self.figures.items()},
-            },
-        }
+            "figures": spread.to_dict(),
+            "noise_counts": dict(zip(("recording", "twin"), self.noise_counts, strict=True)),
+            "frechet_db": {n: {"twin": a, "own_halves": b} for n, (a, b) in self.frechet.items()},
+            "misfits": {n: {"shift": a, "gain": b} for n, (a, b) in self.misfits().items()},
+            "alignment": {n: {"shift": a, "correlation": b} for n, (a, b) in self.alignment.items()},
+            "per_frame": {"frame": self.frames[:, 0], "time": self.times, **self.figures},
+        })  # fmt: skip
 
 
-def _plain(value: ArrayLike) -> object:
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _plain(item) for name, item in value.items()}
     if np.ndim(value):
-        return [_plain(item) for item in np.asarray(value)]
-    return round(float(np.asarray(value)), 5) if np.isfinite(value) else None
+        return [_plain(item) for item in value]
+    if isinstance(value, int | np.integer):
+        return int(value)
+    return round(float(value), 5) if np.isfinite(value) else None
 
 
 def compare(real: Path, twin: Path, progress: Callable[[int, int], None] | None = None) -> Comparison:
@@ -207,7 +200,7 @@ def _pairs(one: Recording, other: Recording) -> Int[np.ndarray, "frame 2"]:
 
 
 class _Analysis:
-    """What is compared of frames: range profile, noise, and, of more than one antenna, maps, velocity and scan."""
+    """Compared quantities of frames: range profile, noise, and, with several antennas, maps, velocity and scan."""
 
     def __init__(self, config: RadarConfig):
         self.config, self._signal = config, Signal(config)
@@ -279,33 +272,25 @@ def _figures(real: dict[str, np.ndarray], twin: dict[str, np.ndarray]) -> dict[s
 def _alignment(real: np.ndarray, twin: np.ndarray, result: Comparison) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Mean correlations over shifts of the twin's range-azimuth maps."""
     tried = np.unique(np.linspace(0, len(real) - 1, _TRIED).astype(int))
+    some = real[tried], twin[tried]
     period = float(np.median(np.diff(result.times))) if len(result.times) > 1 else np.inf
     found = {}
-    for name, step in (
-        ("time", period),
-        ("azimuth", float(result.azimuths[1] - result.azimuths[0])),
-        ("range", float(result.ranges[1] - result.ranges[0])),
+    for name, axis, step, maps in (
+        ("time", 0, period, (real, twin)),
+        ("azimuth", 2, float(result.azimuths[1] - result.azimuths[0]), some),
+        ("range", 1, float(result.ranges[1] - result.ranges[0]), some),
     ):
-        most = min(int(SHIFTS[name] / step), real.shape[("time", "range", "azimuth").index(name)] // 2)
+        length = real.shape[axis]
+        cells = np.arange(length) if axis else tried
+        most = min(int(SHIFTS[name] / step), length // 2)
         if not most:
             continue
         shifts, values = np.arange(-most, most + 1), []
         for shift in shifts:
-            if name == "time":
-                both = tried[(tried - shift >= 0) & (tried - shift < len(real))]
-                pair = real[both], twin[both - shift]
-            else:
-                pair = _overlap(real[tried], twin[tried], int(shift), 2 if name == "azimuth" else 1)
-            values.append(_mean(correlation(*pair)))
+            kept = cells[(cells >= shift) & (cells - shift < length)]  # what both have once the twin is shifted
+            values.append(_mean(correlation(maps[0].take(kept, axis), maps[1].take(kept - shift, axis))))
         found[name] = (shifts * step, np.array(values))
     return found
-
-
-def _overlap(real: np.ndarray, twin: np.ndarray, shift: int, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """What the two have in common once the twin is shifted upward along an axis."""
-    length = real.shape[axis]
-    kept = np.arange(max(shift, 0), length + min(shift, 0))
-    return real.take(kept, axis), twin.take(kept - shift, axis)
 
 
 def _mean(values: np.ndarray) -> float:

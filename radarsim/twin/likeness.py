@@ -15,7 +15,7 @@ from jaxtyping import Float
 PATCH = (8, 8)
 #: Quantiles of a patch's levels.
 QUANTILES = (0.1, 0.5, 0.9)
-#: dB over a map's median that count: what is louder is as loud.
+#: Levels are clipped at this many dB over a map's median.
 DEPTH = 45.0
 #: Weights of MS-SSIM's scales from fine to coarse, and side of its Gaussian window of 1.5 cells (Wang, Simoncelli and
 #: Bovik, "Multiscale structural similarity for image quality assessment", Asilomar 2003). At the coarsest scale
@@ -24,7 +24,7 @@ SCALES, WINDOW = (0.0448, 0.2856, 0.3001, 0.2363, 0.1333), 11
 
 
 def foreground(maps: Float[np.ndarray, "frame row column"]) -> Float[np.ndarray, "frame row column"]:
-    """dB over each map's median, 0...`DEPTH`: most cells of a room are empty, and their noise is nobody's likeness."""
+    """dB over each map's median, 0...`DEPTH`: most cells of a room are empty, and their noise is not compared."""
     return np.clip(maps - np.median(maps, axis=(1, 2), keepdims=True), 0, DEPTH)
 
 

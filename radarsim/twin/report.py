@@ -2,10 +2,11 @@
 
 import json
 from collections.abc import Callable
+from itertools import cycle
 from pathlib import Path
 
 import numpy as np
-import plotly.graph_objects as go
+from plotly.colors import qualitative
 from plotly.subplots import make_subplots
 
 from radarize.heatmaps import Heatmaps
@@ -14,12 +15,18 @@ from radarize.recording import Recording
 from radarize.replacing import write_whole
 from radarize.report.drawings import canvas, draw_doppler, draw_fan, draw_profiles, draw_scan
 from radarize.report.page import COLORS, INK, Page
+from radarize.report.plots import line, panels
 from radarsim.twin.comparison import FIGURES, Comparison, compare
 
 #: Range profiles over time: a picture has no room for more.
 _PROFILES = 400
 _WHO = (("recording", COLORS["slam"]), ("twin", COLORS["odometry"]), ("poses", COLORS["truth"]))
-_SHIFTED = {"time": ("s", 1.0), "azimuth": ("deg", 180 / np.pi), "range": ("m", 1.0)}
+#: Unit, factor to it, and probable reason of a shift.
+_SHIFTED = {
+    "time": ("s", 1.0, "the clocks of poses and radar differ"),
+    "azimuth": ("deg", 180 / np.pi, "the poses' heading, the mounting or the scene is turned"),
+    "range": ("m", 1.0, "the radar's range bias, a lever arm or the scene's size is off"),
+}
 
 
 def report_twin(
@@ -85,21 +92,16 @@ def _headline(figures: dict) -> list[tuple[str, str]]:
 
 def _doubts(found: Comparison, warnings: str) -> list[str]:
     """Sentences on what may make the comparison meaningless."""
-    told = [warnings[0].upper() + warnings[1:] + "."] if warnings else []
+    doubts = [warnings[0].upper() + warnings[1:] + "."] if warnings else []
     for name, (shift, gain) in found.misfits().items():
-        unit, factor = _SHIFTED[name]
-        cause = {
-            "time": "the clocks of poses and radar differ",
-            "azimuth": "the poses' heading, the mounting or the scene is turned",
-            "range": "the radar's range bias, a lever arm or the scene's size is off",
-        }[name]
-        told.append(
+        unit, factor, reason = _SHIFTED[name]
+        doubts.append(
             f"Maps correlate by {gain:.2f} better with the twin shifted by {factor * shift:+.3g} {unit} in {name}: "
-            f"probably {cause}."
+            f"probably {reason}."
         )
     if not len(found.scans):
-        told.append("A single virtual antenna tells no direction: no maps, velocities or scans to compare.")
-    return told
+        doubts.append("A single virtual antenna gives no direction: no maps, velocities or scans to compare.")
+    return doubts
 
 
 def _table(page: Page, summary: dict) -> None:
@@ -141,7 +143,7 @@ def _alignment(page: Page, found: Comparison) -> None:
     )
     figure = make_subplots(rows=1, cols=len(found.alignment))
     for column, (name, (shifts, values)) in enumerate(found.alignment.items(), 1):
-        unit, factor = _SHIFTED[name]
+        unit, factor, _ = _SHIFTED[name]
         x, y = np.round(factor * shifts, 4).tolist(), np.round(values, 4).tolist()
         figure.add_scatter(x=x, y=y, line={"color": COLORS["slam"]}, showlegend=False, row=1, col=column)
         figure.add_vline(x=0, line={"color": INK, "dash": "dot", "width": 1}, row=1, col=column)
@@ -159,12 +161,9 @@ def _profiles(page: Page, found: Comparison) -> None:
             draw_profiles(axis, found.times[shown], found.ranges, power[shown])
             axis.set_title(who)
         page.picture(figure, "Range profiles over time")
-    figure = go.Figure()
+    figure = panels("mean level, dB re 1 count²", x="range, m")
     for (who, color), power in zip(_WHO, found.profiles.swapaxes(0, 1), strict=False):
-        level = 10 * np.log10(np.maximum(power, 1e-9)).mean(axis=0)
-        figure.add_scatter(x=found.ranges.round(4).tolist(), y=level.round(2).tolist(), name=who, line={"color": color})
-    figure.update_xaxes(title="range, m")
-    figure.update_yaxes(title="mean level, dB re 1 count²")
+        line(figure, (found.ranges, 10 * np.log10(np.maximum(power, 1e-9)).mean(axis=0)), who, color)
     page.plot(figure, height=340)
 
 
@@ -204,16 +203,10 @@ def _reach(found: Comparison) -> float:
 
 def _velocities(page: Page, found: Comparison) -> None:
     page.section("Velocity", "From single frames, by Doppler least squares.")
-    figure = make_subplots(rows=2, cols=1, shared_xaxes=True, vertical_spacing=0.06)
-    for column, label in enumerate(("forward, m/s", "left, m/s")):
-        for k, (who, color) in enumerate(_WHO):
-            y = [None if np.isnan(v) else v for v in found.velocity[:, k, column].round(4).tolist()]
-            figure.add_scatter(
-                x=found.times.round(3).tolist(), y=y, name=who, legendgroup=who, showlegend=column == 0,
-                line={"color": color, "width": 1.3}, row=1 + column, col=1,
-            )  # fmt: skip
-        figure.update_yaxes(title=label, row=1 + column, col=1)
-    figure.update_xaxes(title="time, s", row=2, col=1)
+    figure = panels("forward, m/s", "left, m/s")
+    for k, (who, color) in enumerate(_WHO):
+        for axis in range(2):
+            line(figure, (found.times, found.velocity[:, k, axis]), who, color, 1.3, row=axis + 1)
     page.plot(figure, height=420)
 
 
@@ -222,13 +215,9 @@ def _over_time(page: Page, found: Comparison) -> None:
     if len(found.times) < 2 or not shown:
         return
     page.section("Figures over time", "Click a name to show or hide it.")
-    figure = go.Figure()
+    figure = panels("")
     default = ("correlation_range_azimuth", "correlation_doppler_azimuth", "profile_correlation")
-    for name in shown:
-        y = [None if np.isnan(v) else v for v in found.figures[name].round(4).tolist()]
-        figure.add_scatter(
-            x=found.times.round(3).tolist(), y=y, name=name.replace("_", " "), line={"width": 1.2},
-            visible=True if name in default else "legendonly",
-        )  # fmt: skip
-    figure.update_xaxes(title="time, s")
+    for name, color in zip(shown, cycle(qualitative.Plotly)):
+        visible = True if name in default else "legendonly"
+        line(figure, (found.times, found.figures[name]), name.replace("_", " "), color, 1.2, visible=visible)
     page.plot(figure, height=420)

@@ -1,8 +1,7 @@
-"""The twin of a recording: what the simulator makes of the same walk, in a model of the same place.
+"""The twin of a recording: the same walk, simulated in a model of the same place.
 
-Frame by frame the twin has the recording's stamps, lost chirps, radar configuration and poses; what it has of its own
-is the world: surfaces of the scene in place of the real ones, and other speckle and noise. `radarsim.twin.comparison`
-tells how alike the two are.
+Each frame of the twin has the recording's stamp, lost chirps, radar configuration and pose. The world differs: surfaces
+of the scene in place of the real ones, other speckle and other noise. `radarsim.twin.comparison` compares the two.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,7 +26,7 @@ from radarsim.scenario import Scenario
 from radarsim.sensors.suite import chosen
 from radarsim.world.scene import Scene
 
-#: s between two poses: over a longer gap nobody knows where the radar was, and frames there have no twin.
+#: Longest time between two poses, s; frames in a longer gap have no twin.
 GAP = 0.5
 
 
@@ -42,7 +41,7 @@ class Options:
         frontend: front-end file (see `FrontEndConfig`); default: the board's, with channels that the recording's
             channel calibration makes equal.
         fit: fit the front end to the recording instead (`calibrate`), and keep it beside the output as ``.yaml``.
-        every: simulate every so manieth frame.
+        every: simulate every N-th frame.
         duration: s of the recording, from its first frame; default: all of it.
         seed: of speckle, noise and whatever differs from board to board.
         sensors: see `simulate`.
@@ -66,6 +65,8 @@ class Options:
             raise InputError(f"--frontend {self.frontend} is given with --calibrate, expected one of the two")
         if self.every < 1:
             raise InputError(f"every is {self.every}, expected at least 1")
+        if self.duration is not None and not self.duration > 0:
+            raise InputError(f"duration is {self.duration:g} s, expected more than 0")
 
 
 def make_twin(
@@ -91,81 +92,56 @@ def make_twin(
         InputError: unusable recording or scene; no poses, or poses outside the scene.
     """
     world = scene if isinstance(scene, Scene) else Scene.load(scene)
-    walk = _Walk.of(Path(recording), world, options)
+    with Recording(recording) as real:
+        if not len(real):
+            raise InputError(f"{recording}: has no whole frame, expected at least one")
+        config, cfg_text, start = real.config, real.cfg_text, float(real.times[0])
+        wanted = np.arange(0, len(real), options.every)
+        if options.duration is not None:
+            wanted = wanted[real.times[wanted] - start < options.duration]
+        motion, known = _motion(real, real.times[wanted] + config.burst_center, options)
+        frames = wanted[known]
+        times, valid = real.times[frames] - start, real.valid(0, len(real))[frames]
+    motion = motion.until(float(times[-1]) + config.frame_period)
+    _require_inside(motion.position(times), world, recording)
     frontend = options.frontend
     if options.fit:
         frontend = Path(output).with_suffix(".yaml")
         calibrate(recording, frontend)
-    config = walk.config
     settings = FrontEndConfig.load(frontend, config.board) if frontend else _calibrated(config)
-    scenario = Scenario(world, walk.motion, config, settings, options.seed, tuple(chosen(options.sensors)))
-    crossed = crossings(walk.motion, world)
-    about = {
-        "source": "radarsim twin",
-        "twin_of": Path(recording).name,
-        "warnings": "; ".join(filter(None, [walk.left_out, crossed and f"poses: {crossed}"])),
-    }
-    batches = Batches(scenario, walk.times, walk.start, walk.valid)
-    return record(batches, output, cfg_text=walk.cfg_text, attributes=about, progress=progress)
+    scenario = Scenario(world, motion, config, settings, options.seed, tuple(chosen(options.sensors)))
+    doubts = []
+    if left := len(wanted) - len(frames):
+        doubts.append(f"{left} of {len(wanted)} frames have no pose within {GAP:g} s and are left out")
+    if crossed := crossings(motion, world):
+        doubts.append(f"poses: {crossed}")
+    about = {"source": "radarsim twin", "twin_of": Path(recording).name, "warnings": "; ".join(doubts)}
+    batches = Batches(scenario, times, start, valid)
+    return record(batches, output, cfg_text=cfg_text, attributes=about, progress=progress)
 
 
-@dataclass(frozen=True)
-class _Walk:
-    """What a twin takes from its recording.
-
-    Attributes:
-        config: radar configuration.
-        cfg_text: its original text.
-        start: stamp of the recording's first frame, s.
-        times: of the frames to simulate since then, s.
-        valid: their chirps that arrived.
-        motion: of the radar in the scene.
-        left_out: a sentence on frames without poses, or nothing.
-    """
-
-    config: RadarConfig
-    cfg_text: str
-    start: float
-    times: Float[np.ndarray, "frame"]
-    valid: Bool[np.ndarray, "frame loop tx"]
-    motion: Motion
-    left_out: str
-
-    @classmethod
-    def of(cls, path: Path, world: Scene, options: Options) -> "_Walk":
-        """From a recording."""
-        at = options.at
-        with Recording(path) as recording:
-            if not len(recording):
-                raise InputError(f"{path}: has no whole frame, expected at least one")
-            config, start = recording.config, float(recording.times[0])
-            wanted = np.arange(0, len(recording), options.every)
-            if options.duration is not None:
-                wanted = wanted[recording.times[wanted] - start < options.duration]
-            middles = recording.times[wanted] + config.burst_center
-            if at is not None:
-                span = float(recording.times[-1] - start) + config.frame_period
-                yaw, pitch, roll = at.rotation.as_euler("ZYX")
-                motion, known = Motion.still(at.lever_arm, yaw, pitch, roll, span), np.ones(len(wanted), bool)
-            else:
-                stamps, poses = _poses(recording, config.burst_time)
-                poses = _moved(poses, options.origin)
-                motion = motion_through(stamps, poses, start, options.mounting, f"{path}: /truth/pose")
-                known = _between(middles, stamps)
-            left = len(wanted) - int(known.sum())
-            if left == len(wanted):
-                raise InputError(
-                    f"{path}: no frame lies between two of its poses (frames {middles[0]:.3f}...{middles[-1]:.3f} s, "
-                    f"poses {stamps[0]:.3f}...{stamps[-1]:.3f} s), expected stamps of one clock"
-                )
-            wanted = wanted[known]
-            times = recording.times[wanted] - start
-            motion = motion.until(float(times[-1]) + config.frame_period)
-            _require_inside(motion.position(times), world, path)
-            return cls(
-                config, recording.cfg_text, start, times, recording.valid(0, len(recording))[wanted], motion,
-                f"{left} of {left + len(wanted)} frames have no pose within {GAP:g} s and are left out" if left else "",
-            )  # fmt: skip
+def _motion(
+    recording: Recording, middles: Float[np.ndarray, "frame"], options: Options
+) -> tuple[Motion, Bool[np.ndarray, "frame"]]:
+    """The radar's motion in the scene, and which frames, of bursts with these middles (s), have poses on both sides."""
+    config, start = recording.config, float(recording.times[0])
+    if options.at is not None:
+        span = float(recording.times[-1] - start) + config.frame_period
+        yaw, pitch, roll = options.at.rotation.as_euler("ZYX")
+        return Motion.still(options.at.lever_arm, yaw, pitch, roll, span), np.ones(len(middles), bool)
+    stamps, poses = _poses(recording, config.burst_time)
+    if (origin := options.origin) is not None:
+        place = origin.rotation.apply(poses[:, :3]) + origin.lever_arm
+        poses = np.hstack([place, (origin.rotation * Rotation.from_quat(poses[:, 3:])).as_quat()])
+    after = np.clip(np.searchsorted(stamps, middles), 1, len(stamps) - 1)
+    known = (middles >= stamps[0]) & (middles <= stamps[-1]) & (stamps[after] - stamps[after - 1] <= GAP)
+    motion = motion_through(stamps, poses, start, options.mounting, f"{recording.path}: /truth/pose")
+    if not known.any():
+        raise InputError(
+            f"{recording.path}: no frame lies between two of its poses (frames {middles[0]:.3f}...{middles[-1]:.3f} s, "
+            f"poses {stamps[0]:.3f}...{stamps[-1]:.3f} s), expected stamps of one clock"
+        )
+    return motion, known
 
 
 def _poses(recording: Recording, margin: float) -> tuple[Float[np.ndarray, "pose"], Float[np.ndarray, "pose 7"]]:
@@ -197,21 +173,6 @@ def _continued(
     turn = Rotation.from_rotvec(share * (here * there.inv()).as_rotvec())
     place = poses[1, :3] + share * (poses[1, :3] - poses[0, :3])
     return float(stamps[1] + np.sign(stamps[1] - stamps[0]) * margin), np.array([*place, *(turn * here).as_quat()])
-
-
-def _moved(poses: Float[np.ndarray, "pose 7"], origin: Mounting | None) -> Float[np.ndarray, "pose 7"]:
-    """Poses in the scene."""
-    if origin is None:
-        return poses
-    place = origin.rotation.apply(poses[:, :3]) + origin.lever_arm
-    return np.hstack([place, (origin.rotation * Rotation.from_quat(poses[:, 3:])).as_quat()])
-
-
-def _between(times: Float[np.ndarray, "frame"], stamps: Float[np.ndarray, "pose"]) -> Bool[np.ndarray, "frame"]:
-    """Frames with poses on both sides, not more than `GAP` apart."""
-    after = np.clip(np.searchsorted(stamps, times), 1, len(stamps) - 1)
-    inside = (times >= stamps[0]) & (times <= stamps[-1])
-    return inside & (stamps[after] - stamps[after - 1] <= GAP)
 
 
 def _require_inside(places: Float[np.ndarray, "frame 3"], world: Scene, path: Path) -> None:

@@ -7,6 +7,7 @@ import pytest
 from scipy.optimize import minimize
 
 from benchmarks.references.rigs import Rig, burst, isotropic, locate
+from benchmarks.references.smooth_bodies import summed
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
@@ -30,9 +31,7 @@ def scene_of(mesh):
 def field(mesh, position):
     """Echo of the round bodies of a mesh, all parts together, isotropic antenna."""
     position = np.asarray(position, float)
-    found = Reflectors.of(scene_of(mesh), CONFIG).round.flashes(isotropic(position, LAMBDA), 0)
-    mirrored = np.einsum("pij,j->pi", found.isometry[:, :, :3], position) + found.isometry[:, :, 3]
-    return np.sum(found.amplitude * np.exp(2j * np.pi * np.linalg.norm(position - mirrored, axis=1) / LAMBDA))
+    return summed(Reflectors.of(scene_of(mesh), CONFIG).round.specular_points(isotropic(position, LAMBDA), 0), position)
 
 
 def cross_section(amplitude, distance):
@@ -133,7 +132,7 @@ def test_phase_close_by(kind, gap, speed):
     scene = scene_of(mesh)
     nothing = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
     # the round body alone: a cylinder's lids are flat
-    reflectors = replace(Reflectors.of(scene, CONFIG), flat=Flat.none())
+    reflectors = replace(Reflectors.of(scene, CONFIG), flat=Flat.zeros(0))
     echoes = PathFinder(scene, nothing, reflectors, CONFIG, antenna=ISOTROPIC)(np.zeros(3), np.eye(3))
     fit = echoes.lengths(CONFIG, Rig((0, speed, 0)), -CONFIG.burst_center)[np.abs(echoes.amplitude).argmax()]
     axis, radius = (reflectors.round.axis[0], reflectors.round.radius[0])

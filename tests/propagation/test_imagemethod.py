@@ -128,7 +128,7 @@ def test_box_room_has_all_its_images(monkeypatch):
     lattice: a conductor turns the field E into 2 (E n) n - E. The antenna is made isotropic, and tilted, because two
     opposite walls send the wave out in front and take it in from behind.
     """
-    for module, kernel in ((image_chains, "_search"), (plates, "_parts")):
+    for module, kernel in ((image_chains, "_search"), (plates, "_specular_points")):
         monkeypatch.setattr(module, "gain_towards", lambda *_: 1.0)
         monkeypatch.setattr(module, kernel, getattr(module, kernel).py_func)
     p, pose = np.array([0.37, -0.21, 1.23]), Rotation.from_euler("ZYX", [0.3, 0.4, 0.5]).as_matrix()

@@ -1,6 +1,7 @@
 """Smooth curved surfaces against the physical-optics integral over the bodies that their meshes stand for."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -37,6 +38,18 @@ from tests.propagation.test_roundghosts import WALL, summed
 NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
 
 
+@cache
+def body(make, *arguments):
+    """Reflectors of a body's mesh, by its maker."""
+    return reflectors(make(*arguments))
+
+
+@cache
+def samples(make, *arguments):
+    """Places, normals and areas of a body, by its maker."""
+    return make(*arguments)
+
+
 def decibels_and_degrees(found, truth):
     return 20 * np.log10(abs(found) / abs(truth)), np.rad2deg(np.angle(found / truth))
 
@@ -48,11 +61,11 @@ PLACES = [(-0.7, 0, 0), (0, 0.8, 0.4), (0.3, 0.2, 1.0), (2.0, -1, 3)]
 @pytest.mark.parametrize("axes", [(0.2, 0.2, 0.208), (0.15, 0.2, 0.3)])
 def test_ellipsoids(axes, place):
     """A sphere stretched by 4 % and an ellipsoid: 0.4 dB and 3 deg (two thirds of it the mesh's), formerly -25 dB."""
-    found, truth = field(reflectors(stretched(axes)), place), physical_optics(ellipsoid(axes), place)
+    found, truth = field(body(stretched, axes), place), physical_optics(samples(ellipsoid, axes), place)
     off, turn = decibels_and_degrees(found, truth)
     assert off == pytest.approx(0, abs=0.4)
     assert turn == pytest.approx(0, abs=3)
-    finer = decibels_and_degrees(field(reflectors(stretched(axes, 4)), place), truth)
+    finer = decibels_and_degrees(field(body(stretched, axes, 4), place), truth)
     assert finer == pytest.approx((0, 0), abs=0.5)
 
 
@@ -86,9 +99,9 @@ def test_noisy_meshes(subdivisions, noise):
 )  # fmt: skip
 def test_half_cylinders(place):
     """Before, at and past their borders: 0.8 dB and 4 deg; formerly -24 to -29 dB."""
-    found = field(reflectors(half_cylinder(0.15, 1.0, 12)), place)
+    found = field(body(half_cylinder, 0.15, 1.0, 12), place)
     off, turn = decibels_and_degrees(
-        found, physical_optics(tube(0.15, 0.5, np.pi / 2, 3 * np.pi / 2), place, soft=0.02)
+        found, physical_optics(samples(tube, 0.15, 0.5, np.pi / 2, 3 * np.pi / 2), place, soft=0.02)
     )
     assert off == pytest.approx(0, abs=0.8)
     assert turn == pytest.approx(0, abs=4)
@@ -123,8 +136,8 @@ def test_dielectrics_reflect_as_walls_of_theirs_do(material):
 def test_capsules(half, place):
     """Broadside, at the joint and on end: 0.8 dB and 5 deg; formerly -6 dB. Ends of the pipe and of its roundings
     cancel as far as they should."""
-    found = field(reflectors(capsule(0.05, half)), place)
-    off, turn = decibels_and_degrees(found, physical_optics(rounded(0.05, half), place))
+    found = field(body(capsule, 0.05, half), place)
+    off, turn = decibels_and_degrees(found, physical_optics(samples(rounded, 0.05, half), place))
     assert off == pytest.approx(0, abs=0.8)
     assert turn == pytest.approx(0, abs=5)
 
@@ -184,7 +197,7 @@ def test_path_by_antenna(kind, gap, speed):
         mesh, deep = half_cylinder(0.15, 1.0, 24), 0.15
     center = np.array([gap + deep, 0.03, 0.05])
     scene = Scene("body", [SceneObject("body", shapes.placed(mesh, center), MATERIALS["metal"])])
-    smooth = replace(Reflectors.of(scene, CONFIG), flat=Flat.none())
+    smooth = replace(Reflectors.of(scene, CONFIG), flat=Flat.zeros(0))
     echoes = PathFinder(scene, NOTHING, smooth, CONFIG, antenna=ISOTROPIC)(np.zeros(3), np.eye(3))
     fit = echoes.lengths(CONFIG, Rig((0, speed, 0)), -CONFIG.burst_center)[np.abs(echoes.amplitude).argmax()]
 

@@ -25,7 +25,7 @@ def plate(half, gamma=-1.0, center=(0.0, 0.0, 0.0)):
 def field(facets, position):
     """Echo amplitude of the plate, all parts together."""
     position = np.asarray(position, float)
-    parts = plates.parts(facets, isotropic(position, LAMBDA), 0)
+    parts = plates.specular_points(facets, isotropic(position, LAMBDA), 0)
     mirrored = np.einsum("pij,j->pi", parts.isometry[:, :, :3], position) + parts.isometry[:, :, 3]
     return np.sum(parts.amplitude * np.exp(2j * np.pi * np.linalg.norm(position - mirrored, axis=1) / LAMBDA))
 

@@ -90,7 +90,7 @@ def leg_ghosts(bottom, tilt):
     both as the sum of the two orders of floor and leg."""
     half = 0.35 - bottom / 2
     center, turned = np.array([2.0, 0, 0.7 - half]), Rotation.from_euler("y", tilt, degrees=True)
-    leg = RoundBodies.of([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
+    leg = RoundBodies.from_rows([(center, turned.apply([0, 0, 1.0]), 0.03, half, layer())])
     found = curved_ghosts.ghosts(isotropic(HIGH, LAMBDA), 0, FLOOR, np.array([0]), Reflectors(FLOOR, leg))
     points, normals, areas = pole(np.zeros(3), 0.03, 2 * half)
     points, normals = turned.apply(points) + center, turned.apply(normals)

@@ -137,4 +137,4 @@ def test_simulate_takes_the_file(tmp_path):
     first = simulate("office", tmp_path / "a.h5", duration=0.1, seed=2, frontend=tmp_path / "made.yaml")
     found = calibrate(first, tmp_path / "found.yaml").settings
     assert found.full_scale_dbm == pytest.approx(0.0, abs=0.5)
-    simulate("office", tmp_path / "b.h5", duration=0.1, seed=2, frontend=tmp_path / "found.yaml")
+    simulate("physics/room", tmp_path / "b.h5", duration=0.1, seed=2, frontend=tmp_path / "found.yaml")

@@ -62,7 +62,7 @@ ELSEWHERE = room("elsewhere", 6.4, 5.2, [
 
 @pytest.fixture(scope="module")
 def real(tmp_path_factory):
-    """Five frames a second for three seconds on a curve through the place."""
+    """Five frames a second for two seconds on a curve through the place."""
     folder = tmp_path_factory.mktemp("real")
     _, text = load_config("radarize")
     fields = next(line for line in text.splitlines() if line.startswith("frameCfg")).split()
@@ -74,7 +74,7 @@ def real(tmp_path_factory):
     quaternions = Rotation.from_euler("z", yaw[:, None]).as_quat()
     np.savetxt(folder / "poses.tum", np.column_stack([t, place, quaternions]))
     return simulate(
-        PLACE, folder / "real.h5", trajectory=folder / "poses.tum", radar=str(folder / "slow.cfg"), duration=3.0, seed=3
+        PLACE, folder / "real.h5", trajectory=folder / "poses.tum", radar=str(folder / "slow.cfg"), duration=2.0, seed=3
     )
 
 
@@ -176,7 +176,7 @@ def test_a_wrong_clock_and_a_wrong_heading_are_told(real, tmp_path):
 
     first = make_twin(altered(real, tmp_path / "late.h5", late), PLACE, tmp_path / "t.h5", Options(seed=9))
     with Recording(first) as recording:
-        assert "2 of 15 frames have no pose" in recording.attributes["warnings"]
+        assert "2 of 10 frames have no pose" in recording.attributes["warnings"]
     found = compare(tmp_path / "late.h5", first).misfits()
     assert found["time"][0] == pytest.approx(-0.4) and found["time"][1] > 0.1
     second = make_twin(altered(real, tmp_path / "turned.h5", turned), PLACE, tmp_path / "u.h5", Options(seed=9))
@@ -186,7 +186,7 @@ def test_a_wrong_clock_and_a_wrong_heading_are_told(real, tmp_path):
     text = report_twin(real, second)[0].read_text()
     assert "heading, the mounting or the scene is turned" in text and "<img" in text
     figures = json.loads((tmp_path / "u.json").read_text())
-    assert figures["frames"] == 15 and len(figures["per_frame"]["correlation_range_azimuth"]) == 15
+    assert figures["frames"] == 10 and len(figures["per_frame"]["correlation_range_azimuth"]) == 10
     assert figures["misfits"]["azimuth"]["gain"] > 0.05
 
 
@@ -250,6 +250,7 @@ def test_what_is_missing_is_said_in_a_sentence(real, tmp_path):
     assert "lie outside scene place (-2.5...2.5" in refused(origin=Mounting.of((50, 0, 0), (0, 0, 0)))
     assert "expected one of the two" in refused(frontend=tmp_path / "board.yaml", fit=True)
     assert "every is 0" in refused(every=0)
+    assert "duration is 0 s, expected more than 0" in refused(duration=0.0)
 
     def other_clock(poses, file):
         file["truth/time"][:] += 1e6

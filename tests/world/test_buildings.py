@@ -11,8 +11,8 @@ from radarsim.world.clearance import RESOLUTION, Clearance
 from radarsim.world.generators.buildings import Building
 from radarsim.world.scene import Scene
 
-SEEDS = np.random.default_rng(4).integers(0, 10_000, 8).tolist()
-FLOORS = [Building(kind="ABCD"[k % 4], seed=seed, floor=k // 4) for k, seed in enumerate(SEEDS)]
+SEEDS = np.random.default_rng(4).integers(0, 10_000, 4).tolist()
+FLOORS = [Building(kind="ABCD"[k], seed=seed, floor=k // 2) for k, seed in enumerate(SEEDS)]
 #: Names of what is no furniture.
 FIXED = ("wall", "facade", "reveals", "column", "pipe", "window", "door", "way", "lamp", "riser", "stairs", "floor")
 

@@ -18,6 +18,7 @@ from jaxtyping import Complex, Float, Int
 from numba import njit
 
 from radarsim.propagation.apertures import STRIP_FAR, aperture, passes, strip
+from radarsim.propagation.curved import grazes, growth, halving
 from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
     along,
@@ -32,9 +33,9 @@ from radarsim.propagation.fields import (
     unit,
     upright,
     upwards,
+    vec,
     write,
-)
-from radarsim.propagation.fields import vector as vec
+)  # fmt: skip
 from radarsim.propagation.fresnelzone import LEAST_LOSS
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.patches import strength
@@ -42,15 +43,15 @@ from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat, Reflectors
 from radarsim.propagation.table import Table, filled
 
-#: Steps to the point between two images; each shrinks the error by at least the share of the radius in the distance.
+#: Steps to the point between two images (`curved.halving`).
 STEPS = 12
 #: Rays to a cylinder aim at least this far inside the part of it that is lit, m: a leg's end is in the floor.
 _INSIDE = 0.01
 
 
 @dataclass(frozen=True)
-class RoundGhosts(Table):
-    """Echoes of round bodies by way of mirrors.
+class CurvedGhosts(Table):
+    """Echoes of curved reflectors over mirrors.
 
     Attributes:
         points: P as seen through the mirrors of its ways out and back, m.
@@ -74,9 +75,9 @@ def find(view: View) -> Paths:
     """Ghosts above the threshold that nothing hides, weakened and delayed where they pass slabs."""
     observation, flat, reflectors = view.observation, view.flat, view.environment.reflectors
     if reflectors is None:
-        return Paths.none()
+        return Paths.zeros(0)
     found = [ghosts(observation, k, flat, some.seen, reflectors) for k, some in enumerate(view.mirrors)]
-    frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), RoundGhosts.joined(found)
+    frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), CurvedGhosts.joined(found)
     n = 2 * len(every)
     allowed = np.repeat(np.abs(every.amplitude) > LEAST_LOSS * observation.threshold, 2)
     passed = view.obstacles.way(
@@ -93,16 +94,10 @@ def find(view: View) -> Paths:
 
 def ghosts(
     observation: Observation, frame: int, flat: Flat, seen: Int[np.ndarray, "n"], reflectors: Reflectors
-) -> RoundGhosts:
+) -> CurvedGhosts:
     """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
     curved = reflectors.round.columns, reflectors.smooth
-    return filled(
-        lambda n: RoundGhosts(
-            np.empty((n, 2, 3)), np.empty((n, 2, 2, 3)), np.empty((n, 2), np.int64), np.empty(n, complex)
-        ),
-        lambda found: _find(observation, frame, flat.columns, seen, curved, found.columns),
-        256,
-    )
+    return filled(CurvedGhosts, lambda found: _find(observation, frame, flat.columns, seen, curved, found.columns), 256)
 
 
 @njit(cache=True)
@@ -111,23 +106,26 @@ def _find(observation, frame, flat, seen, curved, found):
     p, count = vec(observation.position[frame]), 0
     mirrors, images = np.empty(len(seen) + 1, np.int64), np.empty((len(seen) + 1, 3))
     bodies, patches = curved
-    for b in range(len(bodies.radius)):
-        ball = vec(bodies.center[b]), bodies.radius[b] + bodies.half[b]
+    for b in range(len(bodies.radius) + len(patches.ball)):
+        k = b - len(bodies.radius)
+        if k < 0:
+            ball, sides = (vec(bodies.center[b]), bodies.radius[b] + bodies.half[b]), 1
+        else:
+            ball, sides = (vec(patches.ball[k]), patches.ball[k, 3]), 2 if patches.two_sided[k] else 1
         ways = _ways(observation, p, flat, seen, ball, (mirrors, images))
         for i in range(ways):
             for j in range(max(i, 1), ways):
                 way = mirrors[i], vec(images[i]), mirrors[j], vec(images[j])
-                place, aim, n, size = _strength(observation, flat, bodies, b, way)
-                count += _add(observation, frame, flat, way, (place, aim, n, size, bodies.layer[b]), (found, count))
-    for k in range(len(patches.ball)):
-        ways = _ways(observation, p, flat, seen, (vec(patches.ball[k]), patches.ball[k, 3]), (mirrors, images))
-        for i in range(ways):
-            for j in range(max(i, 1), ways):
-                for turn in range(2 if patches.two_sided[k] else 1):
-                    of, way = (k, 1.0 - 2.0 * turn), (mirrors[i], vec(images[i]), mirrors[j], vec(images[j]))
-                    aim, quadric, place, size = strength(observation, patches, of, way[1], way[3])
-                    echo = place, aim, quadric[2], size, patches.layer[k]
-                    count += _add(observation, frame, flat, way, echo, (found, count))
+                for turn in range(sides):
+                    if k < 0:
+                        place, aim, n, size = _strength(observation, flat, bodies, b, way)
+                        layer = bodies.layer[b]
+                    else:
+                        aim, quadric, place, size = strength(
+                            observation, patches, (k, 1.0 - 2.0 * turn), way[1], way[3]
+                        )
+                        n, layer = quadric[2], patches.layer[k]
+                    count += _add(observation, frame, flat, way, (place, aim, n, size, layer), (found, count))
     return count
 
 
@@ -146,13 +144,11 @@ def _add(observation, frame, flat, way, echo, found):
     ghosts, count = found
     if abs(size) * observation.peak_gain**2 <= observation.threshold:
         return 0
-    if not (_before(flat, one, source, aim) and _before(flat, two, sink, aim)):
-        return 0
-    out, back = _over(observation, frame, flat, one, source, aim), _over(observation, frame, flat, two, sink, aim)
+    out, back = _segment(observation, frame, flat, one, source, aim), _segment(observation, frame, flat, two, sink, aim)
     value = size * out[1] * back[1]
     if abs(value) <= observation.threshold:
         return 0
-    value *= _polarisation(upwards(observation.rotation[frame]), flat, way, aim, n, layer)
+    value *= _polarisation(observation, frame, flat, way, (aim, n, layer))
     if abs(value) <= observation.threshold:
         return 0
     clear, ways = along(aim, 2e-3, n), 1 if one == two else 2
@@ -203,34 +199,22 @@ def _strength(observation, flat, bodies, b, way):
     """The specular point of a body between two images of the radar, a lit point near it for rays to aim at, the normal
     there, and the amplitude that an isotropic antenna gets from one image to the other."""
     radius, half, axis, none = bodies.radius[b], bodies.half[b], vec(bodies.axis[b]), (0.0, 0.0, 0.0)
-    first, one, second, two = way
-    a, c = minus(one, vec(bodies.center[b])), minus(two, vec(bodies.center[b]))
-    z_a, z_c = dot(a, axis), dot(c, axis)
-    a, c = along(a, -z_a, axis), along(c, -z_c, axis)
-    n = unit(along(unit(a), 1.0, unit(c)))
-    for _ in range(STEPS):
-        n = unit(along(unit(along(a, -radius, n)), 1.0, unit(along(c, -radius, n))))
-    near, far = length(along(a, -radius, n)), length(along(c, -radius, n))
-    z = z_a + (z_c - z_a) * near / (near + far)
-    line = along(vec(bodies.center[b]), radius, n)
+    (first, one, second, two), center = way, vec(bodies.center[b])
+    n, a, c = halving((center, axis, radius), one, two, STEPS)
+    z_a, z_c, share = dot(minus(one, center), axis), dot(minus(two, center), axis), length(a) / (length(a) + length(c))
+    z = z_a + (z_c - z_a) * share
+    line = along(center, radius, n)
     place = along(line, z, axis)
-    there, back = minus(place, one), minus(place, two)
-    r1, r2 = length(there), length(back)
-    there, back = unit(there), unit(back)
-    cosine = -dot(n, there)
-    if cosine < 1e-3 or dot(n, back) > -1e-3 or r1 + r2 > 2 * observation.range:
-        return none, none, none, 0j
-    # Hessians of the path over the tangent plane, of a plane there and of the body
     side = axis if half > 0 else unit(cross(n, (0.0, 0.0, 1.0) if abs(n[2]) < 0.9 else (1.0, 0.0, 0.0)))
-    curvature, bend = 1 / r1 + 1 / r2, 2 * cosine / radius
-    t1, t2 = dot(there, cross(n, side)), dot(there, side)
-    h11, h22, h12 = curvature * (1 - t1 * t1), curvature * (1 - t2 * t2), -curvature * t1 * t2
-    plane = h11 * h22 - h12 * h12
-    h11, h22 = h11 + bend, h22 + (0.0 if half > 0 else bend)
-    size = observation.wavelength / (4 * np.pi * (r1 + r2)) * np.sqrt(plane / (h11 * h22 - h12 * h12)) + 0j
+    surface = place, side, n, 0.0 if half > 0 else 1 / radius, 1 / radius
+    _, path, (h11, h22, h12), plane, _ = growth(surface, (0.0, 0.0), one, two)
+    if path > 2 * observation.range or grazes((place, n), one, two, 1e-3):
+        return none, none, none, 0j
+    spread = (plane[0] * plane[1] - plane[2] * plane[2]) / (h11 * h22 - h12 * h12)
+    size = observation.wavelength / (4 * np.pi * path) * np.sqrt(spread) + 0j
     if half == 0:
         return place, place, n, size
-    zone = np.sqrt(observation.wavelength / (2 * (h22 - h12 * h12 / h11)))
+    zone = np.sqrt(observation.wavelength / (2 * (h11 - h12 * h12 / h22)))
     low, high = _above(flat, second, two, line, axis, _above(flat, first, one, line, axis, (-half, half)))
     if low >= high or z <= low - STRIP_FAR * zone or z >= high + STRIP_FAR * zone:
         return none, none, none, 0j
@@ -253,49 +237,43 @@ def _above(flat, m, image, line, axis, span):
 
 
 @njit
-def _before(flat, m, image, place):
-    """Whether a place is before a mirror, where its light gets to."""
-    if m < 0:
-        return True
-    c, n = vec(flat.center[m]), vec(flat.normal[m])
-    return dot(minus(image, c), n) * dot(minus(place, c), n) < 0
-
-
-@njit
 def _seen(flat, m, place):
     """Where a place is seen over a mirror, or straight."""
     return place if m < 0 else mirrored(place, vec(flat.center[m]), vec(flat.normal[m]))
 
 
 @njit
-def _over(observation, frame, flat, m, source, place):
-    """Where a way to a place leaves for, and gain times what the mirror's aperture passes."""
+def _segment(observation, frame, flat, m, source, place):
+    """Where a path to a place leaves for, and gain times what the mirror's aperture passes: zero behind the mirror."""
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
     if m < 0:
         return place, gain_towards(minus(place, p), rotation, observation) + 0j
     center, normal = vec(flat.center[m]), vec(flat.normal[m])
-    h, level = abs(dot(minus(source, center), normal)), abs(dot(minus(place, center), normal))
-    share, far = h / (h + level), length(minus(place, source))
-    stop = along(source, share, minus(place, source))
-    square = 0.5 * observation.wavelength * far * share * (1 - share)
-    value = passes(stop, unit(minus(place, source)), square, aperture(flat, m))
-    return stop, value * gain_towards(minus(stop, p), rotation, observation)
+    h, level = dot(minus(source, center), normal), dot(minus(place, center), normal)
+    if h * level >= 0:
+        return place, 0j
+    share, way = h / (h - level), minus(place, source)
+    stop, square = along(source, share, way), 0.5 * observation.wavelength * length(way) * share * (1 - share)
+    return stop, passes(stop, unit(way), square, aperture(flat, m)) * gain_towards(
+        minus(stop, p), rotation, observation
+    )
 
 
 @njit
-def _polarisation(up, flat, way, place, n, layer):
+def _polarisation(observation, frame, flat, way, surface):
     """Product of the reflection coefficients, an upright field sent and taken.
 
     Directions are those from the images: where the body stands on the mirror, both reflections are at one place.
 
     Args:
-        up: of the board.
+        observation, frame: of the radar.
         flat, way: mirrors and images of the radar out and back.
-        place, n, layer: of the body.
+        surface: place on the body, normal and layer there.
     """
-    one, source, two, sink = way
+    (one, source, two, sink), (place, n, layer) = way, surface
+    p, up = vec(observation.position[frame]), upwards(observation.rotation[frame])
     there, back = unit(minus(place, source)), unit(minus(sink, place))
-    first, last = _turned(flat, one, there), _turned(flat, two, back)
+    first, last = unit(minus(_seen(flat, one, place), p)), unit(minus(p, _seen(flat, two, place)))
     field = sent(up, first)
     if one >= 0:
         field = reflected(field, first, there, vec(flat.normal[one]), flat.layer[one])
@@ -303,9 +281,3 @@ def _polarisation(up, flat, way, place, n, layer):
     if two >= 0:
         field = reflected(field, back, last, vec(flat.normal[two]), flat.layer[two])
     return dot(field, upright(up, last))
-
-
-@njit
-def _turned(flat, m, way):
-    """A direction beyond a mirror, or the same."""
-    return way if m < 0 else mirrored(way, (0.0, 0.0, 0.0), vec(flat.normal[m]))

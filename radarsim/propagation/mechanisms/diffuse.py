@@ -16,12 +16,10 @@ from numba import njit
 
 from radarsim.propagation.candidates import Candidates
 from radarsim.propagation.environment import View
-from radarsim.propagation.fields import dot, facing, length, minus, unit
-from radarsim.propagation.fields import vector as vec
+from radarsim.propagation.fields import dot, facing, length, minus, unit, vec
 from radarsim.propagation.fresnelzone import LEAST_LOSS
-from radarsim.propagation.mechanisms.mirrored_paths import SpecularCandidates
 from radarsim.propagation.media import scattering
-from radarsim.propagation.one_way import OneWay
+from radarsim.propagation.one_way import OneWay, Trials, over_mirrors
 from radarsim.propagation.paths import Kind, Paths
 
 #: Mirrors over which an echo goes out and back, together.
@@ -52,7 +50,7 @@ def _straight(view: View) -> OneWay:
 def _over_mirrors(view: View, straight: OneWay) -> OneWay:
     """Paths over one mirror and over two."""
     observation, targets, candidates, flat = view.observation, view.targets, view.candidates, view.flat
-    specular, free = SpecularCandidates(), np.zeros(len(candidates), bool)
+    trials, free = [], np.zeros(len(candidates), bool)
     free[straight.candidate[~straight.through]] = True
     once, twice = targets.weights[candidates.scatterer, 1:].T > 0
     # Hidden scatterers are seen over mirrors out and back, which is of second order: fewer of them do.
@@ -71,8 +69,8 @@ def _over_mirrors(view: View, straight: OneWay) -> OneWay:
         single = np.stack([seen, np.full(len(seen), -1)], axis=1)
         large = pairs[(flat.half[pairs].prod(axis=2) > LEAST_TWICE / 4).all(axis=1)]
         for chains, some in ((single, one), (large, one[double[one]])):
-            specular.add(frame, chains, rows[some], longest[some], weakest[some])
-    paths, stops = specular.paths(observation, targets, candidates, flat)
+            trials.append(Trials(frame, chains, rows[some], longest[some], weakest[some]))
+    paths, stops = over_mirrors(observation, targets, candidates, flat, trials)
     strength = _strongest_echoes(candidates, straight, paths)
     worth = strength > observation.threshold
     paths, stops, strength = paths[worth], stops[worth], strength[worth]

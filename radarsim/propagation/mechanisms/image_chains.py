@@ -40,9 +40,9 @@ from radarsim.propagation.fields import (
     unit,
     upright,
     upwards,
+    vec,
     write,
 )
-from radarsim.propagation.fields import vector as vec
 from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
 from radarsim.propagation.isometry import inverse
 from radarsim.propagation.observation import Observation
@@ -162,11 +162,7 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observatio
     """
     pairs = pairs[np.lexsort(pairs.T)]
     orders = _Orders(np.searchsorted(pairs[:, 1], np.arange(len(flat) + 1)), np.ascontiguousarray(pairs[:, 0]))
-    return filled(
-        lambda n: Chains(np.empty((n, 3), np.int64), np.empty((n, 3, 4)), np.empty(n, complex), np.empty((n, 3, 3))),
-        lambda found: _search(observation, frame, flat.columns, orders, found.columns),
-        1024,
-    )
+    return filled(Chains, lambda found: _search(observation, frame, flat.columns, orders, found.columns), 1024)
 
 
 @njit(cache=True)

@@ -6,11 +6,11 @@ import numpy as np
 from jaxtyping import Complex, Float
 
 from radarsim.propagation import fresnelzone, patches, plates
-from radarsim.propagation.curved import LINE, Arcs
+from radarsim.propagation.curved import LINE, SpecularPoints
 from radarsim.propagation.environment import View
 from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.paths import GEOMETRY, Kind, Paths
+from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.unevenness import Heights
 
@@ -19,26 +19,27 @@ def find(view: View) -> Paths:
     """Those of all frames above the threshold."""
     observation, flat, reflectors = view.observation, view.facing, view.environment.reflectors
     if reflectors is None:
-        return Paths.none()
+        return Paths.zeros(0)
     found, ways = [], []
     for frame in range(observation.frames):
-        parts = plates.parts(flat, observation, frame)
+        parts = plates.specular_points(flat, observation, frame)
         parts = parts[flat.present(frame)[parts.facet]]
-        bodies = reflectors.round.flashes(observation, frame), patches.flashes(observation, frame, reflectors.smooth)
-        arcs = Arcs.joined(list(bodies))
+        curved = SpecularPoints.joined([
+            reflectors.round.specular_points(observation, frame),
+            patches.specular_points(observation, frame, reflectors.smooth),
+        ])  # fmt: skip
         if reflectors.heights is not None:
             uneven = _uneven(observation, frame, flat[parts.facet], parts.aim, reflectors.heights)
             parts = replace(parts, amplitude=parts.amplitude * uneven)
-        ways += [_to_parts(observation, frame, flat, parts), _to_bodies(observation, frame, arcs)]
+        ways += [_to_parts(observation, frame, flat, parts), _to_bodies(observation, frame, curved)]
         mirrors = np.full((len(parts), 4), -1)
         mirrors[:, 0] = parts.facet
-        shape = np.pad(arcs.shape, ((0, 0), (0, GEOMETRY - arcs.shape.shape[1])))
         found += [
             Paths.of(
                 Kind.IMAGE, parts.isometry, parts.amplitude, frame=frame, level=flat.horizontal[parts.facet],
                 mirrors=mirrors,
             ),
-            Paths.of(Kind.CURVED, shape, arcs.amplitude, frame=frame),
+            Paths.of(Kind.CURVED, curved.geometry, curved.amplitude, frame=frame),
         ]  # fmt: skip
     paths = Paths.joined(found)
     stretches = replace(Stretches.joined(ways), path=np.arange(len(paths)))
@@ -48,7 +49,7 @@ def find(view: View) -> Paths:
     return paths.behind(observation, replace(passed, delay=passed.delay + lag))
 
 
-def _to_parts(observation: Observation, frame: int, flat: Flat, parts: plates.Parts) -> Stretches:
+def _to_parts(observation: Observation, frame: int, flat: Flat, parts: SpecularPoints) -> Stretches:
     """The ways to parts of plates: a flash mirrors, an edge mirrors along its line, a corner echoes like a point.
 
     Across an edge that is near the flash, in Fresnel units, it is a part of the same zone and goes over into it.
@@ -85,13 +86,13 @@ def _spread(mirroring, axes):
     return (1 - (1 - AT_RADAR) * mirroring) * axes, mirroring * axes
 
 
-def _to_bodies(observation: Observation, frame: int, arcs: Arcs) -> Stretches:
+def _to_bodies(observation: Observation, frame: int, curved: SpecularPoints) -> Stretches:
     """The ways to round bodies, which echo like points, and cylinders along their axis like mirrors."""
-    begin, n = np.broadcast_to(observation.position[frame], arcs.aim.shape), len(arcs)
-    way = arcs.aim - begin
+    begin, n = np.broadcast_to(observation.position[frame], curved.aim.shape), len(curved)
+    way = curved.aim - begin
     size = np.linalg.norm(way, axis=1, keepdims=True)
-    line = arcs.shape[:, :1] == LINE
-    aside = np.where(line, arcs.shape[:, 4:7], np.cross(way / size, observation.rotation[frame, :, 2]))
+    line = curved.geometry[:, :1] == LINE
+    aside = np.where(line, curved.geometry[:, 4:7], np.cross(way / size, observation.rotation[frame, :, 2]))
     aside /= np.linalg.norm(aside, axis=1, keepdims=True)
     axes = np.sqrt(observation.wavelength * size / 4)[..., None] * np.stack(
         [aside, np.cross(way / size, aside)], axis=1
@@ -100,7 +101,7 @@ def _to_bodies(observation: Observation, frame: int, arcs: Arcs) -> Stretches:
     before, after = _spread(mirroring, axes)
     none, span = (np.full((n, 3), -1), np.zeros((n, 3, 3)), np.zeros((n, 3, 2, 3))), np.tile([0.0, 0.5], (n, 1))
     return Stretches(
-        np.zeros(n, int), np.full(n, frame), begin, arcs.aim, before, after, *none, span, mirroring
+        np.zeros(n, int), np.full(n, frame), begin, curved.aim, before, after, *none, span, mirroring
     )  # fmt: skip
 
 

@@ -172,7 +172,7 @@ def test_a_noisy_scan_gets_flat_walls(tmp_path):
 
 
 def test_a_budget_that_cannot_be_met(tmp_path):
-    trimesh.creation.icosphere(5, radius=3).export(tmp_path / "ball.ply")
+    trimesh.creation.icosphere(4, radius=3).export(tmp_path / "ball.ply")
     with pytest.raises(InputError, match="would move 1 % of its surface by more than .* raise --budget"):
         import_scene(tmp_path / "ball.ply", tmp_path, Options(budget=100))
 

@@ -8,6 +8,8 @@ import pytest
 import shapely
 import trimesh
 from PIL import Image
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation, RotationSpline
 
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
@@ -75,15 +77,16 @@ def test_pictures_work_as_well_as_their_yaml(tmp_path):
     assert one.read_text().splitlines()[1:] == two.read_text().splitlines()[1:]
 
 
-def peak(scene: Scene, position, yaw: float) -> tuple[float, float, float]:
-    """Range (m), azimuth (deg) and power (dB) of the strongest cell of the range-azimuth map beyond 1 m."""
+def peaks(scene: Scene, motion: Motion) -> list[tuple[float, float, float]]:
+    """Range (m), azimuth (deg) and power (dB) of the strongest cell beyond 1 m of the maps at 0 and 10 s."""
     config = PRESETS["radarize"]
-    radar = Scenario(scene, Motion.still(position, yaw=yaw), config)
-    maps = Heatmaps(config)
-    power = maps.range_azimuth(radar.frames(np.zeros(1)).samples)[0].numpy()
-    power[maps.ranges < 1.0] = 0
-    r, a = np.unravel_index(power.argmax(), power.shape)
-    return float(maps.ranges[r]), float(np.rad2deg(maps.azimuths[a])), float(10 * np.log10(power[r, a]))
+    radar = Scenario(Scene(scene.name, scene.objects), motion, config)  # as drawn: flat, and empty
+    maps, found = Heatmaps(config), []
+    for power in maps.range_azimuth(radar.frames(np.array([0.0, 10.0])).samples).numpy():
+        power[maps.ranges < 1.0] = 0
+        r, a = np.unravel_index(power.argmax(), power.shape)
+        found.append((float(maps.ranges[r]), float(np.rad2deg(maps.azimuths[a])), float(10 * np.log10(power[r, a]))))
+    return found
 
 
 def test_echoes_of_imported_walls_are_those_of_native_ones(tmp_path):
@@ -100,10 +103,16 @@ def test_echoes_of_imported_walls_are_those_of_native_ones(tmp_path):
     scan.vertices = scan.vertices + np.random.default_rng(1).normal(0, 0.003, scan.vertices.shape)
     scan.export(tmp_path / "scan.ply")
     scanned = Scene.load(import_scene(tmp_path / "scan.ply", tmp_path / "out", Options(default="plasterboard")).path)
-    for position, yaw in (((3.2, 2.7, 1.2), np.pi), ((3.0, 2.5, 1.2), -np.pi / 2 + 0.3)):
-        expected = peak(Scene("native", native.objects), position, yaw)
-        for scene in (plan, scanned):
-            found = peak(Scene(scene.name, scene.objects), position, yaw)  # as drawn: flat, and empty
+    places, yaws = ((3.2, 2.7, 1.2), (3.0, 2.5, 1.2)), (np.pi, -np.pi / 2 + 0.3)
+    times = np.array([-1.0, 1.0, 9.0, 11.0])
+    motion = Motion(
+        10.0,
+        CubicSpline(times, np.repeat(places, 2, axis=0)),
+        RotationSpline(times, Rotation.from_euler("z", np.repeat(yaws, 2)[:, None])),
+    )
+    native, plan, scanned = (peaks(scene, motion) for scene in (native, plan, scanned))
+    for expected, *others in zip(native, plan, scanned, strict=True):
+        for found in others:
             assert found[0] == pytest.approx(expected[0], abs=0.06)
             assert found[1] == pytest.approx(expected[1], abs=2.1)
             assert found[2] == pytest.approx(expected[2], abs=1.5)

@@ -12,6 +12,7 @@ from jaxtyping import Complex, Float, Int, Int16, UInt8
 
 from radarize.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
+from radarsim.machine.rng import keyed_rng
 from radarsim.machine.threads import one_blas_thread
 from radarsim.motion.trajectory import Motion
 from radarsim.propagation.antenna import gain_pattern
@@ -29,7 +30,6 @@ from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.receiver.interference import Interference
 from radarsim.receiver.synthesis import Synthesizer
-from radarsim.rng import keyed_rng
 from radarsim.world.raycast import RayCaster
 from radarsim.world.scene import Scene
 

@@ -12,7 +12,7 @@ from radarsim.motion.walk import Walk
 from radarsim.propagation.path_types import PathType
 from radarsim.propagation.paths import Paths
 from radarsim.scenario import Scenario
-from radarsim.world.preview.rendering import CAP, cut_open
+from radarsim.world.preview.rendering import cut_open
 from radarsim.world.scene import Scene
 
 #: Rays of each cause that are drawn, the strongest.
@@ -65,10 +65,9 @@ def _words(cause: PathType) -> str:
 
 def _building(scene: Scene) -> list[go.Mesh3d]:
     meshes = []
-    for mesh, material in cut_open(scene):
-        (x, y, z), (i, j, k) = mesh.vertices.T, mesh.faces.T
-        red, green, blue = (round(255 * float(c)) for c in (material.color if material else CAP))
-        name = material.name if material else "cut"
+    for item in cut_open(scene):
+        (x, y, z), (i, j, k), name = item.mesh.vertices.T, item.mesh.faces.T, item.name
+        red, green, blue = (round(255 * float(c)) for c in item.material.color)
         meshes.append(
             go.Mesh3d(
                 x=x.round(3), y=y.round(3), z=z.round(3), i=i, j=j, k=k, color=f"rgb({red},{green},{blue})", name=name,

@@ -37,7 +37,7 @@ LAYERS = (
 )
 #: The same of `radarsim`.
 SIMULATOR = (
-    "rng machine plugins",
+    "machine",
     "world",
     "motion",
     "propagation",

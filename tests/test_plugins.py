@@ -8,11 +8,11 @@ import pytest
 from radarize.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
-from radarsim import plugins
 from radarsim.motion.trajectory import Motion
 from radarsim.propagation import finder
 from radarsim.scenario import Scenario
 from radarsim.sensors import suite
+from radarsim.world import plugins
 from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 4})

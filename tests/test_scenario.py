@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from radarize.radar.presets import PRESETS
+from radarsim.machine.rng import keyed_rng
 from radarsim.motion.trajectory import Motion
 from radarsim.receiver.frontend_config import Band, FrontEndConfig
-from radarsim.rng import keyed_rng
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
 

@@ -29,7 +29,7 @@ def test_it_shows_building_tour_and_echoes(tmp_path):
         names = browser.evaluate(DATA.format("type === 'scatter3d'", "name"))
         assert names[:2] == ["tour", "direct"] and len(names) == 1 + len(causes)
         corners = browser.evaluate(DATA.format("type === 'mesh3d'", "x.length"))
-        assert corners == [len(mesh.vertices) for mesh, _ in cut_open(scene)]
+        assert corners == [len(item.mesh.vertices) for item in cut_open(scene)]
         (place,) = browser.evaluate(DATA.format("name === 'direct'", "x[0]"))
         assert place == pytest.approx(motion.position(frame.middles)[0, 0], abs=1e-3)
         assert browser.errors == []

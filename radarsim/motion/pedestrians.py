@@ -3,9 +3,9 @@
 import numpy as np
 
 from radarize.errors import InputError
+from radarsim.machine.rng import keyed_rng
 from radarsim.motion.tour import Ground
 from radarsim.motion.trajectory import Motion
-from radarsim.rng import keyed_rng
 from radarsim.world.clearance import LOWEST, Clearance, ground_level
 from radarsim.world.movers import Person
 from radarsim.world.scene import Scene

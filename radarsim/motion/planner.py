@@ -11,6 +11,7 @@ from radarsim.motion.tour import SLACK, route, tour
 from radarsim.motion.trajectory import Motion, Mounting
 from radarsim.world.clearance import Clearance, ground_level, nearest
 from radarsim.world.scene import Scene
+from radarsim.world.validation import naming
 
 CLEARANCE = 0.22  # of the sensor on the clearance map, m; of its real place it is 0.2 m or more
 _ATTEMPTS = 12
@@ -52,7 +53,7 @@ def plan_motion(
     height = ground_level(scene) + carrier.height
     low, top = carrier.body
     clearance = Clearance.of(scene, low, max(top, carrier.height + mounting.lever_arm[2] + 0.25))
-    try:
+    with naming(f"scene {scene.name}, platform {platform}"):
         if waypoints is not None:
             _check(scene, carrier, clearance, waypoints)
             legs = route(clearance, carrier.radius, waypoints)
@@ -70,8 +71,6 @@ def plan_motion(
             touches |= clearance.at(motion.path(times)[:, :2]) < carrier.footprint + 0.05
             if not touches.any() and np.linalg.norm(motion.velocity(times), axis=1).max() <= carrier.top_speed:
                 return motion if duration is None else motion.until(duration)
-    except InputError as error:
-        raise InputError(f"scene {scene.name}, platform {platform}: {error}") from error
     where = place[clearance.at(place).argmin()]
     raise InputError(
         f"scene {scene.name}, platform {platform}: found no {'tour' if waypoints is None else 'walk'} that keeps the "

@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.errors import InputError
+from radarsim.machine.rng import keyed_rng
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.trajectory import Motion, Mounting, motion_from_tum
 from radarsim.motion.waypoints import read_waypoints
-from radarsim.rng import keyed_rng
 from radarsim.world.scene import Scene
 
 _TOUR = 40.0  # s, unless asked for

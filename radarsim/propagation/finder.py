@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float
 
 from radarize.radar.config import RadarConfig
-from radarsim import plugins
 from radarsim.propagation import tracks
 from radarsim.propagation.antenna import Antenna, gain_pattern
 from radarsim.propagation.environment import Environment, View
@@ -19,6 +18,7 @@ from radarsim.propagation.observation import Observation
 from radarsim.propagation.paths import Paths
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.surface import Scattering
+from radarsim.world import plugins
 from radarsim.world.scene import Scene
 
 #: Ways in which an echo comes about; plug-ins append theirs.

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from radarize.errors import InputError
-from radarsim import plugins
 from radarsim.machine.threads import one_blas_thread
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import AdcByCause, CauseCounts
@@ -19,6 +18,7 @@ from radarsim.sensors.pose import TruePose
 from radarsim.sensors.scan import Occupancy, PlanarScan
 from radarsim.sensors.sensor import Sensor
 from radarsim.sensors.tracking import TrackingCamera
+from radarsim.world import plugins
 
 #: Sensors that cost next to nothing and are always there.
 ALWAYS: dict[str, type[Sensor]] = {"pose": TruePose, "scan": PlanarScan, "causes": CauseCounts}

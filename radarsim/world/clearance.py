@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw
 from scipy import ndimage
 
 from radarsim.world.scene import Scene
+from radarsim.world.shapes import closest
 
 RESOLUTION = 0.025  # m
 #: What rises less above the ground than this, m, is walked and rolled over: carpets, thresholds, unevenness.
@@ -101,19 +102,11 @@ def nearest(scene: Scene, points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.nd
 
     Triangles less than `LOWEST` above the ground do not count. Where there is nothing else: inf and -1.
     """
-    import open3d
-
     high = scene.triangles[:, :, 2].max(axis=1) > ground_level(scene) + LOWEST
     if not high.any():
         return np.full(len(points), np.inf), np.full(len(points), -1)
-    corners = np.ascontiguousarray(scene.triangles[high].reshape(-1, 3), np.float32)
-    tensor, world = open3d.core.Tensor.from_numpy, open3d.t.geometry.RaycastingScene()
-    numbers = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
-    world.add_triangles(tensor(corners), tensor(numbers))
-    query = np.asarray(points, np.float32)
-    found = world.compute_closest_points(tensor(query))
-    distance = np.linalg.norm(found["points"].numpy() - query, axis=1).astype(float)
-    return distance, scene.triangle_object[high][found["primitive_ids"].numpy()]
+    distance, triangle = closest(scene.triangles[high], points)
+    return distance, scene.triangle_object[high][triangle]
 
 
 def _floor(scene: Scene, below: float) -> Bool[np.ndarray, "t"]:

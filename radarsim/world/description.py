@@ -36,13 +36,13 @@ from typing import Annotated, Literal, NamedTuple, Union
 
 import numpy as np
 import trimesh
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, create_model
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from radarize.errors import InputError
 from radarize.files import within
 from radarize.yamlfile import read_yaml
-from radarsim import plugins
-from radarsim.world import shapes
+from radarsim.world import plugins, shapes
+from radarsim.world.fields import Length, Name, Strict, Vector
 from radarsim.world.generators.buildings import Building, Office
 from radarsim.world.generators.small_objects import small_objects
 from radarsim.world.interferers import Interferer
@@ -51,12 +51,9 @@ from radarsim.world.movers import Mover
 from radarsim.world.objects import SceneObject
 from radarsim.world.squareness import out_of_square
 from radarsim.world.surface_settings import SurfaceSettings
-from radarsim.world.validation import format_validation_error
+from radarsim.world.validation import naming
 
-Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
 Share = Annotated[float, Field(ge=0, le=10)]
-Vector = tuple[Number, Number, Number]
 
 
 class Parts(NamedTuple):
@@ -69,11 +66,7 @@ class Parts(NamedTuple):
     interferers: list[Interferer]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Custom(_Strict):
+class Custom(Strict):
     """A material of constant permittivity, or a conductor."""
 
     permittivity: Annotated[float, Field(ge=1)] = 1.0
@@ -95,14 +88,14 @@ class Custom(_Strict):
         )  # fmt: skip
 
 
-class CustomMaterial(_Strict):
+class CustomMaterial(Strict):
     custom: Custom
 
 
-class Shape(_Strict, ABC):
+class Shape(Strict, ABC):
     """An object of a scene file. A subclass with a `shape` of its own and `mesh(folder)` can be named there."""
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     material: str | CustomMaterial
     position: Vector = (0.0, 0.0, 0.0)
     solid: bool = False  # part of the surface of a body, though open: seen from its outside only
@@ -110,6 +103,15 @@ class Shape(_Strict, ABC):
     @abstractmethod
     def mesh(self, folder: Path) -> trimesh.Trimesh:
         """In world coordinates; files that it names are relative to a folder."""
+
+    def object(self, folder: Path) -> SceneObject:
+        """What stands in the scene."""
+        if isinstance(self.material, CustomMaterial):
+            made_of = self.material.custom.material(f"custom {self.name}")
+        else:
+            with naming(f"object {self.name!r}"):
+                made_of = material(self.material)
+        return SceneObject(self.name, self.mesh(folder), made_of, self.solid)
 
 
 class TurnedShape(Shape):
@@ -181,10 +183,10 @@ class Mesh(TurnedShape):
 class _Change(BaseModel):
     model_config = ConfigDict(extra="allow", frozen=True)
 
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
 
 
-class Level(_Strict):
+class Level(Strict):
     """What one level changes and adds."""
 
     objects: list[_Change] = []
@@ -192,7 +194,7 @@ class Level(_Strict):
     interferers: list[_Change] = []
 
 
-class Description(_Strict):
+class Description(Strict):
     """A scene file. Needs objects, a building, or both."""
 
     name: str = ""
@@ -309,13 +311,11 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
         InputError: unknown key, value, material, mesh file or level.
     """
     description = described(data, source, level)
-    try:
-        objects = [SceneObject(o.name, o.mesh(folder), _material(o), o.solid) for o in description.objects]
+    with naming(source):
+        objects = [item.object(folder) for item in description.objects]
         if description.building:
             objects += description.building.build()
         objects += small_objects(objects, description.clutter)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from error
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
     if description.building:
@@ -331,16 +331,15 @@ def described(data: object, source: str, level: int = 0) -> Description:
     """
     if not isinstance(data, dict):
         raise InputError(f"{source}: holds {type(data).__name__}, expected keys such as objects and building")
-    try:
-        model = description_model()
+    model = description_model()
+    with naming(source, data):
         plain = model.model_validate(data)
         if not 0 <= level <= len(plain.levels):
-            raise InputError(f"{source}: level is {level}, expected 0 to {len(plain.levels)}")
-        for changes in plain.levels[:level]:
-            data = apply_level(data, changes)
+            raise InputError(f"level is {level}, expected 0 to {len(plain.levels)}")
+    for changes in plain.levels[:level]:
+        data = apply_level(data, changes)
+    with naming(source, data):
         return model.model_validate(data)
-    except ValidationError as error:
-        raise InputError(f"{source}: {format_validation_error(error, data)}") from error
 
 
 def apply_level(data: dict, changes: Level) -> dict:
@@ -355,12 +354,3 @@ def apply_level(data: dict, changes: Level) -> dict:
             if not known:
                 entries.append(change)
     return data | parts
-
-
-def _material(item: Shape) -> Material:
-    if isinstance(item.material, CustomMaterial):
-        return item.material.custom.material(f"custom {item.name}")
-    try:
-        return material(item.material)
-    except InputError as error:
-        raise InputError(f"object {item.name!r}: {error}") from error

@@ -13,18 +13,19 @@ from typing import Annotated
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import BaseModel, ConfigDict, Field, field_validator
+from pydantic import Field, field_validator
 from scipy.spatial.transform import Rotation
 
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.yamlfile import changed
+from radarsim.world.fields import Name, Strict
 
 Number = Annotated[float, Field(ge=-1e4, le=1e4)]
 Vector = tuple[Number, Number, Number]
 
 
-class Interferer(BaseModel):
+class Interferer(Strict):
     """A radar that sends by itself: antennas and power of the board are those of the radar that it disturbs.
 
     Attributes:
@@ -37,9 +38,7 @@ class Interferer(BaseModel):
         clock_ppm: by how much its clock is faster than that of the radar that it disturbs.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
     radar: RadarConfig = PRESETS["radarize"]
     position: Vector
     velocity: Vector = (0.0, 0.0, 0.0)

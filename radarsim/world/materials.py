@@ -98,29 +98,6 @@ class Material:
         root = np.sqrt(eps - (1.0 - cos**2))  # principal branch: decays into the medium under e^{+jwt}
         return np.asarray((cos - root) / (cos + root)), np.asarray((eps * cos - root) / (eps * cos + root))
 
-    def slab(
-        self, cos_theta: Float[np.ndarray, "*n"], frequency: float
-    ) -> tuple[Complex[np.ndarray, "2 *n"], Complex[np.ndarray, "2 *n"]]:
-        """Reflection and transmission of a slab of this material's thickness in air (ITU-R P.2040-4, eqs. 42, 43).
-
-        Args:
-            cos_theta: cosine of the angle between ray and normal, 0...1.
-            frequency: Hz.
-
-        Returns:
-            (gamma, tau), each with TE and TM in rows; the phase of tau counts from entry to exit face. For an opaque
-            material gamma is `fresnel` and tau zero.
-        """
-        cos = np.abs(np.asarray(cos_theta, float))
-        gamma = np.stack(self.fresnel(cos, frequency))
-        if self.thickness is None or self.conductor:
-            return gamma, np.zeros_like(gamma)
-        wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT
-        root = np.sqrt(self.permittivity_at(frequency) - (1.0 - cos**2))
-        through = np.exp(-1j * wavenumber * self.thickness * root)
-        loops = 1 - gamma**2 * through**2
-        return gamma * (1 - through**2) / loops, (1 - gamma**2) * through / loops
-
     def coherent_factor(self, cos_theta: Float[np.ndarray, "*n"], frequency: float) -> Float[np.ndarray, "*n"]:
         """Amplitude factor exp(-8 (pi sigma_h cos / lambda)^2) that roughness leaves to specular reflection."""
         wavelength = SPEED_OF_LIGHT / frequency

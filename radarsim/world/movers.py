@@ -16,17 +16,15 @@ from typing import Annotated, Literal
 
 import numpy as np
 from jaxtyping import Float
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError
 from radarsim.world import shapes
+from radarsim.world.fields import Length, Name, Number, Strict
+from radarsim.world.fields import Vector as Point
 from radarsim.world.materials import Material, material
 from radarsim.world.objects import SceneObject
-
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-Point = tuple[Number, Number, Number]
 
 
 @dataclass(frozen=True)
@@ -77,15 +75,13 @@ class Part:
         return point, normal
 
 
-class Mover(BaseModel, ABC):
+class Mover(Strict, ABC):
     """What moves by itself. A subclass with a `kind` of its own can be named in scene files.
 
     Parts of no material share the mover's `cross_section`, m^2; where it has none, they hide and do not echo.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    name: Annotated[str, Field(min_length=1)]
+    name: Name
 
     @abstractmethod
     def parts(self) -> list[Part]:

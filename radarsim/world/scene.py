@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from radarize.errors import InputError
 from radarsim.machine import llvm
+from radarsim.world import shapes
 from radarsim.world.description import built, find, read, split_level
 from radarsim.world.materials import EPS0, Material
 from radarsim.world.objects import SceneObject
@@ -198,8 +199,7 @@ class Scene:
 
     def cut(self, height: float) -> tuple[Float[np.ndarray, "n 2 2"], Int[np.ndarray, "n"]]:
         """What the plane z = `height` cuts: ends of segments, m, and the triangle that each is of."""
-        flat = np.arange(3 * len(self.triangles)).reshape(-1, 3)
-        mesh = trimesh.Trimesh(self.triangles.reshape(-1, 3), flat, process=False)
+        mesh = shapes.loose(self.triangles)
         # A cut through an edge or a horizontal face is ill defined; a nanometre up it is not.
         lines, faces = trimesh.intersections.mesh_plane(mesh, [0, 0, 1], [0, 0, height + 1e-9], return_faces=True)
         lines = np.round(np.asarray(lines, float)[..., :2].reshape(-1, 2, 2), 6)

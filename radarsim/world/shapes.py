@@ -4,12 +4,14 @@ Faces of a box can be left out where they would touch another surface: a hidden 
 and two coplanar faces would reflect twice.
 """
 
+from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 import shapely
 import trimesh
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 from shapely.geometry import Polygon
@@ -34,7 +36,7 @@ def mesh(vertices: Float[np.ndarray, "v 3"], faces: ArrayLike) -> trimesh.Trimes
     return result
 
 
-def exact(vertices: Float[np.ndarray, "v 3"], faces: ArrayLike) -> trimesh.Trimesh:
+def exact(vertices: ArrayLike, faces: ArrayLike) -> trimesh.Trimesh:
     """A mesh of vertices that are known to be different."""
     return trimesh.Trimesh(np.asarray(vertices, float), np.array(faces), process=False)
 
@@ -137,3 +139,29 @@ def scattered(corners: Float[np.ndarray, "n 3 3"], rng: np.random.Generator) -> 
     share = rng.random((len(corners), 2))
     share[share.sum(axis=1) > 1] = 1 - share[share.sum(axis=1) > 1]  # the other half of the parallelogram
     return corners[:, 0] + np.einsum("nk,nkd->nd", share, corners[:, 1:] - corners[:, :1])
+
+
+def loose(triangles: Float[np.ndarray, "t 3 3"]) -> trimesh.Trimesh:
+    """Triangles as a mesh in which no two share a corner."""
+    return trimesh.Trimesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False)
+
+
+def closest(
+    triangles: Float[np.ndarray, "t 3 3"], points: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "n"], Int[np.ndarray, "n"]]:
+    """Distance from points to the nearest of some triangles, m, and which it is."""
+    world, tensor = tested(triangles)
+    query = np.asarray(points, np.float32)
+    found = world.compute_closest_points(tensor(query))
+    distance = np.linalg.norm(found["points"].numpy() - query, axis=1).astype(float)
+    return distance, found["primitive_ids"].numpy().astype(np.int64)
+
+
+def tested(triangles: Float[np.ndarray, "t 3 3"]) -> tuple[Any, Callable[[np.ndarray], Any]]:
+    """Open3D's ray and distance tests on triangles, and what makes tensors for them."""
+    import open3d
+
+    world, tensor = open3d.t.geometry.RaycastingScene(), open3d.core.Tensor.from_numpy
+    mesh = loose(triangles)
+    world.add_triangles(tensor(mesh.vertices.astype(np.float32)), tensor(mesh.faces.astype(np.uint32)))
+    return world, tensor

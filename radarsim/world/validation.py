@@ -1,8 +1,23 @@
 """What pydantic finds wrong with something that a user wrote, as one sentence."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 from pydantic import ValidationError
+
+from radarize.errors import InputError
+
+
+@contextmanager
+def naming(where: str, data: object = None) -> Iterator[None]:
+    """Begin sentences about what is wrong with the place that they are about; those of pydantic are about `data`."""
+    try:
+        yield
+    except ValidationError as error:
+        raise InputError(f"{where}: {format_validation_error(error, data)}") from error
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
 
 
 def format_validation_error(error: ValidationError, data: object) -> str:

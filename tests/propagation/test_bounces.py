@@ -14,7 +14,9 @@ from radarsim.propagation.mechanisms import image_chains
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world.materials import MATERIALS
+from radarsim.world.objects import SceneObject
 from radarsim.world.scene import Scene
+from radarsim.world.shapes import span
 
 CONFIG = PRESETS["radarize"]
 LAMBDA = CONFIG.wavelength
@@ -23,9 +25,16 @@ UP = np.array([0.0, 0.0, 1.0])
 
 @pytest.fixture(scope="module")
 def office():
-    """The office, all of metal, and what reflects in it."""
-    scene = Scene.load("office")
-    scene = Scene("metal", [replace(item, material=MATERIALS["metal"]) for item in scene.objects])
+    """The office with one more cabinet and without frames, all of metal, and what reflects in it."""
+    cabinet = SceneObject(
+        "one more", span((8.7123, 6.458, 0.0), (9.7123, 6.98, 1.6), ("-z",)), MATERIALS["metal"], True
+    )
+    office = [
+        replace(item, material=MATERIALS["metal"])
+        for item in Scene.load("office").objects
+        if not item.name.endswith("frame")
+    ]
+    scene = Scene("metal", [*office, cabinet])
     return scene, Reflectors.of(scene, CONFIG)
 
 
@@ -42,7 +51,7 @@ def by_chains(office, position, axis, spread, bounces):
     return np.sum((found.amplitude * np.exp(2j * np.pi * path / LAMBDA) * fan(off, spread))[found.bounces == bounces])
 
 
-HERE, THERE = np.array([8.3705, 5.6786, 1.1985]), np.array([5.4405, 6.1516, 1.1822])
+HERE, THERE = np.array([8.3705, 5.6786, 1.1985]), np.array([10.4405, 6.1516, 1.1822])
 
 
 @pytest.mark.parametrize(
@@ -50,8 +59,8 @@ HERE, THERE = np.array([8.3705, 5.6786, 1.1985]), np.array([5.4405, 6.1516, 1.18
     [
         (HERE, (8.712, 7.0, 1.1985), 2),  # a cabinet's side and the wall
         (HERE, (8.3705, 7.0, 0.0), 2),  # wall and floor
-        (THERE, (5.4405, 5.0, 2.7), 2),  # wall and ceiling
-        (THERE, (5.4405, 5.0, -1.52), 3),  # floor, wall and ceiling
+        (THERE, (10.4405, 5.0, 2.7), 2),  # wall and ceiling
+        (THERE, (10.4405, 5.0, -1.52), 3),  # floor, wall and ceiling
     ],
 )
 def test_corners_that_there_are(office, position, target, bounces):
@@ -66,9 +75,9 @@ def test_corners_that_there_are(office, position, target, bounces):
     ("position", "edge", "spread"),
     [
         (HERE, (8.712, 6.48, 1.1985), 0.1),  # of the cabinet
-        (HERE, (11.14, 7.0, 1.1985), 0.1),  # of doorways
-        (THERE, (4.21, 7.0, 1.1822), 0.1),
-        (THERE, (1.72, 7.0, 1.1822), 0.05),
+        (HERE, (4.69, 5.0, 1.1985), 0.05),  # of doorways
+        (THERE, (4.69, 5.0, 1.1822), 0.05),
+        (THERE, (12.94, 7.0, 1.1822), 0.05),
     ],
 )
 def test_outer_edges_are_no_corners(office, position, edge, spread):

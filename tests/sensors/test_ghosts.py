@@ -21,9 +21,9 @@ CONFIG = PRESETS["radarize"]
 def seen():
     """Three frames of people in an office: (ghost sensor, its rows, map of the I/Q by cause)."""
     scene = Scene.load("visitors")
-    motion = Walk("handheld", 5.0).through(scene, 1)
+    motion = Walk("handheld", 5.0).through(scene, 5)
     scenario = Scenario(scene, motion, CONFIG, FrontEndConfig.of(CONFIG.board, mismatch=None), seed=1)
-    sensor, frames = Ghosts(scenario), scenario.frames(np.array([1.4, 4.1, 4.9]))
+    sensor, frames = Ghosts(scenario), scenario.frames(np.array([1.4, 2.9, 4.1]))
     iq = AdcByCause(scenario).observe(frames)["truth/adc_by_cause"].astype(np.float32)
     maps = Heatmaps(CONFIG, azimuths=AZIMUTHS)
     reference = np.stack([maps.range_azimuth(part).numpy() for part in iq])

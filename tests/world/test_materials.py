@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from radarize.errors import InputError
+from radarize.radar.presets import PRESETS
+from radarsim.propagation.media import layer, mirror, window
 from radarsim.world.materials import MATERIALS, Material, constant, itu_permittivity, material, skin
 
 FREQUENCY = 77e9
@@ -70,13 +72,13 @@ def test_conductor():
 
 
 def test_slab_conserves_energy_and_resonates():
-    wavelength = 299792458.0 / FREQUENCY
-    half_wave = Material("test", constant(4.0, 0.0), 0.0, 0.0, thickness=wavelength / 4)  # half a wave inside, n = 2
-    gamma, tau = half_wave.slab(np.array([1.0]), FREQUENCY)
-    assert np.all(np.abs(gamma) < 1e-12) and np.abs(tau) == pytest.approx(1.0)
-    other = Material("test", constant(4.0, 0.0), 0.0, 0.0, thickness=1.234e-3)
-    gamma, tau = other.slab(np.linspace(0.1, 1, 20), FREQUENCY)
-    assert np.abs(gamma) ** 2 + np.abs(tau) ** 2 == pytest.approx(1.0)
+    config = PRESETS["radarize"]
+    half_wave = constant(4.0, 0.0), config.wavelength / 4  # half a wave inside, n = 2
+    for (law, thickness), cosines in ((half_wave, [1.0]), ((constant(4.0, 0.0), 1.234e-3), np.linspace(0.1, 1, 20))):
+        slab = layer(Material("test", law, 0.0, 0.0, thickness=thickness), config)
+        gamma, tau = np.array([(mirror(slab, c), window(slab, c, 0.01)[:2]) for c in cosines]).transpose(1, 0, 2)
+        assert np.abs(gamma) ** 2 + np.abs(tau) ** 2 == pytest.approx(1.0)
+        assert thickness != half_wave[1] or np.all(np.abs(gamma) < 1e-12)
 
 
 def test_skin_meets_published_values():

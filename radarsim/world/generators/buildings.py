@@ -7,34 +7,33 @@ The seed gives what the floors of a building share (`skeleton`): outline, corrid
 rooms, doors (`layout`) and furniture (`furnishing`). World origin at the south-west corner, floor at z = 0.
 """
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from dataclasses import replace
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 from shapely.geometry import box as area
 
 from radarsim.world import shapes
-from radarsim.world.generators import joinery, walls
+from radarsim.world.fields import Strict
+from radarsim.world.generators import walls
 from radarsim.world.generators.furnishing import furnish
 from radarsim.world.generators.furniture import make
+from radarsim.world.generators.joinery import fill
 from radarsim.world.generators.layout import FloorPlan
-from radarsim.world.generators.office import OfficePlan, arrange
-from radarsim.world.generators.openings import Opening
-from radarsim.world.generators.rooms import Room, Site
+from radarsim.world.generators.rooms import Site
 from radarsim.world.generators.skeleton import Block, Skeleton, skeleton
 from radarsim.world.generators.styles import STYLES, Style
 from radarsim.world.objects import SceneObject
 
 
-class Floor(BaseModel):
+class Floor(Strict, ABC):
     """One floor of a building. Same parameters, same objects to the last bit."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
 
     kind: str
     seed: Annotated[int, Field(ge=0)] = 0
+    floor: Annotated[int, Field(ge=0)] = 0
     furnished: bool = True
 
     @property
@@ -42,43 +41,52 @@ class Floor(BaseModel):
         """Materials, sizes and densities."""
         return STYLES[self.kind]
 
+    @abstractmethod
+    def skeleton(self) -> Skeleton:
+        """What all floors share."""
+
+    def plan(self) -> FloorPlan:
+        """The floor's rooms and openings."""
+        return FloorPlan(self.skeleton(), self.style, self._rng(self.floor, 1))
+
+    def build(self) -> list[SceneObject]:
+        """All objects of the floor: walls, floors, ceilings, doors, windows, fittings, furniture."""
+        plan, site = self.plan(), Site(self._rng(self.floor, 2), self.style.height)
+        surfaces(site, plan)
+        for opening in plan.openings:
+            for name, mesh, what in fill(opening, plan.style):
+                site.add(f"{opening.name} {name}", mesh, what)
+        depth, width, spacing = plan.style.lamp
+        lamp = make("lamp", height=plan.style.height, d=depth, w=width)
+        for room in plan.rooms:
+            site.lamps(room, lamp, spacing, np.pi / 2 if room.size[0] > room.size[1] else 0.0)
+            if self.furnished:
+                furnish(site, room, plan)
+        return site.objects
+
+    def _rng(self, *purpose: int) -> np.random.Generator:
+        return np.random.default_rng([self.seed, *self.kind.encode(), *purpose])
+
 
 class Building(Floor):
     """A floor of style A, B, C or D."""
 
     kind: Literal["A", "B", "C", "D"]
-    floor: Annotated[int, Field(ge=0)] = 0
 
     def skeleton(self) -> Skeleton:
-        """What all floors share."""
-        return skeleton(self.style, np.random.default_rng([self.seed, ord(self.kind)]))
-
-    def plan(self) -> FloorPlan:
-        """The floor's rooms and openings."""
-        return FloorPlan(self.skeleton(), self.style, self._rng(1))
-
-    def build(self) -> list[SceneObject]:
-        """All objects of the floor: walls, floors, ceilings, doors, windows, fittings, furniture."""
-        plan, site = self.plan(), Site(self._rng(2), self.style.height)
-        surfaces(site, plan)
-        for opening in plan.openings:
-            fit(site, plan, opening)
-        equip(site, plan, furnish if self.furnished else None)
-        return site.objects
-
-    def _rng(self, purpose: int) -> np.random.Generator:
-        return np.random.default_rng([self.seed, ord(self.kind), self.floor, purpose])
+        """Rings of corridors with rooms on both sides."""
+        return skeleton(self.style, self._rng())
 
 
 class Office(Floor):
-    """A floor of style `office`."""
+    """A floor of style `office`: a corridor along x between two rows of rooms, of given sizes."""
 
     kind: Literal["office"] = "office"
     length: Annotated[float, Field(ge=8, le=200)] = 18.0  # along x, outside to outside, m
     depth: Annotated[float, Field(ge=8, le=40)] = 12.0  # along y
     height: Annotated[float, Field(ge=2.4, le=6)] = 2.7  # floor to ceiling
     corridor: Annotated[float, Field(ge=1.4, le=6)] = 2.0  # width
-    room: Annotated[float, Field(ge=2.8, le=12)] = 4.2  # mean width of a room
+    room: Annotated[float, Field(ge=2.8, le=12)] = 4.2  # usual width of a room
 
     @property
     def style(self) -> Style:
@@ -86,34 +94,19 @@ class Office(Floor):
         return replace(STYLES["office"], height=self.height)
 
     def skeleton(self) -> Skeleton:
-        """A corridor between two blocks of rooms, the southern one first."""
+        """The southern row first."""
         thick, wall = self.style.outer, self.style.inner
-        low, far = self.depth / 2 - self.corridor / 2, self.length - thick
-        high = low + self.corridor
+        low, high, far = (self.depth - self.corridor) / 2, (self.depth + self.corridor) / 2, self.length - thick
         sides = (thick, low - wall), (high + wall, self.depth - thick)
-        blocks = [Block((thick, y0, far, y1), 0, "rooms", self.room) for y0, y1 in sides]
+        blocks = [Block((thick, y0, far, y1), 0, "rooms", self.room / 3, self.room) for y0, y1 in sides]
         outline = area(0.0, 0.0, self.length, self.depth)
         return Skeleton({"corridor": (thick, low, far, high)}, blocks, outline=outline)
-
-    def build(self) -> list[SceneObject]:
-        """All objects of the floor: doors, windows, walls, floors, ceilings, fittings, furniture."""
-        rng = np.random.default_rng(self.seed)
-        plan, site = OfficePlan(self.skeleton(), self.style, rng), Site(rng, self.height)
-        for opening in plan.openings:
-            fit(site, plan, opening)
-            if opening.kind == "window" and opening.room.kind != "corridor":
-                width = plan.window(opening.room)[1]
-                piece = make("radiator", w=min(1.2, width))
-                site.put(opening.room, piece, *opening.room.wall_place(opening.side, opening.low + width / 2, 0.1))
-        surfaces(site, plan)
-        equip(site, plan, arrange if self.furnished else None)
-        return site.objects
 
 
 def surfaces(site: Site, plan: FloorPlan) -> None:
     """Walls: the ground less the rooms and openings, their faces by label. Floors and ceilings by room."""
     style, height = plan.style, plan.style.height
-    boxes = plan.skeleton.ground(style.outer), plan.spaces(), plan.columns
+    boxes = plan.skeleton.ground(style.outer), [room.floor.bounds for room in plan.rooms], plan.columns
     solids, rooms, pillars = ([(x0, y0, 0.0, x1, y1, height) for x0, y0, x1, y1 in part] for part in boxes)
     spans = [o.span for o in plan.openings]
     found = walls.faces(solids, [*rooms, *spans], pillars)
@@ -134,20 +127,3 @@ def surfaces(site: Site, plan: FloorPlan) -> None:
         if z0 == 0
     ]
     site.add("thresholds", shapes.joined(*sills), style.floor(""))
-
-
-def fit(site: Site, plan: FloorPlan, opening: Opening) -> None:
-    """Put into an opening what it is filled with."""
-    for name, mesh, what in joinery.fill(opening, plan.style):
-        site.add(f"{opening.name} {name}".rstrip(), mesh, what)
-
-
-def equip(site: Site, plan: FloorPlan, furnish: Callable[[Site, Room, FloorPlan], None] | None) -> None:
-    """Lamps in all rooms, and furniture where there is some."""
-    style = plan.style
-    lamp = make("lamp", height=style.height, d=style.lamp[0], w=style.lamp[1])
-    for room in plan.rooms:
-        along_x = style.plain or room.size[0] > room.size[1]
-        site.lamps(room, lamp, style.lamp[2], np.pi / 2 if along_x else 0.0)
-        if furnish:
-            furnish(site, room, plan)

@@ -5,11 +5,10 @@ from shapely.geometry import box as area
 
 from radarize.yamlfile import read_beside
 from radarsim.world import shapes
-from radarsim.world.generators.furniture import Piece, evaluate, make
+from radarsim.world.generators.furniture import Piece, evaluate, make, value
 from radarsim.world.generators.layout import FloorPlan
 from radarsim.world.generators.openings import OPPOSITE
 from radarsim.world.generators.rooms import Room, Site, footprint
-from radarsim.world.generators.stairs import stairs
 
 _ROOMS = read_beside(__file__)
 #: Clear width left beside things in a corridor, m.
@@ -28,8 +27,6 @@ def furnish(site: Site, room: Room, plan: FloorPlan) -> None:
     layout.at_windows()
     if room.kind == "lecture":
         _lecture(layout)
-    elif room.kind == "lounge":
-        _lounge(layout)
     else:
         layout.arrange(_ROOMS[room.kind])
 
@@ -73,7 +70,7 @@ class _Layout:
         side: str,
         kind: str,
         count: int,
-        start: float = 0.1,
+        start: float | dict = 0.1,
         gap: float = 0.03,
         off: float = 0.03,
         material: str = "",
@@ -84,7 +81,7 @@ class _Layout:
         downward = self.back in "ne" and side in (self.left, self.right)
         lit = any(o.side == side for o in self.windows)
         places: list[tuple[float, float, float]] = []
-        at, piece = start, self.made(kind, material)
+        at, piece = value(start, {}, self.rng), self.made(kind, material)
         while len(places) < count and at + piece.width < high - low - 0.03:
             middle = at + piece.width / 2
             place = room.wall_place(side, high - middle if downward else low + middle, off + piece.depth / 2)
@@ -101,21 +98,20 @@ class _Layout:
         """Put furniture as `furnishing.yaml` says."""
         short, long = sorted(self.room.size)
         for step in steps:
-            more = {name: value for name, value in step.items() if name not in ("at", "put", "count")}
-            side, kind = step["at"], step["put"]
+            about = dict(step)
+            side, kind, before = about.pop("at"), about.pop("put"), about.pop("before", None)
             kind = kind if isinstance(kind, str) else kind[int(self.rng.random() >= 0.5)]
-            count = int(evaluate(step.get("count", 1), {"area": short * long, "short": short, "long": long}))
+            count = int(evaluate(about.pop("count", 1), {"area": short * long, "short": short, "long": long}))
             if side == "middle":
-                self.tables(count, kind, **more)
-            elif kind == "desk":
-                self.desks(getattr(self, side), count)
-            else:
-                self.line(getattr(self, side), kind, count, **more)
-
-    def desks(self, side: str, count: int) -> None:
-        """Desks along a wall, a chair at each."""
-        for place in self.line(side, "desk", count, start=self.rng.uniform(0.3, 0.6), gap=0.4, off=0.06):
-            self.site.seat(self.room, *place)
+                self.tables(count, kind, **about)
+                continue
+            for x, y, yaw in self.line(getattr(self, side), kind, count, **about):
+                if before == "chair":
+                    self.site.seat(self.room, x, y, yaw)
+                elif before:
+                    piece = make(before["put"], self.rng, w=before["w"], d=before["d"])
+                    x, y = x + before["away"] * np.cos(yaw), y + before["away"] * np.sin(yaw)
+                    self.site.put_if_free(self.room, piece, x, y, yaw)
 
     def tables(self, rows: int, kind: str, seats: tuple[int, ...] = (), gap: float = 0.01, **given: float) -> None:
         """Tables in the middle, end to end along the room's longer side, with chairs along `seats` (their sides)."""
@@ -155,7 +151,8 @@ class _Layout:
         length, width = room.size[0] - 0.9, 2.5
         x = room.x1 - length / 2 if at_low else room.x0 + length / 2
         y = room.y1 - width / 2 if door.side == "s" else room.y0 + width / 2
-        self.site.put(room, stairs(self.site.height, width, length), x, y, -np.pi / 2 if at_low else np.pi / 2)
+        piece = make("stairs", height=self.site.height, width=width, length=length)
+        self.site.put(room, piece, x, y, -np.pi / 2 if at_low else np.pi / 2)
 
 
 def _lecture(x: _Layout) -> None:
@@ -179,21 +176,8 @@ def _lecture(x: _Layout) -> None:
                     sx, sy = px - side * np.sin(yaw), py + side * np.cos(yaw)
                     site.seat(room, float(sx), float(sy), yaw, away=0.62)
     if not rows:  # the ways between its doors leave no room for rows
-        x.desks(x.left, 2)
-        x.desks(x.right, 2)
-        x.line(x.front, "shelf", 3)
+        x.arrange(_ROOMS["lecture"])
     x.line(x.front, "bin", 1)
-
-
-def _lounge(x: _Layout) -> None:
-    for side in (x.left, x.right):
-        for px, py, yaw in x.line(side, "sofa", 2, start=0.5, gap=0.2):
-            low = make("table", d=0.6, w=1.0)
-            x.site.put_if_free(x.room, low, px + 0.95 * np.cos(yaw), py + 0.95 * np.sin(yaw), yaw)
-    x.line(x.back, "plant", 2, start=0.1, gap=0.5)
-    x.line(x.left, "vending", 1)
-    x.tables(1, "table", (-1, 1), w=1.2)
-    x.line(x.front, "plant", 1)
 
 
 def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:

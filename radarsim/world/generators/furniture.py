@@ -14,8 +14,8 @@ from radarize.yamlfile import read_beside
 from radarsim.world import shapes
 
 #: What formulas in the file may use beside a piece's variables.
-_NAMES = {name: getattr(np, name) for name in ("arange", "cos", "linspace", "pi", "sin")}
-_NAMES |= {"__builtins__": {}, "max": max, "min": min, "range": range}
+_NAMES = {name: getattr(np, name) for name in ("arange", "arctan2", "cos", "hypot", "linspace", "pi", "sin")}
+_NAMES |= {"__builtins__": {}, "len": len, "max": max, "min": min, "range": range, "round": round}
 _ARITHMETIC = (
     ast.Expression, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Tuple, ast.List, ast.Subscript, ast.Slice,
     ast.Call, ast.Compare, ast.expr_context, ast.operator, ast.unaryop, ast.cmpop,
@@ -38,7 +38,7 @@ class Piece:
     parts: dict[str, trimesh.Trimesh]
 
 
-def make(kind: str, rng: np.random.Generator | None = None, material: str = "", **given: float) -> Piece:
+def make(kind: str, rng: np.random.Generator | None = None, material: str = "", **given: Any) -> Piece:
     """Make a piece.
 
     Args:
@@ -51,7 +51,7 @@ def make(kind: str, rng: np.random.Generator | None = None, material: str = "", 
     found: dict[str, list[trimesh.Trimesh]] = {}
     for name, choice in about.get("with", {}).items():
         if name not in given:
-            values[name] = _needed(rng).choice(choice) if isinstance(choice, list) else _value(choice, values, rng)
+            values[name] = _needed(rng).choice(choice) if isinstance(choice, list) else value(choice, values, rng)
     for what, shape, arguments, *more in about["parts"]:
         without, variables = more + ["", {}][len(more) :]
         what = (material or about["material"]) if what == "own" else what
@@ -59,7 +59,7 @@ def make(kind: str, rng: np.random.Generator | None = None, material: str = "", 
             mesh = getattr(shapes, shape)(*evaluate(arguments, each), *([tuple(without.split())] if without else ()))
             turned = shapes.placed(mesh, each["at"], each["turn"]) if "turn" in each else mesh
             found.setdefault(what, []).append(turned)
-    depth, width = evaluate(about["size"], values)
+    depth, width = evaluate(about.get("size", [0, 0]), values)
     return Piece(kind, depth, width, {what: shapes.joined(*some) for what, some in found.items()})
 
 
@@ -79,13 +79,13 @@ def _repeated(variables: list[tuple], values: dict, rng: np.random.Generator | N
         yield values
         return
     (name, choice), *rest = variables
-    value = _value(choice, values, rng)
-    for each in [value] if np.ndim(value) == 0 or name in ("at", "turn") else value:
+    found = value(choice, values, rng)
+    for each in [found] if np.ndim(found) == 0 or name in ("at", "turn") else found:
         yield from _repeated(rest, values | {name: each}, rng)
 
 
-def _value(choice: object, values: dict, rng: np.random.Generator | None) -> Any:
-    """A uniform number, or what a formula gives."""
+def value(choice: object, values: dict, rng: np.random.Generator | None) -> Any:
+    """A uniform number between two (`from` and `to`), or what a formula gives."""
     return _needed(rng).uniform(choice["from"], choice["to"]) if isinstance(choice, dict) else evaluate(choice, values)
 
 

@@ -16,8 +16,8 @@ from radarsim.world.generators.skeleton import Block, Box, Skeleton
 from radarsim.world.generators.styles import Style
 from radarsim.world.generators.walls import Face
 
-#: Narrowest and widest room, m; the usual width.
-NARROWEST, WIDEST, USUAL = 2.8, 8.4, 4.3
+#: Narrowest and widest room, m.
+NARROWEST, WIDEST = 2.8, 8.4
 #: From a corner to a door, m.
 JAMB = 0.35
 #: Floor kept free in front of a door, m.
@@ -75,10 +75,6 @@ class FloorPlan:
         self._keep_ways()
         self.columns = self._columns()
 
-    def spaces(self) -> list[Box]:
-        """What the walls enclose: the rooms."""
-        return [(room.x0, room.y0, room.x1, room.y1) for room in self.rooms]
-
     # Rooms
 
     def _split(self, block: Block) -> None:
@@ -92,7 +88,7 @@ class FloorPlan:
         modules = max(1, round((end - start) / block.pitch))
         pitch = (end - start) / modules
         least = max(1, int(np.ceil(NARROWEST / pitch)))
-        usual = max(least, round(USUAL / pitch))
+        usual = max(least, round(block.room / pitch))
         most = max(usual, int(WIDEST / pitch))
         widths: list[int] = []
         choices = [usual, max(least, usual - 1), min(most, 2 * usual), usual + 1]

@@ -61,13 +61,13 @@ class Opening:
             return None
         return self.bay if self.kind == "glass wall" else (self.low, self.high)
 
-    def leaf_area(self, off: float = 0.0, around: float = 0.1) -> Polygon:
-        """Floor under an open leaf that hangs `off` the wall (m), and a little `around` it (m)."""
+    def leaf_area(self) -> Polygon:
+        """Floor under an open leaf, and a little around it."""
         low, high = self.passage or (self.low, self.high)
-        hinge = (low if self.hinge < 0 else high) - self.hinge * off
-        tip = hinge - self.hinge * np.cos(self.angle) * (high - low), off + np.sin(self.angle) * (high - low)
+        hinge = low if self.hinge < 0 else high
+        tip = hinge - self.hinge * np.cos(self.angle) * (high - low), np.sin(self.angle) * (high - low)
         ends = [self.room.wall_place(self.side, *end)[:2] for end in ((hinge, 0.0), tip)]
-        return LineString(ends).buffer(around)
+        return LineString(ends).buffer(0.1)
 
 
 def strip(room: Room, side: str, low: float, high: float, near: float, far: float) -> Box:

@@ -51,10 +51,9 @@ class Room:
         """All of its floor."""
         return area(self.x0, self.y0, self.x1, self.y1)
 
-    def is_free(self, spot: Polygon, ignore_kept: bool = False) -> bool:
+    def is_free(self, spot: Polygon) -> bool:
         """Whether a piece of floor lies in the room and nothing stands there."""
-        blocked = self.taken if ignore_kept else self.taken + self.kept
-        return self.floor.contains(spot) and not any(spot.intersects(other) for other in blocked)
+        return self.floor.contains(spot) and not any(spot.intersects(other) for other in self.taken + self.kept)
 
     def wall(self, side: str) -> tuple[float, float]:
         """Ends of the wall at a `side` ("n", "s", "e", "w"), m."""
@@ -102,28 +101,12 @@ class Site:
             self.put(room, piece, x, y, yaw)
         return free
 
-    def against_wall(self, room: Room, piece: Piece, gap: float = 0.03) -> float | None:
-        """Put a piece with its back to a wall where there is room, and return its yaw, or None."""
-        for _ in range(24):
-            side = "nsew"[self.rng.integers(4)]
-            half = piece.width / 2 + 0.02
-            low, high = room.wall(side)[0] + half, room.wall(side)[1] - half
-            if low >= high:
-                continue
-            x, y, yaw = room.wall_place(side, self.rng.uniform(low, high), gap + piece.depth / 2)
-            if self.put_if_free(room, piece, x, y, yaw):
-                return yaw
-        return None
-
-    def seat(
-        self, room: Room, x: float, y: float, yaw: float, away: float = 0.82, sway: float = 0.5,
-        ignore_kept: bool = False,
-    ) -> None:  # fmt: skip
-        """A chair in front of what stands at a place, turned to it up to a `sway` (rad)."""
-        turn = yaw + np.pi + self.rng.uniform(-sway, sway)
+    def seat(self, room: Room, x: float, y: float, yaw: float, away: float = 0.82) -> None:
+        """A chair in front of what stands at a place, turned to it up to half a radian."""
+        turn = yaw + np.pi + self.rng.uniform(-0.5, 0.5)
         piece = make("chair")
         x, y = x + away * np.cos(yaw), y + away * np.sin(yaw)
-        if room.is_free(footprint(piece, x, y, turn), ignore_kept):
+        if room.is_free(footprint(piece, x, y, turn)):
             self.put(room, piece, x, y, turn)
 
     def lamps(self, room: Room, piece: Piece, spacing: float, yaw: float = np.pi / 2) -> None:

@@ -27,8 +27,8 @@ Box = tuple[float, float, float, float]  # x0 y0 x1 y1, m
 LONG = 21.0, 36.0
 #: A ring longer than this gets a cross corridor in its middle, m.
 LONGEST_RING = 78.0
-#: A core deeper than this holds two rows of rooms, m; rows in it are at least so deep.
-DEEP_CORE, CORE_ROW = 7.0, 3.9
+#: Rows of rooms in the core are at least so deep, m.
+CORE_ROW = 3.9
 STAIRS, TOILET, STUB = (5.6, 3.0, 1.9)  # sizes along the core, m
 
 
@@ -41,12 +41,14 @@ class Block:
         axis: along which its rooms stand side by side, 0 or 1.
         use: ``rooms``, ``core``, ``stairs`` or ``toilet``.
         pitch: distance of the axes on which its walls and windows stand, m.
+        room: usual width of its rooms, m.
     """
 
     box: Box
     axis: int
     use: str
     pitch: float
+    room: float = 4.3
 
 
 @dataclass

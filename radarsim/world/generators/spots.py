@@ -8,10 +8,11 @@ from itertools import product
 
 import numpy as np
 import shapely
+import trimesh
 from jaxtyping import Bool, Float, Int
 
 from radarsim.world.objects import SceneObject
-from radarsim.world.shapes import scattered
+from radarsim.world.shapes import loose, scattered, tested
 
 #: Heights over the floor, m: of tops that people put things on, of ceilings, and of what is still there: only a wall.
 TOPS, CEILINGS, WALLS = (0.6, 2.0), 2.0, 2.25
@@ -123,8 +124,6 @@ class Surroundings:
     """
 
     def __init__(self, objects: Sequence[SceneObject]):
-        import open3d
-
         counts = [len(o.mesh.faces) for o in objects]
         self._corners = np.concatenate([np.asarray(o.mesh.vertices)[o.mesh.faces] for o in objects])
         cross = np.cross(self._corners[:, 1] - self._corners[:, 0], self._corners[:, 2] - self._corners[:, 0])
@@ -133,17 +132,14 @@ class Surroundings:
         self._clear = np.repeat([o.material.clear for o in objects], counts)
         self._built = np.repeat([o.material.name in BUILT for o in objects], counts)
         self._body = np.repeat([not o.two_sided for o in objects], counts)
-        self._world = open3d.t.geometry.RaycastingScene()
-        flat = self._corners.reshape(-1, 3).astype(np.float32)
-        self._tensor = open3d.core.Tensor.from_numpy
-        numbers = np.arange(len(flat), dtype=np.uint32).reshape(-1, 3)
-        self._world.add_triangles(self._tensor(flat), self._tensor(numbers))
+        self._world, self._tensor = tested(self._corners)
         up, height = self._normals[:, 2], self._corners[:, :, 2].mean(axis=1)
         rising = np.flatnonzero(up > LEVEL)
         # floors are among the lowest that faces up, but for what lies astray in scans
         order = rising[np.argsort(height[rising], kind="stable")]
         total = np.cumsum(self._areas[order])
-        self.floor = float(height[order[np.searchsorted(total, 0.05 * total[-1])]] if len(order) else flat[:, 2].min())
+        low = height[order[np.searchsorted(total, 0.05 * total[-1])]] if len(order) else self._corners[..., 2].min()
+        self.floor = float(low)
 
     @property
     def seed(self) -> int:
@@ -174,17 +170,10 @@ class Surroundings:
     def _lines(self) -> tuple[Float[np.ndarray, "line 2 3"], Float[np.ndarray, "line 3"]]:
         """What is still there so high up: lines on the floor, left to right, one of a triangle, m; and normals."""
         level = self.floor + WALLS
-        up, z = np.abs(self._normals[:, 2]), self._corners[:, :, 2]
-        rows = np.flatnonzero((up < UPRIGHT) & ~self._clear & (z.min(axis=1) < level) & (z.max(axis=1) > level))
-        corners, above = self._corners[rows], z[rows] > level
-        # the corner that is alone on its side, and the two others
-        alone = np.argmax(above == (above.sum(axis=1) == 1)[:, None], axis=1)
-        one, *others = (corners[np.arange(len(rows)), (alone + k) % 3] for k in range(3))
-        ends = []
-        for other in others:
-            share = (level - one[:, 2]) / (other[:, 2] - one[:, 2])
-            ends.append(one + share[:, None] * (other - one))
-        lines, normals = np.stack(ends, axis=1), self._normals[rows] * [1, 1, 0]
+        rows = np.flatnonzero((np.abs(self._normals[:, 2]) < UPRIGHT) & ~self._clear)
+        wall = loose(self._corners[rows])
+        lines, faces = trimesh.intersections.mesh_plane(wall, [0, 0, 1], [0, 0, level], return_faces=True)
+        lines, normals = np.reshape(lines, (-1, 2, 3)), self._normals[rows[np.asarray(faces, int)]] * [1, 1, 0]
         lines[:, :, 2] = self.floor
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         along = np.cross([0.0, 0.0, 1.0], normals)

@@ -1,4 +1,4 @@
-"""Styles of buildings (`styles.yaml`): materials, sizes and densities; four after the paper's, and the plain `office`.
+"""Styles of buildings (`styles.yaml`): materials, sizes and densities; four after the paper's, and `office`.
 
 Lengths in m; a pair of numbers is a range that a building draws from; shares and chances lie in 0...1; weights are
 relative.
@@ -70,7 +70,6 @@ class Style:
         storage: material of cabinets and of shelves.
         fittings: pieces along corridors with their number per 10 m.
         kinds: weights of the kinds of rooms at a facade; `core`: of those inside.
-        plain: doors without casings, two panes to a window, all lamps along x.
     """
 
     height: float
@@ -98,7 +97,6 @@ class Style:
     fittings: dict[str, float] = field(default_factory=dict)
     kinds: dict[str, float]
     core: dict[str, float] = field(default_factory=dict)
-    plain: bool = False
 
     def floor(self, kind: str) -> str:
         """Floor material of a kind of room."""

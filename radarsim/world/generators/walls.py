@@ -12,7 +12,6 @@ import numpy as np
 import trimesh
 from jaxtyping import Bool, Float
 
-Corner = tuple[float, float]
 Span = tuple[float, float, float, float, float, float]  # x0 y0 z0 x1 y1 z1
 
 

@@ -22,7 +22,7 @@ from radarsim.world.importers import carmen, floorplan, meshes, mitsuba, rosmap
 from radarsim.world.importers.cleaning import clean, decimate, edges_of_many
 from radarsim.world.importers.flatten import flatten
 from radarsim.world.importers.naming import MaterialMap
-from radarsim.world.importers.part import Part
+from radarsim.world.importers.part import Part, unreported
 from radarsim.world.importers.shells import turned_to_rooms
 from radarsim.world.importers.upright import up_axis
 
@@ -100,7 +100,7 @@ def import_scene(
     source: Path,
     output: Path,
     options: Options = Options(),  # noqa: B008
-    progress: Callable[..., None] | None = None,
+    progress: Callable[..., object] = unreported,
 ) -> Imported:
     """Write a scene file from a mesh, a Mitsuba scene, a ROS map or a lidar log.
 
@@ -169,7 +169,7 @@ def _kind(source: Path) -> str:
 
 
 def _fit(
-    parts: list[Part], source: Path, options: Options, remarks: list[str], progress: Callable[..., None] | None
+    parts: list[Part], source: Path, options: Options, remarks: list[str], progress: Callable[..., object]
 ) -> list[Part]:
     """Clean, scale, turn and place the parts of a mesh."""
     units, up = options.units or "m", options.up
@@ -187,8 +187,7 @@ def _fit(
     for number, part in enumerate(parts, 1):
         part.mesh.vertices = np.asarray(part.mesh.vertices) * UNITS[units]
         found.append(clean(part, str(source)))
-        if progress:
-            progress("cleaning", number, len(parts))
+        progress("cleaning", number, len(parts))
     before = sum(len(part.mesh.faces) for part in parts)
     parts = [part for part in found if part is not None]
     if not parts:
@@ -211,12 +210,11 @@ def _fit(
 
 
 def _flat(
-    part: Part, source: Path, number: int, count: int, remarks: list[str], progress: Callable[..., None] | None
+    part: Part, source: Path, number: int, count: int, remarks: list[str], progress: Callable[..., object]
 ) -> Part:
     """A scanned part with its planes flat."""
     found = flatten(part.mesh)
-    if progress:
-        progress("finding planes", number, count)
+    progress("finding planes", number, count)
     if found is None:
         return part
     remarks.append(

@@ -21,6 +21,7 @@ from radarize.files import read_bytes
 from radarize.npyfile import read_npz
 from radarize.tum import read_tum
 from radarsim.world.importers.occupancy import OccupancyGrid
+from radarsim.world.importers.part import unreported
 
 #: Readings beyond are no echo: SICK scanners say so with 32.767 or 81.83 m.
 USABLE = 30.0
@@ -45,7 +46,7 @@ class Scan:
     bearings: Float[np.ndarray, "beam"]
 
 
-def grid(path: Path, resolution: float, progress: Callable[..., None] | None = None) -> OccupancyGrid:
+def grid(path: Path, resolution: float, progress: Callable[..., object] = unreported) -> OccupancyGrid:
     """Occupancy by counting the beams that ended in a cell and those that passed it.
 
     Args:
@@ -77,7 +78,7 @@ def grid(path: Path, resolution: float, progress: Callable[..., None] | None = N
     hits, passes = np.zeros(shape.astype(int), np.int32), np.zeros(shape.astype(int), np.int32)
     for number, (start, end, ok) in enumerate(zip(starts, ends, usable, strict=True), 1):
         _cast((start[ok] - low) / resolution, (end[ok] - low) / resolution, hits, passes)
-        if progress and (number % 16 == 0 or number == len(scans)):
+        if number % 16 == 0 or number == len(scans):
             progress("casting scans", number, len(scans))
     occupied = hits > OCCUPIED * (hits + passes)
     return OccupancyGrid(occupied, (passes >= SEEN) & ~occupied, resolution, (float(low[0]), float(low[1]), 0.0))

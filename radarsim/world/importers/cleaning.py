@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import trimesh
-from jaxtyping import Float
 
 from radarize.errors import InputError
-from radarsim.world.importers.part import Part
+from radarsim.world.importers.part import Part, unreported
+from radarsim.world.shapes import closest
 
 #: Corners closer than this are one, decimals of a metre.
 _DIGITS = 5
@@ -34,12 +34,10 @@ def clean(part: Part, source: str) -> Part | None:
         raise InputError(f"{source}: part {part.name!r} has {bad} corners that are no finite numbers")
     mesh = trimesh.Trimesh(np.where(used[:, None], vertices, 0.0), faces, process=False)
     mesh.merge_vertices(digits_vertex=_DIGITS)
-    faces = mesh.faces[mesh.area_faces > 1e-12]
-    # The same three corners, whichever way round, are one sheet.
-    faces = faces[np.sort(np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1])] if len(faces) else faces
-    if not len(faces):
+    mesh.update_faces(mesh.area_faces > 1e-12)
+    if not len(mesh.faces):
         return None
-    mesh = trimesh.Trimesh(mesh.vertices, faces, process=False)
+    mesh.update_faces(mesh.unique_faces())  # the same three corners, whichever way round, are one sheet
     mesh.remove_unreferenced_vertices()
     return replace(part, mesh=mesh)
 
@@ -51,7 +49,7 @@ def edges_of_many(mesh: trimesh.Trimesh) -> int:
 
 
 def decimate(
-    parts: list[Part], budget: int, source: str, progress: Callable[..., None] | None = None
+    parts: list[Part], budget: int, source: str, progress: Callable[..., object] = unreported
 ) -> tuple[list[Part], float]:
     """Parts with no more than about `budget` triangles together, and the deviation of 99 % of the surface, m.
 
@@ -67,8 +65,7 @@ def decimate(
         return parts, 0.0
     made, deviations = [], []
     for number, part in enumerate(parts):
-        if progress:
-            progress("decimating", number, len(parts))
+        progress("decimating", number, len(parts))
         target = max(12, int(budget * len(part.mesh.faces) / total))
         if len(part.mesh.faces) <= target:
             made.append(part)
@@ -79,12 +76,12 @@ def decimate(
         coarse = dense.simplify_quadric_decimation(target)
         mesh = trimesh.Trimesh(np.asarray(coarse.vertices), np.asarray(coarse.triangles), process=False)
         share = int(np.ceil(_SAMPLES * len(part.mesh.faces) / total))
-        deviations.append(distances(part.mesh, mesh, share))
+        points = part.mesh.vertices[:: max(1, len(part.mesh.vertices) // share)]
+        deviations.append(closest(mesh.triangles, points)[0])
         thin = clean(replace(part, mesh=mesh), source)
         if thin is not None:
             made.append(thin)
-    if progress:
-        progress("decimating", len(parts), len(parts))
+    progress("decimating", len(parts), len(parts))
     left = sum(len(part.mesh.faces) for part in made)
     moved = float(np.quantile(np.concatenate(deviations), 0.99))
     if moved > DEVIATION or left > 1.2 * budget:
@@ -93,13 +90,3 @@ def decimate(
             f"expected at most {budget} triangles within {DEVIATION} m: raise --budget or simplify the mesh first"
         )
     return made, moved
-
-
-def distances(mesh: trimesh.Trimesh, other: trimesh.Trimesh, count: int) -> Float[np.ndarray, "n"]:
-    """Distance of about `count` corners of a mesh from the surface of another, m."""
-    import open3d as o3d
-
-    tensor, scene = o3d.core.Tensor.from_numpy, o3d.t.geometry.RaycastingScene()
-    scene.add_triangles(tensor(np.array(other.vertices, np.float32)), tensor(np.array(other.faces, np.uint32)))
-    points = mesh.vertices[:: max(1, len(mesh.vertices) // max(count, 1))]
-    return scene.compute_distance(tensor(np.ascontiguousarray(points, np.float32))).numpy()

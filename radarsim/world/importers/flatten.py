@@ -41,10 +41,10 @@ def flatten(mesh: trimesh.Trimesh) -> Flattened | None:
     if len(mesh.faces) < MANY or edge > FINE:
         return None
     vertices = np.asarray(mesh.vertices)
-    links = _links(mesh)
+    links = trimesh.smoothing.laplacian_calculation(mesh)
     steps = int(np.clip(2 * (_LENGTH / edge) ** 2, *_STEPS))
-    smooth = _smoothed(vertices, links, steps)
-    copy = trimesh.Trimesh(smooth, mesh.faces, process=False)
+    copy = trimesh.Trimesh(vertices, mesh.faces, process=False)
+    trimesh.smoothing.filter_laplacian(copy, 0.5, steps, False, False, links)  # half way to the neighbours' mean
     found = [faces for faces in regions(copy) if mesh.area_faces[faces].sum() >= SMALLEST]
     if not found:
         return None
@@ -73,33 +73,17 @@ def flatten(mesh: trimesh.Trimesh) -> Flattened | None:
     return Flattened(result, len(found), float(share), noise)
 
 
-def _links(mesh: trimesh.Trimesh) -> sparse.csr_array:
-    """Which corners share an edge."""
-    a, b = mesh.edges_unique.T
-    ones = np.ones(2 * len(a))
-    count = len(mesh.vertices)
-    return sparse.coo_array((ones, (np.concatenate([a, b]), np.concatenate([b, a]))), shape=(count, count)).tocsr()
-
-
-def _smoothed(vertices: Float[np.ndarray, "v 3"], links: sparse.csr_array, steps: int) -> Float[np.ndarray, "v 3"]:
-    """Each corner half way to the mean of its neighbours, `steps` times."""
-    share = 0.5 / np.maximum(links.sum(axis=1), 1)[:, None]
-    for _ in range(steps):
-        vertices = 0.5 * vertices + share * (links @ vertices)
-    return vertices
-
-
 def _fit(points: Float[np.ndarray, "n 3"]) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
     """A point on the plane through points, and its unit normal."""
     at = points.mean(axis=0)
     return at, np.linalg.eigh((points - at).T @ (points - at))[1][:, 0]
 
 
-def _spread(corners: np.ndarray, near: np.ndarray, links: sparse.csr_array, steps: int) -> np.ndarray:
+def _spread(corners: np.ndarray, near: np.ndarray, links: sparse.coo_matrix, steps: int) -> np.ndarray:
     """The corners near a plane that can be reached from some of its own in so many steps."""
     reached = np.zeros(len(near), bool)
     reached[corners] = near[corners]
-    edge = np.flatnonzero(reached)
+    edge, links = np.flatnonzero(reached), links.tocsr()
     for _ in range(steps):
         following = np.unique(links[edge].indices)
         edge = following[near[following] & ~reached[following]]

@@ -13,7 +13,7 @@ from radarize.errors import InputError
 from radarsim.world import shapes
 from radarsim.world.importers.faces import Face, faces, rooms
 from radarsim.world.importers.occupancy import OccupancyGrid
-from radarsim.world.importers.part import Part
+from radarsim.world.importers.part import Part, unreported
 from radarsim.world.planes import trapezoids
 
 #: Things that are no walls (chair legs, boxes, people who stood still) are this high, m.
@@ -29,7 +29,7 @@ _COURT = 1.0
 
 
 def parts(
-    grid: OccupancyGrid, height: float, thickness: float, source: str, progress: Callable[..., None] | None = None
+    grid: OccupancyGrid, height: float, thickness: float, source: str, progress: Callable[..., object] = unreported
 ) -> list[Part]:
     """The parts of a building with the plan of a grid: ``walls``, ``clutter``, ``floor`` and ``ceiling``.
 
@@ -46,16 +46,15 @@ def parts(
     inside = rooms(grid)
     if not inside.any():
         raise InputError(f"{source}: has no square metre of free ground together, expected the map of a building")
-    step = progress or (lambda *_: None)
-    step("finding walls", 0, 3)
+    progress("finding walls", 0, 3)
     found = faces(grid, inside)
-    step("finding walls", 1, 3)
+    progress("finding walls", 1, 3)
     if not found:
         raise InputError(f"{source}: has no straight wall beside its free ground, expected the map of a building")
     solid = walls(found, thickness, grid, inside)
-    step("finding walls", 2, 3)
+    progress("finding walls", 2, 3)
     rest = clutter(grid, inside, solid)
-    step("finding walls", 3, 3)
+    progress("finding walls", 3, 3)
     built = [Part("walls", upright(_placed(solid, grid), height), "plasterboard", solid=True)]
     if rest:
         low = _placed(MultiPolygon(rest), grid)
@@ -138,17 +137,9 @@ def clutter(grid: OccupancyGrid, inside: Bool[np.ndarray, "x y"], solid: shapely
 
 def upright(area: shapely.Geometry, height: float, lid: bool = False) -> trimesh.Trimesh:
     """The upright sides of an area from the floor to `height` (m), seen from outside; its top too if `lid`."""
-    pieces = []
-    for part in shapely.get_parts(area):
-        part = shapely.geometry.polygon.orient(part)
-        for ring in (part.exterior, *part.interiors):
-            at = np.asarray(ring.coords)[:, :2]
-            for a, b in zip(at[:-1], at[1:], strict=True):
-                corners = [(*a, 0.0), (*b, 0.0), (*b, height), (*a, height)]
-                pieces.append(trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False))
-        if lid:
-            pieces.append(shapes.polygon(part, (0, 0, height)))
-    return shapes.joined(*pieces)
+    whole = shapes.joined(*(trimesh.creation.extrude_polygon(part, height) for part in shapely.get_parts(area)))
+    whole.update_faces((whole.face_normals[:, 2] > -0.5) & (lid | (whole.face_normals[:, 2] < 0.5)))
+    return whole
 
 
 def _placed(area: shapely.Geometry, grid: OccupancyGrid) -> shapely.Geometry:

@@ -4,14 +4,12 @@ import re
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from pydantic import TypeAdapter, ValidationError
-
 from radarize.errors import InputError
 from radarize.yamlfile import read_beside, read_yaml
 from radarsim.world.description import CustomMaterial
 from radarsim.world.importers.part import Part
 from radarsim.world.materials import MATERIALS, material
-from radarsim.world.validation import format_validation_error
+from radarsim.world.validation import naming
 
 Choice = str | dict
 
@@ -48,15 +46,8 @@ class MaterialMap:
         if not isinstance(data, dict):
             raise InputError(f"{path}: holds {type(data).__name__}, expected lines 'pattern: material'")
         for pattern, choice in data.items():
-            try:
-                if isinstance(choice, str):
-                    material(choice)
-                else:
-                    TypeAdapter(CustomMaterial).validate_python(choice)
-            except ValidationError as error:
-                raise InputError(f"{path}: {pattern}: {format_validation_error(error, choice)}") from error
-            except InputError as error:
-                raise InputError(f"{path}: {pattern}: {error}") from error
+            with naming(f"{path}: {pattern}", choice):
+                material(choice) if isinstance(choice, str) else CustomMaterial.model_validate(choice)
         return cls({str(pattern): choice for pattern, choice in data.items()}, default)
 
     def choose(self, part: Part) -> tuple[Choice, str]:

@@ -25,3 +25,7 @@ class Part:
     solid: bool = False
     room: bool = False
     labels: tuple[str, ...] = ()
+
+
+def unreported(*_: object) -> None:
+    """Progress that nobody wants to see."""

@@ -53,7 +53,8 @@ def blueprint(scene: Scene) -> "Figure":
     cut = Section.of(scene, height)
     for area, owner in cut.areas(scene):
         # The cut is black, as is the custom; the faces of walls show what they are made of.
-        face = "0.2" if wall[owner] else colors[owner]
+        # The reveals of an opening are lower than the wall that they bound.
+        face = "0.2" if wall[owner] or area.area > 1.0 else colors[owner]
         for ring in _filled(area):
             axes.fill(*ring.T, facecolor=face, edgecolor="none", zorder=3)
     shade = np.where(wall[cut.owner, None], 0.85, 0.7) * colors[cut.owner]

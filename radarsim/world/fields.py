@@ -1,0 +1,16 @@
+"""What the fields of scene files are made of."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Name = Annotated[str, Field(min_length=1)]
+Vector = tuple[Number, Number, Number]
+
+
+class Strict(BaseModel):
+    """Fields that do not change, and no others."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)

@@ -37,6 +37,8 @@ from radarsim.propagation.table import Table
 POINT, LINE, QUADRIC = 1.0, 2.0, 3.0
 #: Numbers of a curved surface in `SpecularPoints.geometry`.
 SHAPE = 13
+#: Square of an angle, rad^2: a normal that a step turns by less is found.
+_STILL = 1e-22
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,7 @@ def halving(body, one, two, steps):
     Args:
         body: a point of its axis, the axis (of a sphere zero), radius; m.
         one, two: the places, m.
-        steps: each shrinks the error by at least the share of the radius in the distance.
+        steps: at most; each shrinks the error by at least the share of the radius in the distance.
 
     Returns:
         the normal, and the ways to both places from there across the axis, m.
@@ -137,7 +139,9 @@ def halving(body, one, two, steps):
     a, b = moved(a, -dot(a, axis), axis), moved(b, -dot(b, axis), axis)
     n = unit(moved(unit(a), 1.0, unit(b)))
     for _ in range(steps):
-        n = unit(moved(unit(moved(a, -radius, n)), 1.0, unit(moved(b, -radius, n))))
+        before, n = n, unit(moved(unit(moved(a, -radius, n)), 1.0, unit(moved(b, -radius, n))))
+        if dot(minus(n, before), minus(n, before)) < _STILL:
+            break
     return n, moved(a, -radius, n), moved(b, -radius, n)
 
 

@@ -59,21 +59,37 @@ def couples(
 
 
 def _seen(observation: Observation, flat: Flat, obstacles: Obstacles) -> list[Int[np.ndarray, "n"]]:
-    """Per frame, the reflectors in range that turn a face to the radar and of which something can be seen: slabs are
-    clear, here, what stands behind too many of them costs less than rays that count them."""
+    """Per frame, the reflectors in range that turn a face to the radar and of which something can be seen, through as
+    many slabs as waves are followed."""
     turned = np.zeros((observation.frames, len(flat)), np.bool_)
     _turned(flat.columns, observation, turned)
     index = [np.flatnonzero(some) for some in turned]
-    opaque = None if obstacles.transmission is None else obstacles.transmission.opaque
-    if opaque is None:
+    scene, slabs = obstacles.scene, obstacles.transmission
+    opaque = None if slabs is None else slabs.opaque
+    if scene is None or slabs is None or opaque is None:
         return index
     frame, every = np.repeat(np.arange(len(index)), [len(i) for i in index]), np.concatenate(index)
     points, owner = _spread(flat, every, observation.position[frame], observation.range)
-    found, number = np.zeros(len(every), bool), np.arange(len(owner)) - np.searchsorted(owner, owner)
+    begin, number = observation.position[frame[owner]], np.arange(len(owner)) - np.searchsorted(owner, owner)
+    found, clear = np.zeros(len(every), bool), np.zeros(len(owner), bool)
     for some in (number < FEWEST, number >= FEWEST):  # most show themselves in a few points
         rows = np.flatnonzero(some & ~found[owner])
-        clear = ~opaque.occluded(observation.position[frame[owner[rows]]], points[rows], margin=CLEARANCE)
-        found[owner[rows[clear]]] = True
+        clear[rows] = ~opaque.occluded(begin[rows], points[rows], margin=CLEARANCE)
+        found[owner[clear]] = True
+    if opaque is not scene:
+        rows = np.flatnonzero(clear)
+        rows = rows[np.arange(len(rows)) - np.searchsorted(owner[rows], owner[rows]) < FEWEST]
+        free = ~scene.occluded(begin[rows], points[rows], margin=CLEARANCE)
+        found[:] = False
+        found[owner[rows[free]]] = True
+        up = observation.rotation[frame[owner], :, 2]
+        for _ in range(FEWEST):  # one point a reflector at a time, since slabs take long to count
+            left = rows[~found[owner[rows]]]
+            _, first = np.unique(owner[left], return_index=True)
+            left = left[first]
+            passed = slabs.passage(begin[left], points[left], up[left])[0] != 0
+            found[owner[left[passed]]] = True
+            rows = np.setdiff1d(rows, left, assume_unique=True)
     return [every[(frame == k) & found] for k in range(observation.frames)]
 
 

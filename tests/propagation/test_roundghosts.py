@@ -10,7 +10,7 @@ from radarsim.propagation.curved import RoundBodies
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.mechanisms import curved_ghosts
 from radarsim.propagation.paths import Kind
-from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.reflectors import Flat, Reflectors
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
@@ -153,3 +153,41 @@ def test_ghosts_behind_a_pane(kind):
         assert 20 * np.log10(abs(found / truth)) == pytest.approx(0, abs=0.1)
         assert np.rad2deg(np.angle(found / truth * np.exp(2j * np.pi * late / LAMBDA))) == pytest.approx(0, abs=4)
         assert 0.005 < late < 0.03
+
+
+def test_no_pair_of_segments_is_passed_over():
+    """Ghosts of random bodies over random mirrors are those of all pairs of segments, one by one."""
+    rng = np.random.default_rng(4)
+    plates = [
+        conductors((place, *Rotation.random(random_state=int(rng.integers(1 << 30))).as_matrix()[:2], half))
+        for place, half in zip(
+            rng.uniform([0.5, -3, -1.5], [6, 3, 1.5], (60, 3)), rng.uniform(0.02, 2.0, (60, 2)), strict=True
+        )
+    ]
+    bodies = [
+        SceneObject(
+            f"body {k}", shapes.cylinder(rng.uniform([0.5, -3, -1], [6, 3, 1]), radius, height, 24), WALL.material
+        )
+        for k, (radius, height) in enumerate(zip(rng.uniform(0.005, 0.2, 8), rng.uniform(0.1, 3.0, 8), strict=True))
+    ]
+    flat = Flat.joined(plates)
+    reflectors = Reflectors.of(Scene("bodies", bodies), CONFIG)
+    observation = isotropic(np.zeros(3), LAMBDA)
+    observation = observation._replace(threshold=1e-9)
+    seen = np.arange(len(flat))
+    found = curved_ghosts.ghosts(observation, 0, flat, seen, reflectors)
+    height = np.einsum("md,md->m", flat.center, flat.normal)
+    images = [np.zeros(3), *(2 * height[:, None] * flat.normal)]
+    every, count = curved_ghosts.CurvedGhosts.zeros(4096), 0
+    for b in range(len(reflectors.round)):
+        for i, j in zip(*np.triu_indices(len(images)), strict=True):
+            if j > 0:
+                way = i - 1, tuple(images[i]), j - 1, tuple(images[j])
+                place, aim, n, size = curved_ghosts._strength(
+                    observation, flat.columns, reflectors.round.columns, b, way
+                )
+                echo = place, aim, n, size, reflectors.round.layer[b]
+                count += curved_ghosts._add(observation, 0, flat.columns, way, echo, (every.columns, count))
+    assert count > 100 and len(found) == count
+    assert np.array_equal(found.mirrors, every.mirrors[:count])
+    assert found.amplitude == pytest.approx(every.amplitude[:count])

@@ -41,12 +41,11 @@ from radarsim.propagation.observation import Observation
 from radarsim.propagation.patches import strength
 from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat, Reflectors
+from radarsim.propagation.segments import INSIDE, Capsule, fill, matched, room
 from radarsim.propagation.table import Table, filled
 
 #: Steps to the point between two images (`curved.halving`).
 STEPS = 12
-#: Rays to a cylinder aim at least this far inside the part of it that is lit, m: a leg's end is in the floor.
-_INSIDE = 0.01
 
 
 @dataclass(frozen=True)
@@ -103,19 +102,21 @@ def ghosts(
 @njit(cache=True)
 def _find(observation, frame, flat, seen, curved, found):
     """Returns how many there are, of which as many as fit are written."""
-    p, count = vec(observation.position[frame]), 0
-    mirrors, images = np.empty(len(seen) + 1, np.int64), np.empty((len(seen) + 1, 3))
+    count, segments = 0, room(len(seen) + 1)
     bodies, patches = curved
     for b in range(len(bodies.radius) + len(patches.ball)):
         k = b - len(bodies.radius)
         if k < 0:
-            ball, sides = (vec(bodies.center[b]), bodies.radius[b] + bodies.half[b]), 1
+            capsule, sides = Capsule(vec(bodies.center[b]), vec(bodies.axis[b]), bodies.half[b], bodies.radius[b]), 1
         else:
-            ball, sides = (vec(patches.ball[k]), patches.ball[k, 3]), 2 if patches.two_sided[k] else 1
-        ways = _ways(observation, p, flat, seen, ball, (mirrors, images))
-        for i in range(ways):
-            for j in range(max(i, 1), ways):
-                way = mirrors[i], vec(images[i]), mirrors[j], vec(images[j])
+            capsule = Capsule(vec(patches.ball[k]), (0.0, 0.0, 0.0), 0.0, patches.ball[k, 3])
+            sides = 2 if patches.two_sided[k] else 1
+        total = fill(observation, frame, flat, seen, capsule, segments)
+        for i in range(total):
+            for j in range(max(i, 1), total):
+                if not matched(observation, capsule, segments, i, j):
+                    continue
+                way = segments.mirror[i], vec(segments.image[i]), segments.mirror[j], vec(segments.image[j])
                 for turn in range(sides):
                     if k < 0:
                         place, aim, n, size = _strength(observation, flat, bodies, b, way)
@@ -166,35 +167,6 @@ def _add(observation, frame, flat, way, echo, found):
 
 
 @njit
-def _ways(observation, p, flat, seen, ball, ways):
-    """Mirrors (-1: none, the first) and images of the radar of all ways that may lead into a ball; returns how many."""
-    mirrors, images = ways
-    center, size = ball
-    if length(minus(center, p)) - size > observation.range:
-        return 0
-    mirrors[0], count = -1, 1
-    write(p, images[0])
-    for m in seen:
-        c, n = vec(flat.center[m]), vec(flat.normal[m])
-        height = dot(minus(p, c), n)
-        level = dot(minus(center, c), n) * (1.0 if height > 0 else -1.0)
-        if abs(height) < 0.01 or level + size < 0.01:
-            continue
-        source = along(p, -2 * height, n)
-        share = abs(height) / (abs(height) + max(level, 0.0))
-        at = minus(along(source, share, minus(center, source)), c)
-        spare = size * share + STRIP_FAR * np.sqrt(observation.wavelength * observation.range / 8) + 0.1
-        if (
-            abs(dot(at, vec(flat.u[m]))) < flat.half[m, 0] + spare
-            and abs(dot(at, vec(flat.v[m]))) < flat.half[m, 1] + spare
-        ):
-            mirrors[count] = m
-            write(source, images[count])
-            count += 1
-    return count
-
-
-@njit
 def _strength(observation, flat, bodies, b, way):
     """The specular point of a body between two images of the radar, a lit point near it for rays to aim at, the normal
     there, and the amplitude that an isotropic antenna gets from one image to the other."""
@@ -218,7 +190,7 @@ def _strength(observation, flat, bodies, b, way):
     low, high = _above(flat, second, two, line, axis, _above(flat, first, one, line, axis, (-half, half)))
     if low >= high or z <= low - STRIP_FAR * zone or z >= high + STRIP_FAR * zone:
         return none, none, none, 0j
-    inside = min(_INSIDE, (high - low) / 2)
+    inside = min(INSIDE, (high - low) / 2)
     aim = along(line, min(max(z, low + inside), high - inside), axis)
     return place, aim, n, size * strip((low - z) / zone, (high - z) / zone)
 

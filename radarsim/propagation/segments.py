@@ -1,0 +1,222 @@
+"""Path segments between the radar and a curved body, straight or over a mirror, and which pairs of them make an echo.
+
+A ghost goes out on one segment and back on another. Of tens of thousands of pairs nearly none is worth a look, so each
+segment has bounds: the part of the body's axis that the mirror's aperture shows the radar, and what it passes at most.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numba import njit
+
+from radarsim.propagation.apertures import STRIP_FAR
+from radarsim.propagation.fields import along, dot, gain_towards, length, minus, mirrored, unit, vec, write
+
+#: m: the point at which rays aim lies at least so far within the lit part of an axis.
+INSIDE = 0.01
+#: Fresnel's integral over a slit is at most this.
+_SLIT = 1.17
+#: A body is thin from so many radii away, and so short that the gain hardly changes along it.
+_THIN, _SHORT = 20.0, 0.3
+#: The ends of a cylinder are felt at most so many Fresnel units away.
+_ZONES = 1.2 * STRIP_FAR
+#: What the gain may change along a short one, and what all that is left out may add to an amplitude.
+_GAIN, _SAFE = 1.3, 2.0
+
+
+class Capsule(NamedTuple):
+    """What holds a curved body: middle, axis, half length and radius, m."""
+
+    center: tuple[float, float, float]
+    axis: tuple[float, float, float]
+    half: float
+    radius: float
+
+
+class Segments(NamedTuple):
+    """Segments to a body; as many rows as there are mirrors in sight, and one.
+
+    Attributes:
+        mirror: its index; -1: straight.
+        image: the radar as seen in the mirror, m.
+        span: the part of the axis, from its middle, to which it leads at most, m.
+        place: of the image, from the body's middle along its axis, and away from the axis, m.
+        aside: unit vector from the axis to the image.
+        cut: whether the mirror may hide the lower and the upper end.
+        most: gain times what the aperture passes, at most.
+    """
+
+    mirror: Int[np.ndarray, "segment"]
+    image: Float[np.ndarray, "segment 3"]
+    span: Float[np.ndarray, "segment 2"]
+    place: Float[np.ndarray, "segment 2"]
+    aside: Float[np.ndarray, "segment 3"]
+    cut: Bool[np.ndarray, "segment 2"]
+    most: Float[np.ndarray, "segment"]
+
+
+@njit
+def room(count):
+    """Segments to fill in."""
+    return Segments(
+        np.empty(count, np.int64), np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2)),
+        np.empty((count, 3)), np.empty((count, 2), np.bool_), np.empty(count),
+    )  # fmt: skip
+
+
+@njit
+def fill(observation, frame, flat, seen, capsule, segments):
+    """Fill in the segments of a frame that may lead to a body, the straight one first, over mirrors in sight (`seen`);
+    return how many there are, 0 if the body is out of range."""
+    center, axis, half, radius = capsule
+    p, rotation = vec(observation.position[frame]), observation.rotation[frame]
+    forward = rotation[0, 0], rotation[1, 0], rotation[2, 0]
+    if length(minus(center, p)) - radius - half > observation.range:
+        return 0
+    span = _clip((-half, half), -dot(minus(center, p), forward), -dot(axis, forward), radius)
+    _write(segments, 0, -1, p, capsule, span)
+    segments.most[0] = _gain(observation, frame, p, (p, (0.0, 0.0, 0.0)), span, capsule)
+    segments.cut[0] = False
+    count = 1
+    for m in seen:
+        n = vec(flat.normal[m])
+        height = dot(minus(p, vec(flat.center[m])), n)
+        away = n if height > 0 else (-n[0], -n[1], -n[2])
+        height, level, rise = abs(height), dot(minus(center, vec(flat.center[m])), away), dot(axis, away)
+        if height < 0.01 or level + radius + half < 0.01:
+            continue
+        image = along(p, -2 * height, away)
+        span = _span(observation, flat, m, (image, height, level, rise), capsule, (forward, dot(away, forward)))
+        if span[0] > span[1]:
+            continue
+        _write(segments, count, m, image, capsule, span)
+        cut = level - half * abs(rise) < radius
+        segments.cut[count, 0], segments.cut[count, 1] = cut and rise > 0, cut and rise < 0
+        passed = _passed(observation, flat, m, (height, level, rise), capsule, segments.place[count])
+        mirror = vec(flat.center[m]), n
+        segments.most[count] = passed * _gain(observation, frame, p, mirror, span, capsule)
+        count += 1
+    return count
+
+
+@njit
+def _write(segments, k, mirror, image, capsule, span):
+    segments.mirror[k] = mirror
+    write(image, segments.image[k])
+    segments.span[k, 0], segments.span[k, 1] = span
+    offset = minus(image, capsule.center)
+    z = dot(offset, capsule.axis)
+    offset = along(offset, -z, capsule.axis)
+    segments.place[k, 0], segments.place[k, 1] = z, length(offset)
+    write(unit(offset), segments.aside[k])
+
+
+@njit
+def _span(observation, flat, m, radar, capsule, ahead):
+    """The part of an axis, with all within a radius of it, to which a mirror passes light that the radar sends forward.
+
+    A place at z is before the mirror by L + R z, so light to it meets the mirror at the share H / (H + L + R z) of the
+    way from the image: where that lies is linear in z over the same denominator.
+
+    Args:
+        radar: its image, how far it is from the mirror (H), and L and R.
+        ahead: forward direction of the radar, and its part along the mirror's normal.
+    """
+    (image, height, level, rise), (center, axis, half, radius), (forward, off) = radar, capsule, ahead
+    span, full = _clip((-half, half), -level, -rise, radius), height + level
+    foot, way = minus(image, vec(flat.center[m])), minus(center, image)
+    farthest, nearest = level + half * abs(rise) + radius, max(level - half * abs(rise) - radius, 0.0)
+    longest = length(way) + half + radius
+    share = min(farthest / (height + farthest), 0.5)  # of the way that lies beyond the mirror, at most
+    zone = STRIP_FAR * np.sqrt(0.5 * observation.wavelength * longest * share * (1 - share))
+    # It is longer in the plane of incidence, by how directions differ from the one to the middle (`apertures.passes`).
+    far, cosine = length(way), (height + nearest) / longest
+    turned, spread = abs(dot(way, vec(flat.u[m]))) / far, (half + radius) / max(far - half - radius, 1e-9)
+    zones = (
+        zone / max(np.sqrt(max(1 - (turned + spread) ** 2, 0.0)), cosine),
+        zone * np.sqrt(1 - max(turned - spread, 0.0) ** 2) / cosine,
+    )
+    for k in range(2):
+        side, window = vec(flat.u[m]) if k == 0 else vec(flat.v[m]), flat.half[m, k] + zones[k]
+        x, aside, turn = dot(foot, side), dot(way, side), dot(axis, side)
+        slack = radius * (height + abs(x) + window)
+        for sign in (-1.0, 1.0):
+            over = sign * x - window
+            span = _clip(span, over * full + sign * height * aside, over * rise + sign * height * turn, slack)
+    out = -2 * height * off
+    begin, slope = out * full + height * dot(way, forward), out * rise + height * dot(axis, forward)
+    return _clip(span, -begin, -slope, 3 * height * radius)
+
+
+@njit
+def _clip(span, begin, slope, slack):
+    """The part of a span where begin + slope z <= slack."""
+    low, high = span
+    if abs(slope) < 1e-9:
+        return span if begin <= slack else (1.0, 0.0)
+    edge = (slack - begin) / slope
+    return (low, min(high, edge)) if slope > 0 else (max(low, edge), high)
+
+
+@njit
+def _passed(observation, flat, m, radar, capsule, place):
+    """What a mirror's aperture passes at most: a slit that is narrow in Fresnel units passes its width / sqrt(2)."""
+    height, level, rise = radar
+    farthest = level + capsule.half * abs(rise) + capsule.radius
+    nearest = level - capsule.half * abs(rise) - capsule.radius
+    if nearest <= 0:
+        return _SLIT * _SLIT
+    way = max(np.hypot(place[1], max(abs(place[0]) - capsule.half, 0.0)) - capsule.radius, 0.0)
+    square = 0.5 * observation.wavelength * way * height / (height + farthest) * nearest / (height + nearest)
+    width = 2 / np.sqrt(2 * square + 1e-12)
+    return min(width * flat.half[m, 0], _SLIT) * min(width * flat.half[m, 1], _SLIT)
+
+
+@njit
+def _gain(observation, frame, p, mirror, span, capsule):
+    """Gain towards a part of an axis seen in a mirror (place, normal), at most."""
+    center, axis, _, _ = capsule
+    low, high = span
+    middle = mirrored(along(center, (low + high) / 2, axis), mirror[0], mirror[1])
+    far = length(minus(middle, p))
+    if high - low > _SHORT * far or _THIN * capsule.radius > far:
+        return observation.peak_gain
+    most = 0.0
+    for z in (low, (low + high) / 2, high):
+        place = mirrored(along(center, z, axis), mirror[0], mirror[1])
+        most = max(most, gain_towards(minus(place, p), observation.rotation[frame], observation))
+    return min(_GAIN * most, observation.peak_gain)
+
+
+@njit
+def matched(observation, capsule, segments, i, j):
+    """Whether a body may echo on two segments: a part of it is lit on both, its specular point is near there, and the
+    echo is not below the threshold whatever its ends take.
+
+    The path grows by C over a plane and by C + B over a body of that radius: it spreads by at most 1 / (1 + B / C).
+    """
+    half, radius = capsule.half, capsule.radius
+    low, high = max(segments.span[i, 0], segments.span[j, 0]), min(segments.span[i, 1], segments.span[j, 1])
+    if low > high:
+        return False
+    d1, d2, z, spread = segments.place[i, 1], segments.place[j, 1], 0.0, 0.0
+    if half > 0:
+        slope = (segments.place[j, 0] - segments.place[i, 0]) / (d1 + d2)
+        z, spread = segments.place[i, 0] + slope * d1, abs(slope) * radius
+        if not (segments.cut[i, 0] or segments.cut[j, 0]) and max(z + spread, INSIDE - half) < low:
+            return False
+        if not (segments.cut[i, 1] or segments.cut[j, 1]) and min(z - spread, half - INSIDE) > high:
+            return False
+    if min(d1, d2) < _THIN * radius:
+        return True
+    r1, r2 = np.hypot(d1, segments.place[i, 0] - z), np.hypot(d2, segments.place[j, 0] - z)
+    slant, path = min(d1 / r1, d2 / r2), r1 + r2
+    zone = np.sqrt(observation.wavelength * r1 * r2 / (2 * path)) / slant
+    if path - 2 * radius > 2 * observation.range or abs(z) - half > _ZONES * zone + spread:
+        return False
+    between = dot(vec(segments.aside[i]), vec(segments.aside[j]))
+    cosine = np.sqrt(max(1 + between, 0.0) / 2) * slant
+    growth = max(cosine - 1 / _THIN, 0.0) * 2 / radius * r1 * r2 / path
+    most = segments.most[i] * segments.most[j] * observation.wavelength / (4 * np.pi * path)
+    return _SAFE * most > observation.threshold * np.sqrt(1 + growth)

@@ -57,13 +57,18 @@ class Paths:
     def lengths(self, config: RadarConfig, motion, time: float) -> Float[np.ndarray, "path virtual 3"]:
         """Path lengths over the burst, as `Paths.lengths`: shorter by what an antenna moves along the path."""
         times = time + BurstClock.of(config).nodes
-        position, rotation = motion.position(times), motion.rotation(times).as_matrix()
+        return self.lengths_from(motion.position(times), motion.rotation(times).as_matrix(), config)
+
+    def lengths_from(
+        self, position: Float[np.ndarray, "node 3"], rotation: Float[np.ndarray, "node 3 3"], config: RadarConfig
+    ) -> Float[np.ndarray, "path virtual 3"]:
+        """The same from poses at the burst's nodes, as `Paths.lengths_from`."""
         tx = position[:, None] + tx_positions(config) @ rotation.transpose(0, 2, 1) - self.tx_center
         rx = position[:, None] + rx_positions(config) @ rotation.transpose(0, 2, 1) - self.rx_center
         out = np.einsum("pd,tkd->pkt", self.departure, tx)
         back = np.einsum("pd,trd->prt", self.arrival, rx)
         values = self.length[:, None, None, None] - out[:, :, None] - back[:, None]
-        return np.stack(parabola(*np.moveaxis(values.reshape(len(self), -1, len(times)), -1, 0)), axis=-1)
+        return np.stack(parabola(*np.moveaxis(values.reshape(len(self), -1, len(position)), -1, 0)), axis=-1)
 
 
 class PathSolverFinder:

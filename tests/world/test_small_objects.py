@@ -71,7 +71,7 @@ def test_backs_lie_on_surfaces(drawn, found, name):
     near = world.compute_closest_points(back.astype(np.float32))
     away = np.linalg.norm(near["points"].numpy() - back, axis=2)
     facing = np.einsum("spd,sd->sp", normals[near["primitive_ids"].numpy()], spots.normal)
-    assert away.max() < 5.5e-3  # desks stand 1 cm apart, and things on both
+    assert away.max() < 10.5e-3  # desks stand 1 cm apart, shelves 2 cm, and objects lie on both
     assert np.mean(facing > 0.99) > 0.97  # where two surfaces meet, the nearest one may be the other
 
 

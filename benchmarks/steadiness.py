@@ -12,7 +12,6 @@ from unittest.mock import patch
 import numpy as np
 from jaxtyping import Complex, Float
 
-from benchmarks.realism import SCENES
 from benchmarks.results import Data, Page, script, tracked, walked
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
@@ -24,6 +23,7 @@ from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
 from radarsim.world.scene import Scene
 
+SCENES = "office", "buildings/a", "buildings/b", "buildings/c", "buildings/d"
 CONFIG = PRESETS["radarize"]
 #: Of the field's power, dB: changes above it are counted.
 LIMIT = -10.0

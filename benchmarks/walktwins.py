@@ -16,7 +16,8 @@ import numpy as np
 import yaml
 from jaxtyping import Float, UInt8
 
-from benchmarks.realism import CONFIG, shares
+from benchmarks.likeness.pictures import CONFIG
+from benchmarks.likeness.statistics import shares
 from benchmarks.results import CLONE, POSES, Page, radarhd, script, tracked
 from radarize import polar
 from radarize.tum import planar_poses, write_tum

@@ -126,6 +126,6 @@ def _output(model: nn.Module, x: Tensor) -> Float[np.ndarray, "sample"]:
 
 
 def _balanced(outputs: list[np.ndarray], label: np.ndarray) -> float:
-    """Mean of the shares of either kind that are told rightly."""
+    """Mean of the shares of either kind that are classified correctly."""
     shares = [np.concatenate([o > 0 for o, k in zip(outputs, label, strict=True) if k == kind]) for kind in (0, 1)]
     return float((np.mean(~shares[0]) + np.mean(shares[1])) / 2)

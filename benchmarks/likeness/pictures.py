@@ -15,11 +15,9 @@ from jaxtyping import UInt8
 from radarize import polar
 from radarize.jobs import Report
 from radarize.radar.presets import PRESETS
-from radarize.yamlfile import read_yaml
 from radarsim.motion.walk import Walk
 from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
-from radarsim.world.description import find
 from radarsim.world.scene import Scene
 
 #: Chirps of the real walks, one loop of a frame.
@@ -53,19 +51,18 @@ class Simulated:
     """A simulated walk by cart.
 
     Attributes:
-        scene: name of a scene or fields of a scene file.
+        scene: fields of a scene file.
         seed: of walk and world.
         surfaces: fields of the scene file that are set, e.g. ``clutter``.
     """
 
-    scene: str | dict
+    scene: dict
     seed: int
     surfaces: dict[str, float] = field(default_factory=dict)
 
     def __call__(self, report: Report) -> Bursts:
         """Simulate its bursts."""
-        about = read_yaml(find(self.scene)) if isinstance(self.scene, str) else self.scene
-        scene = Scene.of(about | self.surfaces, "scene")
+        scene = Scene.of(self.scene | self.surfaces, self.scene["name"])
         scenario = Scenario(scene, Walk("cart", DURATION).through(scene, self.seed), CONFIG, seed=self.seed)
         begin = np.linspace(0, scenario.motion.duration - TIMES[-1] - CONFIG.frame_period, BURSTS)
         times = np.ravel(begin[:, None] + TIMES)

@@ -11,6 +11,8 @@ from radarsim.propagation.fields import dot, minus, vec
 FADE, FAR = 3.0, 5.0
 #: The same for one-way paths to scatterers: there are many, and at 3 an edge diffracts -23 dB.
 STRIP_FADE, STRIP_FAR = 2.0, 3.0
+#: Fresnel's integral over a slit is at most this.
+SLIT = 1.17
 #: Most corners that the overlap of three quadrilaterals and a square can have, and one to close it.
 CORNERS = 20
 

@@ -25,6 +25,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
+from radarsim.propagation.apertures import SLIT
 from radarsim.propagation.fields import cross, dot, minus, vec
 from radarsim.propagation.lattice import FEW, MANY, Lattice, coupled
 from radarsim.propagation.observation import Observation
@@ -40,8 +41,6 @@ LEAST_SPLIT = 20.0
 AT_RADAR = 0.5
 #: Fewer nodes than this within a mirror say less than the one ray through its middle.
 _FEWEST = 4
-#: No slit passes more than this of an amplitude.
-_MOST = 1.17
 #: Where an obstacle stands is known to this many halvings of a stretch.
 _HALVINGS = 4
 #: Rays to a point spread no wider than for an obstacle at this share of the way to it.
@@ -106,7 +105,7 @@ def passage(
     rho = np.sqrt(near * (1 - far) / (far * (1 - near)))
     both = coupled(fans[first], fans[last], rho, stretches.mirroring[rows[first]], MANY.couplings)
     single = some.factor[first] * some.factor[last]
-    both = np.where(np.isnan(both), single, _bounded(both, _MOST**2))
+    both = np.where(np.isnan(both), single, _bounded(both, SLIT**2))
     factor = found.factor ** (1 + returns[path])
     factor[rows[last]] = 1
     factor[rows[first]] = both
@@ -177,7 +176,7 @@ def _fans(
     fans[:, 1][inside] = 1
     clear[inside] = passed.blocked == 0
     whole = fans[:, 1] @ MANY.weight
-    factor = _bounded(fans[:, 0] @ MANY.weight / whole, _MOST)
+    factor = _bounded(fans[:, 0] @ MANY.weight / whole, SLIT)
     through = _sums(many, power * passed.through, count) > total / 2
     return fans, Passage(factor, later, through, 1 - np.minimum(np.abs(clear @ MANY.weight / whole), 1))
 

@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Complex, Float, Float32, Int
 from numba import njit, prange
 
-from radarsim.propagation.apertures import STRIP_FAR, aperture, misses, passes
+from radarsim.propagation.apertures import SLIT, STRIP_FAR, aperture, misses, passes
 from radarsim.propagation.candidates import Candidates
 from radarsim.propagation.fields import (
     along,
@@ -36,8 +36,8 @@ from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.table import Table
 from radarsim.propagation.targets import Targets
 
-#: No rectangular aperture passes more than this: Fresnel's integral over a slit is below 1.17.
-_MOST = 1.17**2
+#: No rectangular aperture passes more than this.
+_MOST = SLIT**2
 
 
 @dataclass(frozen=True)

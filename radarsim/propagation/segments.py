@@ -10,13 +10,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
 
-from radarsim.propagation.apertures import STRIP_FAR
+from radarsim.propagation.apertures import SLIT, STRIP_FAR
 from radarsim.propagation.fields import along, dot, gain_towards, length, minus, mirrored, unit, vec, write
 
 #: m: the point at which rays aim lies at least so far within the lit part of an axis.
 INSIDE = 0.01
-#: Fresnel's integral over a slit is at most this.
-_SLIT = 1.17
 #: A body is thin from so many radii away, and so short that the gain hardly changes along it.
 _THIN, _SHORT = 20.0, 0.3
 #: The ends of a cylinder are felt at most so many Fresnel units away.
@@ -57,8 +55,8 @@ class Segments(NamedTuple):
 
 
 @njit
-def room(count):
-    """Segments to fill in."""
+def empty_segments(count):
+    """Segments for `fill`."""
     return Segments(
         np.empty(count, np.int64), np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2)),
         np.empty((count, 3)), np.empty((count, 2), np.bool_), np.empty(count),
@@ -74,7 +72,7 @@ def fill(observation, frame, flat, seen, capsule, segments):
     forward = rotation[0, 0], rotation[1, 0], rotation[2, 0]
     if length(minus(center, p)) - radius - half > observation.range:
         return 0
-    span = _clip((-half, half), -dot(minus(center, p), forward), -dot(axis, forward), radius)
+    span = clip((-half, half), -dot(minus(center, p), forward), -dot(axis, forward), radius)
     _write(segments, 0, -1, p, capsule, span)
     segments.most[0] = _gain(observation, frame, p, (p, (0.0, 0.0, 0.0)), span, capsule)
     segments.cut[0] = False
@@ -124,7 +122,7 @@ def _span(observation, flat, m, radar, capsule, ahead):
         ahead: forward direction of the radar, and its part along the mirror's normal.
     """
     (image, height, level, rise), (center, axis, half, radius), (forward, off) = radar, capsule, ahead
-    span, full = _clip((-half, half), -level, -rise, radius), height + level
+    span, full = clip((-half, half), -level, -rise, radius), height + level
     foot, way = minus(image, vec(flat.center[m])), minus(center, image)
     farthest, nearest = level + half * abs(rise) + radius, max(level - half * abs(rise) - radius, 0.0)
     longest = length(way) + half + radius
@@ -143,14 +141,14 @@ def _span(observation, flat, m, radar, capsule, ahead):
         slack = radius * (height + abs(x) + window)
         for sign in (-1.0, 1.0):
             over = sign * x - window
-            span = _clip(span, over * full + sign * height * aside, over * rise + sign * height * turn, slack)
+            span = clip(span, over * full + sign * height * aside, over * rise + sign * height * turn, slack)
     out = -2 * height * off
     begin, slope = out * full + height * dot(way, forward), out * rise + height * dot(axis, forward)
-    return _clip(span, -begin, -slope, 3 * height * radius)
+    return clip(span, -begin, -slope, 3 * height * radius)
 
 
 @njit
-def _clip(span, begin, slope, slack):
+def clip(span, begin, slope, slack):
     """The part of a span where begin + slope z <= slack."""
     low, high = span
     if abs(slope) < 1e-9:
@@ -166,11 +164,11 @@ def _passed(observation, flat, m, radar, capsule, place):
     farthest = level + capsule.half * abs(rise) + capsule.radius
     nearest = level - capsule.half * abs(rise) - capsule.radius
     if nearest <= 0:
-        return _SLIT * _SLIT
+        return SLIT * SLIT
     way = max(np.hypot(place[1], max(abs(place[0]) - capsule.half, 0.0)) - capsule.radius, 0.0)
     square = 0.5 * observation.wavelength * way * height / (height + farthest) * nearest / (height + nearest)
     width = 2 / np.sqrt(2 * square + 1e-12)
-    return min(width * flat.half[m, 0], _SLIT) * min(width * flat.half[m, 1], _SLIT)
+    return min(width * flat.half[m, 0], SLIT) * min(width * flat.half[m, 1], SLIT)
 
 
 @njit

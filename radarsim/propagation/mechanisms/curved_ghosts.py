@@ -41,7 +41,7 @@ from radarsim.propagation.observation import Observation
 from radarsim.propagation.patches import strength
 from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat, Reflectors
-from radarsim.propagation.segments import INSIDE, Capsule, fill, matched, room
+from radarsim.propagation.segments import INSIDE, Capsule, clip, empty_segments, fill, matched
 from radarsim.propagation.table import Table, filled
 
 #: Steps to the point between two images (`curved.halving`).
@@ -102,7 +102,7 @@ def ghosts(
 @njit(cache=True)
 def _find(observation, frame, flat, seen, curved, found):
     """Returns how many there are, of which as many as fit are written."""
-    count, segments = 0, room(len(seen) + 1)
+    count, segments = 0, empty_segments(len(seen) + 1)
     bodies, patches = curved
     for b in range(len(bodies.radius) + len(patches.ball)):
         k = b - len(bodies.radius)
@@ -202,10 +202,7 @@ def _above(flat, m, image, line, axis, span):
         return span
     c, n = vec(flat.center[m]), vec(flat.normal[m])
     turn = -1.0 if dot(minus(image, c), n) > 0 else 1.0
-    level, rise, (low, high) = turn * dot(minus(line, c), n), turn * dot(axis, n), span
-    if abs(rise) < 1e-9:
-        return span if level > 0 else (low, low)
-    return (max(low, -level / rise), high) if rise > 0 else (low, min(high, -level / rise))
+    return clip(span, -turn * dot(minus(line, c), n), -turn * dot(axis, n), 0.0)
 
 
 @njit

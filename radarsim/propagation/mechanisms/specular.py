@@ -52,9 +52,10 @@ def find(view: View) -> Paths:
 
 
 def _to_parts(observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: SpecularPoints) -> Stretches:
-    """The ways to parts of plates: a flash mirrors, an edge mirrors along its line, a corner echoes like a point.
+    """Path segments to parts of plates: a face mirrors, an edge mirrors along its line, a corner echoes like a point.
 
-    Across an edge that is near the flash, in Fresnel units, it is a part of the same zone and goes over into it.
+    Across an edge that is near the specular point, in Fresnel units, it is a part of the same zone and goes over into
+    it.
     """
     here, n = observation.position[frame], len(parts)
     way = parts.aim - here

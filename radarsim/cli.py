@@ -155,8 +155,9 @@ def twin(
 
 @scene_app.command()
 def info(scene: SceneName) -> None:
-    """Print extent, objects and materials of SCENE."""
+    """Print extent, objects, materials, clutter and unevenness of SCENE."""
     from radarsim.world.scene import Scene
+    from radarsim.world.surface_settings import IDEAL
 
     with working("loading the scene"):
         loaded = Scene.load(scene)
@@ -170,6 +171,10 @@ def info(scene: SceneName) -> None:
         area = sum(mesh.area for mesh in meshes)
         rows.append((name, len(meshes), sum(len(mesh.faces) for mesh in meshes), f"{area:.2f}"))
     print_table(("material", "objects", "triangles", "area, m2"), rows, numbers=(1, 2, 3))
+    settings = loaded.surface_settings
+    print(f"clutter: {settings.clutter:g}, unevenness: {settings.unevenness:g}")
+    if settings == IDEAL:
+        print("This scene is bare. `clutter: 1` and `unevenness: 1` in its file make it like a room in use.")
 
 
 @scene_app.command()

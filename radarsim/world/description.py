@@ -22,13 +22,15 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
-``clutter`` and ``unevenness`` are the clutter and roughness settings (`SurfaceSettings`): 1 as in furnished rooms that
-are in use; default 0. With clutter the scene has more objects (`small_objects`). ``interferers`` are other radars that
-send there (`interferers`); levels change and add them, too.
+``clutter`` and ``unevenness`` are the clutter and roughness settings (`SurfaceSettings`): 1, the default of buildings, as
+in rooms that are in use; 0, the default of scenes without a building, bare, flat and square. With clutter the scene has
+more objects (`small_objects`). ``interferers`` are other radars that send there (`interferers`); levels change and add
+them, too.
 """
 
 import re
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
@@ -50,7 +52,7 @@ from radarsim.world.materials import Material, constant, decibel, material
 from radarsim.world.movers import Mover
 from radarsim.world.objects import SceneObject
 from radarsim.world.squareness import out_of_square
-from radarsim.world.surface_settings import SurfaceSettings
+from radarsim.world.surface_settings import IDEAL, IN_USE, SurfaceSettings
 from radarsim.world.validation import naming
 
 Share = Annotated[float, Field(ge=0, le=10)]
@@ -202,14 +204,15 @@ class Description(Strict):
     building: Annotated[Office | Building, Field(discriminator="kind")] | None = None
     moving: list[Mover] = []
     levels: list[Level] = []
-    clutter: Share = 0.0
-    unevenness: Share = 0.0
+    clutter: Share | None = None
+    unevenness: Share | None = None
     interferers: list[Interferer] = []
 
     @property
     def surface_settings(self) -> SurfaceSettings:
-        """Clutter and roughness."""
-        return SurfaceSettings(self.clutter, self.unevenness)
+        """Clutter and roughness: given, or those of a building, or none."""
+        given = {name: getattr(self, name) for name in ("clutter", "unevenness") if getattr(self, name) is not None}
+        return replace(IN_USE if self.building else IDEAL, **given)
 
 
 def description_model() -> type[Description]:
@@ -311,16 +314,17 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
         InputError: unknown key, value, material, mesh file or level.
     """
     description = described(data, source, level)
+    settings = description.surface_settings
     with naming(source):
         objects = [item.object(folder) for item in description.objects]
         if description.building:
             objects += description.building.build()
-        objects += small_objects(objects, description.clutter)
+        objects += small_objects(objects, settings.clutter)
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
     if description.building:
-        objects = out_of_square(objects, description.unevenness, description.building.seed)
-    return Parts(description.name, objects, description.moving, description.surface_settings, description.interferers)
+        objects = out_of_square(objects, settings.unevenness, description.building.seed)
+    return Parts(description.name, objects, description.moving, settings, description.interferers)
 
 
 def described(data: object, source: str, level: int = 0) -> Description:

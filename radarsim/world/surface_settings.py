@@ -20,3 +20,5 @@ class SurfaceSettings:
 
 #: Bare, flat and square.
 IDEAL = SurfaceSettings()
+#: As in rooms that are furnished and in use.
+IN_USE = SurfaceSettings(1.0, 1.0)

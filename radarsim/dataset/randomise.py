@@ -9,8 +9,8 @@
 
 Fields that are not named are not drawn: ``randomise: {}`` draws nothing. Normal distributions end at three standard
 deviations. What a building of the data set gives itself (``clutter: 0``), and a variant's mounting, is not drawn. A
-draw is keyed by the recording's seed and the field, so it hangs on neither order nor workers, nor on other fields; the
-variants of a recording share it.
+draw is keyed by the recording's seed and the field: it depends on no other field or recording, nor on the order in which
+they are made, and the variants of a recording share it.
 """
 
 from collections.abc import Collection, Iterator, Mapping
@@ -57,7 +57,7 @@ _SCALED = [name for name in DIELECTRICS if name != "skin"]
 
 @dataclass(frozen=True)
 class Distribution:
-    """Of one number.
+    """Probability distribution of a number.
 
     Attributes:
         kind: ``uniform``, ``normal``, ``lognormal``, ``choice`` or ``constant``.

@@ -8,9 +8,9 @@
       height: {handheld: {uniform: [1.0, 1.4]}, cart: 0.95}                # by platform; a number is a constant
 
 Fields that are not named are not drawn: ``randomise: {}`` draws nothing. Normal distributions end at three standard
-deviations. What a building of the data set gives itself (``clutter: 0``), and a variant's mounting, is not drawn. A
-draw is keyed by the recording's seed and the field: it depends on no other field or recording, nor on the order in which
-they are made, and the variants of a recording share it.
+deviations. What a building of the data set gives itself (``clutter: 0``), and what a variant's mounting sets, is not
+drawn. A draw is keyed by the recording's seed and the field. It depends on no other field or recording, nor on the
+order in which they are made, and the variants of a recording share it.
 """
 
 from collections.abc import Collection, Iterator, Mapping

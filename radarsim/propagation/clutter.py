@@ -16,6 +16,12 @@ add up to the share s that would be scattered if no point were in another's shad
 (1 - exp(-s)) / s of its cross section, and the surface reflects, scatters and lets through exp(-s) of the power that it
 would without them (`uncovered`).
 
+Corners of objects and of the building (frames, fins, hinges, recesses, edges of shelves: dihedrals and trihedrals of 2
+to 20 cm) echo back to where the wave comes from, and hardly elsewhere: as many more points that have the backscatter
+lobe alone. They are large. A reflector of area A and power reflectivity R has a cross section of 4 pi R A^2 / lambda^2
+far away only; near by it is a mirror, whose echo grows with its distance (`scatterers.extended_factor`). So small ones
+decide near the radar, and large ones farther away. What their lobes scatter is taken from the surface, too.
+
 A point keeps its place, cross section and phase for good, so it is coherent under motion; it is hidden, mirrored and
 seen through panes as any other scatterer is, but not from behind its own surface.
 """
@@ -33,6 +39,8 @@ from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import scattered
 
+_Places, _Numbers = Float[np.ndarray, "n 3"], Float[np.ndarray, "n"]
+
 #: Objects a square metre at level 1: on walls (plugs, handles, screws, cables), on what stands at the height of desks
 #: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
 #: drawn it was 4, 16 and 3; of those there are some 0.2, 3 and 0.1.
@@ -40,6 +48,8 @@ ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
 #: Mean radar cross section of a lone object head-on, m^2 (half of it at 45 deg), and exponent of its distribution
 #: P(sigma > s) = exp(-(s / scale)^exponent).
 CROSS_SECTION, EXPONENT = 0.2, 0.7
+#: The same of corners, far away; their power reflectivity, and the exponent of their lobe, ((1 + cos) / 2)^exponent.
+CORNER, CORNER_EXPONENT, REFLECTIVITY, LOBE_EXPONENT = 2.0, 0.5, 0.3, 200.0
 #: Points of a scene, some 200 bytes each: a floor of the largest buildings has ten thousand.
 MOST = 5_000_000
 #: Mean distance from the surface, m, over the least: half the depth of what hangs or stands there.
@@ -70,19 +80,18 @@ class Clutter:
                 f"scene {scene.name}: clutter is {level:g}, which makes {mean.sum():.2g} points, expected "
                 f"at most {MOST:g}"
             )
-        count = rng.poisson(mean)
-        on = np.repeat(np.arange(len(area)), count)
-        place = scattered(corners[on], rng)
-        place += (NEAREST + rng.exponential(STANDOFF, len(on)))[:, None] * normals[on]
-        size = rng.exponential(1.0, len(on))
-        sigma = cross_section(size) * in_the_open(crowding(scene, middles, normals))[on]
-        self._points = replace(
-            Scatterers.points(place, sigma, rng.uniform(0, 2 * np.pi, len(on))),
-            normal=normals[on],
-            horizontal=scene.floors_and_ceilings[on],
-            bounces=_strongest(size, BOUNCE_STRIDE),
-            bounces_twice=_strongest(size, BOUNCE_STRIDE**2),
-        )
+        left = in_the_open(crowding(scene, middles, normals))
+        parts = []
+        for draw in (_points, _corners):
+            on = np.repeat(np.arange(len(area)), rng.poisson(mean))
+            place = scattered(corners[on], rng)
+            place += (NEAREST + rng.exponential(STANDOFF, len(on)))[:, None] * normals[on]
+            size = rng.exponential(1.0, len(on))
+            parts.append(replace(
+                draw(place, size, left[on], rng), normal=normals[on], horizontal=scene.floors_and_ceilings[on],
+            ))  # fmt: skip
+        self._points = Scatterers.joined(parts)
+        place = self._points.position
         self._grid = Grid(place, place)
 
     def __len__(self) -> int:
@@ -114,7 +123,8 @@ def densities(
 def crowding(scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
     """Share of what falls on surfaces that their objects would scatter if none were in another's shadow: above 1 where
     they are many."""
-    return scene.surface_settings.clutter * densities(scene, place, normal) * CROSS_SECTION / 4
+    taken = CROSS_SECTION / 4 + CORNER / (LOBE_EXPONENT + 1)
+    return scene.surface_settings.clutter * densities(scene, place, normal) * taken
 
 
 def uncovered(
@@ -129,13 +139,32 @@ def in_the_open(crowding: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
     return -np.expm1(-crowding) / np.maximum(crowding, 1e-12)
 
 
-def cross_section(size: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+def cross_section(size: Float[np.ndarray, "n"], mean: float, exponent: float) -> Float[np.ndarray, "n"]:
     """Weibull's law from exponential numbers of mean 1, m^2."""
-    return CROSS_SECTION / gamma(1 + 1 / EXPONENT) * size ** (1 / EXPONENT)
+    return mean / gamma(1 + 1 / exponent) * size ** (1 / exponent)
 
 
-def _strongest(size: Float[np.ndarray, "n"], stride: int) -> Float[np.ndarray, "n"]:
+def _points(place: _Places, size: _Numbers, left: _Numbers, rng: np.random.Generator) -> Scatterers:
+    """Isotropic ones."""
+    sigma = cross_section(size, CROSS_SECTION, EXPONENT) * left
+    once, twice = (_strongest(size, stride, EXPONENT) for stride in (BOUNCE_STRIDE, BOUNCE_STRIDE**2))
+    phase = rng.uniform(0, 2 * np.pi, len(size))
+    return replace(Scatterers.points(place, sigma, phase), bounces=once, bounces_twice=twice)
+
+
+def _corners(place: _Places, size: _Numbers, left: _Numbers, rng: np.random.Generator) -> Scatterers:
+    """Those that echo back."""
+    sigma = cross_section(size, CORNER, CORNER_EXPONENT) * left
+    once, twice = (_strongest(size, stride, CORNER_EXPONENT) for stride in (BOUNCE_STRIDE, BOUNCE_STRIDE**2))
+    phase = rng.uniform(0, 2 * np.pi, len(size))
+    return replace(
+        Scatterers.points(place, sigma, phase), bounces=once, bounces_twice=twice,
+        lobe=np.tile([0.0, 0.0, 1.0, LOBE_EXPONENT], (len(size), 1)), extended=np.sqrt(sigma / (np.pi * REFLECTIVITY)),
+    )  # fmt: skip
+
+
+def _strongest(size: _Numbers, stride: int, exponent: float) -> _Numbers:
     """Weights of power where one point in `stride`, the strongest ones, stands for all; mean power stays."""
     least = log(stride)
-    held = gammaincc(1 + 1 / EXPONENT, least)  # share of the mean cross section that they have
+    held = gammaincc(1 + 1 / exponent, least)  # share of the mean cross section that they have
     return (size > least) / held

@@ -33,6 +33,7 @@ from radarsim.propagation.fields import (
 from radarsim.propagation.media import mirror
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
+from radarsim.propagation.scatterers import extended_factor
 from radarsim.propagation.table import Table
 from radarsim.propagation.targets import Targets
 
@@ -273,7 +274,7 @@ def _over(observation, flat, chains, k, aims, scatterers, out):
         if cosine <= 0:
             continue
         leaving = minus(bounce, p)
-        size = gain_towards(leaving, rotation, observation) / full
+        size = gain_towards(leaving, rotation, observation) / full * extended_factor(scatterers.extended[j], full)
         least = aims.weakest[i] / np.sqrt(cosine)
         te, tm = mirror(flat.layer[last], min(abs(dot(way, nl)), 1.0))
         if most * size * max(abs(te), abs(tm)) <= least:

@@ -28,6 +28,7 @@ seen through panes as any other scatterer is, but not from behind its own surfac
 
 from dataclasses import replace
 from math import gamma, log
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -35,27 +36,70 @@ from scipy.special import gammaincc
 
 from radarize.errors import InputError
 from radarsim.propagation.hashgrid import Grid
+from radarsim.propagation.media import LAMBERT, concentration
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.world.scene import Scene
 from radarsim.world.shapes import scattered
-
-_Places, _Numbers = Float[np.ndarray, "n 3"], Float[np.ndarray, "n"]
 
 #: Objects a square metre at level 1: on walls (plugs, handles, screws, cables), on what stands at the height of desks
 #: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
 #: drawn it was 4, 16 and 3; of those there are some 0.2, 3 and 0.1.
 ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
-#: Mean radar cross section of a lone object head-on, m^2 (half of it at 45 deg), and exponent of its distribution
-#: P(sigma > s) = exp(-(s / scale)^exponent).
-CROSS_SECTION, EXPONENT = 0.2, 0.7
-#: The same of corners, far away; their power reflectivity, and the exponent of their lobe, ((1 + cos) / 2)^exponent.
-CORNER, CORNER_EXPONENT, REFLECTIVITY, LOBE_EXPONENT = 2.0, 0.5, 0.3, 200.0
 #: Points of a scene, some 200 bytes each: a floor of the largest buildings has ten thousand.
 MOST = 5_000_000
 #: Mean distance from the surface, m, over the least: half the depth of what hangs or stands there.
 STANDOFF, NEAREST = 0.03, 0.01
 #: Below the first height over the lowest floor an upward face is a floor, above the second none is within reach, m.
 LOW, HIGH = 0.15, 2.0
+
+
+class Population(NamedTuple):
+    """Objects of one sort.
+
+    Attributes:
+        mean: radar cross section of a lone one head-on, far away, m^2 (half of it at 45 deg).
+        exponent: of its distribution P(sigma > s) = exp(-(s / scale)^exponent).
+        lobe: scattering pattern (`media.scattering`).
+        reflectivity: of power, of extended ones (`scatterers.extended_factor`); None: points.
+    """
+
+    mean: float
+    exponent: float
+    lobe: tuple[float, float, float, float] = LAMBERT
+    reflectivity: float | None = None
+
+    @property
+    def taken(self) -> float:
+        """What one takes from what falls on the surface, m^2."""
+        return self.mean / 4 * (self.lobe[0] + self.lobe[2] / concentration(self.lobe[3]))
+
+    def cross_sections(self, size: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
+        """Weibull's law from exponential numbers of mean 1, m^2."""
+        return self.mean / gamma(1 + 1 / self.exponent) * size ** (1 / self.exponent)
+
+    def strongest(self, size: Float[np.ndarray, "n"], stride: int) -> Float[np.ndarray, "n"]:
+        """Weights of power where one in `stride`, the strongest ones, stands for all; mean power stays."""
+        least = log(stride)
+        held = gammaincc(1 + 1 / self.exponent, least)  # share of the mean cross section that they have
+        return (size > least) / held
+
+    def drawn(
+        self, place: Float[np.ndarray, "n 3"], left: Float[np.ndarray, "n"], rng: np.random.Generator
+    ) -> Scatterers:
+        """Some at places (m), of which others' shadows leave a share of the cross section."""
+        size = rng.exponential(1.0, len(place))
+        sigma = self.cross_sections(size) * left
+        extended = 0 * sigma if self.reflectivity is None else np.sqrt(sigma / (np.pi * self.reflectivity))
+        return replace(
+            Scatterers.points(place, sigma, rng.uniform(0, 2 * np.pi, len(place))),
+            bounces=self.strongest(size, BOUNCE_STRIDE), bounces_twice=self.strongest(size, BOUNCE_STRIDE**2),
+            lobe=np.tile(self.lobe, (len(place), 1)), extended=extended,
+        )  # fmt: skip
+
+
+#: Of every density there are as many small objects as corners.
+SMALL = Population(0.2, 0.7)
+CORNERS = Population(2.0, 0.5, lobe=(0.0, 0.0, 1.0, 200.0), reflectivity=0.3)
 
 
 class Clutter:
@@ -70,26 +114,23 @@ class Clutter:
     """
 
     def __init__(self, scene: Scene, rng: np.random.Generator):
-        corners, normals = scene.triangles, scene.normals
-        sides = corners[:, 1:] - corners[:, :1]
+        triangles, normals = scene.triangles, scene.normals
+        sides = triangles[:, 1:] - triangles[:, :1]
         area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
-        middles, level = corners.mean(axis=1), scene.surface_settings.clutter
+        middles, level = triangles.mean(axis=1), scene.surface_settings.clutter
         mean = level * densities(scene, middles, normals) * area
         if mean.sum() > MOST:
             raise InputError(
                 f"scene {scene.name}: clutter is {level:g}, which makes {mean.sum():.2g} points, expected "
                 f"at most {MOST:g}"
             )
-        left = in_the_open(crowding(scene, middles, normals))
-        parts = []
-        for draw in (_points, _corners):
+        left, parts = in_the_open(crowding(scene, middles, normals)), []
+        for population in (SMALL, CORNERS):
             on = np.repeat(np.arange(len(area)), rng.poisson(mean))
-            place = scattered(corners[on], rng)
+            place = scattered(triangles[on], rng)
             place += (NEAREST + rng.exponential(STANDOFF, len(on)))[:, None] * normals[on]
-            size = rng.exponential(1.0, len(on))
-            parts.append(replace(
-                draw(place, size, left[on], rng), normal=normals[on], horizontal=scene.floors_and_ceilings[on],
-            ))  # fmt: skip
+            found = population.drawn(place, left[on], rng)
+            parts.append(replace(found, normal=normals[on], horizontal=scene.floors_and_ceilings[on]))
         self._points = Scatterers.joined(parts)
         place = self._points.position
         self._grid = Grid(place, place)
@@ -123,8 +164,7 @@ def densities(
 def crowding(scene: Scene, place: Float[np.ndarray, "n 3"], normal: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n"]:
     """Share of what falls on surfaces that their objects would scatter if none were in another's shadow: above 1 where
     they are many."""
-    taken = CROSS_SECTION / 4 + CORNER / (LOBE_EXPONENT + 1)
-    return scene.surface_settings.clutter * densities(scene, place, normal) * taken
+    return scene.surface_settings.clutter * densities(scene, place, normal) * (SMALL.taken + CORNERS.taken)
 
 
 def uncovered(
@@ -137,34 +177,3 @@ def uncovered(
 def in_the_open(crowding: Float[np.ndarray, "n"]) -> Float[np.ndarray, "n"]:
     """What is left of each object's cross section on average, with the shadows of the others."""
     return -np.expm1(-crowding) / np.maximum(crowding, 1e-12)
-
-
-def cross_section(size: Float[np.ndarray, "n"], mean: float, exponent: float) -> Float[np.ndarray, "n"]:
-    """Weibull's law from exponential numbers of mean 1, m^2."""
-    return mean / gamma(1 + 1 / exponent) * size ** (1 / exponent)
-
-
-def _points(place: _Places, size: _Numbers, left: _Numbers, rng: np.random.Generator) -> Scatterers:
-    """Isotropic ones."""
-    sigma = cross_section(size, CROSS_SECTION, EXPONENT) * left
-    once, twice = (_strongest(size, stride, EXPONENT) for stride in (BOUNCE_STRIDE, BOUNCE_STRIDE**2))
-    phase = rng.uniform(0, 2 * np.pi, len(size))
-    return replace(Scatterers.points(place, sigma, phase), bounces=once, bounces_twice=twice)
-
-
-def _corners(place: _Places, size: _Numbers, left: _Numbers, rng: np.random.Generator) -> Scatterers:
-    """Those that echo back."""
-    sigma = cross_section(size, CORNER, CORNER_EXPONENT) * left
-    once, twice = (_strongest(size, stride, CORNER_EXPONENT) for stride in (BOUNCE_STRIDE, BOUNCE_STRIDE**2))
-    phase = rng.uniform(0, 2 * np.pi, len(size))
-    return replace(
-        Scatterers.points(place, sigma, phase), bounces=once, bounces_twice=twice,
-        lobe=np.tile([0.0, 0.0, 1.0, LOBE_EXPONENT], (len(size), 1)), extended=np.sqrt(sigma / (np.pi * REFLECTIVITY)),
-    )  # fmt: skip
-
-
-def _strongest(size: _Numbers, stride: int, exponent: float) -> _Numbers:
-    """Weights of power where one point in `stride`, the strongest ones, stands for all; mean power stays."""
-    least = log(stride)
-    held = gammaincc(1 + 1 / exponent, least)  # share of the mean cross section that they have
-    return (size > least) / held

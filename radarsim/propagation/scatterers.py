@@ -70,8 +70,8 @@ def extended_factor(extended, distance):
     """What an extended reflector leaves of the amplitude of a one-way path.
 
     A flat one of area A and power reflectivity R has sigma = 4 pi R A^2 / lambda^2 far away, and is a mirror with an
-    echo of pi R r^2 near by. Between, the powers of 1 / sigma and 1 / (pi R r^2) add up; they are equal at `extended`,
-    sqrt(sigma / (pi R)). The square root of that, for a way out and a way back each.
+    echo of pi R r^2 near by. Between, 1 / sigma and 1 / (pi R r^2) add up here, without Fresnel's ripples; they are
+    equal at `extended`, sqrt(sigma / (pi R)). This is the fourth root, for the amplitude of a way out or back.
     """
     ratio = extended / distance
     return (1.0 + ratio * ratio) ** -0.25

@@ -27,8 +27,8 @@ CONFIG = PRESETS["radarhd"].model_copy(update={"loops": 1})
 OFFSETS, BURSTS = np.array([0, 1, 4, 20, 24]), 40
 #: s, between frames of a burst; s, of a simulated walk.
 TIMES, DURATION = OFFSETS * CONFIG.frame_period, 60.0
-#: m/s, of the real walks on average (1,009 m in 42,116 frames), and of a cart. Nothing moves but the radar, so frames as
-#: much nearer in time are as far apart in space as the real ones.
+#: m/s, of the real walks on average (1,009 m in 42,116 frames), and of a cart. Nothing moves but the radar, so frames
+#: as much nearer in time are as far apart in space as the real ones.
 REAL_SPEED, CART_SPEED = 0.48, PLATFORMS["cart"].speed
 
 Bursts = UInt8[np.ndarray, "burst frame range azimuth"]

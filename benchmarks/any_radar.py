@@ -60,7 +60,6 @@ def main(options: argparse.Namespace) -> Page:
         networks=(*former.used(TOLD), *shipped.used(TOLD)),
         notes=[
             "Recordings end in the name of their variant (scenes/datasets/any-radar.yaml). These walks chose the epoch "
-            "of the shipped networks, and calibrated them. Buildings from 611 on are bare, as are all from which the "
-            "former networks learned.",
+            "of the shipped networks, and calibrated them. The former networks learned from bare buildings alone.",
         ],
     )

@@ -15,7 +15,7 @@ from radarsim.sensors.scan import Cell, Occupancy
 from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"]
-SCENES = ("office", "lived_in", "buildings/a", "buildings/c")
+SCENES = ("office", "buildings/a", "buildings/c")
 #: Where a cell lies, by its state in the horizontal plane.
 WHERE = {"before the first surface": Cell.FREE, "at it": Cell.SURFACE, "behind it": Cell.UNKNOWN}
 

@@ -34,7 +34,8 @@ def main(options: argparse.Namespace) -> Page:
     office, other, rows = Scene.load("office"), options.seed + 6, []
 
     def all_of(material: str) -> Scene:
-        return Scene("office", [replace(each, material=MATERIALS[material]) for each in office.objects])
+        objects = [replace(each, material=MATERIALS[material]) for each in office.objects]
+        return Scene("office", objects, surface_settings=office.surface_settings)
 
     twins: list[tuple[str, Scene, Change | None, int]] = [
         ("the same again", office, None, options.seed),

@@ -68,9 +68,11 @@ def trajectory_and_map(run: Path) -> plt.Figure:
 
 
 def scenes() -> None:
-    """Plans and renderings of the office and of a floor of each style."""
-    for name in ("office", *(f"buildings/{kind}" for kind in "abcd")):
-        for path in preview(Scene.load(name), HERE, samples=64):
+    """Plans and renderings of the office, of the same one without clutter, and of a floor of each style."""
+    bare = {"building": {"kind": "office", "seed": 7}, "clutter": 0, "unevenness": 0}
+    drawn = [Scene.load(name) for name in ("office", *(f"buildings/{kind}" for kind in "abcd"))]
+    for scene in (*drawn, Scene.of(bare, "office_bare")):
+        for path in preview(scene, HERE, samples=64):
             small = Image.open(path).convert("RGB")
             small.thumbnail((900, 900))
             small.quantize(96).save(path, optimize=True)

@@ -180,7 +180,7 @@ def info(scene: SceneName) -> None:
     settings = loaded.surface_settings
     print(f"clutter: {settings.clutter:g}, unevenness: {settings.unevenness:g}")
     if settings == IDEAL:
-        print("This scene is bare. `clutter: 1` and `unevenness: 1` in its file make it like a room in use.")
+        print("This scene is bare. `clutter: 1` and `unevenness: 1` in its file furnish it.")
 
 
 @scene_app.command()

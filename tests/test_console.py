@@ -93,7 +93,11 @@ def test_an_imported_part_keeps_its_name_whole(printed, tmp_path, monkeypatch):
 
 
 def test_a_scene_and_the_list_of_benchmarks(printed):
-    assert {"plasterboard", "triangles", "objects"} <= set(printed(radarsim.cli.app, "scene", "info", "office"))
+    words = printed(radarsim.cli.app, "scene", "info", "office")
+    assert {"plasterboard", "triangles", "objects"} <= set(words)
+    assert "clutter: 1, unevenness: 1" in " ".join(words) and "bare" not in words
+    words = " ".join(printed(radarsim.cli.app, "scene", "info", "physics/room"))
+    assert "clutter: 0, unevenness: 0" in words and "`clutter: 1` and `unevenness: 1`" in words
     assert {"odometry-platforms", "(RadarHD's", "repository)."} <= set(printed(radarize.cli.app, "benchmark", "list"))
 
 

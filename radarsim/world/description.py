@@ -24,9 +24,9 @@ Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
 ``clutter`` and ``unevenness`` are the clutter and roughness settings (`SurfaceSettings`): 1, the default of buildings,
 as in rooms that are in use; 0, the default of scenes without a building, bare, flat and square. With clutter the scene
-has more objects (`small_objects`). ``furniture`` is the number of pieces in a building's rooms, as a share of the
-usual; ``materials`` has factors of materials' permittivity and conductivity: ``{wood: {permittivity: 1.1}}``.
-``interferers`` are other radars that send there (`interferers`); levels change and add them, too.
+has more objects (`small_objects`). ``furniture`` is the number of pieces in a building's rooms as a share of the usual;
+``materials`` has factors of materials' permittivity and conductivity: ``{wood: {permittivity: 1.1}}``. ``interferers``
+are other radars that send there (`interferers`); levels change and add them, too.
 """
 
 import re

@@ -31,7 +31,7 @@ def office():
     )
     office = [
         replace(item, material=MATERIALS["metal"])
-        for item in Scene.load("office").objects
+        for item in Scene.of({"building": {"kind": "office", "seed": 7}, "clutter": 0, "unevenness": 0}, "o").objects
         if not item.name.endswith("frame")
     ]
     scene = Scene("metal", [*office, cabinet])

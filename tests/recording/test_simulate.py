@@ -94,9 +94,9 @@ def test_iq_by_cause_adds_up(tmp_path):
 
 @pytest.mark.parametrize(("name", "size"), [("corridor", (40, 9.6)), ("floor", (50, 30))])
 def test_large_scenes_can_be_walked(name, size):
-    """The benchmark's buildings have their size, and a tour through them."""
+    """The benchmark's buildings have their size, but for corners out of square, and a tour through them."""
     scene = Scene.load(name)
-    assert np.ptp(scene.bounds, axis=0)[:2] == pytest.approx(size)
+    assert np.ptp(scene.bounds, axis=0)[:2] == pytest.approx(size, rel=0.005)
     assert plan_motion(scene, "handheld", 5.0, np.random.default_rng(0)).duration == 5.0
 
 

@@ -174,11 +174,20 @@ def test_mistakes_in_levels(tmp_path, level, text, complaint):
     ("text", "settings"),
     [
         (f"objects: [{WALL}]", SurfaceSettings(0, 0)),
-        ("building: {kind: office}", SurfaceSettings(0, 0)),
-        ("building: {kind: B, seed: 3}\nclutter: 1", SurfaceSettings(1, 0)),
         (f"objects: [{WALL}]\nclutter: 0.5\nunevenness: 2", SurfaceSettings(0.5, 2)),
+        (
+            f"objects: [{WALL}]\nunevenness: 1\nlevels: [objects: [{{name: wall, material: wood}}]]",
+            SurfaceSettings(0, 1),
+        ),
+        ("building: {kind: office}", SurfaceSettings(1, 1)),
+        (f"objects: [{WALL}]\nbuilding: {{kind: office}}", SurfaceSettings(1, 1)),
+        ("building: {kind: B, seed: 3}\nclutter: 0.5", SurfaceSettings(0.5, 1)),
+        ("building: {kind: B, seed: 3}\nunevenness: 0", SurfaceSettings(1, 0)),
+        ("building: {kind: office}\nclutter: 0\nunevenness: 0", SurfaceSettings(0, 0)),
     ],
 )
 def test_clutter_and_unevenness(tmp_path, text, settings):
-    """None by default."""
+    """1 by default of what has a building, 0 of objects alone; what is given counts, 0 too, at every level."""
     assert load(tmp_path, text).surface_settings == settings
+    if "levels" in text:
+        assert Scene.load(f"{tmp_path / 'scene.yaml'}@1").surface_settings == settings

@@ -148,13 +148,12 @@ def test_as_many_as_asked_for():
 
 
 def test_without_clutter_it_is_the_drawing(drawn):
-    described = {"building": {"kind": "B", "seed": 3}}
-    assert bytes_of(Scene.of(described, "b").objects) == bytes_of(drawn["B"])
-    assert bytes_of(Scene.of(described | {"clutter": 0}, "b").objects) == bytes_of(drawn["B"])
+    bare = {"building": {"kind": "B", "seed": 3}, "clutter": 0, "unevenness": 0}
+    assert bytes_of(Scene.of(bare, "b").objects) == bytes_of(drawn["B"])
 
 
 def test_same_surfaces_same_small_objects(drawn):
-    lived = Scene.of({"building": {"kind": "office", "seed": 7}, "clutter": 1}, "office")
+    lived = Scene.of({"building": {"kind": "office", "seed": 7}, "unevenness": 0}, "office")
     own = small_objects(drawn["office"], 1.0)
     assert own
     assert bytes_of(lived.objects) == bytes_of(drawn["office"] + own)

@@ -39,7 +39,7 @@ _FEW, _MANY = ((np.polynomial.legendre.leggauss(n) + np.array([[1.0], [0.0]])) /
 
 def specular_points(flat: Flat, observation: Observation, frame: int) -> SpecularPoints:
     """Specular points, edges and corners of all facets above the threshold in one frame."""
-    return filled(SpecularPoints, lambda found: _specular_points(flat.columns, observation, frame, found.columns), 1024)
+    return filled(SpecularPoints, lambda found: _specular_points(flat.columns, observation, frame, found.columns))
 
 
 @njit(cache=True)

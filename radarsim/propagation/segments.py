@@ -7,7 +7,7 @@ segment has bounds: the part of the body's axis that the mirror's aperture shows
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from numba import njit
 
 from radarsim.propagation.apertures import SLIT, STRIP_FAR
@@ -41,7 +41,7 @@ class Segments(NamedTuple):
         span: the part of the axis, from its middle, to which it leads at most, m.
         place: of the image, from the body's middle along its axis, and away from the axis, m.
         aside: unit vector from the axis to the image.
-        cut: whether the mirror may hide the lower and the upper end.
+        ends: of what the mirror does not cut off of the axis: the lower end at least and at most, and the upper one, m.
         most: gain times what the aperture passes, at most.
     """
 
@@ -50,7 +50,7 @@ class Segments(NamedTuple):
     span: Float[np.ndarray, "segment 2"]
     place: Float[np.ndarray, "segment 2"]
     aside: Float[np.ndarray, "segment 3"]
-    cut: Bool[np.ndarray, "segment 2"]
+    ends: Float[np.ndarray, "segment 4"]
     most: Float[np.ndarray, "segment"]
 
 
@@ -59,14 +59,69 @@ def empty_segments(count):
     """Segments for `fill`."""
     return Segments(
         np.empty(count, np.int64), np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2)),
-        np.empty((count, 3)), np.empty((count, 2), np.bool_), np.empty(count),
+        np.empty((count, 3)), np.empty((count, 4)), np.empty(count),
     )  # fmt: skip
 
 
-@njit
-def fill(observation, frame, flat, seen, capsule, segments):
-    """Fill in the segments of a frame that may lead to a body, the straight one first, over mirrors in sight (`seen`);
-    return how many there are, 0 if the body is out of range."""
+class Images(NamedTuple):
+    """The radar of one frame as seen in mirrors in sight.
+
+    Attributes:
+        mirror: index of each.
+        image: where the radar is seen in it, m.
+        height: of the radar over it, m.
+        away: its normal on the radar's side.
+        u, v, half: of the reflector (`reflectors.Flat`).
+        foot: the image from the reflector's middle, along u and v, m.
+        forward: what `away` has of the radar's forward direction.
+    """
+
+    mirror: Int[np.ndarray, "image"]
+    image: Float[np.ndarray, "3 image"]
+    height: Float[np.ndarray, "image"]
+    away: Float[np.ndarray, "3 image"]
+    u: Float[np.ndarray, "3 image"]
+    v: Float[np.ndarray, "3 image"]
+    half: Float[np.ndarray, "2 image"]
+    foot: Float[np.ndarray, "2 image"]
+    forward: Float[np.ndarray, "image"]
+
+
+@njit(cache=True)
+def images(observation, frame, flat, seen):
+    """Images of the radar of a frame in mirrors in sight (`seen`) that it does not touch."""
+    p, rotation, count = vec(observation.position[frame]), observation.rotation[frame], 0
+    n = len(seen)
+    found = Images(
+        np.empty(n, np.int64), np.empty((3, n)), np.empty(n), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)),
+        np.empty((2, n)), np.empty((2, n)), np.empty(n),
+    )  # fmt: skip
+    for m in seen:
+        away, u, v = vec(flat.normal[m]), vec(flat.u[m]), vec(flat.v[m])
+        height = dot(minus(p, vec(flat.center[m])), away)
+        if abs(height) < 0.01:
+            continue
+        if height < 0:
+            away, height = (-away[0], -away[1], -away[2]), -height
+        image = along(p, -2 * height, away)
+        foot = minus(image, vec(flat.center[m]))
+        found.mirror[count], found.height[count] = m, height
+        write(image, found.image[:, count])
+        write(away, found.away[:, count])
+        write(u, found.u[:, count])
+        write(v, found.v[:, count])
+        found.half[0, count], found.half[1, count] = flat.half[m]
+        found.foot[0, count], found.foot[1, count] = dot(foot, u), dot(foot, v)
+        found.forward[count] = dot(away, (rotation[0, 0], rotation[1, 0], rotation[2, 0]))
+        count += 1
+    found.mirror[count:] = -1
+    return found
+
+
+@njit(cache=True)
+def fill(observation, frame, flat, images, capsule, segments):
+    """Fill in the segments of a frame that may lead to a body, the straight one first, over mirrors in sight; return
+    how many there are, 0 if the body is out of range."""
     center, axis, half, radius = capsule
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
     forward = rotation[0, 0], rotation[1, 0], rotation[2, 0]
@@ -75,27 +130,76 @@ def fill(observation, frame, flat, seen, capsule, segments):
     span = clip((-half, half), -dot(minus(center, p), forward), -dot(axis, forward), radius)
     _write(segments, 0, -1, p, capsule, span)
     segments.most[0] = _gain(observation, frame, p, (p, (0.0, 0.0, 0.0)), span, capsule)
-    segments.cut[0] = False
-    count = 1
-    for m in seen:
-        n = vec(flat.normal[m])
-        height = dot(minus(p, vec(flat.center[m])), n)
-        away = n if height > 0 else (-n[0], -n[1], -n[2])
-        height, level, rise = abs(height), dot(minus(center, vec(flat.center[m])), away), dot(axis, away)
-        if height < 0.01 or level + radius + half < 0.01:
+    segments.ends[0] = -half, -half, half, half
+    count, worth = 1, np.empty(len(images.mirror), np.bool_)
+    _look(observation, images, capsule, (p, forward), worth)
+    for k in range(len(worth)):
+        m = images.mirror[k]
+        if not worth[k] or m < 0:
             continue
-        image = along(p, -2 * height, away)
-        span = _span(observation, flat, m, (image, height, level, rise), capsule, (forward, dot(away, forward)))
+        image, height, away = vec(images.image[:, k]), images.height[k], vec(images.away[:, k])
+        level, rise = dot(minus(center, image), away) - height, dot(axis, away)
+        span = _span(observation, flat, m, (image, height, level, rise), capsule, (forward, images.forward[k]))
         if span[0] > span[1]:
             continue
         _write(segments, count, m, image, capsule, span)
-        cut = level - half * abs(rise) < radius
-        segments.cut[count, 0], segments.cut[count, 1] = cut and rise > 0, cut and rise < 0
+        around = radius * np.sqrt(max(1 - rise * rise, 0.0))  # a line on the body is at most so much nearer
+        segments.ends[count] = -half, -half, half, half
+        for end in range(2):
+            low, high = clip((-half, half), -level, -rise, (1 - 2 * end) * around)
+            if rise > 1e-9:
+                segments.ends[count, end] = low
+            elif rise < -1e-9:
+                segments.ends[count, 3 - end] = high
         passed = _passed(observation, flat, m, (height, level, rise), capsule, segments.place[count])
-        mirror = vec(flat.center[m]), n
+        mirror = vec(flat.center[m]), vec(flat.normal[m])
         segments.most[count] = passed * _gain(observation, frame, p, mirror, span, capsule)
         count += 1
     return count
+
+
+@njit(cache=True, error_model="numpy")
+def _look(observation, images, capsule, radar, worth):
+    """Over which mirrors light may reach a body: a quick look at all of them, with `_span`'s bounds taken one by one
+    and Fresnel zones as long as they are in the plane of incidence."""
+    center, axis, half, radius = capsule
+    here, forward = radar
+    reach = 2 * observation.range - length(minus(center, here)) + 2 * (half + radius)
+    ahead, zone = dot(axis, forward), STRIP_FAR * STRIP_FAR * 0.5 * observation.wavelength
+    x, y, z = images.image
+    nx, ny, nz = images.away
+    ux, uy, uz = images.u
+    vx, vy, vz = images.v
+    half_u, half_v = images.half
+    foot_u, foot_v = images.foot
+    for k in range(len(worth)):
+        dx, dy, dz, height = center[0] - x[k], center[1] - y[k], center[2] - z[k], images.height[k]
+        full, far = dx * nx[k] + dy * ny[k] + dz * nz[k], np.sqrt(dx * dx + dy * dy + dz * dz)
+        rise = axis[0] * nx[k] + axis[1] * ny[k] + axis[2] * nz[k]
+        ends = half * abs(rise) + radius
+        farthest, nearest, longest = full + ends, max(full - ends, height), far + half + radius
+        share = min(1 - height / farthest, 0.5)
+        wide = longest * np.sqrt(zone * longest * share * (1 - share)) / nearest
+        window_u, window_v = half_u[k] + wide, half_v[k] + wide
+        aside_u, aside_v = dx * ux[k] + dy * uy[k] + dz * uz[k], dx * vx[k] + dy * vy[k] + dz * vz[k]
+        turn_u = height * (axis[0] * ux[k] + axis[1] * uy[k] + axis[2] * uz[k])
+        turn_v = height * (axis[0] * vx[k] + axis[1] * vy[k] + axis[2] * vz[k])
+        off_u, off_v = foot_u[k] * full + height * aside_u, foot_v[k] * full + height * aside_v
+        slack_u = radius * (height + abs(foot_u[k]) + window_u) + window_u * full
+        slack_v = radius * (height + abs(foot_v[k]) + window_v) + window_v * full
+        low_u, high_u = (foot_u[k] - window_u) * rise + turn_u, (foot_u[k] + window_u) * rise + turn_u
+        low_v, high_v = (foot_v[k] - window_v) * rise + turn_v, (foot_v[k] + window_v) * rise + turn_v
+        out = -2 * height * images.forward[k]
+        begin = out * full + height * (dx * forward[0] + dy * forward[1] + dz * forward[2])
+        worth[k] = (
+            (farthest > height)
+            & (far < reach)
+            & (off_u - half * abs(low_u) < slack_u)
+            & (-off_u - half * abs(high_u) < slack_u)
+            & (off_v - half * abs(low_v) < slack_v)
+            & (-off_v - half * abs(high_v) < slack_v)
+            & (begin + half * abs(out * rise + height * ahead) + 3 * height * radius > 0)
+        )
 
 
 @njit
@@ -199,22 +303,29 @@ def matched(observation, capsule, segments, i, j):
     if low > high:
         return False
     d1, d2, z, spread = segments.place[i, 1], segments.place[j, 1], 0.0, 0.0
+    one, two = segments.ends[i], segments.ends[j]
+    ends = max(one[0], two[0]), max(one[1], two[1]), min(one[2], two[2]), min(one[3], two[3])
     if half > 0:
         slope = (segments.place[j, 0] - segments.place[i, 0]) / (d1 + d2)
         z, spread = segments.place[i, 0] + slope * d1, abs(slope) * radius
-        if not (segments.cut[i, 0] or segments.cut[j, 0]) and max(z + spread, INSIDE - half) < low:
-            return False
-        if not (segments.cut[i, 1] or segments.cut[j, 1]) and min(z - spread, half - INSIDE) > high:
+        if aim(z + spread, ends[1], ends[3]) < low or aim(z - spread, ends[0], ends[2]) > high:
             return False
     if min(d1, d2) < _THIN * radius:
         return True
     r1, r2 = np.hypot(d1, segments.place[i, 0] - z), np.hypot(d2, segments.place[j, 0] - z)
     slant, path = min(d1 / r1, d2 / r2), r1 + r2
     zone = np.sqrt(observation.wavelength * r1 * r2 / (2 * path)) / slant
-    if path - 2 * radius > 2 * observation.range or abs(z) - half > _ZONES * zone + spread:
+    if path - 2 * radius > 2 * observation.range or max(ends[0] - z, z - ends[3]) > _ZONES * zone + spread:
         return False
     between = dot(vec(segments.aside[i]), vec(segments.aside[j]))
     cosine = np.sqrt(max(1 + between, 0.0) / 2) * slant
     growth = max(cosine - 1 / _THIN, 0.0) * 2 / radius * r1 * r2 / path
     most = segments.most[i] * segments.most[j] * observation.wavelength / (4 * np.pi * path)
     return _SAFE * most > observation.threshold * np.sqrt(1 + growth)
+
+
+@njit
+def aim(z, low, high):
+    """Where on a lit part of an axis rays aim at whose specular point is at z; grows with all three."""
+    middle = (low + high) / 2
+    return min(max(z, min(low + INSIDE, middle)), max(high - INSIDE, middle))

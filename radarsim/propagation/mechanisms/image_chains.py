@@ -153,7 +153,7 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observatio
     """
     pairs = pairs[np.lexsort(pairs.T)]
     orders = _Orders(np.searchsorted(pairs[:, 1], np.arange(len(flat) + 1)), np.ascontiguousarray(pairs[:, 0]))
-    return filled(Chains, lambda found: _search(observation, frame, flat.columns, orders, found.columns), 1024)
+    return filled(Chains, lambda found: _search(observation, frame, flat.columns, orders, found.columns))
 
 
 @njit(cache=True)

@@ -37,11 +37,12 @@ from radarsim.propagation.fields import (
     write,
 )  # fmt: skip
 from radarsim.propagation.fresnelzone import LEAST_LOSS
+from radarsim.propagation.mirror_images import images
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.patches import strength
 from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat, Reflectors
-from radarsim.propagation.segments import Capsule, aim, clip, empty_segments, fill, images, matched
+from radarsim.propagation.segments import Capsule, aim, clip, empty_segments, fill, matched
 from radarsim.propagation.table import Table, filled
 
 #: Steps to the point between two images (`curved.halving`).

@@ -39,7 +39,7 @@ _FEW, _MANY = ((np.polynomial.legendre.leggauss(n) + np.array([[1.0], [0.0]])) /
 
 def specular_points(flat: Flat, observation: Observation, frame: int) -> SpecularPoints:
     """Specular points, edges and corners of all facets above the threshold in one frame."""
-    return filled(SpecularPoints, lambda found: _specular_points(flat.columns, observation, frame, found.columns), 1024)
+    return filled(SpecularPoints, lambda found: _specular_points(flat.columns, observation, frame, found.columns))
 
 
 @njit(cache=True)
@@ -91,15 +91,18 @@ def _specular_points(flat, observation, frame, found):
                 rho = np.hypot(slant, x)
                 if rho >= reach:
                     continue
-                towards = minus(vec(corners[f, end]), p)
-                scale = mirror * gain_towards(towards, rotation, observation) ** 2
                 least = h * h * abs(s) / (rho * (s * s + x * x) * abs(x) + 1e-12) * wavelength / (8 * np.pi**2)
-                if min(least, 0.25) * scale > 0.1 * weakest:
+                most = min(least, 0.25) * mirror
+                if most * observation.peak_gain**2 <= 0.1 * weakest:
+                    continue
+                if most * gain_towards(minus(vec(corners[f, end]), p), rotation, observation) ** 2 > 0.1 * weakest:
                     value[end] -= sign * np.sign(x) * _beyond(h, s, slant, abs(x), wavelength)
             if low < 0 < high and slant < reach:
+                least = h * h * np.sqrt(wavelength * slant / 2) / (slant * slant * abs(s)) / (2 * np.pi)
+                if min(least, 0.5) * mirror * observation.peak_gain**2 <= weakest:
+                    continue
                 point = along(foot, s, out)
                 scale = mirror * gain_towards(minus(point, p), rotation, observation) ** 2
-                least = h * h * np.sqrt(wavelength * slant / 2) / (slant * slant * abs(s)) / (2 * np.pi)
                 if min(least, 0.5) * scale > weakest:
                     own = -2 * _beyond(h, s, slant, 0.0, wavelength)
                     if abs(own) * scale > weakest:

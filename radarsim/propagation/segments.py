@@ -7,11 +7,12 @@ segment has bounds: the part of the body's axis that the mirror's aperture shows
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from numba import njit
 
 from radarsim.propagation.apertures import SLIT, STRIP_FAR
 from radarsim.propagation.fields import along, dot, gain_towards, length, minus, mirrored, unit, vec, write
+from radarsim.propagation.mirror_images import look
 
 #: m: the point at which rays aim lies at least so far within the lit part of an axis.
 INSIDE = 0.01
@@ -41,7 +42,7 @@ class Segments(NamedTuple):
         span: the part of the axis, from its middle, to which it leads at most, m.
         place: of the image, from the body's middle along its axis, and away from the axis, m.
         aside: unit vector from the axis to the image.
-        cut: whether the mirror may hide the lower and the upper end.
+        ends: of what the mirror does not cut off of the axis: the lower end at least and at most, and the upper one, m.
         most: gain times what the aperture passes, at most.
     """
 
@@ -50,7 +51,7 @@ class Segments(NamedTuple):
     span: Float[np.ndarray, "segment 2"]
     place: Float[np.ndarray, "segment 2"]
     aside: Float[np.ndarray, "segment 3"]
-    cut: Bool[np.ndarray, "segment 2"]
+    ends: Float[np.ndarray, "segment 4"]
     most: Float[np.ndarray, "segment"]
 
 
@@ -59,14 +60,14 @@ def empty_segments(count):
     """Segments for `fill`."""
     return Segments(
         np.empty(count, np.int64), np.empty((count, 3)), np.empty((count, 2)), np.empty((count, 2)),
-        np.empty((count, 3)), np.empty((count, 2), np.bool_), np.empty(count),
+        np.empty((count, 3)), np.empty((count, 4)), np.empty(count),
     )  # fmt: skip
 
 
-@njit
-def fill(observation, frame, flat, seen, capsule, segments):
-    """Fill in the segments of a frame that may lead to a body, the straight one first, over mirrors in sight (`seen`);
-    return how many there are, 0 if the body is out of range."""
+@njit(cache=True)
+def fill(observation, frame, flat, images, capsule, segments):
+    """Fill in the segments of a frame that may lead to a body, the straight one first, over mirrors in sight; return
+    how many there are, 0 if the body is out of range."""
     center, axis, half, radius = capsule
     p, rotation = vec(observation.position[frame]), observation.rotation[frame]
     forward = rotation[0, 0], rotation[1, 0], rotation[2, 0]
@@ -75,24 +76,29 @@ def fill(observation, frame, flat, seen, capsule, segments):
     span = clip((-half, half), -dot(minus(center, p), forward), -dot(axis, forward), radius)
     _write(segments, 0, -1, p, capsule, span)
     segments.most[0] = _gain(observation, frame, p, (p, (0.0, 0.0, 0.0)), span, capsule)
-    segments.cut[0] = False
-    count = 1
-    for m in seen:
-        n = vec(flat.normal[m])
-        height = dot(minus(p, vec(flat.center[m])), n)
-        away = n if height > 0 else (-n[0], -n[1], -n[2])
-        height, level, rise = abs(height), dot(minus(center, vec(flat.center[m])), away), dot(axis, away)
-        if height < 0.01 or level + radius + half < 0.01:
+    segments.ends[0] = -half, -half, half, half
+    count, worth = 1, np.empty(len(images.mirror), np.bool_)
+    look(observation, images, capsule, (p, forward), worth)
+    for k in range(len(worth)):
+        m = images.mirror[k]
+        if not worth[k] or m < 0:
             continue
-        image = along(p, -2 * height, away)
-        span = _span(observation, flat, m, (image, height, level, rise), capsule, (forward, dot(away, forward)))
+        image, height, away = vec(images.image[:, k]), images.height[k], vec(images.away[:, k])
+        level, rise = dot(minus(center, image), away) - height, dot(axis, away)
+        span = _span(observation, flat, m, (image, height, level, rise), capsule, (forward, images.forward[k]))
         if span[0] > span[1]:
             continue
         _write(segments, count, m, image, capsule, span)
-        cut = level - half * abs(rise) < radius
-        segments.cut[count, 0], segments.cut[count, 1] = cut and rise > 0, cut and rise < 0
+        around = radius * np.sqrt(max(1 - rise * rise, 0.0))  # a line on the body is at most so much nearer
+        segments.ends[count] = -half, -half, half, half
+        for end in range(2):
+            low, high = clip((-half, half), -level, -rise, (1 - 2 * end) * around)
+            if rise > 1e-9:
+                segments.ends[count, end] = low
+            elif rise < -1e-9:
+                segments.ends[count, 3 - end] = high
         passed = _passed(observation, flat, m, (height, level, rise), capsule, segments.place[count])
-        mirror = vec(flat.center[m]), n
+        mirror = vec(flat.center[m]), vec(flat.normal[m])
         segments.most[count] = passed * _gain(observation, frame, p, mirror, span, capsule)
         count += 1
     return count
@@ -199,22 +205,29 @@ def matched(observation, capsule, segments, i, j):
     if low > high:
         return False
     d1, d2, z, spread = segments.place[i, 1], segments.place[j, 1], 0.0, 0.0
+    one, two = segments.ends[i], segments.ends[j]
+    ends = max(one[0], two[0]), max(one[1], two[1]), min(one[2], two[2]), min(one[3], two[3])
     if half > 0:
         slope = (segments.place[j, 0] - segments.place[i, 0]) / (d1 + d2)
         z, spread = segments.place[i, 0] + slope * d1, abs(slope) * radius
-        if not (segments.cut[i, 0] or segments.cut[j, 0]) and max(z + spread, INSIDE - half) < low:
-            return False
-        if not (segments.cut[i, 1] or segments.cut[j, 1]) and min(z - spread, half - INSIDE) > high:
+        if aim(z + spread, ends[1], ends[3]) < low or aim(z - spread, ends[0], ends[2]) > high:
             return False
     if min(d1, d2) < _THIN * radius:
         return True
     r1, r2 = np.hypot(d1, segments.place[i, 0] - z), np.hypot(d2, segments.place[j, 0] - z)
     slant, path = min(d1 / r1, d2 / r2), r1 + r2
     zone = np.sqrt(observation.wavelength * r1 * r2 / (2 * path)) / slant
-    if path - 2 * radius > 2 * observation.range or abs(z) - half > _ZONES * zone + spread:
+    if path - 2 * radius > 2 * observation.range or max(ends[0] - z, z - ends[3]) > _ZONES * zone + spread:
         return False
     between = dot(vec(segments.aside[i]), vec(segments.aside[j]))
     cosine = np.sqrt(max(1 + between, 0.0) / 2) * slant
     growth = max(cosine - 1 / _THIN, 0.0) * 2 / radius * r1 * r2 / path
     most = segments.most[i] * segments.most[j] * observation.wavelength / (4 * np.pi * path)
     return _SAFE * most > observation.threshold * np.sqrt(1 + growth)
+
+
+@njit
+def aim(z, low, high):
+    """Where on a lit part of an axis rays aim at whose specular point is at z; grows with all three."""
+    middle = (low + high) / 2
+    return min(max(z, min(low + INSIDE, middle)), max(high - INSIDE, middle))

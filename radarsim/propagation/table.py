@@ -65,13 +65,13 @@ class Table:
 Rows = TypeVar("Rows", bound=Table)
 
 
-def filled(table: type[Rows], fill: Callable[[Rows], int], size: int) -> Rows:
+def filled(table: type[Rows], fill: Callable[[Rows], int], size: int = 4096) -> Rows:
     """A table of as many rows as there turn out to be.
 
     Args:
         table: its type.
         fill: writes as many rows as fit; returns how many there are.
-        size: rows to begin with.
+        size: rows to begin with; where there are more, `fill` has to begin anew.
     """
     while True:
         found = table.zeros(size)

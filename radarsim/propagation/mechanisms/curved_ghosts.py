@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Complex, Float, Int
 from numba import njit
 
-from radarsim.propagation.apertures import STRIP_FAR, aperture, passes, strip
+from radarsim.propagation.apertures import STRIP_FAR, aperture, misses, passes, strip
 from radarsim.propagation.curved import grazes, growth, halving
 from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
@@ -37,11 +37,12 @@ from radarsim.propagation.fields import (
     write,
 )  # fmt: skip
 from radarsim.propagation.fresnelzone import LEAST_LOSS
+from radarsim.propagation.mirror_images import images
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.patches import strength
 from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat, Reflectors
-from radarsim.propagation.segments import INSIDE, Capsule, clip, empty_segments, fill, matched
+from radarsim.propagation.segments import Capsule, aim, clip, empty_segments, fill, matched
 from radarsim.propagation.table import Table, filled
 
 #: Steps to the point between two images (`curved.halving`).
@@ -96,13 +97,13 @@ def ghosts(
 ) -> CurvedGhosts:
     """Ghosts over a mirror on one way or on both, above the threshold, not yet tested for what is in the way."""
     curved = reflectors.round.columns, reflectors.smooth
-    return filled(CurvedGhosts, lambda found: _find(observation, frame, flat.columns, seen, curved, found.columns), 256)
+    return filled(CurvedGhosts, lambda found: _find(observation, frame, flat.columns, seen, curved, found.columns))
 
 
 @njit(cache=True)
 def _find(observation, frame, flat, seen, curved, found):
     """Returns how many there are, of which as many as fit are written."""
-    count, segments = 0, empty_segments(len(seen) + 1)
+    count, segments, mirrored_radar = 0, empty_segments(len(seen) + 1), images(observation, frame, flat, seen)
     bodies, patches = curved
     for b in range(len(bodies.radius) + len(patches.ball)):
         k = b - len(bodies.radius)
@@ -111,7 +112,7 @@ def _find(observation, frame, flat, seen, curved, found):
         else:
             capsule = Capsule(vec(patches.ball[k]), (0.0, 0.0, 0.0), 0.0, patches.ball[k, 3])
             sides = 2 if patches.two_sided[k] else 1
-        total = fill(observation, frame, flat, seen, capsule, segments)
+        total = fill(observation, frame, flat, mirrored_radar, capsule, segments)
         for i in range(total):
             for j in range(max(i, 1), total):
                 if not matched(observation, capsule, segments, i, j):
@@ -119,14 +120,14 @@ def _find(observation, frame, flat, seen, curved, found):
                 way = segments.mirror[i], vec(segments.image[i]), segments.mirror[j], vec(segments.image[j])
                 for turn in range(sides):
                     if k < 0:
-                        place, aim, n, size = _strength(observation, flat, bodies, b, way)
+                        place, lit, n, size = _strength(observation, flat, bodies, b, way)
                         layer = bodies.layer[b]
                     else:
-                        aim, quadric, place, size = strength(
+                        lit, quadric, place, size = strength(
                             observation, patches, (k, 1.0 - 2.0 * turn), way[1], way[3]
                         )
                         n, layer = quadric[2], patches.layer[k]
-                    count += _add(observation, frame, flat, way, (place, aim, n, size, layer), (found, count))
+                    count += _add(observation, frame, flat, way, (place, lit, n, size, layer), (found, count))
     return count
 
 
@@ -140,19 +141,27 @@ def _add(observation, frame, flat, way, echo, found):
         echo: place P, a lit point for rays to aim at, normal, amplitude from image to image, layer.
         found: ghosts so far, and how many.
     """
-    one, source, two, sink = way
-    place, aim, n, size, layer = echo
+    (one, source, two, sink), p = way, vec(observation.position[frame])
+    place, lit, n, size, layer = echo
     ghosts, count = found
     if abs(size) * observation.peak_gain**2 <= observation.threshold:
         return 0
-    out, back = _segment(observation, frame, flat, one, source, aim), _segment(observation, frame, flat, two, sink, aim)
-    value = size * out[1] * back[1]
+    back = _stop(observation, flat, two, sink, lit)
+    if not back[0]:
+        return 0
+    out = _stop(observation, flat, one, source, lit)
+    if not out[0]:
+        return 0
+    for m, (_, stop, direction, square) in ((one, out), (two, back)):
+        size *= gain_towards(minus(stop, p), observation.rotation[frame], observation)
+        if m >= 0:
+            size *= passes(stop, direction, square, aperture(flat, m))
+    if abs(size) <= observation.threshold:
+        return 0
+    value = size * _polarisation(observation, frame, flat, way, (lit, n, layer))
     if abs(value) <= observation.threshold:
         return 0
-    value *= _polarisation(observation, frame, flat, way, (aim, n, layer))
-    if abs(value) <= observation.threshold:
-        return 0
-    clear, ways = along(aim, 2e-3, n), 1 if one == two else 2
+    clear, ways = along(lit, 2e-3, n), 1 if one == two else 2
     for swapped in range(ways):
         row = count + swapped
         if row < len(ghosts.amplitude):
@@ -161,7 +170,7 @@ def _add(observation, frame, flat, way, echo, found):
                 leg, m = (out, one) if end == swapped else (back, two)
                 ghosts.mirrors[row, end] = m
                 write(_seen(flat, m, place), ghosts.points[row, end])
-                write(leg[0] if m >= 0 else clear, ghosts.stops[row, end, 0])
+                write(leg[1] if m >= 0 else clear, ghosts.stops[row, end, 0])
                 write(clear, ghosts.stops[row, end, 1])
     return ways
 
@@ -190,9 +199,7 @@ def _strength(observation, flat, bodies, b, way):
     low, high = _above(flat, second, two, line, axis, _above(flat, first, one, line, axis, (-half, half)))
     if low >= high or z <= low - STRIP_FAR * zone or z >= high + STRIP_FAR * zone:
         return none, none, none, 0j
-    inside = min(INSIDE, (high - low) / 2)
-    aim = along(line, min(max(z, low + inside), high - inside), axis)
-    return place, aim, n, size * strip((low - z) / zone, (high - z) / zone)
+    return place, along(line, aim(z, low, high), axis), n, size * strip((low - z) / zone, (high - z) / zone)
 
 
 @njit
@@ -212,20 +219,19 @@ def _seen(flat, m, place):
 
 
 @njit
-def _segment(observation, frame, flat, m, source, place):
-    """Where a path to a place leaves for, and gain times what the mirror's aperture passes: zero behind the mirror."""
-    p, rotation = vec(observation.position[frame]), observation.rotation[frame]
+def _stop(observation, flat, m, source, place):
+    """Whether light gets to a place over a mirror or straight, over which point it leaves the radar, the direction from
+    there on, and the square of the Fresnel unit there, m^2."""
     if m < 0:
-        return place, gain_towards(minus(place, p), rotation, observation) + 0j
-    center, normal = vec(flat.center[m]), vec(flat.normal[m])
-    h, level = dot(minus(source, center), normal), dot(minus(place, center), normal)
+        return True, place, (0.0, 0.0, 0.0), 0.0
+    window = aperture(flat, m)
+    h, level = dot(minus(source, window[0]), window[1]), dot(minus(place, window[0]), window[1])
     if h * level >= 0:
-        return place, 0j
+        return False, place, (0.0, 0.0, 0.0), 0.0
     share, way = h / (h - level), minus(place, source)
     stop, square = along(source, share, way), 0.5 * observation.wavelength * length(way) * share * (1 - share)
-    return stop, passes(stop, unit(way), square, aperture(flat, m)) * gain_towards(
-        minus(stop, p), rotation, observation
-    )
+    way = unit(way)
+    return not misses(stop, way, square, window), stop, way, square
 
 
 @njit

@@ -19,7 +19,8 @@ from radarsim.propagation.environment import View
 from radarsim.propagation.fields import dot, facing, length, minus, unit, vec
 from radarsim.propagation.fresnelzone import LEAST_LOSS
 from radarsim.propagation.media import scattering
-from radarsim.propagation.one_way import OneWay, Trials, over_mirrors
+from radarsim.propagation.mirror_reach import Trials
+from radarsim.propagation.one_way import OneWay, over_mirrors
 from radarsim.propagation.paths import Kind, Paths
 
 #: Mirrors over which an echo goes out and back, together.

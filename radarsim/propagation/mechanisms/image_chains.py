@@ -41,7 +41,7 @@ from radarsim.propagation.fields import (
     upwards,
     vec,
     write,
-)
+)  # fmt: skip
 from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
 from radarsim.propagation.isometry import inverse
 from radarsim.propagation.observation import Observation
@@ -77,8 +77,7 @@ def find(view: View) -> Paths:
     """Chains of two and three mirrors above the threshold, either way round."""
     observation, flat = view.observation, view.flat
     found = [chains(flat, some.pairs, observation, k) for k, some in enumerate(view.mirrors)]
-    frame = np.repeat(np.arange(len(found)), [len(f) for f in found])
-    every = Chains.joined(found)
+    frame, every = np.repeat(np.arange(len(found)), [len(f) for f in found]), Chains.joined(found)
     two = every.mirrors[:, 1] == every.mirrors[:, 2]
     stretches = _stretches(observation, flat, frame, every)
     passed = fresnelzone.passage(observation, flat, view.obstacles, stretches, np.abs(every.amplitude))
@@ -125,8 +124,7 @@ def _stretches(observation: Observation, flat: Flat, frame: Int[np.ndarray, "cha
     two = chains.mirrors[:, 1] == chains.mirrors[:, 2]
     mirrors = np.where(two[:, None] & (np.arange(3) == 2), -1, chains.mirrors)
     along = np.concatenate([np.zeros_like(whole), there, whole], axis=1) / whole
-    whole_path = (np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4]))
-    mirrors, reflections, aside = whole_path
+    mirrors, reflections, aside = (np.repeat(each, 4, axis=0) for each in (mirrors, chains.stops, apart[:, 1:4]))
     return Stretches(
         path=np.repeat(np.arange(len(frame)), 4), frame=np.repeat(frame, 4),
         begin=stops[:, :-1].reshape(-1, 3), end=stops[:, 1:].reshape(-1, 3),
@@ -153,7 +151,7 @@ def chains(flat: Flat, pairs: Int[np.ndarray, "pair 2"], observation: Observatio
     """
     pairs = pairs[np.lexsort(pairs.T)]
     orders = _Orders(np.searchsorted(pairs[:, 1], np.arange(len(flat) + 1)), np.ascontiguousarray(pairs[:, 0]))
-    return filled(Chains, lambda found: _search(observation, frame, flat.columns, orders, found.columns), 1024)
+    return filled(Chains, lambda found: _search(observation, frame, flat.columns, orders, found.columns))
 
 
 @njit(cache=True)
@@ -281,10 +279,7 @@ def _reflected(way, up, ray, flat):
 def _isometry(way, flat, out):
     """R_1 ... R_k as matrix | offset."""
     for column in range(4):
-        if column < 3:
-            x = (1.0 * (column == 0), 1.0 * (column == 1), 1.0 * (column == 2))
-        else:
-            x = (0.0, 0.0, 0.0)
+        x = 1.0 * (column == 0), 1.0 * (column == 1), 1.0 * (column == 2)  # of the offset, the origin
         for k in range(len(way) - 1, -1, -1):
             n = vec(flat.normal[way[k]])
             height = dot(x, n) if column < 3 else dot(minus(x, vec(flat.center[way[k]])), n)
@@ -300,6 +295,5 @@ def _course(way, p, aim, flat, stops):
         if k < len(way):
             n = vec(flat.normal[way[k]])
             t = dot(minus(vec(flat.center[way[k]]), start), n) / dot(now, n)
-            start = along(start, t, now)
-            now = along(now, -2 * dot(now, n), n)
+            start, now = along(start, t, now), _turned(now, flat, way[k])
         write(start, stops[k])

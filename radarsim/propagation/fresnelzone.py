@@ -27,7 +27,7 @@ from numba import njit
 
 from radarsim.propagation.apertures import SLIT
 from radarsim.propagation.fields import cross, dot, minus, vec
-from radarsim.propagation.lattice import FEW, MANY, Lattice, coupled, shares
+from radarsim.propagation.lattice import FEW, HALF, MANY, Lattice, coupled, shares
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Obstacles, Passage
 from radarsim.propagation.reflectors import Flat
@@ -45,8 +45,9 @@ _FEWEST = 4
 _NARROW = 2.0
 #: Where an obstacle stands is known to this many halvings of a stretch, and a border to as many of a link.
 _HALVINGS = 4
-#: Rays to a point spread no wider than for an obstacle at this share of the way to it.
+#: Rays to a point spread no wider than for an obstacle at this share of the way to it, so wide.
 _BESIDE = 0.7
+_WIDEST = np.sqrt(2 * _BESIDE / (1 - _BESIDE))
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def _partly(
     long = np.any(stretches.begin != stretches.end, axis=1)
     rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
     fitted = _fitted(flat, stretches[rows])
-    few, begin, end, inside = _rays(flat, fitted, FEW)
+    few, begin, end, inside = _rays(flat, fitted, FEW, _WIDEST - 1)
     clear = obstacles.clear(observation, fitted.frame[few], begin, end)
     # Alike are all that are as the ray in the middle; then what that met is all there is.
     unlike = _sums(few, clear != (factor[rows[few]] == 1), len(rows))
@@ -171,7 +172,8 @@ def _fitted(flat: Flat, stretches: Stretches) -> Stretches:
     narrow = (low < high) & (high - low < _NARROW)
     share, middle = np.ones(narrow.shape), np.zeros(narrow.shape)
     share[narrow] = (high - low)[narrow] / _NARROW
-    middle[narrow] = (1 - share[narrow]) * (low[narrow] + high[narrow]) / 2
+    # Rays to all parts of a small plate aim at one place, so that these meet the same obstacles.
+    middle[narrow] = np.minimum(2 * (1 - share[narrow]), 1) * (low[narrow] + high[narrow]) / 2
     at_radar, back = stretches.span[:, :1] == 0, stretches.span[:, 1:] == 0.5
     mirroring = stretches.mirroring * np.where(back, share, 1)
     spread = np.where(back, (1 - (1 - AT_RADAR) * mirroring) / (1 - (1 - AT_RADAR) * stretches.mirroring), share)
@@ -265,24 +267,31 @@ def _bounded(value: Complex[np.ndarray, "n"], most: float) -> Complex[np.ndarray
     return value * np.minimum(1, most / np.maximum(np.abs(value), 1e-12))
 
 
-def _rays(flat: Flat, stretches: Stretches, lattice: Lattice) -> tuple[np.ndarray, ...]:
-    """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which stretch these are."""
+def _rays(flat: Flat, stretches: Stretches, lattice: Lattice, wider: float = 0.0) -> tuple[np.ndarray, ...]:
+    """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which stretch these are.
+
+    The outermost rays to points begin by this share wider apart: a zone is wider than the cone of rays to its tip.
+    """
     inside = np.empty((len(stretches), len(lattice.nodes)), np.bool_)
     _within(flat.corners, flat.normal, stretches.columns, lattice.nodes, inside)
     owner, node = np.nonzero(inside)
     begin, end = np.empty((2, len(owner), 3))
-    _spread(stretches.columns, owner, lattice.nodes[node], begin, end)
+    nodes = lattice.nodes[node]
+    cone = nodes * (1 + wider * (1 - stretches.mirroring[owner]) * (nodes / HALF) ** 2)
+    _spread(stretches.columns, owner, cone, nodes, begin, end)
     return owner, begin, end, inside
 
 
 @njit(cache=True)
-def _spread(stretches, owner, nodes, begin, end):
-    """Writes where the rays of some nodes begin and end."""
+def _spread(stretches, owner, first, last, begin, end):
+    """Writes where rays begin and end, by their nodes at either end."""
     for r in range(len(owner)):
-        i, x, y = owner[r], nodes[r, 0], nodes[r, 1]
+        i = owner[r]
         for d in range(3):
-            begin[r, d] = stretches.begin[i, d] + x * stretches.before[i, 0, d] + y * stretches.before[i, 1, d]
-            end[r, d] = stretches.end[i, d] + x * stretches.after[i, 0, d] + y * stretches.after[i, 1, d]
+            begin[r, d], end[r, d] = stretches.begin[i, d], stretches.end[i, d]
+            for axis in range(2):
+                begin[r, d] += first[r, axis] * stretches.before[i, axis, d]
+                end[r, d] += last[r, axis] * stretches.after[i, axis, d]
 
 
 @njit(cache=True)

@@ -16,7 +16,7 @@ from scipy.special import erfc
 #: Correlations of two screens in steps of 1 / `_RHOS`.
 _RHOS = 10
 #: Half the side of the lattice's square, Fresnel units.
-_HALF = 1.5
+HALF = 1.5
 #: What changes of the nodes' weights cost in the fit of these, beside errors of half planes.
 _STIFF = 0.4
 #: How much more errors of upright and level half planes count in it.
@@ -39,14 +39,14 @@ class Lattice:
         do fades, so that it does not begin with a step.
         """
         k = np.arange(count)
-        nodes = _HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
-        weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.cos(np.pi * nodes / (2 * _HALF)).prod(axis=1)
+        nodes = HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
+        weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.cos(np.pi * nodes / (2 * HALF)).prod(axis=1)
         weight /= weight.sum()
         angle, edge = (x.ravel() for x in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(-1.5, 1.5, 31)))
         inside = edge[:, None] - np.cos(angle)[:, None] * nodes[:, 0] - np.sin(angle)[:, None] * nodes[:, 1]
         clear = _half_planes(inside, _neighbours(nodes))
         lit = edge > 0
-        inner = np.clip((_HALF - np.abs(edge)) / 0.45, 0, 1)
+        inner = np.clip((HALF - np.abs(edge)) / 0.45, 0, 1)
         truth = erfc(-edge * np.sqrt(np.pi / 2) * np.exp(-0.25j * np.pi)) / 2
         truth = lit + (truth - lit) * inner**2 * (3 - 2 * inner)
         # As exact in the shadow as in the light, and more so for upright and level edges.
@@ -76,7 +76,7 @@ class Lattice:
         out[:, 0], out[0, -1] = np.outer(self.weight, self.weight), np.diag(self.weight)
         taper = self.weight * np.exp(-0.5j * np.pi * np.sum(self.nodes**2, axis=1))
         # The kernel is averaged over cells, which it varies within where rho is near 1.
-        cell = 2 * _HALF / np.sqrt(count) * np.array([-0.25, 0.25])
+        cell = 2 * HALF / np.sqrt(count) * np.array([-0.25, 0.25])
         place = self.nodes[:, None] + np.stack(np.meshgrid(cell, cell), axis=-1).reshape(-1, 2)
         for kind, step in [(0, k) for k in range(1, _RHOS)] + [(1, k) for k in range(1, _RHOS + 1)]:
             rho = min(step / _RHOS, 0.95) * np.array([1, 1 - kind])

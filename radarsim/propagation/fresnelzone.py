@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Complex, Float, Int
 from numba import njit
+from numpy.typing import ArrayLike
 
 from radarsim.propagation.apertures import SLIT
 from radarsim.propagation.fields import cross, dot, minus, vec
@@ -37,6 +38,9 @@ from radarsim.propagation.table import Table
 LEAST_LOSS = 4.0
 #: The same for zones: some 16 dB over noise.
 LEAST_SPLIT = 20.0
+#: Echoes that are at least this much stronger are free of steps, some 40 dB over noise: by zones of narrow mirrors and
+#: points, and by where borders pass between nodes.
+LEAST_SMOOTH = 400.0
 #: At the radar rays are so far apart, as a share of what they are at a mirror.
 AT_RADAR = 0.5
 #: Fewer nodes than this within a mirror say less than the one ray through its middle.
@@ -95,7 +99,8 @@ def passage(
     worth = strength > LEAST_LOSS * observation.threshold
     found = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
     rows, partly, place = _partly(observation, flat, obstacles, stretches, strength, found.factor)
-    fans, some = _fans(observation, flat, obstacles, partly, place)
+    smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
+    fans, some = _fans(observation, flat, obstacles, partly, place, smooth)
     for column, new in zip(found.columns, some.columns, strict=True):
         column[rows] = new
     returns = np.bincount(path, minlength=len(size)) == 1
@@ -127,8 +132,9 @@ def _partly(
     whole path."""
     long = np.any(stretches.begin != stretches.end, axis=1)
     rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
-    fitted = _fitted(flat, stretches[rows])
-    few, begin, end, inside = _rays(flat, fitted, FEW, _WIDEST - 1)
+    smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
+    fitted = _fitted(flat, stretches[rows], smooth)
+    few, begin, end, inside = _rays(flat, fitted, FEW, smooth * (_WIDEST - 1))
     clear = obstacles.clear(observation, fitted.frame[few], begin, end)
     # Alike are all that are as the ray in the middle; then what that met is all there is.
     unlike = _sums(few, clear != (factor[rows[few]] == 1), len(rows))
@@ -161,15 +167,16 @@ def _reach(
     return moved + 0.5 ** (_HALVINGS + 1)
 
 
-def _fitted(flat: Flat, stretches: Stretches) -> Stretches:
-    """Stretches whose nodes lie about the middle of what mirrors leave open, where that is narrower than a zone.
+def _fitted(flat: Flat, stretches: Stretches, smooth: Bool[np.ndarray, "stretch"]) -> Stretches:
+    """Stretches, some of which (`smooth`) so that nodes lie about the middle of what mirrors leave open, where that is
+    narrower than a zone.
 
     What a small mirror sends straight back comes from it as from a point.
     """
     edges = np.empty((len(stretches), 2, 2))
     _open(flat.corners, flat.normal, stretches.columns, edges)
     low, high = edges[..., 0], edges[..., 1]
-    narrow = (low < high) & (high - low < _NARROW)
+    narrow = (low < high) & (high - low < _NARROW) & smooth[:, None]
     share, middle = np.ones(narrow.shape), np.zeros(narrow.shape)
     share[narrow] = (high - low)[narrow] / _NARROW
     # Rays to all parts of a small plate aim at one place, so that these meet the same obstacles.
@@ -194,8 +201,10 @@ def _fans(
     obstacles: Obstacles,
     stretches: Stretches,
     place: Float[np.ndarray, "stretch"],
+    smooth: Bool[np.ndarray, "stretch"],
 ) -> tuple[Complex[np.ndarray, "stretch 2 node"], Passage]:
-    """What passes of many rays, zero beyond the mirrors' outlines; which are within; and delays, m.
+    """What passes of many rays, zero beyond the mirrors' outlines; which are within; and delays, m. Borders are looked
+    for between nodes of some (`smooth`).
 
     Rays are straight and zones are not: they are spread so as to be right where the obstacle is.
     """
@@ -218,7 +227,7 @@ def _fans(
     fans[:, 0][inside] = passed.factor * np.exp(wavenumber * (passed.delay - later[many]))
     fans[:, 1][inside] = 1
     clear[inside] = passed.blocked == 0
-    _soften(observation, obstacles, stretches.frame, (begin, end, inside), passed, (fans[:, 0], clear))
+    _soften(observation, obstacles, stretches.frame, (begin, end, inside), passed, smooth, (fans[:, 0], clear))
     whole = fans[:, 1] @ MANY.weight
     factor = _bounded(fans[:, 0] @ MANY.weight / whole, SLIT)
     through = _sums(many, power * passed.through, count) > total / 2
@@ -228,7 +237,7 @@ def _fans(
 def _soften(
     observation: Observation, obstacles: Obstacles, frame: Int[np.ndarray, "stretch"],
     rays: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"], Bool[np.ndarray, "stretch node"]],
-    passed: Passage, values: tuple[np.ndarray, ...],
+    passed: Passage, smooth: Bool[np.ndarray, "stretch"], values: tuple[np.ndarray, ...],
 ) -> None:  # fmt: skip
     """Share values of nodes among those about which borders pass, by where on the links between nodes these are.
 
@@ -237,14 +246,17 @@ def _soften(
         frame: of each stretch.
         rays: of the nodes, begin and end, and which nodes of which stretch they are.
         passed: of the rays.
+        smooth: which stretches.
         values: of the nodes (stretch, node), written in place.
     """
     begin, end, inside = rays
     state, number = np.full(inside.shape, -1, np.int8), np.zeros(inside.shape, int)
     state[inside], number[inside] = 2 - (passed.factor != 1) - (passed.factor == 0), np.arange(len(begin))
-    one, two = state[:, MANY.links[:, 0]], state[:, MANY.links[:, 1]]
+    some = np.flatnonzero(smooth)
+    one, two = state[some[:, None], MANY.links[:, 0]], state[some[:, None], MANY.links[:, 1]]
     s, link = np.nonzero((one != two) & (one >= 0) & (two >= 0))
     first = (one > two)[s, link].astype(int)  # the more open node
+    s = some[s]
     open_, other = MANY.links[link, 1 - first], MANY.links[link, first]
     here, there = number[s, open_], number[s, other]
     through = state[s, open_] == 1
@@ -267,17 +279,19 @@ def _bounded(value: Complex[np.ndarray, "n"], most: float) -> Complex[np.ndarray
     return value * np.minimum(1, most / np.maximum(np.abs(value), 1e-12))
 
 
-def _rays(flat: Flat, stretches: Stretches, lattice: Lattice, wider: float = 0.0) -> tuple[np.ndarray, ...]:
+def _rays(flat: Flat, stretches: Stretches, lattice: Lattice, wider: ArrayLike = 0.0) -> tuple[np.ndarray, ...]:
     """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which stretch these are.
 
-    The outermost rays to points begin by this share wider apart: a zone is wider than the cone of rays to its tip.
+    The outermost rays to points begin by a share, `wider` (by stretch), farther apart: a zone is wider than the cone of
+    rays to its tip.
     """
     inside = np.empty((len(stretches), len(lattice.nodes)), np.bool_)
     _within(flat.corners, flat.normal, stretches.columns, lattice.nodes, inside)
     owner, node = np.nonzero(inside)
     begin, end = np.empty((2, len(owner), 3))
     nodes = lattice.nodes[node]
-    cone = nodes * (1 + wider * (1 - stretches.mirroring[owner]) * (nodes / HALF) ** 2)
+    wide = np.broadcast_to(wider, len(stretches))[:, None] * (1 - stretches.mirroring)
+    cone = nodes * (1 + wide[owner] * (nodes / HALF) ** 2)
     _spread(stretches.columns, owner, cone, nodes, begin, end)
     return owner, begin, end, inside
 

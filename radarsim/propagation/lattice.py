@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Bool, Complex, Float, Int
+from jaxtyping import Bool, Complex, Float, Float32, Int
 from numba import njit
 from scipy.spatial import Delaunay
 from scipy.special import erfc
@@ -61,11 +61,11 @@ class Lattice:
         """Pairs of nodes whose cells touch."""
         return _neighbours(self.nodes)
 
-    def degrees(self, inside: Bool[np.ndarray, "*n node"]) -> Int[np.ndarray, "*n node"]:
+    def degrees(self, inside: Bool[np.ndarray, "*n node"]) -> Float32[np.ndarray, "*n node"]:
         """Number of links of each node to nodes that are inside."""
-        linked = np.zeros((len(self.nodes), len(self.nodes)), int)
+        linked = np.zeros((len(self.nodes), len(self.nodes)), np.float32)
         linked[tuple(np.concatenate([self.links, self.links[:, ::-1]]).T)] = 1
-        return inside @ linked
+        return inside.astype(np.float32) @ linked
 
     @cached_property
     def couplings(self) -> Complex[np.ndarray, "kind rho node node"]:

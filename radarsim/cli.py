@@ -83,19 +83,25 @@ def dataset(
     specification: Annotated[
         Path, typer.Argument(metavar="SPEC.yaml", help="A file, or small, training, evaluation, stress, ...")
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="Folder of the recordings.")],
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="Folder of the recordings.")] = None,
+    plan: Annotated[bool, typer.Option("--plan", help="Print what differs between the recordings, and stop.")] = False,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; one per core by default.")] = None,
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
     replace: Annotated[bool, typer.Option("--replace", help="Make recordings of other parameters anew.")] = False,
 ) -> None:
     """Make the recordings of a data set. Started again, it goes on where it was stopped."""
+    from radarsim.dataset.plan import print_plan
     from radarsim.dataset.run import make
     from radarsim.dataset.specification import Specification
 
+    wanted = Specification.load(specification)
+    if plan:
+        print_plan(wanted)
+        return
+    if output is None:
+        raise InputError("--output is missing, expected a folder for the recordings, or --plan")
     with progress("frames") as report:
-        outcome = make(
-            Specification.load(specification), output, workers=workers, ray=ray, replace=replace, progress=report
-        )
+        outcome = make(wanted, output, workers=workers, ray=ray, replace=replace, progress=report)
     print(f"{len(outcome.made)} recordings made, {len(outcome.kept)} were there; {output}")
     if outcome.failed:
         raise InputError(f"{len(outcome.failed)} recordings failed: {'; '.join(outcome.failed.values())}")

@@ -16,6 +16,8 @@
     variants:                          # every recording once for each, with the same seed and walk
       plain: {}
       coarse: {radar: {samples: 48}, attributes: {value: 48}}             # see `radarsim.dataset.variant`
+    randomise:                         # drawn for each recording; by default as in real rooms, {}: nothing
+      clutter: {uniform: [0.7, 1.4]}                                    # see `radarsim.dataset.randomise`
     splits:
       random: {kind: random, folds: 5}                                  # random-0 ... random-4
       platform: {kind: platform, train: [handheld]}                     # tested on all others
@@ -44,6 +46,7 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
 from radarize.yamlfile import read_yaml
+from radarsim.dataset.randomise import OF_SENSOR, Platform, Randomise
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task, content
 from radarsim.dataset.variant import Attributes, Variant
@@ -51,10 +54,9 @@ from radarsim.world.description import described, description_model, find, shipp
 from radarsim.world.validation import format_validation_error
 
 #: What a building here may say of itself that stands beside `building` in a scene file.
-OF_SCENE = "clutter", "unevenness", "interferers"
+OF_SCENE = "clutter", "unevenness", "furniture", "materials", "interferers"
 #: Recordings that a data set may stand for: a count with a digit too many takes all memory.
 MOST = 20_000
-Platform = Literal["handheld", "cart", "robot"]
 Name = Annotated[str, Field(pattern=r"^[A-Za-z0-9-]+$")]
 
 
@@ -110,6 +112,7 @@ class Specification(Frozen):
     storage: Literal["raw", "heatmaps"] = "raw"
     variants: dict[Name, Variant] = {}
     attributes: Attributes = {}
+    randomise: Randomise = Field(default_factory=Randomise.usual)
     splits: dict[Name, Split] = {}
     _folder: Path = Path()
 
@@ -177,26 +180,29 @@ class Specification(Frozen):
         for number, group in enumerate(self.recordings):
             for name, platform, floor in group.each(count):
                 seed = np.random.SeedSequence([self.seed, *name.encode()]).generate_state(1, np.uint64)[0]
+                seed = int(seed >> np.uint64(1))
                 for key in made_in[number]:
                     variant, (config, digest) = variants[key], settings[key]
                     place = group.building, floor, variant.level
                     if place not in scenes:
-                        scene = self._scene(*place)
-                        scenes[place] = scene, content(scene)
+                        scene, fixed = self._scene(*place)
+                        scenes[place] = scene, content(scene), fixed
+                    scene, file, fixed = scenes[place]
                     frames = config.frames_within(group.duration)
                     if not frames:
                         raise InputError(
                             f"recordings[{number}].duration is {group.duration} s, expected at least one frame "
                             f"({config.burst_time:.4f} s)"
                         )
+                    fixed = fixed | set(OF_SENSOR if variant.mounting else ())
                     tasks.append(
                         Task(
                             name=name + key, radar=radar, frontend=frontend, sensors=sensors, storage=self.storage,
                             building=group.building, floor=floor, platform=platform,
-                            duration=group.duration, frames=frames, seed=int(seed >> np.uint64(1)), settings=digest,
+                            duration=group.duration, frames=frames, seed=seed, settings=digest,
                             waypoints=group.waypoints, people=group.people, variant=variant,
                             attributes=self.attributes | group.attributes | variant.attributes,
-                            scene=scenes[place][0], content=scenes[place][1],
+                            scene=scene, content=file, randomised=self.randomise.draw(seed, platform, fixed),
                         )
                     )  # fmt: skip
         return tuple(tasks)
@@ -238,16 +244,17 @@ class Specification(Frozen):
 
         return tuple(chosen(["all"] if self.sensors == "all" else self.sensors))
 
-    def _scene(self, building: str, floor: int | None, level: int) -> dict | str:
+    def _scene(self, building: str, floor: int | None, level: int) -> tuple[dict | str, set[str]]:
+        """A scene, and what is not drawn for recordings in it."""
         given = self.buildings[building]
         if isinstance(given, str):
             try:
                 file = within(find(self._beside(given)), "it", self._folder, Path("scenes"), shipped()).resolve()
                 level = level or split_level(given)[1]
-                described(read_yaml(file), file.name, level)
+                built = described(read_yaml(file), file.name, level).building
             except InputError as error:
                 raise InputError(f"buildings.{building}: {error}") from error
-            return f"{file}@{level}" if level else str(file)
+            return f"{file}@{level}" if level else str(file), set() if built else {"furniture"}
         if level:
             raise InputError(f"buildings.{building}: is generated and has no levels, expected a scene file")
         settings = {key: given[key] for key in OF_SCENE if key in given}
@@ -259,7 +266,7 @@ class Specification(Frozen):
             raise InputError(
                 f"buildings.{building}: {format_validation_error(error, description).removeprefix('building.')}"
             ) from error
-        return description
+        return description, set(given)
 
     def _beside(self, name: str) -> str:
         """A file that the specification names: beside it where there is one, else left to those who look further."""

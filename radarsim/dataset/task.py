@@ -6,6 +6,7 @@ from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from hashlib import sha256
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from radarize.errors import InputError, explained
 from radarize.radar.presets import load_config
 from radarize.recording import Recording
 from radarsim.dataset import physics
+from radarsim.dataset.randomise import OF_SENSOR, mounting
 from radarsim.dataset.variant import Attributes, Variant
 from radarsim.world.description import meshes, split_level
 
@@ -49,6 +51,7 @@ class Task:
         variant: what differs from other recordings of the same walk.
         attributes: of the recording.
         people: pedestrians near the radar's path.
+        randomised: what was drawn for it, see `Randomise.draw`.
     """
 
     name: str
@@ -69,6 +72,7 @@ class Task:
     variant: Variant = Variant()
     attributes: Attributes = field(default_factory=dict)
     people: int = 0
+    randomised: dict[str, Any] = field(default_factory=dict)
 
     @property
     def parameters(self) -> dict[str, object]:
@@ -81,6 +85,7 @@ class Task:
             found[file] = found[file] and Path(found[file]).name
         found["attributes"] = self.attributes or None  # older recordings know no such fields
         found["people"] = self.people or None
+        found["randomised"] = self.randomised or None
         found["variant"] = self.variant.model_dump(mode="json", exclude_defaults=True) or None
         found["scene"] = found.pop("content") or self.scene
         return found
@@ -172,13 +177,18 @@ class Task:
         from radarsim.recording.simulate import planned
         from radarsim.world.scene import Scene
 
-        scene = Scene.load(self.scene) if isinstance(self.scene, str) else Scene.of(self.scene, self._place)
-        mild = Scene.load(split_level(self.scene)[0]) if self.variant.level else scene
+        drawn = {name: value for name, value in self.randomised.items() if name not in OF_SENSOR}
+        if isinstance(self.scene, str):
+            scene = Scene.load(self.scene, drawn)
+            mild = Scene.load(split_level(self.scene)[0], drawn) if self.variant.level else scene
+        else:
+            scene = mild = Scene.of(self.scene | drawn, self._place)
         radar = self.variant.radar_of(self.radar)
         scenario, cfg_text, _ = planned(
             scene, walk_in=mild, seed=self.seed, radar=radar, sensors=self.sensors, people=self.people,
             frontend=self.variant.frontend_of(self.frontend, load_config(radar)[0].board),
-            platform=self.platform, duration=self.duration, mounting=self.variant.mounted,
+            platform=self.platform, duration=self.duration,
+            mounting=self.variant.mounted or mounting(self.randomised, self.platform),
             waypoints=None if self.waypoints is None else np.array(self.waypoints),
         )  # fmt: skip
         return scenario, cfg_text

@@ -22,6 +22,9 @@ an entry whose name is there already (``*`` and ``?`` stand for others) changes 
 
 Level 2 of ``scenes/corner.yaml`` is the scene ``corner@2``.
 
+``furniture`` is the number of pieces in a building's rooms, as a share of the usual; ``materials`` has factors of
+materials' permittivity and conductivity: ``{plasterboard: {permittivity: 1.1, conductivity: 0.7}}``.
+
 ``clutter`` and ``unevenness`` are the clutter and roughness settings (`SurfaceSettings`): 1 as in furnished rooms that
 are in use; default 0. With clutter the scene has more objects (`small_objects`). ``interferers`` are other radars that
 send there (`interferers`); levels change and add them, too.
@@ -29,6 +32,8 @@ send there (`interferers`); levels change and add them, too.
 
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
@@ -36,7 +41,7 @@ from typing import Annotated, Literal, NamedTuple, Union
 
 import numpy as np
 import trimesh
-from pydantic import BaseModel, ConfigDict, Field, create_model
+from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator
 
 from radarize.errors import InputError
 from radarize.files import within
@@ -46,7 +51,7 @@ from radarsim.world.fields import Length, Name, Strict, Vector
 from radarsim.world.generators.buildings import Building, Office
 from radarsim.world.generators.small_objects import small_objects
 from radarsim.world.interferers import Interferer
-from radarsim.world.materials import Material, constant, decibel, material
+from radarsim.world.materials import DIELECTRICS, MATERIALS, Material, constant, decibel, material
 from radarsim.world.movers import Mover
 from radarsim.world.objects import SceneObject
 from radarsim.world.squareness import out_of_square
@@ -54,6 +59,7 @@ from radarsim.world.surface_settings import SurfaceSettings
 from radarsim.world.validation import naming
 
 Share = Annotated[float, Field(ge=0, le=10)]
+Factor = Annotated[float, Field(gt=0, le=10)]
 
 
 class Parts(NamedTuple):
@@ -186,6 +192,13 @@ class _Change(BaseModel):
     name: Name
 
 
+class Factors(Strict):
+    """How a material differs from that of the table."""
+
+    permittivity: Factor = 1.0
+    conductivity: Factor = 1.0
+
+
 class Level(Strict):
     """What one level changes and adds."""
 
@@ -204,7 +217,16 @@ class Description(Strict):
     levels: list[Level] = []
     clutter: Share = 0.0
     unevenness: Share = 0.0
+    furniture: Annotated[float, Field(ge=0, le=2)] = 1.0
+    materials: dict[str, Factors] = {}
     interferers: list[Interferer] = []
+
+    @field_validator("materials")
+    @classmethod
+    def _known(cls, factors: dict[str, Factors]) -> dict[str, Factors]:
+        if unknown := factors.keys() - set(DIELECTRICS):
+            raise ValueError(f"names {min(unknown)!r}, expected some of: {', '.join(DIELECTRICS)}")
+        return factors
 
     @property
     def surface_settings(self) -> SurfaceSettings:
@@ -287,13 +309,19 @@ def meshes(path: Path) -> list[Path]:
     return [path.parent / name for name in sorted(found)]
 
 
-def read(path: Path, level: int = 0) -> Parts:
+def read(path: Path, level: int = 0, changes: Mapping[str, object] | None = None) -> Parts:
     """Name, objects, movers, surface settings and interferers of a scene file at one of its levels.
+
+    Args:
+        path: of the file.
+        level: of severity, where there are some.
+        changes: values in place of the file's.
 
     Raises:
         InputError: unreadable, malformed YAML, unknown key, value, material, mesh file or level.
     """
-    parts = built(read_yaml(path), str(path), path.parent, level)
+    data = read_yaml(path)
+    parts = built(data | dict(changes or {}) if isinstance(data, dict) else data, str(path), path.parent, level)
     name = parts.name or path.stem
     return parts._replace(name=f"{name}@{level}" if level else name)
 
@@ -314,8 +342,11 @@ def built(data: object, source: str, folder: Path, level: int = 0) -> Parts:
     with naming(source):
         objects = [item.object(folder) for item in description.objects]
         if description.building:
-            objects += description.building.build()
+            objects += description.building.build(description.furniture)
         objects += small_objects(objects, description.clutter)
+    if description.materials:
+        made_of = {name: MATERIALS[name].scaled(**dict(by)) for name, by in description.materials.items()}
+        objects = [replace(each, material=made_of.get(each.material.name, each.material)) for each in objects]
     if not objects:
         raise InputError(f"{source}: has neither objects nor a building, expected at least one")
     if description.building:

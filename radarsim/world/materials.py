@@ -19,7 +19,7 @@ lower it by as much at grazing.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
@@ -31,6 +31,7 @@ from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.yamlfile import read_beside
 
 EPS0 = 8.8541878128e-12
+_BAND = 77e9  # Hz, where what is scattered is weighed against what is reflected
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,17 @@ class Material:
         if isinstance(self.permittivity, str):
             return itu_permittivity(self.permittivity, frequency)
         return complex(self.permittivity(frequency))
+
+    def scaled(self, permittivity: float = 1.0, conductivity: float = 1.0) -> "Material":
+        """The material with eps' (which stays at least 1) and conductivity times factors; a conductor stays as it is.
+
+        Roughness stays, so sigma0 follows the power reflected at normal incidence.
+        """
+        if self.conductor:
+            return self
+        made = replace(self, permittivity=partial(_scaled, self, permittivity, conductivity))
+        before, after = (abs(each.fresnel(np.array(1.0), _BAND)[0]) for each in (self, made))
+        return replace(made, sigma0=float(self.sigma0 * (after / before) ** 2))
 
     def fresnel(
         self, cos_theta: Float[np.ndarray, "*n"], frequency: float
@@ -166,6 +178,11 @@ def _constant(permittivity: float, conductivity: float, frequency: float) -> com
     return complex(permittivity, -conductivity / (2 * np.pi * frequency * EPS0))
 
 
+def _scaled(material: Material, permittivity: float, conductivity: float, frequency: float) -> complex:
+    eps = material.permittivity_at(frequency)
+    return complex(max(1.0, permittivity * eps.real), conductivity * eps.imag)
+
+
 def decibel(value: float) -> float:
     """Power ratio of `value` dB."""
     return 10.0 ** (value / 10.0)
@@ -182,6 +199,8 @@ def _registered(
 
 
 MATERIALS = {name: _registered(name, **about) for name, about in read_beside(__file__).items()}
+#: Names of those that have a permittivity.
+DIELECTRICS = tuple(name for name, each in MATERIALS.items() if not each.conductor)
 
 
 def material(name: str) -> Material:

@@ -4,7 +4,7 @@ Rays run on the Mitsuba geometry of a Sionna RT scene (Embree on a CPU, one shap
 within a kilometre of the origin, which is checked, positions are good to 0.06 mm, well under the margin of `occluded`.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 
@@ -82,17 +82,18 @@ class Scene:
         return Scene, (self.name, self.objects, self.movers, self.surface_settings, self.interferers)
 
     @classmethod
-    def load(cls, path: str | Path) -> "Scene":
+    def load(cls, path: str | Path, changes: Mapping[str, object] | None = None) -> "Scene":
         """Read a scene file.
 
         Args:
             path: a YAML file; a bare name such as ``office`` is looked for as a file here, then in ``scenes/`` here,
                 then among the scenes that come with the project. ``NAME@2`` is level 2 of a scene that has levels.
+            changes: values in place of the file's (``{"clutter": 1.2}``).
 
         Raises:
             InputError: missing file, malformed YAML, unknown key, material or level, missing mesh; with file and field.
         """
-        return cls(*read(find(path), split_level(path)[1]))
+        return cls(*read(find(path), split_level(path)[1], changes))
 
     @classmethod
     def of(cls, description: dict, name: str) -> "Scene":

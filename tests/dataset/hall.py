@@ -34,7 +34,7 @@ def write(folder: Path, **changes) -> Path:
     """A specification of recordings in the hall, and the files that it names."""
     (folder / "hall.yaml").write_text(HALL)
     (folder / "small.cfg").write_text(write_cfg(CONFIG))
-    plain = {"name": "tiny", "seed": 1, "buildings": {"hall": "hall.yaml"}, "radar": "small.cfg"}
+    plain = {"name": "tiny", "seed": 1, "buildings": {"hall": "hall.yaml"}, "radar": "small.cfg", "randomise": {}}
     path = folder / "tiny.yaml"
     path.write_text(yaml.safe_dump(plain | {"recordings": recordings()} | changes))
     return path

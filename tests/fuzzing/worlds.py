@@ -35,6 +35,7 @@ recordings:
   - {building: A, floors: [0, 1], platform: handheld, count: 2, duration: 2}
   - {building: o, platform: [cart, robot], count: 1, duration: 1, waypoints: [[1, 1], [2, 2]]}
 sensors: [imu]
+randomise: {clutter: {uniform: [0.7, 1.4]}, height: {cart: {normal: [1, 0.1]}, robot: 0.2}, furniture: {choice: [1, 2]}}
 variants: {plain: {}, coarse: {radar: {samples: 48}, attributes: {value: 48}}}
 splits: {random: {kind: random, folds: 2}, platform: {kind: platform, train: [handheld]}}
 """

@@ -1,5 +1,7 @@
 """Floors of all four styles: walkable, closed, reproducible, and of the style's materials."""
 
+import re
+
 import numpy as np
 import pytest
 import shapely
@@ -15,6 +17,10 @@ SEEDS = np.random.default_rng(4).integers(0, 10_000, 4).tolist()
 FLOORS = [Building(kind="ABCD"[k], seed=seed, floor=k // 2) for k, seed in enumerate(SEEDS)]
 #: Names of what is no furniture.
 FIXED = ("wall", "facade", "reveals", "column", "pipe", "window", "door", "way", "lamp", "riser", "stairs", "floor")
+FURNITURE = re.compile(
+    "(desk|chair|cabinet|shelf|bin|whiteboard|table|bench|printer|fridge|counter|cubicle|basin|sofa|plant|vending|lockers"
+    r"|noticeboard|extinguisher|lectern) \d+ "
+)
 
 
 @pytest.fixture(scope="module")
@@ -189,3 +195,21 @@ def test_description_of_a_building():
         Scene.of({"building": {"kind": "E", "seed": 2}}, "odd")
     with pytest.raises(InputError, match=r"scene odd: building\.floor is -1"):
         Scene.of({"building": {"kind": "A", "floor": -1}}, "odd")
+
+
+@pytest.mark.parametrize("kind", "ABCD")
+def test_density_of_furniture(kind):
+    """More or fewer pieces between the same walls and doors; as many as usual at 1, and more where there is room."""
+
+    def pieces(density: float) -> int:
+        return len({o.name.rsplit(" ", 1)[0] for o in floor.build(density) if FURNITURE.search(o.name)})
+
+    floor = Building(kind=kind, seed=12)
+    none, few, usual, many = (pieces(density) for density in (0.0, 0.6, 1.0, 1.4))
+    assert none == 0 and 0.4 < few / usual < 0.85 and 1.0 < many / usual < 1.4
+    bare, full = (
+        [o for o in floor.build(d) if re.search(r"wall|facade|floor|ceiling|door|window", o.name)] for d in (0, 1.4)
+    )
+    assert [o.name for o in bare] == [o.name for o in full]
+    assert all(np.array_equal(a.mesh.vertices, b.mesh.vertices) for a, b in zip(bare, full, strict=True))
+    assert pieces(1.0) == len({o.name.rsplit(" ", 1)[0] for o in floor.build() if FURNITURE.search(o.name)})

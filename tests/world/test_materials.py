@@ -1,5 +1,7 @@
 """Materials against Fresnel's formulas in closed form and the ITU's numbers."""
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -90,3 +92,25 @@ def test_names():
     assert material("itu_ceiling_board") is MATERIALS["ceiling board"]
     with pytest.raises(InputError, match="'unobtainium'.*concrete.*wood"):
         material("unobtainium")
+
+
+def test_a_scaled_material():
+    """eps' and conductivity by their factors at every frequency; what is scattered follows what is reflected."""
+    for name in ("concrete", "fabric", "plasterboard"):
+        plain, other = material(name), material(name).scaled(permittivity=1.2, conductivity=0.5)
+        for frequency in (60e9, 77e9, 81e9):
+            eps, scaled = (each.permittivity_at(frequency) for each in (plain, other))
+            assert scaled == pytest.approx(complex(1.2 * eps.real, 0.5 * eps.imag))
+        power = [abs((1 - np.sqrt(m.permittivity_at(77e9))) / (1 + np.sqrt(m.permittivity_at(77e9)))) ** 2
+                 for m in (plain, other)]  # fmt: skip
+        assert other.sigma0 / plain.sigma0 == pytest.approx(power[1] / power[0])
+        assert (other.roughness, other.thickness, other.name) == (plain.roughness, plain.thickness, plain.name)
+    assert material("ceiling board").scaled(permittivity=0.5).permittivity_at(77e9).real == 1.0
+    assert material("metal").scaled(permittivity=2.0) is material("metal")
+    whole = material("wood").scaled()
+    assert (
+        whole.permittivity_at(77e9) == material("wood").permittivity_at(77e9)
+        and whole.sigma0 == material("wood").sigma0
+    )
+    again = pickle.loads(pickle.dumps(material("wood").scaled(1.1)))
+    assert again.permittivity_at(77e9) == material("wood").scaled(1.1).permittivity_at(77e9)

@@ -49,9 +49,13 @@ class Floor(Strict, ABC):
         """The floor's rooms and openings."""
         return FloorPlan(self.skeleton(), self.style, self._rng(self.floor, 1))
 
-    def build(self) -> list[SceneObject]:
-        """All objects of the floor: walls, floors, ceilings, doors, windows, fittings, furniture."""
-        plan, site = self.plan(), Site(self._rng(self.floor, 2), self.style.height)
+    def build(self, furniture: float = 1.0) -> list[SceneObject]:
+        """All objects of the floor: walls, floors, ceilings, doors, windows, fittings, furniture.
+
+        Args:
+            furniture: number of pieces of furniture, as a share of the usual.
+        """
+        plan, site = self.plan(), Site(self._rng(self.floor, 2), self.style.height, furniture)
         surfaces(site, plan)
         for opening in plan.openings:
             for name, mesh, what in fill(opening, plan.style):

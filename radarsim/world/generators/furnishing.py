@@ -101,9 +101,10 @@ class _Layout:
             about = dict(step)
             side, kind, before = about.pop("at"), about.pop("put"), about.pop("before", None)
             kind = kind if isinstance(kind, str) else kind[int(self.rng.random() >= 0.5)]
-            count = int(evaluate(about.pop("count", 1), {"area": short * long, "short": short, "long": long}))
-            if side == "middle":
-                self.tables(count, kind, **about)
+            usual = evaluate(about.pop("count", 1), {"area": short * long, "short": short, "long": long})
+            count = self.site.number(usual)
+            if side == "middle":  # which the usual number fills
+                self.tables(min(count, int(usual)), kind, **about)
                 continue
             for x, y, yaw in self.line(getattr(self, side), kind, count, **about):
                 if before == "chair":
@@ -161,23 +162,24 @@ def _lecture(x: _Layout) -> None:
     along_x = room.size[0] >= room.size[1]
     length, across = room.size if along_x else room.size[::-1]
     stage = ("we" if along_x else "sn")[int(x.rng.integers(2))]
-    x.line(stage, "whiteboard", 2, start=0.6, gap=0.1)
+    x.line(stage, "whiteboard", site.number(2), start=0.6, gap=0.1)
     middle = room.center[1] if along_x else room.center[0]
-    site.put_if_free(room, make("lectern"), *room.wall_place(stage, middle + 0.9, 1.1))
+    if site.number(1):
+        site.put_if_free(room, make("lectern"), *room.wall_place(stage, middle + 0.9, 1.1))
     width, rows = 1.6, 0
     columns = max(1, int((across - 0.4) / (width + 0.8)))
     for row in range(int((length - 3.4) / 1.25) + 1):
         for k in range(columns):
             along = middle + (k - (columns - 1) / 2) * (across - 0.2) / columns
             px, py, yaw = room.wall_place(stage, along, 2.2 + 1.25 * row)
-            if site.put_if_free(room, make("table", d=0.5, w=width), px, py, yaw):
+            if site.number(1) and site.put_if_free(room, make("table", d=0.5, w=width), px, py, yaw):
                 rows += 1
                 for side in (-0.4, 0.4):
                     sx, sy = px - side * np.sin(yaw), py + side * np.cos(yaw)
                     site.seat(room, float(sx), float(sy), yaw, away=0.62)
     if not rows:  # the ways between its doors leave no room for rows
         x.arrange(_ROOMS["lecture"])
-    x.line(x.front, "bin", 1)
+    x.line(x.front, "bin", site.number(1))
 
 
 def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
@@ -190,7 +192,8 @@ def _corridor(site: Site, room: Room, plan: FloorPlan) -> None:
     ]
     avoid += [c.floor.buffer(0.3) for c in plan.corridors if c is not room]
     for what, density in style.fittings.items():
-        for _ in range(int(density * length / 10 + rng.random())):
+        share = 1.0 if what == "lift" else site.density
+        for _ in range(int(share * density * length / 10 + rng.random())):
             piece = make(what, rng)
             if what == "cabinet":
                 piece = make(what, rng, style.storage[0])

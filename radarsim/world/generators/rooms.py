@@ -75,13 +75,18 @@ class Site:
     Attributes:
         rng: draws everything.
         height: of the ceilings, m.
+        density: of furniture: number of pieces, as a share of the usual.
         objects: so far.
     """
 
-    def __init__(self, rng: np.random.Generator, height: float):
-        self.rng, self.height = rng, height
+    def __init__(self, rng: np.random.Generator, height: float, density: float = 1.0):
+        self.rng, self.height, self.density = rng, height, density
         self.objects: list[SceneObject] = []
         self._count: dict[str, int] = {}
+
+    def number(self, usual: float) -> int:
+        """How many pieces there are where `usual` ones would be; the density's fraction of one is drawn."""
+        return int(usual) if self.density == 1 else int(int(usual) * self.density + self.rng.random())
 
     def add(self, name: str, mesh: trimesh.Trimesh, what: str) -> None:
         """Add an object of a material. Panes are sheets, all else is the surface of a body."""

@@ -32,6 +32,7 @@ DENSE = {
     "FEW": Lattice.fibonacci(89, 55),
     "MANY": Lattice.fibonacci(233, 144),
     "LEAST_SPLIT": fresnelzone.LEAST_SPLIT / 10,
+    "LEAST_SMOOTH": fresnelzone.LEAST_SMOOTH / 10,
 }
 #: Hz, over the sweep.
 TONES = CONFIG.center_frequency + CONFIG.bandwidth * np.linspace(-0.5, 0.5, 9)

@@ -9,6 +9,10 @@ from numba import njit
 from radarsim.propagation.apertures import CORNERS, FAR, depth
 from radarsim.propagation.fields import along, cross, dot, minus, mirrored, unit, vec
 
+#: Cosines of incidence up to which a mirror passes nothing, and from which on all that its aperture does: no other
+#: bound is met so that an echo would vanish in one step, since wide mirrors have room for it at any grazing angle.
+GRAZING, CLEAR = 0.004, 0.02
+
 
 class Room(NamedTuple):
     """Scratch for polygons: bounds as outward normals and offsets, and corners as `apertures.overlap` takes them."""
@@ -33,7 +37,8 @@ def window(way, p, path, ray, wavelength, flat, room):
         path: length of the whole way, m.
 
     Returns:
-        how many bounds there are, -1 where nothing is left open; two axes across the ray.
+        how many bounds there are, -1 where nothing is left open; two axes across the ray; and what mirrors that are
+        met at grazing incidence leave of the amplitude.
     """
     normal, corners, planes = flat.normal, flat.corners, room.planes
     aside = (0.0, 0.0, 1.0) if abs(ray[2]) < 0.7 else (1.0, 0.0, 0.0)
@@ -41,20 +46,22 @@ def window(way, p, path, ray, wavelength, flat, room):
     e2 = cross(ray, e1)
     # Instead of unfolding the mirrors, the path and its axes are folded; the start moves to its images.
     start, now, f1, f2 = p, ray, e1, e2
-    count, before, last = 0, 0.0, ray
+    count, before, last, left = 0, 0.0, ray, 1.0
     for k in range(len(way)):
         m = way[k]
         n, c = vec(normal[m]), vec(flat.center[m])
         slope = dot(now, n)
-        if abs(slope) < 0.02 or (slope > 0 and not flat.two_sided[m]):
-            return -1, e1, e2
+        if abs(slope) <= GRAZING or (slope > 0 and not flat.two_sided[m]):
+            return -1, e1, e2, 0.0
+        share = min((abs(slope) - GRAZING) / (CLEAR - GRAZING), 1.0)
+        left *= share * share * (3 - 2 * share)
         t = dot(minus(c, start), n) / slope
         if t <= 0.005 or t >= path - 0.005 or t < before - np.sqrt(wavelength * path):
-            return -1, e1, e2
+            return -1, e1, e2, 0.0
         if k > 0:
             count = _bounded(planes, count, _junction((now, f1, f2), (before, last), (t, n)), path, wavelength)
             if count < 0:
-                return -1, e1, e2
+                return -1, e1, e2, 0.0
         before = t
         x, y = 0.0, 0.0  # the middle of the window
         for side in range(4):
@@ -75,11 +82,11 @@ def window(way, p, path, ray, wavelength, flat, room):
             at = dot(one, now) + share * (dot(two, now) - dot(one, now))
             count = _bounded(planes, count, (nx, ny, nx * x + ny * y, at), path, wavelength)
             if count < 0:
-                return -1, e1, e2
+                return -1, e1, e2, 0.0
         now, last = along(now, -2 * slope, n), n
         start = mirrored(start, c, n)
         f1, f2 = along(f1, -2 * dot(f1, n), n), along(f2, -2 * dot(f2, n), n)
-    return count, e1, e2
+    return count, e1, e2, left
 
 
 @njit(cache=True)

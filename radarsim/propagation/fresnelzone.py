@@ -22,12 +22,13 @@ the single rays to scatterers (`paths`), which count twice, have the right mean 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Complex, Float, Int
+from jaxtyping import Bool, Complex, Float, Int
 from numba import njit
+from numpy.typing import ArrayLike
 
 from radarsim.propagation.apertures import SLIT
 from radarsim.propagation.fields import cross, dot, minus, vec
-from radarsim.propagation.lattice import FEW, MANY, Lattice, coupled
+from radarsim.propagation.lattice import FEW, HALF, MANY, Lattice, coupled, shares
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Obstacles, Passage
 from radarsim.propagation.reflectors import Flat
@@ -37,14 +38,20 @@ from radarsim.propagation.table import Table
 LEAST_LOSS = 4.0
 #: The same for zones: some 16 dB over noise.
 LEAST_SPLIT = 20.0
+#: Echoes that are at least this much stronger are free of steps, some 40 dB over noise: by zones of narrow mirrors and
+#: points, and by where borders pass between nodes.
+LEAST_SMOOTH = 400.0
 #: At the radar rays are so far apart, as a share of what they are at a mirror.
 AT_RADAR = 0.5
 #: Fewer nodes than this within a mirror say less than the one ray through its middle.
 _FEWEST = 4
-#: Where an obstacle stands is known to this many halvings of a stretch.
+#: What mirrors leave open is narrow below this, Fresnel units.
+_NARROW = 2.0
+#: Where an obstacle stands is known to this many halvings of a stretch, and a border to as many of a link.
 _HALVINGS = 4
-#: Rays to a point spread no wider than for an obstacle at this share of the way to it.
+#: Rays to a point spread no wider than for an obstacle at this share of the way to it, so wide.
 _BESIDE = 0.7
+_WIDEST = np.sqrt(2 * _BESIDE / (1 - _BESIDE))
 
 
 @dataclass(frozen=True)
@@ -91,8 +98,9 @@ def passage(
     path, strength = stretches.path, size[stretches.path]
     worth = strength > LEAST_LOSS * observation.threshold
     found = obstacles.passage(observation, stretches.frame, stretches.begin, stretches.end, worth)
-    rows, place = _partly(observation, flat, obstacles, stretches, strength, found.factor)
-    fans, some = _fans(observation, flat, obstacles, stretches[rows], place)
+    rows, partly, place = _partly(observation, flat, obstacles, stretches, strength, found.factor)
+    smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
+    fans, some = _fans(observation, flat, obstacles, partly, place, smooth)
     for column, new in zip(found.columns, some.columns, strict=True):
         column[rows] = new
     returns = np.bincount(path, minlength=len(size)) == 1
@@ -103,7 +111,7 @@ def passage(
     owner, first, last = owner[two], first[two], last[two]
     near, far = place[first], np.where(returns[owner], 1 - place[last], place[last])
     rho = np.sqrt(near * (1 - far) / (far * (1 - near)))
-    both = coupled(fans[first], fans[last], rho, stretches.mirroring[rows[first]], MANY.couplings)
+    both = coupled(fans[first], fans[last], rho, partly.mirroring[first], MANY.couplings)
     single = some.factor[first] * some.factor[last]
     both = np.where(np.isnan(both), single, _bounded(both, SLIT**2))
     factor = found.factor ** (1 + returns[path])
@@ -119,12 +127,15 @@ def passage(
 def _partly(
     observation: Observation, flat: Flat, obstacles: Obstacles, stretches: Stretches,
     strength: Float[np.ndarray, "stretch"], factor: Complex[np.ndarray, "stretch"],
-) -> tuple[Int[np.ndarray, "partly"], Float[np.ndarray, "partly"]]:  # fmt: skip
-    """Which stretches are partly clear, and where what is in the way stands, as a share of the whole path."""
+) -> tuple[Int[np.ndarray, "partly"], Stretches, Float[np.ndarray, "partly"]]:  # fmt: skip
+    """Which stretches are partly clear, fitted to their mirrors, and where what is in the way stands, as a share of the
+    whole path."""
     long = np.any(stretches.begin != stretches.end, axis=1)
     rows = np.flatnonzero(long & (strength > LEAST_SPLIT * observation.threshold))
-    few, begin, end, inside = _rays(flat, stretches[rows], FEW)
-    clear = obstacles.clear(observation, stretches.frame[rows[few]], begin, end)
+    smooth = strength[rows] > LEAST_SMOOTH * observation.threshold
+    fitted = _fitted(flat, stretches[rows], smooth)
+    few, begin, end, inside = _rays(flat, fitted, FEW, smooth * (_WIDEST - 1))
+    clear = obstacles.clear(observation, fitted.frame[few], begin, end)
     # Alike are all that are as the ray in the middle; then what that met is all there is.
     unlike = _sums(few, clear != (factor[rows[few]] == 1), len(rows))
     partly = (unlike > 0) & (inside.sum(axis=1) >= _FEWEST)
@@ -132,17 +143,56 @@ def _partly(
     hidden = np.flatnonzero(~clear & partly[few])
     number = np.arange(len(hidden)) - np.searchsorted(few[hidden], few[hidden])
     hidden = hidden[(number == 0) | (np.append(number[1:], 0) == 0)]
-    owner, begin, way = few[hidden], begin[hidden], (end - begin)[hidden]
-    reach = np.zeros(len(hidden))
-    for step in 0.5 ** np.arange(1, _HALVINGS + 1):
-        target = begin + (reach + step)[:, None] * way
-        reach += step * obstacles.clear(observation, stretches.frame[rows[owner]], begin, target)
-    reach += 0.5 ** (_HALVINGS + 1)
+    owner, begin, end = few[hidden], begin[hidden], end[hidden]
+    reach = _reach(observation, obstacles, fitted.frame[owner], (begin, begin), (begin, end))
     met = np.bincount(owner, minlength=len(rows))
     share = (_sums(owner, reach, len(rows)) / np.maximum(met, 1))[partly]
-    rows = rows[partly]
-    low, high = stretches.span[rows].T
-    return rows, low + share * (high - low)
+    fitted = fitted[partly]
+    low, high = fitted.span.T
+    return rows[partly], fitted, low + share * (high - low)
+
+
+def _reach(
+    observation: Observation, obstacles: Obstacles, frame: Int[np.ndarray, "ray"],
+    one: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"]],
+    two: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"]],
+    through: Bool[np.ndarray, "ray"] | None = None,
+) -> Float[np.ndarray, "ray"]:  # fmt: skip
+    """How far clear rays can move towards hidden ones (begin and end of either, m) before they are hidden, as a share
+    of the whole way; `through` as in `Obstacles.clear`."""
+    moved = np.zeros(len(frame))
+    for step in 0.5 ** np.arange(1, _HALVINGS + 1):
+        begin, end = (a + (moved + step)[:, None] * (b - a) for a, b in zip(one, two, strict=True))
+        moved += step * obstacles.clear(observation, frame, begin, end, through)
+    return moved + 0.5 ** (_HALVINGS + 1)
+
+
+def _fitted(flat: Flat, stretches: Stretches, smooth: Bool[np.ndarray, "stretch"]) -> Stretches:
+    """Stretches, some of which (`smooth`) so that nodes lie about the middle of what mirrors leave open, where that is
+    narrower than a zone.
+
+    What a small mirror sends straight back comes from it as from a point.
+    """
+    edges = np.empty((len(stretches), 2, 2))
+    _open(flat.corners, flat.normal, stretches.columns, edges)
+    low, high = edges[..., 0], edges[..., 1]
+    narrow = (low < high) & (high - low < _NARROW) & smooth[:, None]
+    share, middle = np.ones(narrow.shape), np.zeros(narrow.shape)
+    share[narrow] = (high - low)[narrow] / _NARROW
+    # Rays to all parts of a small plate aim at one place, so that these meet the same obstacles.
+    middle[narrow] = np.minimum(2 * (1 - share[narrow]), 1) * (low[narrow] + high[narrow]) / 2
+    at_radar, back = stretches.span[:, :1] == 0, stretches.span[:, 1:] == 0.5
+    mirroring = stretches.mirroring * np.where(back, share, 1)
+    spread = np.where(back, (1 - (1 - AT_RADAR) * mirroring) / (1 - (1 - AT_RADAR) * stretches.mirroring), share)
+    aside = np.where(at_radar, 0, middle), np.where(stretches.span[:, 1:] == 1, 0, middle)
+    return replace(
+        stretches,
+        begin=stretches.begin + np.einsum("sa,sad->sd", aside[0], stretches.before),
+        end=stretches.end + np.einsum("sa,sad->sd", aside[1], stretches.after),
+        before=stretches.before * spread[..., None], after=stretches.after * share[..., None],
+        stops=stretches.stops + np.einsum("sa,sgad->sgd", middle, stretches.apart),
+        apart=stretches.apart * share[:, None, :, None], mirroring=mirroring,
+    )  # fmt: skip
 
 
 def _fans(
@@ -151,8 +201,10 @@ def _fans(
     obstacles: Obstacles,
     stretches: Stretches,
     place: Float[np.ndarray, "stretch"],
+    smooth: Bool[np.ndarray, "stretch"],
 ) -> tuple[Complex[np.ndarray, "stretch 2 node"], Passage]:
-    """What passes of many rays, zero beyond the mirrors' outlines; which are within; and delays, m.
+    """What passes of many rays, zero beyond the mirrors' outlines; which are within; and delays, m. Borders are looked
+    for between nodes of some (`smooth`).
 
     Rays are straight and zones are not: they are spread so as to be right where the obstacle is.
     """
@@ -175,10 +227,46 @@ def _fans(
     fans[:, 0][inside] = passed.factor * np.exp(wavenumber * (passed.delay - later[many]))
     fans[:, 1][inside] = 1
     clear[inside] = passed.blocked == 0
+    _soften(observation, obstacles, stretches.frame, (begin, end, inside), passed, smooth, (fans[:, 0], clear))
     whole = fans[:, 1] @ MANY.weight
     factor = _bounded(fans[:, 0] @ MANY.weight / whole, SLIT)
     through = _sums(many, power * passed.through, count) > total / 2
     return fans, Passage(factor, later, through, 1 - np.minimum(np.abs(clear @ MANY.weight / whole), 1))
+
+
+def _soften(
+    observation: Observation, obstacles: Obstacles, frame: Int[np.ndarray, "stretch"],
+    rays: tuple[Float[np.ndarray, "ray 3"], Float[np.ndarray, "ray 3"], Bool[np.ndarray, "stretch node"]],
+    passed: Passage, smooth: Bool[np.ndarray, "stretch"], values: tuple[np.ndarray, ...],
+) -> None:  # fmt: skip
+    """Share values of nodes among those about which borders pass, by where on the links between nodes these are.
+
+    Args:
+        observation, obstacles: the frames, and what is in the way.
+        frame: of each stretch.
+        rays: of the nodes, begin and end, and which nodes of which stretch they are.
+        passed: of the rays.
+        smooth: which stretches.
+        values: of the nodes (stretch, node), written in place.
+    """
+    begin, end, inside = rays
+    state, number = np.full(inside.shape, -1, np.int8), np.zeros(inside.shape, int)
+    state[inside], number[inside] = 2 - (passed.factor != 1) - (passed.factor == 0), np.arange(len(begin))
+    some = np.flatnonzero(smooth)
+    one, two = state[some[:, None], MANY.links[:, 0]], state[some[:, None], MANY.links[:, 1]]
+    s, link = np.nonzero((one != two) & (one >= 0) & (two >= 0))
+    first = (one > two)[s, link].astype(int)  # the more open node
+    s = some[s]
+    open_, other = MANY.links[link, 1 - first], MANY.links[link, first]
+    here, there = number[s, open_], number[s, other]
+    through = state[s, open_] == 1
+    reach = _reach(observation, obstacles, frame[s], (begin[here], end[here]), (begin[there], end[there]), through)
+    near, far = shares(reach)
+    degree = MANY.degrees(inside)
+    for value in values:
+        step = value[s, other] - value[s, open_]
+        np.add.at(value, (s, open_), (1 - near) * step / degree[s, open_])
+        np.subtract.at(value, (s, other), far * step / degree[s, other])
 
 
 def _sums(index: Int[np.ndarray, "n"], values: np.ndarray, count: int) -> Float[np.ndarray, "count"]:
@@ -191,29 +279,70 @@ def _bounded(value: Complex[np.ndarray, "n"], most: float) -> Complex[np.ndarray
     return value * np.minimum(1, most / np.maximum(np.abs(value), 1e-12))
 
 
-def _rays(flat: Flat, stretches: Stretches, lattice: Lattice) -> tuple[np.ndarray, ...]:
-    """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which stretch these are."""
-    shape = len(stretches), len(lattice.nodes)
-    begin, end, inside = np.empty((*shape, 3)), np.empty((*shape, 3)), np.empty(shape, np.bool_)
-    _spread(flat.corners, flat.normal, stretches.columns, lattice.nodes, begin, end, inside)
-    return np.nonzero(inside)[0], begin[inside], end[inside], inside
+def _rays(flat: Flat, stretches: Stretches, lattice: Lattice, wider: ArrayLike = 0.0) -> tuple[np.ndarray, ...]:
+    """Rays within the mirrors' outlines: whose, from where, to where; and which nodes of which stretch these are.
+
+    The outermost rays to points begin by a share, `wider` (by stretch), farther apart: a zone is wider than the cone of
+    rays to its tip.
+    """
+    inside = np.empty((len(stretches), len(lattice.nodes)), np.bool_)
+    _within(flat.corners, flat.normal, stretches.columns, lattice.nodes, inside)
+    owner, node = np.nonzero(inside)
+    begin, end = np.empty((2, len(owner), 3))
+    nodes = lattice.nodes[node]
+    wide = np.broadcast_to(wider, len(stretches))[:, None] * (1 - stretches.mirroring)
+    cone = nodes * (1 + wide[owner] * (nodes / HALF) ** 2)
+    _spread(stretches.columns, owner, cone, nodes, begin, end)
+    return owner, begin, end, inside
 
 
 @njit(cache=True)
-def _spread(corners, normal, stretches, nodes, begin, end, inside):
+def _spread(stretches, owner, first, last, begin, end):
+    """Writes where rays begin and end, by their nodes at either end."""
+    for r in range(len(owner)):
+        i = owner[r]
+        for d in range(3):
+            begin[r, d], end[r, d] = stretches.begin[i, d], stretches.end[i, d]
+            for axis in range(2):
+                begin[r, d] += first[r, axis] * stretches.before[i, axis, d]
+                end[r, d] += last[r, axis] * stretches.after[i, axis, d]
+
+
+@njit(cache=True)
+def _within(corners, normal, stretches, nodes, inside):
+    """Writes which nodes are within the mirrors of each stretch."""
     bounds = np.empty((24, 3))
-    for i in range(len(begin)):
+    for i in range(len(inside)):
+        if i > 0 and stretches.path[i] == stretches.path[i - 1]:
+            inside[i] = inside[i - 1]
+            continue
         count = _bounds(corners, normal, stretches, i, bounds)
         for k in range(len(nodes)):
-            x, y = nodes[k]
-            for d in range(3):
-                begin[i, k, d] = stretches.begin[i, d] + x * stretches.before[i, 0, d] + y * stretches.before[i, 1, d]
-                end[i, k, d] = stretches.end[i, d] + x * stretches.after[i, 0, d] + y * stretches.after[i, 1, d]
             inside[i, k] = True
             for c in range(count):
-                if bounds[c, 0] + x * bounds[c, 1] + y * bounds[c, 2] < -1e-9:
+                if bounds[c, 0] + nodes[k, 0] * bounds[c, 1] + nodes[k, 1] * bounds[c, 2] < -1e-9:
                     inside[i, k] = False
                     break
+
+
+@njit(cache=True)
+def _open(corners, normal, stretches, edges):
+    """Writes from where to where mirrors leave the axes of each stretch open, Fresnel units."""
+    bounds = np.empty((24, 3))
+    for i in range(len(edges)):
+        if i > 0 and stretches.path[i] == stretches.path[i - 1]:
+            edges[i] = edges[i - 1]
+            continue
+        count = _bounds(corners, normal, stretches, i, bounds)
+        for axis in range(2):
+            low, high = -np.inf, np.inf
+            for c in range(count):
+                slope = bounds[c, 1 + axis]
+                if slope > 0:
+                    low = max(low, -bounds[c, 0] / slope)
+                elif slope < 0:
+                    high = min(high, -bounds[c, 0] / slope)
+            edges[i, axis] = low, high
 
 
 @njit

@@ -1,17 +1,22 @@
-"""Nodes over a Fresnel zone and their weights, for one screen and for two (see `fresnelzone`)."""
+"""Nodes over a Fresnel zone and their weights, for one screen and for two (see `fresnelzone`).
+
+What borders leave clear of a node's cell is taken from the links between neighbouring nodes: half of each belongs to
+either node's cell, so what passes changes smoothly as a border moves across a link.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from jaxtyping import Complex, Float
+from jaxtyping import Bool, Complex, Float, Float32, Int
 from numba import njit
+from scipy.spatial import Delaunay
 from scipy.special import erfc
 
 #: Correlations of two screens in steps of 1 / `_RHOS`.
 _RHOS = 10
 #: Half the side of the lattice's square, Fresnel units.
-_HALF = 1.5
+HALF = 1.5
 #: What changes of the nodes' weights cost in the fit of these, beside errors of half planes.
 _STIFF = 0.4
 #: How much more errors of upright and level half planes count in it.
@@ -34,13 +39,14 @@ class Lattice:
         do fades, so that it does not begin with a step.
         """
         k = np.arange(count)
-        nodes = _HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
-        weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.cos(np.pi * nodes / (2 * _HALF)).prod(axis=1)
+        nodes = HALF * (2 * np.stack([(k + 0.5) / count, (k * before + 0.5) / count % 1], axis=1) - 1)
+        weight = np.exp(0.5j * np.pi * np.sum(nodes**2, axis=1)) * np.cos(np.pi * nodes / (2 * HALF)).prod(axis=1)
         weight /= weight.sum()
         angle, edge = (x.ravel() for x in np.meshgrid(np.arange(24) * np.pi / 12, np.linspace(-1.5, 1.5, 31)))
-        clear = np.cos(angle)[:, None] * nodes[:, 0] + np.sin(angle)[:, None] * nodes[:, 1] < edge[:, None]
+        inside = edge[:, None] - np.cos(angle)[:, None] * nodes[:, 0] - np.sin(angle)[:, None] * nodes[:, 1]
+        clear = _half_planes(inside, _neighbours(nodes))
         lit = edge > 0
-        inner = np.clip((_HALF - np.abs(edge)) / 0.45, 0, 1)
+        inner = np.clip((HALF - np.abs(edge)) / 0.45, 0, 1)
         truth = erfc(-edge * np.sqrt(np.pi / 2) * np.exp(-0.25j * np.pi)) / 2
         truth = lit + (truth - lit) * inner**2 * (3 - 2 * inner)
         # As exact in the shadow as in the light, and more so for upright and level edges.
@@ -51,6 +57,17 @@ class Lattice:
         return cls(nodes, weight / weight.sum())
 
     @cached_property
+    def links(self) -> Int[np.ndarray, "link 2"]:
+        """Pairs of nodes whose cells touch."""
+        return _neighbours(self.nodes)
+
+    def degrees(self, inside: Bool[np.ndarray, "*n node"]) -> Float32[np.ndarray, "*n node"]:
+        """Number of links of each node to nodes that are inside."""
+        linked = np.zeros((len(self.nodes), len(self.nodes)), np.float32)
+        linked[tuple(np.concatenate([self.links, self.links[:, ::-1]]).T)] = 1
+        return inside.astype(np.float32) @ linked
+
+    @cached_property
     def couplings(self) -> Complex[np.ndarray, "kind rho node node"]:
         """Weights of pairs of nodes for two screens of correlation 0, 1 / `_RHOS`, ... 1, along both axes (kind 0), or
         along the first one alone (1)."""
@@ -59,7 +76,7 @@ class Lattice:
         out[:, 0], out[0, -1] = np.outer(self.weight, self.weight), np.diag(self.weight)
         taper = self.weight * np.exp(-0.5j * np.pi * np.sum(self.nodes**2, axis=1))
         # The kernel is averaged over cells, which it varies within where rho is near 1.
-        cell = 2 * _HALF / np.sqrt(count) * np.array([-0.25, 0.25])
+        cell = 2 * HALF / np.sqrt(count) * np.array([-0.25, 0.25])
         place = self.nodes[:, None] + np.stack(np.meshgrid(cell, cell), axis=-1).reshape(-1, 2)
         for kind, step in [(0, k) for k in range(1, _RHOS)] + [(1, k) for k in range(1, _RHOS + 1)]:
             rho = min(step / _RHOS, 0.95) * np.array([1, 1 - kind])
@@ -75,7 +92,30 @@ class Lattice:
         return out
 
 
-FEW, MANY = Lattice.fibonacci(21, 13), Lattice.fibonacci(89, 55)
+def shares(open_: Float[np.ndarray, "link"]) -> tuple[Float[np.ndarray, "link"], Float[np.ndarray, "link"]]:
+    """What is open of the halves of links, that of the open node first, if so much of each is from there on."""
+    return np.minimum(2 * open_, 1), np.maximum(2 * open_ - 1, 0)
+
+
+def _neighbours(nodes: Float[np.ndarray, "node 2"]) -> Int[np.ndarray, "link 2"]:
+    corners = Delaunay(nodes).simplices
+    return np.unique(np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]])), axis=0)
+
+
+def _half_planes(inside: Float[np.ndarray, "plane node"], links: Int[np.ndarray, "link 2"]) -> np.ndarray:
+    """Share of each node's cell that lies in half planes, by how deep the nodes are inside."""
+    total, degree = np.zeros_like(inside), np.bincount(links.ravel(), minlength=inside.shape[1])
+    for one, two in links:
+        i, j = inside[:, one], inside[:, two]
+        swap = i < j
+        high, low = np.where(swap, j, i), np.where(swap, i, j)
+        near, far = shares(np.where(high <= 0, 0, np.where(low > 0, 1, high / np.maximum(high - low, 1e-12))))
+        total[:, one] += np.where(swap, far, near)
+        total[:, two] += np.where(swap, near, far)
+    return total / degree
+
+
+FEW, MANY = Lattice.fibonacci(21, 13), Lattice.fibonacci(55, 34)
 
 
 def coupled(

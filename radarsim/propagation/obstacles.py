@@ -63,10 +63,18 @@ class Obstacles:
 
     def clear(
         self, observation: Observation, frame: Int[np.ndarray, "ray"], begin: Float[np.ndarray, "ray 3"],
-        end: Float[np.ndarray, "ray 3"],
+        end: Float[np.ndarray, "ray 3"], through: Bool[np.ndarray, "ray"] | None = None,
     ) -> Bool[np.ndarray, "ray"]:  # fmt: skip
-        """Whether nothing is in the way, slabs included; frames and ends as `passage` has them."""
+        """Whether nothing is in the way; frames and ends as `passage` has them.
+
+        Args:
+            observation, frame, begin, end: of `passage`.
+            through: rays that slabs of the scene do not count for; None: they count for all.
+        """
         blocked = np.zeros(len(frame), bool) if self.scene is None else self.scene.occluded(begin, end, CLEARANCE)
+        if through is not None and self.transmission is not None and self.transmission.opaque is not None:
+            rows = np.flatnonzero(blocked & through)
+            blocked[rows] = self.transmission.opaque.occluded(begin[rows], end[rows], CLEARANCE)
         blocked |= self.moving.occluded(begin, end, observation.time[frame], parts=self.moving.opaque)
         if len(self.plates):
             blocked |= self.plates.passage(observation, frame, begin, end, np.zeros(len(frame), bool))[0] == 0

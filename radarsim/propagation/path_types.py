@@ -170,7 +170,8 @@ class PathTypes:
         lateral /= np.maximum(np.linalg.norm(lateral, axis=1, keepdims=True), 1e-9)
         left = self._row[1]
         aperture = np.ptp(left) * len(left) / max(len(left) - 1, 1)
-        beam = 0.443 * self.config.wavelength / aperture  # half-power half width of a uniform row, sine
+        # half-power half width of a uniform row, sine; one antenna tells no directions apart
+        beam = 0.443 * self.config.wavelength / aperture if aperture > 0 else 1.0
         strong = self.pattern.elevation_gain > self.pattern.elevation_gain[0] / np.sqrt(2)
         rise = np.tan(np.deg2rad(0.5 * np.argmin(strong)) if not strong.all() else np.pi / 4)
         up = np.broadcast_to([0.0, 0.0, 1.0], away.shape)
@@ -207,4 +208,4 @@ def _beams(lengths, row, wavelength, step, steering, cells):
                 im[b] += c * imaginary[a, b] + s * real[a, b]
         for b in range(beams):
             re[b] = re[b] * re[b] + im[b] * im[b]
-        cells[i, 1] = np.argmax(re)
+        cells[i, 1] = np.argmax(re) if antennas > 1 else beams // 2

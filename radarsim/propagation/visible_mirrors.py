@@ -15,8 +15,8 @@ from radarsim.propagation.reflectors import Flat
 
 #: A reflector is looked at in points, one to this area and at least `FEWEST`; one of which none is seen is left out.
 SPACING, FEWEST, MOST = 0.02, 4, 240
-#: Apertures pass some light by their edges: this far from them a ray may lie, m.
-MARGIN = 0.1
+#: Apertures pass some light by their edges: this far from them a ray may lie, m; `apertures.FAR` zones at 8 m.
+MARGIN = 0.25
 #: Reflectors near one another that are looked at together before one by one.
 RUN = 16
 #: A reflector stands before another from this height over its plane on, m: the faces of an outer edge do not see one

@@ -81,7 +81,12 @@ def test_corners_that_there_are(office, position, target, bounces):
     ],
 )
 def test_outer_edges_are_no_corners(office, position, edge, spread):
-    """No ray comes back over both faces of an outer edge: 20 dB and more below what a corner there would return."""
+    """No ray comes back over both faces of an outer edge: 20 dB and more below what a corner there would return.
+
+    At these edges chains return nothing, in fans of 0.05 and 0.1, with door frames and without. Only the rays of the
+    reference are over the limit, about the doorway: a fan of 0.1 returns 0.12 to 0.19 of a corner, one of 0.05 at most
+    0.02. So it comes from what the wider fan takes in beside the edge; which surface that is was not looked for.
+    """
     distance = np.linalg.norm(edge - position)
     axis, corner = (edge - position) / distance, LAMBDA / (8 * np.pi * distance)
     assert abs(bounced(office[0], position, UP, axis, spread, 2, LAMBDA)) < 0.1 * corner

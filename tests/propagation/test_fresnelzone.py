@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import erfc
 
 from benchmarks.references.brute_force import past_edge, past_pole
 from benchmarks.references.poles import CONFIG, LAMBDA, OFFSETS, WALL, left, pole, wall_past_pole
@@ -104,3 +105,45 @@ def test_an_edge_that_goes_behind_a_pillar_bit_by_bit():
     now = np.array([field(e, p, LAMBDA) for e, p in zip(found[1:], places[1:], strict=True)])
     assert abs(now[-1]) < 0.1 * abs(now[0])
     assert np.abs(now - before).max() < 0.3 * np.abs(now).max()
+
+
+def test_a_border_passes_without_steps():
+    """The edge of a screen, half a millimetre at a time; where nodes were clear or not, 0.06 of the amplitude."""
+    offsets = np.arange(-0.02, 0.02, 0.0005)
+    found = 10 ** (np.array([left([WALL], [board(1.0, y)], 4.0) for y in offsets]) / 20)
+    truth = np.array([abs(past_edge(y, (1.0, 3.0), 4.0, LAMBDA)) for y in offsets])
+    assert np.abs(np.diff(found)).max() < 2 * np.abs(np.diff(truth)).max() + 0.01
+    assert np.abs(found - truth).max() < 0.08
+
+
+def test_a_strip_goes_behind_an_edge_as_a_point_does():
+    """A strip of 20 mm, half a zone wide: what passes on the way there passes on the way back, Fresnel's integral
+    squared (by one ray, 0 or 1)."""
+    strip = SceneObject("strip", shapes.rectangle((2, 0, 0), (0.02, 0.4), (-1, 0, 0)), MATERIALS["metal"])
+    reflectors, nothing = (
+        Reflectors.of(Scene("strip", [strip]), CONFIG),
+        Scatterers.points(np.zeros((0, 3)), np.zeros(0)),
+    )
+
+    def echo(*things):
+        finder = PathFinder(Scene("all", [strip, *things]), nothing, reflectors, CONFIG, antenna=ISOTROPIC)
+        return field(finder(np.zeros(3), np.eye(3)), np.zeros(3), LAMBDA)
+
+    offsets = np.arange(-0.04, 0.041, 0.004)
+    found = np.array([abs(echo(board(1.0, y)) / echo()) for y in offsets])
+    zone = np.sqrt(LAMBDA / 2 / 2)
+    truth = np.abs(erfc(-offsets / zone * np.sqrt(np.pi / 2) * np.exp(-0.25j * np.pi)) / 2) ** 2
+    assert np.abs(found - truth)[np.abs(offsets) < 0.015].max() < 0.15
+    assert np.abs(np.diff(found)).max() < 0.15
+    assert found[0] < 0.05 and found[-1] == pytest.approx(1.0, abs=0.2)
+
+
+def test_the_echo_of_a_strip_moves_with_it():
+    """Paths found 5 mm aside keep what a strip of 20 mm echoes; by its edges, nearly opposite, 0.24 of it was lost."""
+    strip = SceneObject("strip", shapes.rectangle((1.75, 0, 0), (0.02, 0.32), (-1, 0, 0)), MATERIALS["metal"])
+    nothing, scene = Scatterers.points(np.zeros((0, 3)), np.zeros(0)), Scene("strip", [strip])
+    finder = PathFinder(scene, nothing, Reflectors.of(scene, CONFIG), CONFIG, antenna=ISOTROPIC)
+    for aside in (0.012, 0.02, 0.03):
+        here, there = np.array([0.0, aside, 0.0]), np.array([0.0, aside + 0.005, 0.0])
+        before, now = (field(finder(place, np.eye(3)), there, LAMBDA) for place in (here, there))
+        assert abs(now - before) < 0.12 * abs(now)

@@ -23,12 +23,12 @@ STILL = SimpleNamespace(position=lambda t: np.zeros((len(t), 3)), rotation=lambd
 NOTHING = Scatterers.points(np.zeros((0, 3)), np.zeros(0))
 
 
-def found(objects, points=NOTHING):
+def found(objects, points=NOTHING, config=CONFIG):
     """Paths at the origin, and their types."""
     scene = Scene("place", [SceneObject(f"{k}", mesh, MATERIALS[name]) for k, (mesh, name) in enumerate(objects)])
-    paths = PathFinder(scene, points, Reflectors.of(scene, CONFIG), CONFIG, 1e-9)(HERE, AHEAD)
-    lengths = paths.lengths(CONFIG, STILL, 0.0)[..., 0]
-    (types,) = PathTypes(scene, CONFIG, gain_pattern(Antenna.of(CONFIG.board)))(
+    paths = PathFinder(scene, points, Reflectors.of(scene, CONFIG), config, 1e-9)(HERE, AHEAD)
+    lengths = paths.lengths(config, STILL, 0.0)[..., 0]
+    (types,) = PathTypes(scene, config, gain_pattern(Antenna.of(config.board)))(
         [paths], [lengths], HERE[None], AHEAD[None]
     )
     return paths, types
@@ -76,6 +76,15 @@ def test_an_image_beside_a_wall(gap, ghost):
     mirrored = paths.bounces == 2
     assert mirrored.any()
     assert (types[mirrored] == PathType.GHOST).all() == ghost
+
+
+@pytest.mark.filterwarnings("error")
+def test_one_antenna_tells_no_directions_apart():
+    """The image beside a wall that a row of eight tells from the wall is at its range, and so no ghost."""
+    alone = CONFIG.model_copy(update={"tx_order": (0,), "rx": (0,)})
+    paths, types = found([wall(3.0, side=1.2)], point(3.0, 0.2, 0.0), alone)
+    mirrored = paths.bounces == 2
+    assert mirrored.any() and (types[mirrored] == PathType.DIRECT).all()
 
 
 def test_what_stands_before_a_wall_is_no_slab():

@@ -26,7 +26,7 @@ from numba import njit
 
 from radarsim.propagation import fresnelzone
 from radarsim.propagation.apertures import FAR, kirchhoff, outlines, overlap
-from radarsim.propagation.chain_aperture import inside, scratch, window
+from radarsim.propagation.chain_aperture import GRAZING, inside, scratch, window
 from radarsim.propagation.environment import View
 from radarsim.propagation.fields import (
     along,
@@ -197,11 +197,11 @@ def _search(observation, frame, flat, orders, found):
                 if _MOST * strength <= threshold:
                     continue
                 way[0], way[1], way[2] = a, b, c
-                bounds, e1, e2 = window(way[:order], p, path, ray, wavelength, flat, room)
+                bounds, e1, e2, left = window(way[:order], p, path, ray, wavelength, flat, room)
                 corners = overlap(room.planes, bounds, room.polygon, room.spare) if bounds >= 0 else 0
                 if corners < 3:
                     continue
-                share = kirchhoff(room.polygon, corners)
+                share = left * kirchhoff(room.polygon, corners)
                 if 1.001 * abs(share) * strength <= threshold:  # what mirrors reflect comes last: it costs the most
                     continue
                 value = _reflected(way[:order], up, ray, flat) * share * strength
@@ -248,7 +248,7 @@ def _meets(image, ray, side, path, wavelength, flat, edges, m):
     """
     n = vec(flat.normal[m])
     slope = dot(ray, n)
-    if side * slope < 0.02 and (abs(slope) < 0.02 or not flat.two_sided[m]):
+    if side * slope <= GRAZING and (abs(slope) <= GRAZING or not flat.two_sided[m]):
         return False
     center = vec(flat.center[m])
     t = dot(minus(center, image), n) / slope

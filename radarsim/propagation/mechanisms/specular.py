@@ -9,10 +9,14 @@ from radarsim.propagation import fresnelzone, patches, plates
 from radarsim.propagation.curved import LINE, SpecularPoints
 from radarsim.propagation.environment import View
 from radarsim.propagation.fresnelzone import AT_RADAR, Stretches
+from radarsim.propagation.isometry import image
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.paths import Kind, Paths
 from radarsim.propagation.reflectors import Flat
 from radarsim.propagation.unevenness import Heights
+
+#: See `_merged`.
+_APART = 0.6
 
 
 def find(view: View) -> Paths:
@@ -34,7 +38,7 @@ def find(view: View) -> Paths:
         ]
     parts, curved = SpecularPoints.joined(found), SpecularPoints.joined(bodies)
     frames = np.arange(observation.frames)
-    of_part = np.repeat(frames, [len(some) for some in found])
+    of_part, parts = _merged(observation, np.repeat(frames, [len(some) for some in found]), flat, parts)
     of_curved = np.repeat(np.repeat(frames, 2), [len(some) for some in bodies])
     mirrors = np.full((len(parts), 4), -1)
     mirrors[:, 0] = parts.facet
@@ -49,6 +53,52 @@ def find(view: View) -> Paths:
     lag = np.append(flat.lag, 0.0)[paths.mirrors[:, 0]]  # at the centre of the sweep, amplitudes know it
     paths = replace(paths, amplitude=paths.amplitude * np.exp(-2j * np.pi * lag / observation.wavelength))
     return paths.behind(observation, replace(passed, delay=passed.delay + lag))
+
+
+def _merged(
+    observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: SpecularPoints
+) -> tuple[Int[np.ndarray, "merged"], SpecularPoints]:
+    """Parts with those across a strip that is narrower than a zone in one, from its middle line.
+
+    Edges on both sides of a strip nearly cancel: their amplitudes go as 1 / s, s from the specular point, which changes
+    as the radar moves on by a share of s. That of the whole strip changes less while s times its width is below about
+    `_APART` squared Fresnel units.
+    """
+    some = flat[parts.facet]
+    here, axes = observation.position[frame] - some.center, np.stack([some.u, some.v, some.normal], axis=1)
+    aside = np.einsum("pad,pd->pa", axes, here)
+    square = observation.wavelength * np.abs(aside[:, 2:]) / 4  # of a Fresnel unit
+    corners = np.einsum("pad,pkd->pka", axes[:, :2], some.corners - some.center[:, None])
+    rectangle = (np.abs(np.abs(corners) - some.half[:, None]) < 1e-6).all(axis=(1, 2))
+    width = 2 * some.half
+    narrow = rectangle[:, None] & (width**2 < square) & (width * np.abs(aside[:, :2]) < _APART * square)
+    rows = np.flatnonzero(narrow.any(axis=1))
+    if not len(rows):
+        return frame, parts
+    narrow, axes, center, place = narrow[rows], axes[rows], some.center[rows], observation.position[frame[rows]]
+    # along u and v a part mirrors nothing, or about a line so far from the middle
+    turned = np.einsum("pad,pde,pae->pa", axes, parts.isometry[rows, :, :3], axes)[:, :2] < 0
+    line = np.einsum("pad,pd->pa", axes[:, :2], image(parts.isometry[rows], center) - center) / 2
+    side = np.where(narrow, 2, np.where(turned, np.sign(line), 0)).astype(int)
+    key = np.column_stack([frame[rows], parts.facet[rows], side])
+    _, first, which = np.unique(key, axis=0, return_index=True, return_inverse=True)
+    sign = np.column_stack([np.where(narrow | turned, -1, 1), np.full(len(rows), -1)])
+    isometry = np.empty((len(rows), 3, 4))
+    isometry[..., :3] = np.einsum("pad,pa,pae->pde", axes, sign, axes)
+    isometry[..., 3] = center - np.einsum("pde,pe->pd", isometry[..., :3], center)
+    isometry[..., 3] += 2 * np.einsum("pa,pad->pd", np.where(narrow | ~turned, 0, line), axes[:, :2])
+    path, new = (np.linalg.norm(image(each, place) - place, axis=1) for each in (parts.isometry[rows], isometry))
+    amplitude = np.zeros(len(first), complex)
+    turn = np.exp(2j * np.pi / observation.wavelength * (path - new))
+    np.add.at(amplitude, which.ravel(), parts.amplitude[rows] * turn)
+    one, across = rows[first], np.where(narrow[..., None], axes[:, :2], 0)[first]
+    aim = parts.aim[one]
+    aim = aim - np.einsum("pad,pae,pe->pd", across, across, aim - center[first])
+    geometry = parts.geometry[one]
+    geometry[:, :12] = isometry[first].reshape(-1, 12)
+    strips = SpecularPoints(parts.facet[one], aim, geometry, amplitude)
+    rest = np.setdiff1d(np.arange(len(parts)), rows, assume_unique=True)
+    return np.append(frame[rest], frame[one]), SpecularPoints.joined([parts[rest], strips])
 
 
 def _to_parts(observation: Observation, frame: Int[np.ndarray, "part"], flat: Flat, parts: SpecularPoints) -> Stretches:

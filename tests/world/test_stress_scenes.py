@@ -43,10 +43,10 @@ CLAIMS = {
     "corner": (caused_by(PathType.GHOST), 0.15),
     "cul-de-sac": (caused_by(PathType.GHOST), 0.08),
     "glass-corridor": (caused_by(PathType.GHOST, PathType.THROUGH_SLAB), 0.1),
-    "mirror-cabinet": (caused_by(PathType.GHOST), 0.15),
+    "mirror-cabinet": (caused_by(PathType.GHOST), 0.1),
     "overhead": (before_the_surface, 0.05),
     "shelves": (caused_by(PathType.GHOST), 0.1),
-    "people": (caused_by(PathType.MOVING), 0.1),
+    "people": (caused_by(PathType.MOVING), 0.06),
 }
 
 

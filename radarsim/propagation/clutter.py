@@ -45,7 +45,7 @@ from radarsim.world.shapes import scattered
 #: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
 #: drawn it was 4, 16 and 3; of those there are some 0.2, 3 and 0.1.
 ON_WALLS, ON_TOPS, UNDER_CEILINGS, ON_FLOORS = 3.5, 12.0, 2.75, 1.0
-#: Points of a scene, some 200 bytes each: a floor of the largest buildings has ten thousand.
+#: Points of a scene, of either population, some 200 bytes each: a floor of the largest buildings has ten thousand.
 MOST = 5_000_000
 #: Mean distance from the surface, m, over the least: half the depth of what hangs or stands there.
 STANDOFF, NEAREST = 0.03, 0.01
@@ -97,7 +97,7 @@ class Population(NamedTuple):
         )  # fmt: skip
 
 
-#: Of every density there are as many small objects as corners.
+#: At each density there are as many small objects as corners.
 SMALL = Population(0.2, 0.7)
 CORNERS = Population(2.0, 0.5, lobe=(0.0, 0.0, 1.0, 200.0), reflectivity=0.3)
 

@@ -63,9 +63,13 @@ class Lattice:
 
     def degrees(self, inside: Bool[np.ndarray, "*n node"]) -> Float32[np.ndarray, "*n node"]:
         """Number of links of each node to nodes that are inside."""
+        return inside.astype(np.float32) @ self._linked
+
+    @cached_property
+    def _linked(self) -> Float32[np.ndarray, "node node"]:
         linked = np.zeros((len(self.nodes), len(self.nodes)), np.float32)
         linked[tuple(np.concatenate([self.links, self.links[:, ::-1]]).T)] = 1
-        return inside.astype(np.float32) @ linked
+        return linked
 
     @cached_property
     def couplings(self) -> Complex[np.ndarray, "kind rho node node"]:

@@ -24,6 +24,7 @@ from radarsim.propagation.obstacles import Obstacles
 from radarsim.propagation.path_types import PathTypes
 from radarsim.propagation.paths import Paths
 from radarsim.propagation.reflectors import Reflectors
+from radarsim.propagation.reverberation import Detours
 from radarsim.propagation.surface import Cluttered, Surface
 from radarsim.propagation.unevenness import Heights
 from radarsim.receiver.frontend import FrontEnd
@@ -97,7 +98,9 @@ class Scenario:
         """Finds the echoes of a pose."""
         weakest, antenna = self.board.weakest, self.board.settings.pattern
         reach = SPEED_OF_LIGHT * self.board.passband[1] / (2 * self.config.slope)
-        scatterers = Cluttered(Surface(self.scene, self.rng("surface")), Clutter(self.scene, self.rng("clutter")))
+        surface, clutter = Surface(self.scene, self.rng("surface")), Clutter(self.scene, self.rng("clutter"))
+        detours = Detours.of(self.scene, self.config, self.rng("reverberation"))
+        scatterers = Cluttered(surface, clutter, detours)
         reflectors = Reflectors.of(self.scene, self.config, Heights.of(self.scene, self.rng("unevenness")))
         return PathFinder(self.scene, scatterers, reflectors, self.config, weakest, reach, antenna, self._moving)
 

@@ -9,7 +9,7 @@ from benchmarks.references.front_end import db
 from benchmarks.references.reciprocity import there_and_back
 from benchmarks.references.rigs import Rig, burst, field
 from benchmarks.references.speckle import speckle as speckles
-from radarsim.propagation.clutter import CORNERS, ON_WALLS, SMALL, Clutter, in_the_open
+from radarsim.propagation.clutter import CROSS_SECTION, EXPONENT, ON_WALLS, STRUCTURE, Clutter, in_the_open
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.reflectors import Reflectors
 from radarsim.propagation.scatterers import Scatterers
@@ -81,10 +81,9 @@ def small_things(axis) -> str:
     Weibull's distribution, P(> s) = exp(-(s / s0)^0.7), and take from the wall what they scatter."""
     wall = SceneObject("wall", shapes.rectangle((3, 0, 1.5), (40, 3), (-1, 0, 0)), material("wood"))
     things = Clutter(Scene("wall", [wall], surface_settings=SurfaceSettings(clutter=1)), np.random.default_rng(0))
-    found = things.near(np.zeros((1, 3)), 50.0)
-    sigma = np.sort(found.sigma[found.extended == 0])
-    mean = SMALL.mean * in_the_open(np.array([ON_WALLS * (SMALL.taken + CORNERS.taken)]))[0]
-    weibull = stats.weibull_min(SMALL.exponent, scale=mean / gamma(1 + 1 / SMALL.exponent))
+    sigma = np.sort(things.near(np.zeros((1, 3)), 50.0).sigma)
+    mean = CROSS_SECTION * in_the_open(np.array([STRUCTURE + ON_WALLS * CROSS_SECTION / 4]))[0]
+    weibull = stats.weibull_min(EXPONENT, scale=mean / gamma(1 + 1 / EXPONENT))
     dbsm, share = db(sigma), (np.arange(len(sigma)) + 0.5) / len(sigma)
     axis.plot(dbsm, weibull.cdf(sigma), **THEORY)
     axis.plot(dbsm[::20], share[::20], **FOUND)

@@ -10,7 +10,6 @@ from radarsim.propagation.fields import dot, facing, gain_towards, minus, vec
 from radarsim.propagation.level_of_detail import FULL_DETAIL, detail, share
 from radarsim.propagation.media import scattering
 from radarsim.propagation.observation import Observation
-from radarsim.propagation.scatterers import extended_factor
 from radarsim.propagation.table import Table
 from radarsim.propagation.targets import Targets
 
@@ -77,7 +76,7 @@ def _look(scatterers, owner, observation, count, index, columns):
             shown = detail(rank, share(gain / observation.peak_gain, away))
             if shown == 0:
                 continue
-            straight, echo = gain / away * extended_factor(scatterers.extended[i], away), 0.0
+            straight, echo = gain / away, 0.0
             size = scale * shown * np.sqrt(scatterers.sigma[i])
             lobe = scatterers.lobe[i]
             if cosine > 0 and gain > 0:

@@ -12,7 +12,8 @@ from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.obstacles import Obstacles
 from radarsim.propagation.reflectors import Flat, Reflectors
-from radarsim.propagation.surface import Scattering
+from radarsim.propagation.reverberation import Detours
+from radarsim.propagation.surface import Cluttered, Scattering
 from radarsim.propagation.targets import Targets
 from radarsim.propagation.visible_mirrors import Mirrors
 from radarsim.world.scene import Scene
@@ -44,6 +45,11 @@ class Environment:
         """The environment of a radar's configuration."""
         moving = MovingTargets([], np.random.default_rng()) if moving is None else moving
         return cls(scene, surface, reflectors, moving, Obstacles.of(scene, moving, config))
+
+    @property
+    def detours(self) -> Detours:
+        """Of waves that are scattered twice and more."""
+        return self.surface.detours if isinstance(self.surface, Cluttered) else Detours.zeros(0)
 
 
 @dataclass(frozen=True, eq=False)

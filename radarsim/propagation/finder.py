@@ -12,7 +12,7 @@ from radarize.radar.config import RadarConfig
 from radarsim.propagation import tracks
 from radarsim.propagation.antenna import Antenna, gain_pattern
 from radarsim.propagation.environment import Environment, View
-from radarsim.propagation.mechanisms import curved_ghosts, diffuse, image_chains, specular
+from radarsim.propagation.mechanisms import curved_ghosts, diffuse, diffuse_multipath, image_chains, specular
 from radarsim.propagation.movingtargets import MovingTargets
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.paths import Paths
@@ -22,7 +22,9 @@ from radarsim.world import plugins
 from radarsim.world.scene import Scene
 
 #: Ways in which an echo comes about; plug-ins append theirs.
-MECHANISMS: list[Callable[[View], Paths]] = [diffuse.find, specular.find, image_chains.find, curved_ghosts.find]
+MECHANISMS: list[Callable[[View], Paths]] = [
+    diffuse.find, specular.find, image_chains.find, curved_ghosts.find, diffuse_multipath.find,
+]  # fmt: skip
 
 
 class PathFinder:

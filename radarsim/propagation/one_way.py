@@ -33,7 +33,6 @@ from radarsim.propagation.media import UNCOVERED, mirror
 from radarsim.propagation.mirror_reach import MOST, Trials, from_zero, image_in, lit, lit_ones
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.reflectors import Flat
-from radarsim.propagation.scatterers import extended_factor
 from radarsim.propagation.table import Table
 from radarsim.propagation.targets import Targets
 
@@ -137,7 +136,7 @@ def _over(observation, flat, chains, k, aims, scatterers, out):
         if cosine <= 0:
             continue
         leaving = minus(bounce, p)
-        size = gain_towards(leaving, rotation, observation) / full * extended_factor(scatterers.extended[j], full)
+        size = gain_towards(leaving, rotation, observation) / full
         least = aims.weakest[i] / np.sqrt(cosine)
         if most * size <= least:
             continue

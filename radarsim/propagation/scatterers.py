@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
-from numba import njit
 from numpy.typing import ArrayLike
 
 from radarsim.propagation.media import LAMBERT
@@ -34,8 +33,6 @@ class Scatterers(Table):
         bounces_twice: the same for paths over two mirrors or more: every sixteenth, with sixteen times the power.
         lobe: its scattering pattern, see `media.weights`.
         rank: 0...1, which decides from how far it is used, see `detail`; negative: from everywhere.
-        extended: distance within which it is larger than a Fresnel zone, m, so that its echo falls short of its cross
-            section (`extended_factor`); 0: a point.
     """
 
     position: Float[np.ndarray, "scatterer 3"]
@@ -48,7 +45,6 @@ class Scatterers(Table):
     bounces_twice: Float[np.ndarray, "scatterer"]
     lobe: Float[np.ndarray, "scatterer 4"]
     rank: Float[np.ndarray, "scatterer"]
-    extended: Float[np.ndarray, "scatterer"]
 
     @classmethod
     def points(cls, position: ArrayLike, sigma: ArrayLike, phase: Float[np.ndarray, "n"] | None = None) -> "Scatterers":
@@ -63,15 +59,3 @@ class Scatterers(Table):
     def near(self, positions: Float[np.ndarray, "position 3"], reach: float) -> "Scatterers":
         """All of them: a given set is taken as it is, a `Surface` draws what is needed."""
         return self
-
-
-@njit(inline="always")
-def extended_factor(extended, distance):
-    """What an extended reflector leaves of the amplitude of a one-way path.
-
-    A flat one of area A and power reflectivity R has sigma = 4 pi R A^2 / lambda^2 far away, and is a mirror with an
-    echo of pi R r^2 near by. Between, 1 / sigma and 1 / (pi R r^2) add up here, without Fresnel's ripples; they are
-    equal at `extended`, sqrt(sigma / (pi R)). This is the fourth root, for the amplitude of a way out or back.
-    """
-    ratio = extended / distance
-    return (1.0 + ratio * ratio) ** -0.25

@@ -17,6 +17,7 @@ from radarsim.propagation.clutter import Clutter, uncovered
 from radarsim.propagation.hashgrid import Grid
 from radarsim.propagation.level_of_detail import FULL_DETAIL
 from radarsim.propagation.media import weights
+from radarsim.propagation.reverberation import Detours
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.world.scene import Scene
 
@@ -103,10 +104,11 @@ class Surface:
 
 @dataclass(frozen=True)
 class Cluttered:
-    """A surface and the small objects on it, as one set of scatterers."""
+    """A surface and the small objects on it, as one set of scatterers, and how waves go to and fro between them."""
 
     surface: Surface
     clutter: Clutter
+    detours: Detours
 
     def __len__(self) -> int:
         return len(self.surface) + len(self.clutter)

@@ -32,6 +32,9 @@ LEAKAGE_DELAYS = (0.1e-9, 1.2e-9)
 DOMINANCE = 0.95
 #: Distances (m) of what counts as the radar's own mount: beyond the leakage, and nearer than anything in a room.
 MOUNT_DISTANCES = (0.1, 0.4)
+#: Amplitude over the leakage's, both behind the high-pass filter, below which an echo is what the leakage's image in an
+#: imperfect mixer leaves.
+LEFT_OVER = 0.05
 _SNAPSHOTS = 60
 
 
@@ -192,17 +195,20 @@ def find_static(
         return float(minimize_scalar(lambda d: explained([d, *others], bins)[0], bounds=near, method="bounded").x)
 
     leak = best(LEAKAGE_DELAYS, [], 5)  # the lowest bins are the leakage's
-    nearest, farthest = MOUNT_DISTANCES
-    mount = best((2 * nearest / SPEED_OF_LIGHT, 2 * farthest / SPEED_OF_LIGHT), [leak], bins)
-    leak = best(LEAKAGE_DELAYS, [mount], 5)
-    found = []
-    for delay, heard in zip((leak, mount), explained([leak, mount], bins)[1], strict=True):
-        heard = heard.reshape(len(config.tx), len(config.rx))
-        power = np.mean(np.abs(heard) ** 2)
-        above = power >= 10 * floor / (n * signal.shape[0] * signal.shape[1])
-        counts = heard / front_end.beat_response(np.array(config.slope * delay))
-        found.append(_Static(delay, counts, float(np.sqrt(power))) if above else None)
-    return found[0], found[1]
+    apart = 0.5 / config.bandwidth  # nearer to each other, two tones explain anything by cancelling
+    nearest, farthest = (2 * distance / SPEED_OF_LIGHT for distance in MOUNT_DISTANCES)
+    mount = best((min(max(nearest, leak + apart), farthest), farthest), [leak], bins)
+    first, last = LEAKAGE_DELAYS
+    leak = best((first, max(first, min(last, mount - apart))), [mount], 5)
+    heard = explained([leak, mount], bins)[1].reshape(2, len(config.tx), len(config.rx))
+    power = np.mean(np.abs(heard) ** 2, axis=(1, 2))
+    weakest = 10 * floor / (n * signal.shape[0] * signal.shape[1])
+    echoes = [
+        _Static(delay, counts / front_end.beat_response(np.array(config.slope * delay)), float(np.sqrt(p)))
+        for delay, counts, p in zip((leak, mount), heard, power, strict=True)
+    ]
+    above = power >= np.array([weakest, max(weakest, LEFT_OVER**2 * power[0])])
+    return echoes[0] if above[0] else None, echoes[1] if above[1] else None
 
 
 def fit_channels(

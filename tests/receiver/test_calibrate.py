@@ -61,6 +61,12 @@ def test_the_mount_is_found(tmp_path, distance):
     assert np.linalg.norm(error) < 0.2 * np.linalg.norm(front.mount[0])
 
 
+def test_leakage_alone_is_no_mount(tmp_path):
+    settings = FrontEndConfig.of(CONFIG.board, mount=None, leakage=Leakage(level_db=-40, delay=0.7e-9))
+    record(tmp_path / "real.h5", settings, 1)
+    assert calibrate(tmp_path / "real.h5", tmp_path / "board.yaml").settings.mount is None
+
+
 @pytest.mark.parametrize(("board", "velocity"), [(1, (0, 0, 0)), (2, (0.7, -0.2, 0))])
 def test_a_known_board_is_found(tmp_path, board, velocity):
     """Full scale within 0.3 dB, leakage 1 dB and 0.1 ns, band edge 2 %, channels 0.1 dB and 1 deg."""

@@ -175,7 +175,7 @@ class FrontEndConfig(_Strict):
         leakage, mismatch, phase_noise: null: none.
         mount: static echoes of the radar's own housing and mount; null: none. The default is the middle of what
             `radarsim calibrate` finds beside the leakage in three public captures of two boards: -61, -69 and -75 dB
-            at 0.13, 0.13 and 0.25 m, one in each.
+            at 0.14, 0.13 and 0.25 m, one in each.
         if_bandwidth_hz: of the IF amplifier, as far as the receiver hears where no decimation filter closes before.
         high_pass: the two first-order stages of the radar configuration.
         band: null: flat up to `if_bandwidth_hz` (echoes beyond the maximum range fold).

@@ -9,6 +9,21 @@ from radarsim.world.clearance import LOWEST
 
 
 @dataclass(frozen=True)
+class Vibration:
+    """Random displacement of a carrier in each of the three axes, with a spectrum that falls by 1 / f^2 in a band.
+
+    Attributes:
+        band: lowest and highest frequency, Hz.
+        rest: RMS displacement at any speed, m.
+        rolling: RMS displacement at 1 m/s, m; its variance grows in proportion to the speed.
+    """
+
+    band: tuple[float, float]
+    rest: float = 0.0
+    rolling: float = 0.0
+
+
+@dataclass(frozen=True)
 class Platform:
     """What carries the sensor.
 
@@ -29,6 +44,7 @@ class Platform:
         bob: amplitude of the gait at 1 m/s, m; zero on wheels.
         sway: amplitude of the gait in roll, pitch, yaw, rad.
         tremor: slow wander of roll and pitch, standard deviation, rad.
+        vibration: of the wheels, or of the hand.
         free_heading: may face elsewhere than it goes.
     """
 
@@ -45,6 +61,7 @@ class Platform:
     reversing: float
     lever_arm: float
     tilt: float
+    vibration: Vibration
     bob: float = 0.0
     sway: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tremor: float = 0.0
@@ -58,7 +75,10 @@ class Platform:
 
 def _platform(about: dict) -> Platform:
     angles = {name: np.deg2rad(about[name]) for name in ("turn_rate", "tilt", "tremor")}
-    return Platform(**about | angles | {"sway": tuple(np.deg2rad(about.get("sway", (0.0, 0.0, 0.0))))})
+    levels = {key: 1e-3 * value for key, value in about["vibration"].items() if key != "band"}
+    vibration = Vibration(tuple(about["vibration"]["band"]), **levels)
+    sway = tuple(np.deg2rad(about.get("sway", (0.0, 0.0, 0.0))))
+    return Platform(**about | angles | {"sway": sway, "vibration": vibration})
 
 
 PLATFORMS = {name: _platform(about) for name, about in read_beside(__file__).items()}

@@ -9,7 +9,9 @@ from jaxtyping import Float
 from radarize.errors import InputError
 from radarsim.machine.rng import keyed_rng
 from radarsim.motion.planner import plan_motion
+from radarsim.motion.platforms import PLATFORMS
 from radarsim.motion.trajectory import Motion, Mounting, motion_from_tum
+from radarsim.motion.vibration import vibrating
 from radarsim.motion.waypoints import read_waypoints
 from radarsim.world.scene import Scene
 
@@ -58,4 +60,5 @@ class Walk:
             places = read_waypoints(places) if isinstance(places, (str, Path)) else places
             length = _TOUR if self.duration is None and places is None else self.duration
             motion = plan_motion(scene, self.platform, length, keyed_rng(seed, "route"), places, self.mounting)
+            motion = vibrating(motion, PLATFORMS[self.platform].vibration, keyed_rng(seed, "vibration"))
         return motion if self.duration is None else motion.until(self.duration)

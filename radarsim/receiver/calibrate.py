@@ -2,8 +2,8 @@
 
 What can be told from a recording and what cannot: counts have no absolute scale, so noise figure and receive gain are
 taken from the data sheet and the configuration, and the noise floor gives the converter's full scale. The band's upper
-edge shows in the noise, the leakage in the lowest range bins, and the channels' errors wherever one echo outshines all
-others of its range and Doppler: there the array must see a plane wave.
+edge shows in the noise, the leakage in the lowest range bins, the mount's echo a little farther, and the channels'
+errors wherever one echo outshines all others of its range and Doppler: there the array must see a plane wave.
 """
 
 from dataclasses import dataclass
@@ -11,17 +11,17 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Complex, Float
-from scipy.optimize import minimize
+from scipy.optimize import minimize, minimize_scalar
 
 from radarize.errors import InputError
 from radarize.radar.array import virtual_positions
 from radarize.radar.boards import load_board
-from radarize.radar.config import RadarConfig
+from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
 from radarize.radar.windows import periodic
 from radarize.recording import Recording
 from radarsim.receiver.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
-from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, PhaseNoise
+from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, MountEcho, PhaseNoise
 from radarsim.receiver.phasenoise import density
 
 #: Chirps of one transmitter that the noise is told from, at least.
@@ -30,6 +30,11 @@ FEWEST_LOOPS = 8
 LEAKAGE_DELAYS = (0.1e-9, 1.2e-9)
 #: Share of a snapshot's power that one plane wave must explain for the channels to be told from it.
 DOMINANCE = 0.95
+#: Distances (m) of what counts as the radar's own mount: beyond the leakage, and nearer than anything in a room.
+MOUNT_DISTANCES = (0.1, 0.4)
+#: Amplitude over the leakage's, both behind the high-pass filter, below which an echo is what the leakage's image in an
+#: imperfect mixer leaves.
+LEFT_OVER = 0.05
 _SNAPSHOTS = 60
 
 
@@ -84,7 +89,7 @@ def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarCon
         raise InputError(f"{source}: a noise power of {floor:.3g} counts^2, expected more than the rounding to counts")
     band, fall = band_edge(profile / floor)
     front_end = FrontEnd(config, FrontEndConfig.of(config.board, band=band))
-    leak = find_leakage(signal, front_end, floor)
+    leak, mount = find_static(signal, front_end, floor)
     # Thermal noise is what rounding of I and Q and the leakage's phase noise leave of it.
     mask = front_end.settings.phase_noise
     thermal = floor - 2 / 12 - (np.median(leak.skirt(config, mask)[flat]) if leak and mask else 0.0)
@@ -97,18 +102,25 @@ def fit(signal: Complex[np.ndarray, "frame loop tx rx sample"], config: RadarCon
         f"figure is the data sheet's {10 * np.log10(factor):.1f} dB",
         f"band flat to {band.flat:.3f} of the sample rate, noise {fall:.1f} dB down in its last sixteenth",
     ]
-    settings = FrontEndConfig.of(config.board, full_scale_dbm=full_scale, band=band, leakage=None)
-    leakage = None
+    settings = FrontEndConfig.of(config.board, full_scale_dbm=full_scale, band=band, leakage=None, mount=None)
+    scale = FrontEnd(config, settings).scale
+    static: dict[str, object] = {}
     if leak:
-        leakage = leak.relative(FrontEnd(config, settings).scale, config)
+        level, channels = leak.relative(scale, config)
+        static["leakage"] = Leakage(level_db=level, delay=round(leak.delay, 12), channels=channels)
         remarks.append(
-            f"leakage {leakage.level_db:.1f} dB at {1e9 * leak.delay:.2f} ns before the high-pass filter, "
+            f"leakage {level:.1f} dB at {1e9 * leak.delay:.2f} ns before the high-pass filter, "
             f"{leak.heard:.1f} counts behind it"
         )
     else:
         remarks.append("no leakage above the noise")
+    if mount:
+        level, channels = mount.relative(scale, config)
+        distance = round(mount.delay * SPEED_OF_LIGHT / 2, 4)
+        static["mount"] = (MountEcho(distance=distance, level_db=level, channels=channels),)
+        remarks.append(f"echo of the mount {level:.1f} dB at {distance:.2f} m, {mount.heard:.1f} counts")
     mismatch, remark = fit_channels(signal, config, floor)
-    return Calibration(settings.model_copy(update={"leakage": leakage, "mismatch": mismatch}), [*remarks, remark])
+    return Calibration(settings.model_copy(update={**static, "mismatch": mismatch}), [*remarks, remark])
 
 
 def band_edge(profile: Float[np.ndarray, "sample"]) -> tuple[Band, float]:
@@ -130,8 +142,8 @@ def band_edge(profile: Float[np.ndarray, "sample"]) -> tuple[Band, float]:
 
 
 @dataclass(frozen=True)
-class _Leak:
-    """Leakage in counts.
+class _Static:
+    """A static echo in counts.
 
     Attributes:
         delay: s.
@@ -149,39 +161,54 @@ class _Leak:
         noise = density(mask, config.center_frequency, f) * 4 * np.sin(np.pi * f * self.delay) ** 2
         return np.mean(np.abs(self.counts) ** 2) * noise * config.sample_rate
 
-    def relative(self, scale: float, config: RadarConfig) -> Leakage:
-        """As a setting; `scale` is counts per unit of amplitude."""
+    def relative(self, scale: float, config: RadarConfig) -> tuple[float, tuple[Channel, ...]]:
+        """Level (dB) and amplitudes of all channels as settings; `scale` is counts per unit of amplitude."""
         mean = np.sqrt(np.mean(np.abs(self.counts) ** 2)) / scale
         whole = np.full((3, 4), mean, complex)
         whole[np.ix_(config.tx, config.rx)] = self.counts / scale
-        channels = [Channel.of(c) for c in whole.ravel()]
-        return Leakage(level_db=round(20 * np.log10(mean), 2), delay=round(self.delay, 12), channels=channels)
+        return round(float(20 * np.log10(mean)), 2), tuple(Channel.of(c) for c in whole.ravel())
 
 
-def find_leakage(
+def find_static(
     signal: Complex[np.ndarray, "frame loop tx rx sample"], front_end: FrontEnd, floor: float
-) -> _Leak | None:
-    """Delay and amplitude of what stands still in the lowest range bins, besides a constant offset."""
+) -> tuple[_Static | None, _Static | None]:
+    """Leakage, and echo of the mount: delays and amplitudes of what stands still nearby, besides a constant offset."""
     config = front_end.config
     static = signal.mean(axis=(0, 1), dtype=complex)
     n = config.samples
     window = periodic(np.hanning, n)
     t = (np.arange(n) - (n - 1) / 2) / config.sample_rate
-    low = np.exp(-2j * np.pi * np.outer(np.arange(5), np.arange(n)) / n) * window  # the five lowest bins
+    bins = max(5, int(np.ceil(MOUNT_DISTANCES[1] / config.range_resolution)) + 2)
+    low = np.exp(-2j * np.pi * np.outer(np.arange(bins), np.arange(n)) / n) * window
     seen = static.reshape(-1, n) @ low.T
 
-    def explained(delay: float) -> tuple[float, Complex[np.ndarray, "virtual"]]:
-        columns = low @ np.stack([np.exp(2j * np.pi * config.slope * delay * t), np.ones(n)], axis=1)
-        parts, *_ = np.linalg.lstsq(columns, seen.T, rcond=None)
-        return np.sum(np.abs(seen.T - columns @ parts) ** 2), parts[0]
+    def explained(delays: list[float], bins: int) -> tuple[float, Complex[np.ndarray, "echo virtual"]]:
+        tones = [np.exp(2j * np.pi * config.slope * delay * t) for delay in delays]
+        columns = low[:bins] @ np.stack([*tones, np.ones(n)], axis=1)
+        parts, *_ = np.linalg.lstsq(columns, seen[:, :bins].T, rcond=None)
+        return np.sum(np.abs(seen[:, :bins].T - columns @ parts) ** 2), parts[:-1]
 
-    delays = np.linspace(*LEAKAGE_DELAYS, 111)
-    delay = float(delays[np.argmin([explained(d)[0] for d in delays])])
-    heard = explained(delay)[1].reshape(len(config.tx), len(config.rx))
-    power = np.mean(np.abs(heard) ** 2)
-    if power < 10 * floor / (n * signal.shape[0] * signal.shape[1]):
-        return None
-    return _Leak(delay, heard / front_end.beat_response(np.array(config.slope * delay)), float(np.sqrt(power)))
+    def best(span: tuple[float, float], others: list[float], bins: int) -> float:
+        delays = np.linspace(*span, 111)
+        start = delays[np.argmin([explained([d, *others], bins)[0] for d in delays])]
+        near = np.clip([start - delays[1] + delays[0], start + delays[1] - delays[0]], *span)
+        return float(minimize_scalar(lambda d: explained([d, *others], bins)[0], bounds=near, method="bounded").x)
+
+    leak = best(LEAKAGE_DELAYS, [], 5)  # the lowest bins are the leakage's
+    apart = 0.5 / config.bandwidth  # nearer to each other, two tones explain anything by cancelling
+    nearest, farthest = (2 * distance / SPEED_OF_LIGHT for distance in MOUNT_DISTANCES)
+    mount = best((min(max(nearest, leak + apart), farthest), farthest), [leak], bins)
+    first, last = LEAKAGE_DELAYS
+    leak = best((first, max(first, min(last, mount - apart))), [mount], 5)
+    heard = explained([leak, mount], bins)[1].reshape(2, len(config.tx), len(config.rx))
+    power = np.mean(np.abs(heard) ** 2, axis=(1, 2))
+    weakest = 10 * floor / (n * signal.shape[0] * signal.shape[1])
+    echoes = [
+        _Static(delay, counts / front_end.beat_response(np.array(config.slope * delay)), float(np.sqrt(p)))
+        for delay, counts, p in zip((leak, mount), heard, power, strict=True)
+    ]
+    above = power >= np.array([weakest, max(weakest, LEFT_OVER**2 * power[0])])
+    return echoes[0] if above[0] else None, echoes[1] if above[1] else None
 
 
 def fit_channels(

@@ -1,7 +1,7 @@
 """From the field at the antennas to ADC counts, in the order in which a receiver does it:
 
     amplify     transmit power, receive gain, gain and phase of each channel
-    couple      leakage from TX to RX
+    couple      leakage from TX to RX, echoes of the mount
     disturb     phase noise on every echo (range-correlated), thermal noise coloured by the decimation filter
     mix         the image of an imperfect I/Q mixer
     convert     saturation and rounding
@@ -18,7 +18,7 @@ from jaxtyping import Complex, Float, Int16
 
 from radarize.radar.boards import load_board
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
-from radarsim.receiver.frontend_config import FrontEndConfig
+from radarsim.receiver.frontend_config import FrontEndConfig, MountEcho
 from radarsim.receiver.phasenoise import Skirts
 
 BOLTZMANN = 1.380649e-23
@@ -31,15 +31,17 @@ class FrontEnd:
     Args:
         config: radar configuration; gives receive gain, transmit back-off, filter corners, sample rate.
         settings: what the front end is made of; default: what the board's file says.
-        rng: draws what stays the same for a board: mismatch, phases of the leakage. Default: board number 0.
+        rng: draws what stays the same for a board: mismatch, leakage, echoes of the mount. Default: board number 0.
 
     Attributes:
         channel: complex gain of each channel.
         leakage: amplitude of the leakage (square root of received over transmitted power) before the high-pass filter.
+        mount: amplitudes of the mount's echoes, likewise.
     """
 
     channel: Complex[np.ndarray, "tx rx"]
     leakage: Complex[np.ndarray, "tx rx"]
+    mount: Complex[np.ndarray, "echo tx rx"]
 
     def __init__(
         self,
@@ -53,6 +55,8 @@ class FrontEnd:
         # Some boards feed receivers from the far side of the patch.
         self.channel = (self._draw_channel(rng) * load_board(config.board).rx_sign)[enabled]
         self.leakage = self._draw_leakage(rng)[enabled]
+        echoes = [self._draw_mount(echo, rng)[enabled] for echo in self.settings.mount or ()]
+        self.mount = np.array(echoes, complex).reshape(-1, *self.leakage.shape)
         self._bins = np.arange(config.samples) * config.sample_rate / config.samples
         self._skirts = None
         if self.settings.phase_noise:
@@ -65,7 +69,7 @@ class FrontEnd:
         if mismatch is None:
             return np.ones((3, 4), complex)
         if mismatch.channels:
-            return np.array([c.factor for c in mismatch.channels]).reshape(3, 4)
+            return mismatch.measured
         factor = 10 ** (mismatch.gain_db * errors[0] / 20) * np.exp(1j * np.deg2rad(mismatch.phase_deg) * errors[1])
         return factor[:3, None] * factor[None, 3:]
 
@@ -74,9 +78,11 @@ class FrontEnd:
         phase = rng.uniform(0, 2 * np.pi, (3, 4))
         if leakage is None:
             return np.zeros((3, 4), complex)
-        if leakage.channels:
-            return np.array([c.factor for c in leakage.channels]).reshape(3, 4)
-        return 10 ** (leakage.level_db / 20) * np.exp(1j * phase)
+        return leakage.measured if leakage.channels else 10 ** (leakage.level_db / 20) * np.exp(1j * phase)
+
+    def _draw_mount(self, echo: MountEcho, rng: np.random.Generator) -> Complex[np.ndarray, "3 4"]:
+        normal = rng.standard_normal((3, 4, 2)).view(complex)[..., 0] * np.sqrt(0.5)
+        return echo.measured if echo.channels else 10 ** (echo.level_db / 20) * normal
 
     # --- levels ------------------------------------------------------------------------------------------------------
     @property
@@ -154,8 +160,7 @@ class FrontEnd:
             bins = scipy.fft.fft(echoes, axis=-1, norm="forward")
         if self._skirts:
             noise = self._bin_noise if self.settings.noise else 0.0
-            delay = self.settings.leakage.delay if self.settings.leakage else 0.0
-            extra += self._skirts(bins, (self.scale * self.leakage).astype(np.complex64), delay, noise, rng)
+            extra += self._skirts(bins, *self._static, noise, rng)
         leakage = self._coupled
         if (rejection := self.settings.image_rejection_db) is not None:
             extra += self._image(bins + scipy.fft.fft(leakage, axis=-1, norm="forward") + extra, rejection)
@@ -171,7 +176,7 @@ class FrontEnd:
     def by_cause(
         self, signals: list[Complex[np.ndarray, "loop tx rx sample"]]
     ) -> list[Complex[np.ndarray, "loop tx rx sample"]]:
-        """Counts that each of several signals makes without noise and converter, and last those of the leakage.
+        """Counts that each of several signals makes without noise and converter, and last those of leakage and mount.
 
         Their sum is what `receive` returns for the sum of the signals with thermal and phase noise off.
         """
@@ -191,14 +196,20 @@ class FrontEnd:
         return np.asarray(signal, np.complex64) * (self.scale * self.channel).astype(np.complex64)[:, :, None]
 
     @cached_property
+    def _static(self) -> tuple[Complex[np.ndarray, "echo tx rx"], Float[np.ndarray, "echo"]]:
+        """Leakage and echoes of the mount: amplitudes in counts before the high-pass filter, and delays, s."""
+        leakage, mount = self.settings.leakage, self.settings.mount or ()
+        delays = np.array([leakage.delay if leakage else 0.0, *(echo.delay for echo in mount)])
+        return (self.scale * np.concatenate([self.leakage[None], self.mount])).astype(np.complex64), delays
+
+    @cached_property
     def _coupled(self) -> Complex[np.ndarray, "tx rx sample"]:
-        """The leakage: an echo of its delay, the same in every chirp."""
-        delay = self.settings.leakage.delay if self.settings.leakage else 0.0
+        """Leakage and echoes of the mount: a tone each, the same in every chirp."""
+        amplitudes, delays = self._static
         n = self.config.samples
-        beat = self.config.slope * delay
-        tone = np.exp(2j * np.pi * beat * (np.arange(n) - (n - 1) / 2) / self.config.sample_rate)
-        amplitude = self.scale * self.leakage * self.beat_response(np.array(beat))
-        return (amplitude[:, :, None] * tone).astype(np.complex64)
+        beat = self.config.slope * delays
+        tones = np.exp(2j * np.pi * np.outer(beat, np.arange(n) - (n - 1) / 2) / self.config.sample_rate)
+        return np.einsum("etr,es->trs", amplitudes, self.beat_response(beat)[:, None] * tones).astype(np.complex64)
 
     def _thermal(self, shape: tuple[int, ...], rng: np.random.Generator) -> Complex[np.ndarray, "loop tx rx sample"]:
         """Thermal noise by bin, coloured by the decimation filter; without one, that of a sample rate's width."""

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import yaml
-from jaxtyping import Float
+from jaxtyping import Complex, Float
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from radarize.errors import InputError
 from radarize.radar.boards import Board, load_board
+from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.replacing import replacing
 from radarize.yamlfile import changed, read_yaml
 from radarsim.propagation.antenna import ISOTROPIC, Antenna
@@ -51,6 +52,11 @@ class _PerChannel(_Strict):
             raise ValueError(f"channels has {len(self.channels)} entries, expected 12: TX1 x RX1..4, then TX2, TX3")
         return self
 
+    @property
+    def measured(self) -> Complex[np.ndarray, "3 4"]:
+        """`channels` as complex amplitudes."""
+        return np.array([c.factor for c in self.channels or ()]).reshape(3, 4)
+
 
 class Mismatch(_PerChannel):
     """Gain and phase errors of the channels.
@@ -70,8 +76,8 @@ class Mismatch(_PerChannel):
 class Leakage(_PerChannel):
     """What goes from TX to RX on the board: one static echo from almost no range.
 
-    The default is the middle of what `radarsim calibrate` finds in three public captures of two boards: -38, -42 and
-    -47 dB at 0.23, 0.42 and 0.66 ns.
+    The default lies within what `radarsim calibrate` finds in three public captures of two boards: -42, -47 and -49 dB
+    at 0.42, 0.36 and 0.69 ns.
 
     Attributes:
         level_db: received over transmitted power, before the high-pass filter; each channel has a random phase.
@@ -81,6 +87,27 @@ class Leakage(_PerChannel):
 
     level_db: float = Field(-42.0, ge=-150, le=0)
     delay: float = Field(0.4e-9, ge=0, le=20e-9)
+
+
+class MountEcho(_PerChannel):
+    """A static echo of the radar's own housing, radome or mount, which moves with it.
+
+    Several edges add up in it: `radarsim calibrate` finds no plane wave in the echoes of public captures, and levels of
+    the channels that spread as those of independent complex normal amplitudes.
+
+    Attributes:
+        distance: m.
+        level_db: received over transmitted power, mean over boards and channels, before the high-pass filter.
+        channels: measured amplitudes in physical order, instead of `level_db` and amplitudes drawn for the board.
+    """
+
+    distance: float = Field(gt=0, le=1)
+    level_db: float = Field(ge=-150, le=0)
+
+    @property
+    def delay(self) -> float:
+        """Out and back, s."""
+        return 2 * self.distance / SPEED_OF_LIGHT
 
 
 class PhaseNoise(_Strict):
@@ -146,6 +173,9 @@ class FrontEndConfig(_Strict):
         adc_bits: resolution. 16: all bits of the file carry signal, as in real captures, where the decimation filter
             has averaged a faster converter. 12: steps of 16 counts.
         leakage, mismatch, phase_noise: null: none.
+        mount: static echoes of the radar's own housing and mount; null: none. The default is the middle of what
+            `radarsim calibrate` finds beside the leakage in three public captures of two boards: -61, -69 and -75 dB
+            at 0.14, 0.13 and 0.25 m, one in each.
         if_bandwidth_hz: of the IF amplifier, as far as the receiver hears where no decimation filter closes before.
         high_pass: the two first-order stages of the radar configuration.
         band: null: flat up to `if_bandwidth_hz` (echoes beyond the maximum range fold).
@@ -160,6 +190,7 @@ class FrontEndConfig(_Strict):
     full_scale_dbm: float = Field(5.0, ge=-100, le=100)
     adc_bits: int = Field(16, ge=2, le=16)
     leakage: Leakage | None = Leakage()
+    mount: tuple[MountEcho, ...] | None = (MountEcho(distance=0.13, level_db=-69.0),)
     mismatch: Mismatch | None = Mismatch()
     phase_noise: PhaseNoise | None
     if_bandwidth_hz: float = Field(ge=1e5, le=1e9)
@@ -181,8 +212,10 @@ class FrontEndConfig(_Strict):
     @classmethod
     def ideal(cls, board: str | Board = "iwr1843boost", **changes: object) -> "FrontEndConfig":
         """Nothing but a board's power and a 16-bit converter, with `changes`."""
-        off = {"noise": False, "leakage": None, "mismatch": None, "phase_noise": None, "high_pass": False}
-        return cls.of(board, **{"antenna": None, "band": None, "image_rejection_db": None, **off, **changes})
+        off = {"noise": False, "leakage": None, "mount": None, "mismatch": None, "phase_noise": None}
+        return cls.of(
+            board, **{"high_pass": False, "antenna": None, "band": None, "image_rejection_db": None, **off, **changes}
+        )
 
     @property
     def pattern(self) -> Antenna:

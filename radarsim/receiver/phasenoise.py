@@ -51,17 +51,17 @@ class Skirts:
     def __call__(
         self,
         bins: Complex[np.ndarray, "loop tx rx sample"],
-        leakage: Complex[np.ndarray, "tx rx"],
-        delay: float,
+        static: Complex[np.ndarray, "echo tx rx"],
+        delays: Float[np.ndarray, "echo"],
         noise: float,
         rng: np.random.Generator,
     ) -> Complex[np.ndarray, "loop tx rx sample"]:
         """Skirts, by bin.
 
         Args:
-            bins: Fourier coefficients of the signal without leakage.
-            leakage: amplitude of the leakage before the high-pass filter.
-            delay: of the leakage, s.
+            bins: Fourier coefficients of the signal without the static echoes.
+            static: amplitudes of the leakage and other static echoes before the high-pass filter.
+            delays: of those, s.
             noise: power of thermal noise per bin; 0: none.
             rng: for the oscillator.
         """
@@ -74,8 +74,9 @@ class Skirts:
         theta *= 1j * self._level
         weakest = NEGLIGIBLE * noise / np.maximum(self._peak, 1e-30)
         out = np.zeros((loops * tx, rx, n), np.complex64)
-        near = (1 - np.exp(-2j * np.pi * self._offset[n - 1 :] * delay)) * self._response
-        out += np.repeat(leakage[None], loops, 0).reshape(loops * tx, rx, 1) * (theta[:, n - 1 :] * near)[:, None]
+        near = (1 - np.exp(-2j * np.pi * np.outer(delays, self._offset[n - 1 :]))) * self._response
+        near = np.einsum("etr,em->trm", static, near)
+        out += np.tile(near, (loops, 1, 1)) * theta[:, None, n - 1 :]
         _add_skirts(bins.reshape(loops * tx, rx, n), theta, self._difference, weakest, out)
         return out.reshape(bins.shape)
 

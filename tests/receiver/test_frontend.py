@@ -8,7 +8,7 @@ from radarize.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarsim.propagation.antenna import ISOTROPIC, Antenna, amplitude_gain, gain_pattern
 from radarsim.receiver.frontend import FrontEnd
-from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch
+from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, MountEcho
 
 SHAPE = CONFIG.frame_shape[:-1]
 N = CONFIG.samples
@@ -91,6 +91,51 @@ def test_measured_leakage_is_taken_as_it_is():
     front = FrontEnd(config, FrontEndConfig.ideal(leakage=Leakage(channels=channels)))
     assert 20 * np.log10(np.abs(front.leakage)) == pytest.approx(np.array([[-41, -43], [-49, -51]]))
     assert np.rad2deg(np.angle(front.leakage)) == pytest.approx(np.array([[10, 30], [90, 110]]))
+
+
+# --- mount -----------------------------------------------------------------------------------------------------------
+def test_mount_echoes_levels_and_places():
+    """An empty scene's range profile: an echo at each distance, at its channel's level behind the high-pass filter."""
+    channels = tuple(Channel(gain_db=-60 - k, phase_deg=25 * k) for k in range(12))
+    mount = [MountEcho(distance=0.3, level_db=-60, channels=channels), MountEcho(distance=0.9, level_db=-70)]
+    settings = FrontEndConfig.ideal(mount=mount, high_pass=True)
+    front = FrontEnd(CONFIG, settings, rng())
+    counts = front.receive(np.zeros(SHAPE, np.complex64), rng())
+    assert np.array_equal(counts, np.broadcast_to(counts[:1], counts.shape))  # constant in time
+    t = (np.arange(N) - (N - 1) / 2) / CONFIG.sample_rate
+    beats = CONFIG.slope * 2 * np.array([0.3, 0.9]) / SPEED_OF_LIGHT
+    found, *_ = np.linalg.lstsq(np.exp(2j * np.pi * np.outer(t, beats)), counts[0].reshape(12, N).T, rcond=None)
+    high_pass = (1j * beats / (1j * beats + 175e3)) * (1j * beats / (1j * beats + 350e3))
+    scale = 32767 * 10 ** ((12 + CONFIG.rx_gain_db - settings.full_scale_dbm) / 20)
+    expected = np.stack([np.array([c.factor for c in channels]), front.mount[1].ravel()]) * high_pass[:, None] * scale
+    assert np.abs(found / expected - 1).max() < 1e-4
+    residual = counts[0].reshape(12, N).T - np.exp(2j * np.pi * np.outer(t, beats)) @ found
+    assert np.abs(residual).max() < 1e-4 * np.abs(found).max()
+
+
+def test_mount_belongs_to_the_board():
+    """Amplitudes differ by channel, follow from the board's seed, and spread as complex normal ones of the level."""
+    boards = np.stack([FrontEnd(CONFIG, rng=np.random.default_rng(k)).mount[0] for k in range(400)])
+    assert np.array_equal(boards[7], FrontEnd(CONFIG, rng=np.random.default_rng(7)).mount[0])
+    assert len(np.unique(np.angle(boards[7]).round(3))) == 12 and not np.isclose(boards[7], boards[8]).any()
+    power = np.abs(boards) ** 2 / 10 ** (FrontEndConfig.of(CONFIG.board).mount[0].level_db / 10)
+    assert power.mean() == pytest.approx(1, abs=0.04) and (power**2).mean() == pytest.approx(2, abs=0.15)
+    without = FrontEnd(CONFIG, FrontEndConfig.of(CONFIG.board, mount=None), np.random.default_rng(7))
+    whole = FrontEnd(CONFIG, rng=np.random.default_rng(7))
+    assert not len(without.mount) and np.array_equal(without.leakage, whole.leakage)
+
+
+def test_mount_has_the_phase_noise_of_its_delay():
+    mount = [MountEcho(distance=0.3, level_db=-20)]
+    front = FrontEnd(CONFIG, FrontEndConfig.ideal(mount=mount, phase_noise=PHASE_NOISE))
+    counts = front.receive(np.zeros(SHAPE, np.complex64), rng())
+    power = power_by_bin(counts - counts.mean(axis=0))[20:80]
+    f = np.arange(20, 80) * CONFIG.sample_rate / N
+    density = np.where(f < 316e3, -83, -93 - 20 * np.log10(f / 1e6))
+    carrier = np.mean(np.abs(front.scale * front.mount[0]) ** 2)
+    correlated = 4 * np.sin(np.pi * f * 0.6 / SPEED_OF_LIGHT) ** 2
+    expected = carrier * np.mean(10 ** (density / 10) * correlated) * CONFIG.sample_rate / N
+    assert db(power.mean() / expected) == pytest.approx(0, abs=0.4)
 
 
 # --- phase noise -----------------------------------------------------------------------------------------------------
@@ -216,6 +261,7 @@ def test_everything_off_is_the_ideal():
     [
         {"noise": False},
         {"leakage": None},
+        {"mount": None},
         {"mismatch": None},
         {"phase_noise": None},
         {"high_pass": False},
@@ -265,6 +311,7 @@ def test_files_round_trip(tmp_path):
         ("tx_powr: 3", "tx_powr: unknown key"),
         ("adc_bits: 24", "adc_bits is 24"),
         ("leakage: {level_db: 10}", "leakage.level_db is 10"),
+        ("mount: [{distance: 3, level_db: -70}]", "mount[0].distance is 3"),
         ("mismatch: {channels: [{gain_db: 0, phase_deg: 0}]}", "channels has 1 entries, expected 12"),
         ("antenna: {azimuth: {degrees: [0, 50], loss_db: [0, 3]}}", "expected ascending from 0 to 90"),
         ("phase_noise: {offset_hz: [1e6, 1e5], dbc_hz: [-90, -100]}", "ascending"),

@@ -1,5 +1,6 @@
-"""Data sets end to end: what sensors and writing cost beside the simulation, how workers share the cores, and what the
-paper's data set would take on this machine, from a sample of one in ten of its recordings."""
+"""Data sets end to end: what sensors and writing cost beside the simulation, how furnished buildings compare with bare
+ones, how workers share the cores, and what the paper's data set would take on this machine, from a sample of one in ten
+of its recordings."""
 
 import argparse
 import os
@@ -28,6 +29,7 @@ from radarsim.world.scene import Scene
 
 CONFIG = PRESETS["radarize"]
 BIG = "radarize146"
+BARE = {"clutter": 0, "unevenness": 0}
 
 
 def steps(frames: int, seed: int, folder: Path) -> dict[str, float]:
@@ -49,6 +51,23 @@ def steps(frames: int, seed: int, folder: Path) -> dict[str, float]:
             writer.append(batch.samples, batch.times, rows=rows)
             spent.append(took | {"writing all": time.perf_counter() - start})
     return dict(pd.DataFrame(spent[1:]).median() / TOGETHER)
+
+
+def furnished_and_bare(frames: int, seed: int) -> dict[str, float]:
+    """Seconds per frame of simulation along the same walks through buildings, furnished and bare, in turns; medians."""
+    share = {}
+    for kind in "ABCD":
+        building, scenarios = {"building": {"kind": kind, "seed": 1}}, {}
+        furnished = Scene.of(building, kind)
+        motion = Walk("handheld", frames * CONFIG.frame_period + 1).through(furnished, seed)
+        for what, scene in (("furnished", furnished), ("bare", Scene.of(building | BARE, kind))):
+            scenarios[f"{kind} {what}"] = Scenario(scene, motion, CONFIG, seed=seed)
+        spent = []
+        for first in range(0, frames, TOGETHER):
+            times = np.arange(first, first + TOGETHER) * CONFIG.frame_period
+            spent.append({name: timed(getattr, each.frames(times), "samples")[1] for name, each in scenarios.items()})
+        share |= dict(pd.DataFrame(spent[1:]).median() / TOGETHER)
+    return share
 
 
 @dataclass
@@ -108,9 +127,9 @@ def row(what: str, seconds: float) -> dict[str, object]:
     "Data sets: speed and size",
     every=(10, f"one in so many recordings of {BIG} is made"),
     seconds=(60.0, "of each at most"),
-    frames=(240, "of the comparison with the simulation alone"),
+    frames=(240, "of the comparisons with the simulation alone and with bare buildings"),
     few=(4, "recordings by which workers and storage are compared"),
-    seed=(0, "of the walk in that comparison"),
+    seed=(0, "of the walks in those comparisons"),
 )
 def main(options: argparse.Namespace) -> Page:
     cores = len(os.sched_getaffinity(0))
@@ -122,6 +141,8 @@ def main(options: argparse.Namespace) -> Page:
         share = steps(options.frames, options.seed, folder)
         for what, seconds in share.items():
             rows.append(row(f"one process: {what}", seconds) | {"of simulation": seconds / share["simulation"]})
+        for what, seconds in furnished_and_bare(options.frames, options.seed).items():
+            rows.append(row(f"one process: simulation, building {what}", seconds))
         runs = {}
         few = sample[:: max(1, len(sample) // options.few)][: options.few]
         short = min(options.seconds, 10.0)

@@ -16,11 +16,19 @@ class Grid:
 
     def __init__(self, low: Float[np.ndarray, "box 3"], high: Float[np.ndarray, "box 3"], cell: float = 4.0):
         self.low, self.high, self.cell = low, high, cell
-        self._boxes: dict[tuple[int, int, int], list[int]] = {}
         first, last = np.floor(low / cell).astype(int), np.floor(high / cell).astype(int)
-        for box, (a, b) in enumerate(zip(first.tolist(), last.tolist(), strict=True)):
-            for key in _cells(a, b):
-                self._boxes.setdefault(key, []).append(box)
+        across, along, up = (last - first + 1).T
+        count = across * along * up
+        box = np.repeat(np.arange(len(low)), count)
+        k = np.arange(len(box)) - np.repeat(np.cumsum(count) - count, count)
+        along, up = along[box], up[box]
+        cells = first[box] + np.stack([k // (along * up), k // up % along, k % up], axis=1)
+        order = np.lexsort(cells.T)
+        cells, box = cells[order], box[order]
+        new = np.ones(len(box), bool)
+        new[1:] = (cells[1:] != cells[:-1]).any(axis=1)
+        keys = map(tuple, cells[new].tolist())
+        self._boxes = dict(zip(keys, np.split(box, np.flatnonzero(new)[1:]), strict=False))  # none where no box is
 
     def near(
         self, positions: Float[np.ndarray, "position 3"], reach: float
@@ -29,7 +37,7 @@ class Grid:
         positions = np.atleast_2d(positions)
         first, last = (np.floor((positions + s * reach) / self.cell).astype(int).tolist() for s in (-1, 1))
         keys = {key for a, b in zip(first, last, strict=True) for key in _cells(a, b)}
-        found = np.unique([box for key in keys for box in self._boxes.get(key, ())]).astype(int)
+        found = np.unique(np.concatenate([np.zeros(0, int), *(self._boxes[key] for key in keys & self._boxes.keys())]))
         outside = np.maximum(self.low[found] - positions[:, None], positions[:, None] - self.high[found])
         distance = np.linalg.norm(np.maximum(outside, 0), axis=2).min(axis=0, initial=np.inf)
         keep = distance <= reach

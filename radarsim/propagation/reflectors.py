@@ -17,7 +17,7 @@ from radarsim.propagation.smooth import pieces
 from radarsim.propagation.table import Table
 from radarsim.propagation.unevenness import FINISHES, Heights
 from radarsim.world.materials import Material
-from radarsim.world.planes import plates
+from radarsim.world.planes import plates_of_each
 from radarsim.world.scene import Scene
 
 
@@ -86,35 +86,35 @@ class Reflectors:
     @classmethod
     def of(cls, scene: Scene, config: RadarConfig, heights: Heights | None = None) -> "Reflectors":
         """The reflectors of a scene."""
-        flat, inner, bodies, smooth = [], [], [], []
+        flat, inner, bodies, smooth, rest = [], [], [], [], []
         tables: dict[Material, tuple[np.ndarray, float]] = {}
         left = np.sqrt(uncovered(scene, scene.triangles.mean(axis=1), scene.normals))
+        smallest = config.wavelength**2  # physical optics holds down to about a wavelength
         for number, item in enumerate(scene.objects):
-            slab, whole = as_slab(item)
+            slab, _ = as_slab(item)
             if slab not in tables:
                 tables[slab] = layer(slab, config), lag(slab, config)
-            made_of, late = tables[slab]
             round_, is_round = recognise(item.mesh)
-            finish = FINISHES.get(item.material.name, 0.0)
-            # physical optics holds down to about a wavelength
-            curved, is_curved = pieces(item.mesh, ~is_round, config.wavelength**2)
+            curved, is_curved = pieces(item.mesh, ~is_round, smallest)
             # a body has one table, and nowhere more energy than falls on it
-            bent = covered(
-                made_of, float(left[scene.triangle_object == number].min(where=is_round | is_curved, initial=1.0))
-            )
+            least = left[scene.triangle_object == number].min(where=is_round | is_curved, initial=1.0)
+            bent = covered(tables[slab][0], float(least))
             bodies += [(b.center, b.axis, b.radius, b.half, bent) for b in round_]
             smooth += [(piece, item.two_sided, bent) for piece in curved]
-            found = plates(item.mesh, ~(is_round | is_curved), config.wavelength**2)
+            rest.append((item.mesh, ~(is_round | is_curved)))
+        for item, found in zip(scene.objects, plates_of_each(rest, smallest), strict=True):
+            slab, whole = as_slab(item)
             deep = None if whole or item.two_sided else slab.thickness  # of the wall of a hollow body, m
+            finish = FINISHES.get(item.material.name, 0.0)
             middles = np.reshape([p.corners.mean(axis=0) for p in found], (-1, 3))
             lying = item.floors_and_ceilings(middles, np.reshape([p.normal for p in found], (-1, 3)))
             for p, horizontal in zip(found, lying, strict=True):
-                rest = (item.two_sided, horizontal, made_of, late, finish, -1, -1)
-                flat.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *rest))
+                more = (item.two_sided, horizontal, *tables[slab], finish, -1, -1)
+                flat.append((p.corners, p.center, p.normal, p.u, p.v, p.half, *more))
                 if deep is not None:
                     inwards = -deep * p.normal
                     place = p.corners[::-1] + inwards, p.center + inwards
-                    inner.append((*place, -p.normal, p.u, -p.v, p.half, *rest))
+                    inner.append((*place, -p.normal, p.u, -p.v, p.half, *more))
         outer = Flat.from_rows(flat)
         seen = np.sqrt(uncovered(scene, outer.corners.mean(axis=1), outer.normal))
         outer = replace(outer, layer=covered(outer.layer, seen))

@@ -8,7 +8,9 @@ by its size; true roughness is the material's, so the residual is left out of th
 bend within a Fresnel zone are no planes: of them only the exactly flat parts count.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -49,21 +51,61 @@ class Plate:
     half: Float[np.ndarray, "2"]
 
 
+class _Triangles(NamedTuple):
+    """Triangles of one region, or of several regions of as many.
+
+    Attributes:
+        corners, center: m.
+        normal: unit vectors.
+        area: m^2.
+        number: of the corners in their mesh.
+    """
+
+    corners: Float[np.ndarray, "*region face 3 3"]
+    normal: Float[np.ndarray, "*region face 3"]
+    area: Float[np.ndarray, "*region face"]
+    center: Float[np.ndarray, "*region face 3"]
+    number: Int[np.ndarray, "*region face 3"]
+
+    @classmethod
+    def of(cls, mesh: trimesh.Trimesh) -> "_Triangles":
+        """All of a mesh."""
+        return cls(mesh.triangles, mesh.face_normals, mesh.area_faces, mesh.triangles_center, np.asarray(mesh.faces))
+
+    def take(self, index: Int[np.ndarray, "*region face"]) -> "_Triangles":
+        """Some of them."""
+        return _Triangles(*(column[index] for column in self))
+
+
 def plates(mesh: trimesh.Trimesh, among: Bool[np.ndarray, "face"], smallest: float) -> list[Plate]:
-    """Quadrilaterals that cover the flat regions of a mesh.
+    """Quadrilaterals that cover the flat regions of a mesh, arguments as for `plates_of_each`."""
+    return plates_of_each([(mesh, among)], smallest)[0]
+
+
+def plates_of_each(
+    meshes: Sequence[tuple[trimesh.Trimesh, Bool[np.ndarray, "face"]]], smallest: float
+) -> list[list[Plate]]:
+    """Quadrilaterals that cover the flat regions of each mesh.
 
     Args:
-        mesh: triangles that share corners where they join.
-        among: which triangles to take.
+        meshes: triangles that share corners where they join, and which of them to take.
         smallest: regions of less area are left out, m^2.
     """
-    found = []
-    if not among.all():
-        mesh = trimesh.Trimesh(mesh.vertices, mesh.faces[among], process=False)
-    for faces in regions(mesh):
-        if mesh.area_faces[faces].sum() >= smallest:
-            found += _cover(mesh, faces)
-    return found
+    taken = [m if among.all() else trimesh.Trimesh(m.vertices, m.faces[among], process=False) for m, among in meshes]
+    triangles = _Triangles(*map(np.concatenate, zip(*map(_Triangles.of, taken), strict=True)))
+    first = np.cumsum([0, *(len(mesh.faces) for mesh in taken)])
+    found = [(k, first[k] + faces) for k, mesh in enumerate(taken) for faces in regions(mesh)]
+    found = [(k, faces) for k, faces in found if triangles.area[faces].sum() >= smallest]
+    counts = np.array([len(faces) for _, faces in found], int)
+    covers: list[list[Plate]] = [[] for _ in found]
+    for count in np.unique(counts):  # regions of as many triangles together
+        some = np.flatnonzero(counts == count)
+        for k, plate in _cover(triangles.take(np.stack([found[k][1] for k in some]))):
+            covers[some[k]].append(plate)
+    per_mesh: list[list[Plate]] = [[] for _ in meshes]
+    for (k, _), cover in zip(found, covers, strict=True):
+        per_mesh[k] += cover
+    return per_mesh
 
 
 def regions(mesh: trimesh.Trimesh) -> list[Int[np.ndarray, "face"]]:
@@ -117,28 +159,32 @@ def _grow(seeds, first, neighbours, triangles, normals, areas):
     return label
 
 
-def _plane(
-    mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]
-) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
-    """Unit normal of a region and a point on its plane: means over its area."""
-    area = mesh.area_faces[faces][:, None]
-    normal = (area * mesh.face_normals[faces]).sum(axis=0)
-    return normal / np.linalg.norm(normal), (area * mesh.triangles_center[faces]).sum(axis=0) / area.sum()
+def _plane(some: _Triangles) -> tuple[Float[np.ndarray, "*region 3"], Float[np.ndarray, "*region 3"]]:
+    """Unit normal of each region and a point on its plane: means over its area."""
+    area = some.area[..., None]
+    return _unit((area * some.normal).sum(axis=-2)), (area * some.center).sum(axis=-2) / area.sum(axis=-2)
 
 
-def _frame(normal: Float[np.ndarray, "3"]) -> Float[np.ndarray, "2 3"]:
-    """Two directions in the plane, the first one horizontal where it can be."""
+def _frame(normal: Float[np.ndarray, "*region 3"]) -> Float[np.ndarray, "*region 2 3"]:
+    """Two directions in each plane, the first one horizontal where it can be."""
     u = np.cross([0.0, 0.0, 1.0], normal)
-    u = np.array([1.0, 0.0, 0.0]) if np.linalg.norm(u) < 1e-6 else u / np.linalg.norm(u)
-    return np.stack([u, np.cross(normal, u)])
+    lying = np.sqrt(np.vecdot(u, u)) < 1e-6
+    u = _unit(np.where(lying[..., None], [1.0, 0.0, 0.0], u))
+    return np.stack([u, np.cross(normal, u)], axis=-2)
+
+
+def _unit(vectors: Float[np.ndarray, "*region 3"]) -> Float[np.ndarray, "*region 3"]:
+    return vectors / np.sqrt(np.vecdot(vectors, vectors))[..., None]
 
 
 def _bends(mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]) -> bool:
     """Whether a paraboloid through the corners of a region has a curvature that a radar would notice."""
+    if len(faces) < 5:  # n triangles that join have n + 2 corners at most
+        return False
     corners = np.unique(mesh.faces[faces])
     if len(corners) < 7:
         return False
-    normal, center = _plane(mesh, faces)
+    normal, center = _plane(_Triangles.of(mesh).take(faces))
     offset = mesh.vertices[corners] - center
     height = offset @ normal
     if np.abs(height).max() < 1e-4:
@@ -158,32 +204,86 @@ def _flat_parts(mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]) -> list[I
     return groups + [np.array([face]) for face in sorted(inside.difference(*(g.tolist() for g in groups)))]
 
 
-def _cover(mesh: trimesh.Trimesh, faces: Int[np.ndarray, "face"]) -> list[Plate]:
-    """The quadrilateral that a region is, or trapezoids that add up to it."""
-    normal, center = _plane(mesh, faces)
+def _cover(some: _Triangles) -> Iterator[tuple[int, Plate]]:
+    """The quadrilateral that each region is, or trapezoids that add up to it, and which region it is of."""
+    normal, center = _plane(some)
     axes = _frame(normal)
-    flat = (mesh.triangles[faces] - center) @ axes.T
-    outline = shapely.minimum_rotated_rectangle(shapely.MultiPoint(flat.reshape(-1, 2)))
-    corners = shapely.get_coordinates(outline)
-    sides = np.diff(corners[:3], axis=0)
-    lengths = np.linalg.norm(sides, axis=1)
-    if len(corners) < 5 or lengths.min() < 10 * GRID:
-        return []
-    turn = sides[0] / lengths[0]
-    turn = np.array([turn, [-turn[1], turn[0]]])
-    fill, quads = mesh.area_faces[faces].sum() / lengths.prod(), []
-    if fill < EXACT_FILL:
-        quads = trapezoids(_smoothed(shapely.union_all(shapely.polygons(flat @ turn.T), grid_size=GRID)))
-    if fill >= SMALLEST_FILL and len(quads) != 1:
-        quads = [shapely.get_coordinates(shapely.transform(outline, lambda xy: xy @ turn.T).envelope)[:4]]
-    u, v = turn @ axes
-    found = []
-    for quad in quads:
-        x0, y0, x1, y1 = inner_rectangle(quad)
-        middle = center + (x0 + x1) / 2 * u + (y0 + y1) / 2 * v
-        half = np.array([x1 - x0, y1 - y0]) / 2
-        found.append(Plate(center + quad @ np.stack([u, v]), middle, normal, u, v, half))
-    return found
+    flat = (some.corners - center[:, None, None]) @ axes[:, None].swapaxes(2, 3)
+    outlines = shapely.minimum_rotated_rectangle(shapely.multipoints(flat.reshape(len(flat), -1, 2)))
+    region = np.flatnonzero(shapely.get_type_id(outlines) == shapely.GeometryType.POLYGON)
+    outline = shapely.get_coordinates(outlines[region]).reshape(-1, 5, 2)
+    sides = np.diff(outline[:, :3], axis=1)
+    lengths = np.linalg.norm(sides, axis=2)
+    wide = lengths.min(axis=1) >= 10 * GRID
+    region, outline, sides, lengths = region[wide], outline[wide], sides[wide], lengths[wide]
+    u = sides[:, 0] / lengths[:, :1]
+    turn = np.stack([u, np.stack([-u[:, 1], u[:, 0]], axis=1)], axis=1)
+    flat, outline = flat[region] @ turn[:, None].swapaxes(2, 3), outline @ turn.swapaxes(1, 2)
+    fill = some.area[region].sum(axis=1) / lengths.prod(axis=1)
+    rectangle, (single, trapezoid) = _rectangles(outline), _lone_trapezoids(flat, some.number[region])
+    rows = zip(fill, flat, rectangle, single, trapezoid, strict=True)
+    quads = [
+        [whole] if f >= EXACT_FILL else [lone] if f >= SMALLEST_FILL and is_one else _strips(f, parts, whole)
+        for f, parts, whole, is_one, lone in rows
+    ]
+    owner = np.repeat(np.arange(len(quads)), [len(each) for each in quads])
+    quad = np.reshape([q for each in quads for q in each], (-1, 4, 2))
+    uv, region = (turn @ axes[region])[owner], region[owner]
+    x0, y0, x1, y1 = inner_rectangle(quad).T[..., None]
+    middle = center[region] + (x0 + x1) / 2 * uv[:, 0] + (y0 + y1) / 2 * uv[:, 1]
+    half = np.concatenate([x1 - x0, y1 - y0], axis=1) / 2
+    columns = center[region, None] + quad @ uv, middle, normal[region], uv[:, 0], uv[:, 1], half
+    return ((k, Plate(*row)) for k, *row in zip(region.tolist(), *columns, strict=True))
+
+
+def _strips(
+    fill: float, triangles: Float[np.ndarray, "face 3 2"], rectangle: Float[np.ndarray, "4 2"]
+) -> list[Float[np.ndarray, "4 2"]]:
+    """Trapezoids that add up to triangles, or the rectangle around them that they fill."""
+    quads = trapezoids(_smoothed(shapely.union_all(shapely.polygons(triangles), grid_size=GRID)))
+    return [rectangle] if fill >= SMALLEST_FILL and len(quads) != 1 else quads
+
+
+def _rectangles(points: Float[np.ndarray, "n point 2"]) -> Float[np.ndarray, "n 4 2"]:
+    """Upright rectangles around points."""
+    (x0, y0), (x1, y1) = points.min(axis=1).T, points.max(axis=1).T
+    return np.stack([x0, y0, x1, y0, x1, y1, x0, y1], axis=1).reshape(-1, 4, 2)
+
+
+def _lone_trapezoids(
+    flat: Float[np.ndarray, "n face 3 2"], number: Int[np.ndarray, "n face 3"]
+) -> tuple[Bool[np.ndarray, "n"], Float[np.ndarray, "n 4 2"]]:
+    """Which convex regions are two triangles that make one trapezoid, and the one that `trapezoids` finds in each.
+
+    Nearly all faces of furniture in rooms that are not quite square are such; in arrays they take a twentieth.
+
+    Args:
+        flat: corners in the plane, m.
+        number: of the corners.
+    """
+    if flat.shape[1] != 2:
+        return np.zeros(len(flat), bool), np.zeros((len(flat), 4, 2))
+    apart = ~(number[:, 1, :, None] == number[:, 0, None]).any(axis=2)
+    fourth = np.take_along_axis(flat[:, 1], apart.argmax(axis=1)[:, None, None], axis=1)
+    quad = np.floor(np.concatenate([flat[:, 0], fourth], axis=1) * (1 / GRID) + 0.5) / (1 / GRID)
+    (along_x, found), (along_y, other) = _between_levels(quad), _between_levels(quad[:, :, ::-1])
+    found = np.where(along_x[:, None, None], found, other[:, :, ::-1])
+    return (along_x | along_y) & (apart.sum(axis=1) == 1), found
+
+
+def _between_levels(quad: Float[np.ndarray, "n 4 2"]) -> tuple[Bool[np.ndarray, "n"], Float[np.ndarray, "n 4 2"]]:
+    """Which convex quadrilaterals have two corners at one y and two at another, and these as `_trapezoids` does."""
+    quad = np.take_along_axis(quad, quad[:, :, 1].argsort(axis=1)[:, :, None], axis=1)
+    steps = np.diff(quad[:, :, 1], axis=1) > GRID
+    low, high = quad[:, :1, 1], quad[:, 2:3, 1]
+    ends = quad.reshape(-1, 2, 2, 2)  # of the left and the right side, below and above
+    ends = np.take_along_axis(ends, ends[..., :1].argsort(axis=2), axis=2)
+    (x0, y0), (x1, y1) = np.moveaxis(ends, (1, 3), (0, 1))
+    rise = np.where(steps[:, 1:2], y1 - y0, 1.0)
+    (a, b), (d, c) = ((x0 + ((y - y0) / rise).clip(0, 1) * (x1 - x0)).T for y in (low, high))
+    low, high = low[:, 0], high[:, 0]
+    found = np.stack([a, low, b, low, c, high, d, high], axis=1).reshape(-1, 4, 2)
+    return (steps == [False, True, False]).all(axis=1), found
 
 
 def _smoothed(region: shapely.Geometry) -> shapely.Geometry:
@@ -223,18 +323,19 @@ def _trapezoids(region: shapely.Geometry) -> list[Float[np.ndarray, "4 2"]]:
     return found
 
 
-def inner_rectangle(quad: Float[np.ndarray, "4 2"]) -> tuple[float, float, float, float]:
-    """x0 y0 x1 y1 of a large upright rectangle in a trapezoid: as high as it is, or half as high at either end.
+def inner_rectangle(quad: Float[np.ndarray, "*n 4 2"]) -> Float[np.ndarray, "*n 4"]:
+    """x0 y0 x1 y1 of a large upright rectangle in each trapezoid: as high as it is, or half as high at either end.
 
     Half a triangle's area is the most that one can hold.
     """
-    flip = abs(quad[1, 1] - quad[0, 1]) > 1e-9  # its parallel sides run along y
-    (x0, low), (x1, _), (x2, high), (x3, _) = quad[:, ::-1] if flip else quad
-    best = (0.0, 0.0, 0.0, 0.0)
+    flip = (np.abs(quad[..., 1, 1] - quad[..., 0, 1]) > 1e-9)[..., None]  # its parallel sides run along y
+    x, y = np.moveaxis(np.where(flip[..., None], quad[..., ::-1], quad), (-1, -2), (0, 1))
+    best, most = np.zeros((*flip.shape[:-1], 4)), np.zeros(flip.shape)
     for begin, end in ((0.0, 1.0), (0.0, 0.5), (0.5, 1.0)):
-        left = max(x0 + begin * (x3 - x0), x0 + end * (x3 - x0))
-        right = min(x1 + begin * (x2 - x1), x1 + end * (x2 - x1))
-        y0, y1 = low + begin * (high - low), low + end * (high - low)
-        if (right - left) * (y1 - y0) > (best[2] - best[0]) * (best[3] - best[1]):
-            best = left, y0, right, y1
-    return (best[1], best[0], best[3], best[2]) if flip else best
+        left = np.maximum(x[0] + begin * (x[3] - x[0]), x[0] + end * (x[3] - x[0]))
+        right = np.minimum(x[1] + begin * (x[2] - x[1]), x[1] + end * (x[2] - x[1]))
+        y0, y1 = y[0] + begin * (y[2] - y[0]), y[0] + end * (y[2] - y[0])
+        area = ((right - left) * (y1 - y0))[..., None]
+        best = np.where(area > most, np.stack([left, y0, right, y1], axis=-1), best)
+        most = np.maximum(area, most)
+    return np.where(flip, best[..., [1, 0, 3, 2]], best)

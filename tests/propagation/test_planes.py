@@ -114,6 +114,27 @@ def test_slanted_edges_are_covered_exactly(region, count):
         assert inner.area > 0.3 * shapely.Polygon(quad).area
 
 
+def test_leaning_faces_are_covered_to_the_bit_as_their_outlines_are_cut(monkeypatch):
+    """Boxes out of square, and wedges: in arrays as by cutting the union of each face's triangles."""
+    rng = np.random.default_rng(1)
+    boxes = [shapes.box(rng.uniform(-5, 5, 3), rng.uniform(0.02, 3, 3)) for _ in range(40)]
+    for box in boxes:
+        box.vertices = box.vertices @ (np.eye(3) + rng.normal(0, 0.003, (3, 3)))
+        top = box.vertices[:, 2] > box.vertices[:, 2].mean()
+        box.vertices[top, 0] += 0.01 * rng.integers(0, 2) * np.ptp(box.vertices[:, 0]) * np.sign(box.vertices[top, 1])
+    meshes = [(box, rng.random(12) < 0.9) for box in boxes]
+    found = planes.plates_of_each(meshes, 1e-5)
+    apart = [planes.plates(*each, 1e-5) for each in meshes]
+    monkeypatch.setattr(planes, "_lone_trapezoids", lambda flat, _: (np.zeros(len(flat), bool), flat[:, 0]))
+    cut = [planes.plates(*each, 1e-5) for each in meshes]
+    assert sum(map(len, found)) > 200
+    for one, *others in zip(found, apart, cut, strict=True):
+        for other in others:
+            assert [[np.asarray(x).tobytes() for x in vars(p).values()] for p in one] == [
+                [np.asarray(x).tobytes() for x in vars(p).values()] for p in other
+            ]
+
+
 def test_an_ell_shaped_wall_flashes_where_it_is():
     """The coherent echo of an L-shaped mesh is that of a large wall in front of it and none in front of the notch."""
     ell = shapely.Polygon([(-1, -1), (1, -1), (1, 0), (0, 0), (0, 1), (-1, 1)])

@@ -27,17 +27,6 @@ from radarize.console import progress, until_interrupted, working
 from radarize.errors import InputError
 
 
-def _antennas(text: str | None, option: str) -> int | tuple[int, ...] | None:
-    """A count (``3``), or TI's antenna numbers (``1,3,2``) as 0-based ones."""
-    if text is None:
-        return None
-    try:
-        numbers = [int(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{option} is {text!r}, expected a count (3) or antenna numbers (1,3,2)") from None
-    return numbers[0] if len(numbers) == 1 else tuple(number - 1 for number in numbers)
-
-
 @app.command("import")
 def import_(
     source: Annotated[
@@ -92,21 +81,12 @@ def import_(
     start_time: Annotated[float | None, typer.Option(help="Stamp of the first frame, s.")] = None,
 ):
     """Make a recording from a capture of a real radar."""
-    fields = {
-        "samples": samples, "loops": loops, "rx": _antennas(rx, "--rx"), "tx": _antennas(tx, "--tx"),
-        "iq_order": iq_order, "board": board, "start_frequency": start_frequency, "slope": slope,
-        "sample_rate": sample_rate, "idle_time": idle_time, "adc_start_time": adc_start_time,
-        "ramp_end_time": ramp_end_time, "frame_period": frame_period,
-    }  # fmt: skip
-    overrides = {name: value for name, value in fields.items() if value is not None}
-    from radarize.importers import Given, import_recording
-    from radarize.radar.presets import load_config
+    given = {name: value for name, value in locals().items() if name not in ("source", "output")}
+    from radarize.api.load import load
     from radarize.recording import keeping
 
-    radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk, align, encoding, layout)
     with keeping(output), progress("import") as report:
-        tell(import_recording(source, output, given, progress=report))
+        tell(load(source, output, progress=report, **given).path)
 
 
 @app.command()

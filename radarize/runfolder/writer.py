@@ -21,7 +21,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS
 from radarize.pipeline import Result
 from radarize.radar.config import RadarConfig
-from radarize.recording import Recording
+from radarize.recording import Frames, Recording
 from radarize.replacing import Replacement
 from radarize.runfolder.occupancy import OccupancyMap
 from radarize.runfolder.reader import FILES, Poses, Scans
@@ -44,7 +44,7 @@ class RunWriter:
         with RunWriter(folder, radar) as writer:
             for result in pipeline.follow(batches):
                 writer.add(result)
-            writer.describe(recording, heatmaps)
+            writer.describe(recording[:], heatmaps)
             writer.finish(pipeline.slam, facts)
 
     Args:
@@ -96,22 +96,23 @@ class RunWriter:
         self.extend("claims/held", track.claims.held, "rad^2: of the heading's error")
         self.write_poses("odometry", (track.time, planar_poses(track.pose)))
 
-    def describe(self, recording: Recording, heatmaps: Heatmaps) -> None:
-        """Say what recording the run is of, with what is true of its frames, and keep heat maps of some for reports.
+    def describe(self, frames: Frames, heatmaps: Heatmaps) -> None:
+        """Say what frames the run is of, with what is true of them, and keep heat maps of some for reports.
 
         Raises:
             InputError: the recording is damaged.
         """
+        recording, span = frames.recording, frames.span
         times, period, name = self._scans["time"], recording.config.frame_period, recording.path.name
         attributes = {k: v for k, v in recording.attributes.items() if isinstance(v, str | int | float)}
-        centers = recording.times[[0, -1]] + recording.config.burst_center
+        centers = recording.times[[span.start, span.stop - 1]] + recording.config.burst_center
         blindness = self.health.blindness
         blindness.lost(float(centers[0]), float(times[0]))
         blindness.lost(float(times[-1]), float(centers[1]))
         self._facts |= {
             "recording": name,
             "recording_attributes": attributes,
-            "frames": len(recording),
+            "frames": len(span),
             "duration_s": float(times[-1] - times[0] + period),
             "blind": blindness.found.model_dump(),
             "health": [each.model_dump() for each in self.health.found],

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 
+from radarize.api.run import run
 from radarize.errors import InputError
 from radarize.importers import Given, import_recording
 from radarize.importers.bag import open_bag
@@ -16,7 +17,6 @@ from radarize.points import PointClouds
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter, Stream
-from radarize.run import run
 from radarize.tum import planar, planar_poses, read_tum
 from tests.echoes import record
 from tests.importers.ros import EPOCH, RADAR, BagWriter, write_published
@@ -134,7 +134,7 @@ def test_the_same_trajectory_comes_out(original, bag, imported, tmp_path):
         pytest.skip("the samples are the same, as another test says: one bag is enough")
     found = []
     for path in (original, imported):
-        out = run(path, tmp_path / path.stem, odometry="doppler", scans="first-echo")
+        out = run(path, tmp_path / path.stem, odometry="doppler", scans="first-echo").path
         times, pose = read_tum(out / "trajectory.tum")
         found.append((times - times[0], planar(pose)))
     assert found[0][0] == pytest.approx(found[1][0], abs=1e-6)

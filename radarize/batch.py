@@ -181,13 +181,10 @@ class Intake:
         return batch
 
     def take_maps(
-        self,
-        maps: Mapping[str, Shaped[np.ndarray, "frame row azimuth"]],
-        stamps: Float[np.ndarray, "frame"],
-        numbers: Int[np.ndarray, "frame"] | None = None,
+        self, maps: Mapping[str, Shaped[np.ndarray, "frame row azimuth"]], stamps: Float[np.ndarray, "frame"]
     ) -> Batch:
-        """The next frames of a recording that holds maps and no samples; see `take`."""
-        numbers = self._count(len(stamps)) if numbers is None else numbers
+        """The next frames of a recording that holds maps and no samples."""
+        numbers = self._count(len(stamps))
         wanted = numbers % self.every == 0
         self.taken += int(np.count_nonzero(wanted))
         shown = {name: each[wanted] for name, each in maps.items()}

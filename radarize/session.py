@@ -5,8 +5,6 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-
 from radarize.batch import Batch, Intake
 from radarize.effort import together
 from radarize.errors import InputError
@@ -88,7 +86,7 @@ def run_each(
     source = frames.recording
     with ExitStack() as stack:
         inputs = inputs_of(frames, weights, configuration)
-        workshop, intake = Workshop(inputs), Intake(inputs.signal)
+        workshop, intake = Workshop(inputs), Intake(inputs.signal, inputs.every)
         each(make, pairs)
         for done, batch in batches(frames, intake):
             if not pipelines:
@@ -114,15 +112,13 @@ def inputs_of(frames: Frames, weights: Path | None, configuration: Configuration
 
 def batches(frames: Frames, intake: Intake) -> Iterator[tuple[int, Batch]]:
     """Frames in batches, each with how many have been read, those between every N-th included."""
-    source, span, every = frames.recording, frames.span, frames.numbers.step
+    source, span = frames.recording, frames.span
     size = together(source.config)
     for start in range(span.start, span.stop, size):
         stop = min(start + size, span.stop)
-        numbers = np.arange(start, stop)
-        numbers = numbers[(numbers - span.start) % every == 0]
-        rows, stamps = numbers - start, source.times[numbers]
+        stamps = source.times[start:stop]
         if pictured(source):
-            batch = intake.take_maps({"picture": source.rows(PICTURE, start, stop)[rows]}, stamps, numbers)
+            batch = intake.take_maps({"picture": source.rows(PICTURE, start, stop)}, stamps)
         else:
-            batch = intake.take(source.adc(start, stop)[rows], stamps, source.valid(start, stop)[rows], numbers)
+            batch = intake.take(source.adc(start, stop), stamps, source.valid(start, stop))
         yield stop - span.start, batch

@@ -46,7 +46,7 @@ SIMULATOR = (
     "scenario",
     "sensors",
     "recording",
-    "dataset emulator twin doctor webpreview",
+    "dataset emulator twin doctor webpreview api",
     "cli",
 )
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are

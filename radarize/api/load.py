@@ -3,7 +3,9 @@
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
-from typing import Literal, TypedDict, Unpack
+from typing import Any, Literal, Protocol, TypedDict, Unpack, cast
+
+import numpy as np
 
 from radarize.errors import InputError
 from radarize.importers import Given, import_recording
@@ -11,9 +13,28 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config
 from radarize.recording import Frames, Recording, in_temporary_file
 
-#: What a function of frames takes: frames, or all those of a recording, open or not.
+#: What the pipeline takes: frames, or all those of a recording, open or not.
 Source = Frames | Recording | str | Path
 _HDF5 = b"\x89HDF"
+
+
+class Samples(Protocol):
+    """Frames that maps and points are made of: those of a recording, or a live one; see `Frames`."""
+
+    @property
+    def numbers(self) -> range: ...
+    @property
+    def times(self) -> np.ndarray: ...
+    @property
+    def samples(self) -> np.ndarray: ...
+    @property
+    def valid(self) -> np.ndarray: ...
+    @property
+    def config(self) -> RadarConfig: ...
+    @property
+    def alone(self) -> bool: ...
+    def __len__(self) -> int: ...
+    def __getitem__(self, frames: slice, /) -> "Samples": ...
 
 
 class Capture(TypedDict, total=False):
@@ -104,6 +125,17 @@ def frames_of(source: Source) -> Frames:
     return (source if isinstance(source, Recording) else load(source))[:]
 
 
+def samples_of(source: Samples | Source) -> Samples:
+    """The same of what holds samples, a live frame too.
+
+    Raises:
+        InputError: it holds none.
+    """
+    if not isinstance(source, Frames | Recording | str | Path) and hasattr(source, "numbers"):
+        return source
+    return frames_of(cast(Source, source))
+
+
 def _is_recording(path: Path) -> bool:
     if path.suffix in (".h5", ".part"):
         return True
@@ -113,15 +145,15 @@ def _is_recording(path: Path) -> bool:
         return file.read(len(_HDF5)) == _HDF5 and path.suffix != ".mat"
 
 
-def _settings(given: Capture) -> Given:
-    known = {each.name for each in fields(Given)} - {"config", "cfg_text", "overrides"}
-    if unknown := given.keys() - Capture.__annotations__.keys():
+def _settings(capture: Capture) -> Given:
+    if unknown := capture.keys() - Capture.__annotations__.keys():
         raise InputError(f"{min(unknown)} is given, expected some of {', '.join(Capture.__annotations__)}")
-    own = {name: value for name, value in given.items() if name in known}
-    others = {n: v for n, v in given.items() if n not in known and n != "config" and v is not None}
-    others |= {name: _antennas(others[name], name) for name in ("rx", "tx") if name in others}
-    radar, text = load_config(given["config"]) if given.get("config") is not None else (None, "")
-    return Given(radar, text, others, **own)
+    given: dict[str, Any] = dict(capture)
+    config = given.pop("config", None)
+    radar, text = (None, "") if config is None else load_config(config)
+    own = {each.name: given.pop(each.name) for each in fields(Given) if each.name in given}
+    antennas = {name: _antennas(given[name], name) for name in ("rx", "tx") if name in given}
+    return Given(radar, text, given | antennas, **own)
 
 
 def _antennas(value: object, name: str) -> object:

@@ -7,17 +7,16 @@ import numpy as np
 import torch
 import xarray
 
-from radarize.api.load import Source, frames_of
+from radarize.api.load import Samples, Source, samples_of
 from radarize.effort import together
 from radarize.errors import InputError
 from radarize.heatmaps import Heatmaps
-from radarize.recording import Frames
 
 Beamformer = Literal["bartlett", "capon", "elevation-aware"]
 _UNITS = {"range": "m", "doppler": "m/s", "azimuth": "rad"}
 
 
-def range_azimuth(frames: Source, *, method: Beamformer = "bartlett") -> xarray.DataArray:
+def range_azimuth(frames: Samples | Source, *, method: Beamformer = "bartlett") -> xarray.DataArray:
     """Compute range-azimuth maps: power over range and azimuth, summed over Doppler.
 
     Args:
@@ -47,10 +46,10 @@ def range_azimuth(frames: Source, *, method: Beamformer = "bartlett") -> xarray.
             return maps.elevation_aware_of(spectrum)
         return maps.range_azimuth_of(spectrum, method)
 
-    return _made(frames_of(frames), power, "range", "azimuth")
+    return _made(samples_of(frames), power, "range", "azimuth")
 
 
-def doppler_azimuth(frames: Source, *, method: Beamformer = "bartlett") -> xarray.DataArray:
+def doppler_azimuth(frames: Samples | Source, *, method: Beamformer = "bartlett") -> xarray.DataArray:
     """Compute Doppler-azimuth maps: power over closing speed and azimuth, summed over range.
 
     A static world that a radar of velocity v in direction theta sees lies at v cos(azimuth - theta).
@@ -74,10 +73,10 @@ def doppler_azimuth(frames: Source, *, method: Beamformer = "bartlett") -> xarra
     def power(maps: Heatmaps, spectrum: torch.Tensor) -> torch.Tensor:
         return maps.doppler_azimuth_of(spectrum, method, elevation_aware=method == "elevation-aware")
 
-    return _made(frames_of(frames), power, "doppler", "azimuth")
+    return _made(samples_of(frames), power, "doppler", "azimuth")
 
 
-def range_doppler(frames: Source) -> xarray.DataArray:
+def range_doppler(frames: Samples | Source) -> xarray.DataArray:
     """Compute range-Doppler maps: power over range and closing speed, averaged over all virtual antennas.
 
     Args:
@@ -95,10 +94,10 @@ def range_doppler(frames: Source) -> xarray.DataArray:
         >>> power.dims, power.doppler.units
         (('range', 'doppler'), 'm/s')
     """
-    return _made(frames_of(frames), Heatmaps.range_doppler_of, "range", "doppler")
+    return _made(samples_of(frames), Heatmaps.range_doppler_of, "range", "doppler")
 
 
-def range_profile(frames: Source) -> xarray.DataArray:
+def range_profile(frames: Samples | Source) -> xarray.DataArray:
     """Compute range profiles: power over range, summed over Doppler and averaged over all virtual antennas.
 
     Args:
@@ -117,10 +116,10 @@ def range_profile(frames: Source) -> xarray.DataArray:
         >>> bool(0.3 < nearest < 4)
         True
     """
-    return _made(frames_of(frames), Heatmaps.range_profile_of, "range")
+    return _made(samples_of(frames), Heatmaps.range_profile_of, "range")
 
 
-def _made(frames: Frames, power: Callable[[Heatmaps, torch.Tensor], torch.Tensor], *names: str) -> xarray.DataArray:
+def _made(frames: Samples, power: Callable[[Heatmaps, torch.Tensor], torch.Tensor], *names: str) -> xarray.DataArray:
     maps, size = Heatmaps(frames.config), together(frames.config)
     parts = (frames[start : start + size] for start in range(0, len(frames), size))
     made = [power(maps, maps.spectrum(part.samples, part.valid)).numpy() for part in parts]

@@ -58,7 +58,8 @@ def estimate_odometry(
     frames = frames_of(frames)
     chosen, _ = choose(frames, weights, method, scans)
     inputs = inputs_of(frames, folder(weights), configuration(config))
-    follower, intake = Workshop(inputs).odometry(chosen["odometry"], chosen["scans"]), Intake(inputs.signal)
+    follower = Workshop(inputs).odometry(chosen["odometry"], chosen["scans"])
+    intake = Intake(inputs.signal, inputs.every)
     tracks = []
     for done, batch in batches(frames, intake):
         if batch:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float, Int
 
-from radarize.api.load import Source, frames_of
+from radarize.api.load import Samples, Source, samples_of
 from radarize.canvas import axes_or_new, png
 from radarize.effort import together
 from radarize.points import COLUMNS, PointCloudConfig, PointClouds
@@ -67,7 +67,7 @@ class PointCloud:
         return png(self.plot)
 
 
-def point_cloud(frames: Source, *, settings: PointCloudConfig | None = None) -> PointCloud:
+def point_cloud(frames: Samples | Source, *, settings: PointCloudConfig | None = None) -> PointCloud:
     """Detect points by the processing chain of TI's demo firmware: CFAR over range and Doppler, then angles.
 
     Args:
@@ -85,7 +85,7 @@ def point_cloud(frames: Source, *, settings: PointCloudConfig | None = None) -> 
         >>> points.xyz.shape[1], sorted(points.to_pandas())
         (3, ['frame', 'noise', 'snr', 'velocity', 'x', 'y', 'z'])
     """
-    frames = frames_of(frames)
+    frames = samples_of(frames)
     clouds, size = PointClouds(frames.config, settings), together(frames.config)
     points, numbers = [np.zeros((0, len(COLUMNS)))], [np.zeros(0, int)]
     for part in (frames[start : start + size] for start in range(0, len(frames), size)):

@@ -65,10 +65,10 @@ class Run:
             return None
         time, pose = found
         scans, claims = self._folder.scans, self._folder.claims
-        known = claims is not None and len(claims.held) == len(time)
-        covariance = since_start(planar(pose), claims) if known else None
-        velocities = (scans.get(name) for name in ("velocity", "velocity_covariance"))
-        return Trajectory(time, pose, covariance, *velocities, name="odometry")
+        return Trajectory(
+            time, pose, None if claims is None else since_start(planar(pose), claims), scans.get("velocity"),
+            scans.get("velocity_covariance"), name="odometry",
+        )  # fmt: skip
 
     @cached_property
     def truth(self) -> Trajectory | None:

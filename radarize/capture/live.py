@@ -1,7 +1,7 @@
 """The pipeline on a stream, with a page that shows it."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from threading import Event
 from typing import TYPE_CHECKING
 
@@ -9,13 +9,14 @@ import numpy as np
 import torch
 
 from radarize.batch import Intake
-from radarize.capture.page import Page
+from radarize.capture.page import Page, Unwatched
 from radarize.capture.record import Keeper
 from radarize.capture.stream import Stream, follow
 from radarize.capture.view import View
 from radarize.health import Health
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.registry import Inputs, Workshop
+from radarize.pipeline import Result
 from radarize.recording import Losses
 from radarize.runfolder import OccupancyMap
 from radarize.slam.rehearsal import rehearse
@@ -46,7 +47,9 @@ class Live:
         busy: s spent on the frames so far, showing them included.
     """
 
-    def __init__(self, inputs: Inputs, methods: dict[str, str], page: Page, foxglove: "Server | None" = None):
+    def __init__(
+        self, inputs: Inputs, methods: dict[str, str], page: Page | Unwatched, foxglove: "Server | None" = None
+    ):
         self.pipeline, self.page, self.foxglove = Workshop(inputs).pipeline(**methods, endless=True), page, foxglove
         self.intake = Intake(inputs.signal, inputs.every)
         self.view = View(self.pipeline, inputs.signal)
@@ -64,6 +67,19 @@ class Live:
         keeper: Keeper | None = None,
         progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
+        """`follow` the stream to its end."""
+        for _ in self.follow(stream, stopping, frames=frames, keeper=keeper, progress=progress):
+            pass
+
+    def follow(
+        self,
+        stream: Stream,
+        stopping: Event,
+        *,
+        frames: int | None = None,
+        keeper: Keeper | None = None,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+    ) -> Iterator[tuple[np.ndarray, Result]]:
         """Follow the stream until the user stops it, there are enough frames, or it ends; then finish the map.
 
         Args:
@@ -73,13 +89,16 @@ class Live:
             keeper: records the frames as well.
             progress: called with frames done and wanted (0: until stopped).
 
+        Yields:
+            frames that came together (`FrameRing.dtype`), and what the pipeline made of them, if it used any.
+
         Raises:
-            InputError: see `follow`.
+            InputError: see `radarize.capture.stream.follow`.
         """
         self._keeper = keeper
         self.page.send("facts", self.view.facts())
         for came in follow(stream, stopping, most=TOGETHER, frames=frames):
-            start = time.monotonic()
+            start, result = time.monotonic(), None
             adc, stamps, valid = came["adc"], came["time"], came["valid"]
             if batch := self.intake.take(adc, stamps, valid, came["number"]):
                 result = self.pipeline.push(batch)
@@ -93,6 +112,8 @@ class Live:
                 self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
             self.busy += time.monotonic() - start
             progress(int(came["number"][-1]) + 1, frames or 0)
+            if result is not None:
+                yield came, result
         self.pipeline.finish()
         self._show_map()
         self.page.send("end", {"troubles": self.troubles(stream)})

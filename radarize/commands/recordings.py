@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -24,7 +24,6 @@ from radarize.commands.app import (
     warn,
 )
 from radarize.console import progress, until_interrupted, working
-from radarize.errors import InputError
 
 
 @app.command("import")
@@ -81,12 +80,12 @@ def import_(
     start_time: Annotated[float | None, typer.Option(help="Stamp of the first frame, s.")] = None,
 ):
     """Make a recording from a capture of a real radar."""
-    given = {name: value for name, value in locals().items() if name not in ("source", "output")}
+    given = dict(locals())
     from radarize.api.load import load
     from radarize.recording import keeping
 
     with keeping(output), progress("import") as report:
-        tell(load(source, output, progress=report, **given).path)
+        tell(load(**given, progress=report).path)
 
 
 @app.command()
@@ -104,15 +103,17 @@ def capture(
     overwrite: Overwrite = False,
 ):
     """Record a real radar: IWR1843BOOST with a DCA1000. Whatever ends it, Ctrl-C too, leaves a whole file."""
+    from radarize.api.live import frames_within, sensor
     from radarize.capture.record import record
     from radarize.recording import spare
 
     if not overwrite:
         spare(output, anything=True)
-    sensor = _sensor(config, port, baud, host, dca, command_port, data_port)
-    most = _frames_within(duration, frames, sensor.config.frame_period)
-    with until_interrupted() as stopping, progress("capture") as report, sensor:
-        record(sensor, output, stopping, frames=most, overwrite=overwrite, progress=report)
+    network: Any = {"host": host, "dca": dca, "command_port": command_port, "data_port": data_port}
+    radar = sensor(config, port, {"baud": baud, **network})
+    most = frames_within(duration, frames, radar.config.frame_period)
+    with until_interrupted() as stopping, progress("capture") as report, radar:
+        record(radar, output, stopping, frames=most, overwrite=overwrite, progress=report)
     tell(output)
 
 
@@ -141,44 +142,21 @@ def live(
     overwrite: Overwrite = False,
 ):
     """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
-    from contextlib import ExitStack
+    given = dict(locals())
+    from radarize.api.live import live
 
-    from radarize.capture.live import Live, prepare
-    from radarize.capture.page import Page
-    from radarize.capture.record import recording
-    from radarize.capture.replay import Replay
-    from radarize.methods.registry import Inputs, best_methods, pace
-    from radarize.recording import spare
-
-    if output and not overwrite:
-        spare(output, anything=True)
-    if replay and (config or port):
-        raise InputError(f"--replay {replay} is given with --config or --port, expected one of the two")
-    stream = Replay(replay) if replay else _sensor(config, port, baud, host, dca, command_port, data_port)
-    radar, methods = stream.config, best_methods(stream.config)[0]
-    chosen = {"odometry": odometry or methods["odometry"], "scans": scans or methods["scans"]}
-    keeper = None
-    with until_interrupted() as stopping, ExitStack() as stack:
+    with until_interrupted() as stopping:
         with working("warming up"):
-            inputs = prepare(Inputs(radar, every=every or pace(chosen["odometry"], radar)), chosen)
-        server = None
-        if foxglove is not None:
-            from radarize.foxglove import Server
-
-            server = stack.enter_context(Server(foxglove))
-        live = Live(inputs, chosen, stack.enter_context(Page(address)), server)
-        report = stack.enter_context(progress("live"))
-        stack.enter_context(stream)
-        print(f"page: {live.page.url}", flush=True)
-        if server is not None:
-            print(f"Foxglove: {server.url}", flush=True)
-        if output:
-            keeper = stack.enter_context(recording(stream, output, overwrite))
-        most = _frames_within(duration, frames, radar.frame_period)
-        live.run(stream, stopping, frames=most, keeper=keeper, progress=report)
-        warnings = live.troubles(stream)
-    warn([*warnings, *live.losses.warnings(), *live.pipeline.slam.warnings()])
-    print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
+            session = live(**given)
+        with progress("live") as report, session:
+            print(f"page: {session.url}", flush=True)
+            if session.server is not None:
+                print(f"Foxglove: {session.server.url}", flush=True)
+            for _ in session.frames(stopping, report):
+                pass
+    warn(session.warnings)
+    followed = session.live.losses.frames
+    print(f"{followed} frames, {1e3 * session.live.busy / max(followed, 1):.1f} ms each")
 
 
 @app.command()
@@ -190,24 +168,6 @@ def recover(
     from radarize.recording import recover
 
     tell(recover(part, output))
-
-
-def _sensor(config: str | None, port: str | None, baud: int, *network):
-    """The sensor that the options of `capture` and `live` describe."""
-    from radarize.capture.board import Network
-    from radarize.capture.sensor import Sensor
-    from radarize.radar.presets import load_config
-
-    for name, value in (("--config", config), ("--port", port)):
-        if value is None:
-            raise InputError(f"{name} is missing, expected {'a .cfg or a preset' if name == '--config' else 'a TTY'}")
-    radar, text = load_config(config)
-    return Sensor(radar, text, config, port, baud=baud, network=Network(*network))
-
-
-def _frames_within(duration: float | None, frames: int | None, period: float) -> int | None:
-    limits = [frames, None if duration is None else max(round(duration / period), 1)]
-    return min((limit for limit in limits if limit is not None), default=None)
 
 
 @app.command()

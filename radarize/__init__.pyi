@@ -18,3 +18,4 @@ from radarize.recording import Recording as Recording
 from radarize.trajectory import Trajectory as Trajectory
 
 __version__: str
+odometry = estimate_odometry

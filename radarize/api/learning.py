@@ -37,6 +37,6 @@ def torch_dataset(
     Example:
         >>> dataset = rz.torch_dataset(".", features=["doppler_azimuth"], labels=["velocity"])
         >>> {name: tuple(tensor.shape) for name, tensor in dataset[0].items()}
-        {'doppler_azimuth': (1, 64, 80), 'velocity': (1, 3)}
+        {'doppler_azimuth': (1, 32, 80), 'velocity': (1, 3)}
     """
     return Frames(data, split, part, (*features, *labels), window, stride=stride)

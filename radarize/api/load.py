@@ -96,9 +96,9 @@ def load(
     Example:
         >>> rec = rz.load("walk.h5")
         >>> rec
-        <recording walk.h5: 24 frames of 33.33 ms, scene stress/corner; ...>
+        <recording walk.h5: 24 frames of 33.33 ms, scene corner; ...>
         >>> rec[4:8].samples.shape  # frame, loop, transmitter, receiver, sample, I and Q
-        (4, 64, 3, 4, 96, 2)
+        (4, 32, 3, 4, 96, 2)
     """
     path = Path(source)
     if _is_recording(path):

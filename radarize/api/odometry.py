@@ -51,7 +51,7 @@ def estimate_odometry(
     Example:
         >>> odometry = rz.odometry(rec, method="doppler")
         >>> odometry
-        <odometry: 24 poses, 0.... m in 0.77 s>
+        <odometry: 24 poses, ... m in 0.77 s>
         >>> odometry.velocity.shape, odometry.covariance.shape
         ((24, 2), (24, 3, 3))
     """

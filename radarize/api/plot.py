@@ -77,6 +77,7 @@ def _array(axes: "Axes", array: xarray.DataArray, title: str, velocity: Any) -> 
             draw_range_doppler(axes, values, array.range.values, array.doppler.values, title)
         case ("frame", "range"):
             draw_profiles(axes, array.time.values, array.range.values, values)
+            axes.set_title(title)
         case ("range",):
             axes.plot(array.range, 10 * np.log10(np.maximum(values, values.max(initial=1e-30) * 1e-9)))
             axes.set(xlabel="range, m", ylabel="power, dB of squared ADC counts", title=title)

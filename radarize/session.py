@@ -13,12 +13,12 @@ from radarize.methods.method import Inputs, Weights
 from radarize.methods.registry import Workshop
 from radarize.pipeline import Pipeline
 from radarize.polar import PICTURE, pictured
-from radarize.recording import Frames
+from radarize.recording import Clip
 from radarize.runfolder import RunWriter
 
 
 def run_each(
-    frames: Frames,
+    frames: Clip,
     pairs: dict[Path, tuple[str, str]],
     *,
     weights: Path | None = None,
@@ -98,7 +98,7 @@ def run_each(
     return failed
 
 
-def inputs_of(frames: Frames, weights: Path | None, configuration: Configuration | None) -> Inputs:
+def inputs_of(frames: Clip, weights: Path | None, configuration: Configuration | None) -> Inputs:
     """What methods are made from, for frames of a recording.
 
     Raises:
@@ -110,7 +110,7 @@ def inputs_of(frames: Frames, weights: Path | None, configuration: Configuration
     return Inputs(source.config, configuration or Configuration(), Weights(weights), source, frames.numbers.step)
 
 
-def batches(frames: Frames, intake: Intake) -> Iterator[tuple[int, Batch]]:
+def batches(frames: Clip, intake: Intake) -> Iterator[tuple[int, Batch]]:
     """Frames in batches, each with how many have been read, those between every N-th included."""
     source, span = frames.recording, frames.span
     size = together(source.config)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from radarize.foxglove import Server
 
 
-class Options(TypedDict, total=False):
+class LiveOptions(TypedDict, total=False):
     """How the radar is reached, and what else is done with its frames; the options of ``radarize live``."""
 
     baud: int
@@ -114,7 +114,7 @@ class LiveSession:
     live: Live
     server: "Server | None" = None
 
-    def __init__(self, stream: Stream, inputs: Inputs, methods: dict[str, str], most: int | None, options: Options):
+    def __init__(self, stream: Stream, inputs: Inputs, methods: dict[str, str], most: int | None, options: LiveOptions):
         self.stream, self.methods, self.most = stream, methods, most
         self._threads = torch.get_num_threads()  # which `prepare` sets to one
         self._inputs, self._options, self._stack = prepare(inputs, methods), options, ExitStack()
@@ -209,7 +209,7 @@ def live(
     every: int | None = None,
     duration: float | None = None,
     frames: int | None = None,
-    **options: Unpack[Options],
+    **options: Unpack[LiveOptions],
 ) -> LiveSession:
     """Run the pipeline on a real radar (IWR1843BOOST with a DCA1000), or on a recording in real time.
 
@@ -241,8 +241,8 @@ def live(
         >>> frame.number, pose.shape, power.dims
         (7, (3,), ('range', 'azimuth'))
     """
-    if unknown := options.keys() - Options.__annotations__.keys():
-        raise InputError(f"{min(unknown)} is given, expected some of {', '.join(Options.__annotations__)}")
+    if unknown := options.keys() - LiveOptions.__annotations__.keys():
+        raise InputError(f"{min(unknown)} is given, expected some of {', '.join(LiveOptions.__annotations__)}")
     if (output := options.get("output")) and not options.get("overwrite"):
         spare(Path(output), anything=True)
     if replay and (config or port):
@@ -255,7 +255,7 @@ def live(
     return LiveSession(stream, inputs, methods, frames_within(duration, frames, radar.frame_period), options)
 
 
-def sensor(config: str | Path | RadarConfig | None, port: str | None, options: Options) -> Sensor:
+def sensor(config: str | Path | RadarConfig | None, port: str | None, options: LiveOptions) -> Sensor:
     """A radar on its serial port, and its capture card.
 
     Raises:

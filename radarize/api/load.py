@@ -11,15 +11,15 @@ from radarize.errors import InputError
 from radarize.importers import Given, import_recording
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config
-from radarize.recording import Frames, Recording, in_temporary_file
+from radarize.recording import Clip, Recording, in_temporary_file
 
 #: What the pipeline takes: frames, or all those of a recording, open or not.
-Source = Frames | Recording | str | Path
+Source = Clip | Recording | str | Path
 _HDF5 = b"\x89HDF"
 
 
 class Samples(Protocol):
-    """Frames that maps and points are made of: those of a recording, or a live one; see `Frames`."""
+    """Frames that maps and points are made of: those of a recording, or a live one; see `Clip`."""
 
     @property
     def numbers(self) -> range: ...
@@ -37,7 +37,7 @@ class Samples(Protocol):
     def __getitem__(self, frames: slice, /) -> "Samples": ...
 
 
-class Capture(TypedDict, total=False):
+class CaptureOptions(TypedDict, total=False):
     """What a foreign file does not say of itself; the options of ``radarize import``."""
 
     config: str | Path | RadarConfig | None
@@ -70,7 +70,7 @@ def load(
     output: str | Path | None = None,
     *,
     progress: Callable[[int, int], None] | None = None,
-    **given: Unpack[Capture],
+    **given: Unpack[CaptureOptions],
 ) -> Recording:
     """Open a recording, or make one of a capture.
 
@@ -112,13 +112,13 @@ def load(
     return in_temporary_file(lambda to: import_recording(path, to, settings, report), f"{path.stem}.h5")
 
 
-def frames_of(source: Source) -> Frames:
+def frames_of(source: Source) -> Clip:
     """Frames as they are, or all of a recording.
 
     Raises:
         InputError: no recording.
     """
-    if isinstance(source, Frames):
+    if isinstance(source, Clip):
         return source
     if not isinstance(source, Recording | str | Path):
         raise InputError(f"{source!r} is a {type(source).__name__}, expected a recording, frames of one, or a file")
@@ -131,7 +131,7 @@ def samples_of(source: Samples | Source) -> Samples:
     Raises:
         InputError: it holds none.
     """
-    if not isinstance(source, Frames | Recording | str | Path) and hasattr(source, "numbers"):
+    if not isinstance(source, Clip | Recording | str | Path) and hasattr(source, "numbers"):
         return source
     return frames_of(cast(Source, source))
 
@@ -145,9 +145,9 @@ def _is_recording(path: Path) -> bool:
         return file.read(len(_HDF5)) == _HDF5 and path.suffix != ".mat"
 
 
-def _settings(capture: Capture) -> Given:
-    if unknown := capture.keys() - Capture.__annotations__.keys():
-        raise InputError(f"{min(unknown)} is given, expected some of {', '.join(Capture.__annotations__)}")
+def _settings(capture: CaptureOptions) -> Given:
+    if unknown := capture.keys() - CaptureOptions.__annotations__.keys():
+        raise InputError(f"{min(unknown)} is given, expected some of {', '.join(CaptureOptions.__annotations__)}")
     given: dict[str, Any] = dict(capture)
     config = given.pop("config", None)
     radar, text = (None, "") if config is None else load_config(config)

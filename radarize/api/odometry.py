@@ -15,7 +15,7 @@ from radarize.odometry.claims import Claims, Unknown
 from radarize.odometry.integration import Track
 from radarize.polar import pictured
 from radarize.pose import between
-from radarize.recording import Frames
+from radarize.recording import Clip
 from radarize.session import batches, inputs_of
 from radarize.trajectory import Trajectory
 from radarize.tum import planar_poses
@@ -72,7 +72,7 @@ def estimate_odometry(
 
 
 def choose(
-    frames: Frames, weights: str | Path | None, odometry: str | None, scans: str | None
+    frames: Clip, weights: str | Path | None, odometry: str | None, scans: str | None
 ) -> tuple[dict[str, str], str]:
     """Methods by what they are for, those of choice where none is named; and why these have no networks, if so."""
     best, why = (BEST, "") if weights else best_methods(frames.config)

@@ -9,7 +9,7 @@ from radarize.api.points import PointCloud
 from radarize.api.run import Run
 from radarize.canvas import axes_or_new
 from radarize.errors import InputError
-from radarize.recording import Frames, Recording
+from radarize.recording import Clip, Recording
 from radarize.report.drawings import draw_doppler, draw_fan, draw_profiles, draw_range_doppler
 from radarize.runfolder import OccupancyMap
 from radarize.trajectory import Trajectory
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def plot(
-    what: "xarray.DataArray | Trajectory | PointCloud | Run | OccupancyMap | Recording | Frames",
+    what: "xarray.DataArray | Trajectory | PointCloud | Run | OccupancyMap | Recording | Clip",
     axes: "Axes | None" = None,
     *,
     title: str = "",
@@ -49,7 +49,7 @@ def plot(
         True
     """
     axes = axes_or_new(axes)
-    if isinstance(what, Recording | Frames):
+    if isinstance(what, Recording | Clip):
         if what.truth is None:
             raise InputError(f"{what!r}: has no true poses to draw, expected maps of it, such as range_azimuth(rec[0])")
         what = what.truth

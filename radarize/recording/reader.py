@@ -25,7 +25,7 @@ _LATEST = 1e11
 class Recording:
     """A recording opened for reading; use as a context manager, or keep it open.
 
-    ``recording[100]`` and ``recording[100:110]`` are frames, see `Frames`; ``len(recording)`` is how many there are.
+    ``recording[100]`` and ``recording[100:110]`` are frames, see `Clip`; ``len(recording)`` is how many there are.
 
     Args:
         path: an ``.h5`` file, finished, growing, or left behind by a crash.
@@ -83,14 +83,14 @@ class Recording:
     def __len__(self) -> int:
         return len(self.times)
 
-    def __getitem__(self, frames: int | slice) -> "Frames":
+    def __getitem__(self, frames: int | slice) -> "Clip":
         """Some frames; none of them is read before it is asked for.
 
         Raises:
             IndexError: there is no frame of this number.
             InputError: the frames are not in ascending order.
         """
-        return Frames(self, range(len(self)))[frames]
+        return Clip(self, range(len(self)))[frames]
 
     def __repr__(self) -> str:
         c, scene = self.config, self.attributes.get("scene", "")
@@ -250,7 +250,7 @@ class Recording:
 
 
 @dataclass(frozen=True, eq=False)
-class Frames:
+class Clip:
     """Some frames of a recording, by ``recording[start:stop:step]``, or one of them, by ``recording[number]``. Samples
     are read when they are asked for.
 
@@ -267,13 +267,13 @@ class Frames:
     def __len__(self) -> int:
         return len(self.numbers)
 
-    def __getitem__(self, frames: int | slice) -> "Frames":
+    def __getitem__(self, frames: int | slice) -> "Clip":
         if not isinstance(frames, slice):
             number = self.numbers[frames]
-            return Frames(self.recording, range(number, number + 1), alone=True)
+            return Clip(self.recording, range(number, number + 1), alone=True)
         if frames.step is not None and frames.step < 1:
             raise InputError(f"{self.recording.path}: frames step by {frames.step}, expected 1 (all frames) or more")
-        return Frames(self.recording, self.numbers[frames])
+        return Clip(self.recording, self.numbers[frames])
 
     def __repr__(self) -> str:
         which = f"frame {self.numbers[0]}" if self.alone else f"frames {list(self.numbers)}"

@@ -21,7 +21,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS
 from radarize.pipeline import Result
 from radarize.radar.config import RadarConfig
-from radarize.recording import Frames, Recording
+from radarize.recording import Clip, Recording
 from radarize.replacing import Replacement
 from radarize.runfolder.occupancy import OccupancyMap
 from radarize.runfolder.reader import FILES, Poses, Scans
@@ -96,7 +96,7 @@ class RunWriter:
         self.extend("claims/held", track.claims.held, "rad^2: of the heading's error")
         self.write_poses("odometry", (track.time, planar_poses(track.pose)))
 
-    def describe(self, frames: Frames, heatmaps: Heatmaps) -> None:
+    def describe(self, frames: Clip, heatmaps: Heatmaps) -> None:
         """Say what frames the run is of, with what is true of them, and keep heat maps of some for reports.
 
         Raises:

@@ -10,8 +10,8 @@ import typer
 import radarize as rz
 import radarsim
 from radarize import cli as radarize_cli
-from radarize.api.live import Options
-from radarize.api.load import Capture
+from radarize.api.live import LiveOptions
+from radarize.api.load import CaptureOptions
 from radarize.capture.board import Network
 from radarize.capture.uart import BAUD
 from radarize.importers import Given
@@ -40,7 +40,7 @@ def of_fields(kind: type) -> dict[str, object]:
 PAIRS = {
     "radarize run": (rz.run, {}, {"every": "frames are sliced: rec[::2]"}),
     "radarize evaluate": (rz.evaluate, {}, {"beside": "one table of several", "as_json": "how it is printed"}),
-    "radarize import": (rz.load, dict.fromkeys(Capture.__annotations__) | of_fields(Given), {}),
+    "radarize import": (rz.load, dict.fromkeys(CaptureOptions.__annotations__) | of_fields(Given), {}),
     "radarize live": (
         rz.live,
         {**of_fields(Network), "baud": BAUD, "output": None, "overwrite": False, "address": None, "foxglove": None},
@@ -65,7 +65,9 @@ def test_options(command):
     app = {"radarize": radarize_cli, "radarsim": radarsim_cli}[package].app
     parameters = typer.main.get_command(app).commands[name].params
     of_command = {each.name: each.default for each in parameters if each.name not in {"help", *alone}}
-    options = get_type_hints({rz.load: Capture, rz.live: Options, radarsim.simulate: Plan}.get(function, object))
+    options = get_type_hints(
+        {rz.load: CaptureOptions, rz.live: LiveOptions, radarsim.simulate: Plan}.get(function, object)
+    )
     known = defaults(function) | {option: more[option] for option in options}
     assert of_command.keys() == known.keys() - PROGRESS
     for option, default in of_command.items():

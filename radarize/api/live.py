@@ -119,6 +119,7 @@ class LiveSession:
         self._threads = torch.get_num_threads()  # which `prepare` sets to one
         self._inputs, self._options, self._stack = prepare(inputs, methods), options, ExitStack()
         self._keeper: Keeper | None = None
+        self._told: list[str] = []
         self._entered = False
 
     def __enter__(self) -> "LiveSession":
@@ -139,6 +140,7 @@ class LiveSession:
         return self
 
     def __exit__(self, *error: Any) -> None:
+        self._told = self.warnings  # while the board can still be asked
         self._entered = False
         torch.set_num_threads(self._threads)
         self._stack.__exit__(*error)
@@ -196,6 +198,8 @@ class LiveSession:
     @property
     def warnings(self) -> list[str]:
         """What is wrong with the stream and its recording so far, and where odometry had a hard time."""
+        if not self._entered:
+            return self._told
         return [*self.live.troubles(self.stream), *self.live.losses.warnings(), *self.live.pipeline.slam.warnings()]
 
 

@@ -152,8 +152,9 @@ def _settings(capture: CaptureOptions) -> Given:
     config = given.pop("config", None)
     radar, text = (None, "") if config is None else load_config(config)
     own = {each.name: given.pop(each.name) for each in fields(Given) if each.name in given}
-    antennas = {name: _antennas(given[name], name) for name in ("rx", "tx") if name in given}
-    return Given(radar, text, given | antennas, **own)
+    overrides = {name: value for name, value in given.items() if value is not None}
+    overrides |= {name: _antennas(overrides[name], name) for name in ("rx", "tx") if name in overrides}
+    return Given(radar, text, overrides, **own)
 
 
 def _antennas(value: object, name: str) -> object:

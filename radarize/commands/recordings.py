@@ -80,7 +80,7 @@ def import_(
     start_time: Annotated[float | None, typer.Option(help="Stamp of the first frame, s.")] = None,
 ):
     """Make a recording from a capture of a real radar."""
-    given = dict(locals())
+    given = dict(locals())  # all options, by name
     from radarize.api.load import load
     from radarize.recording import keeping
 
@@ -142,7 +142,7 @@ def live(
     overwrite: Overwrite = False,
 ):
     """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
-    given = dict(locals())
+    given = dict(locals())  # all options, by name
     from radarize.api.live import live
 
     with until_interrupted() as stopping:

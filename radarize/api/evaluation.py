@@ -9,7 +9,6 @@ from radarize.api.run import Run
 from radarize.evaluation.evaluate import evaluate as figures
 from radarize.report import words
 from radarize.report.run import methods
-from radarize.runfolder import RunFolder
 
 if TYPE_CHECKING:
     import pandas
@@ -25,8 +24,8 @@ class Evaluation(Mapping[str, object]):
         True
     """
 
-    def __init__(self, folder: RunFolder, reference: Path | None = None):
-        self._folder, self._figures = folder, figures(folder, reference)
+    def __init__(self, run: Run, reference: Path | None = None):
+        self._run, self._figures = run, figures(run.folder, reference)
 
     def __getitem__(self, name: str) -> object:
         return self._figures[name]
@@ -40,7 +39,7 @@ class Evaluation(Mapping[str, object]):
     @property
     def method(self) -> str:
         """What the run was made with."""
-        return methods(self._folder)
+        return methods(self._run.folder)
 
     @property
     def tables(self) -> Iterator[words.Table | str]:
@@ -71,8 +70,8 @@ class Evaluation(Mapping[str, object]):
         Raises:
             InputError: it cannot be written.
         """
-        self._folder.write_metrics(self._figures)
-        return self._folder.path / "metrics.json"
+        self._run.folder.write_metrics(self._figures)
+        return self._run.path / "metrics.json"
 
 
 def evaluate(run: Run | str | Path, *, reference: str | Path | None = None) -> Evaluation:
@@ -96,8 +95,7 @@ def evaluate(run: Run | str | Path, *, reference: str | Path | None = None) -> E
         >>> round(float(found.to_pandas()["odometry.distance"]), 1)  # m
         0.4
     """
-    place = run.path if isinstance(run, Run) else Path(run)
-    return Evaluation(RunFolder(place), None if reference is None else Path(reference))
+    return Evaluation(run if isinstance(run, Run) else Run(run), None if reference is None else Path(reference))
 
 
 def _frame(table: words.Table) -> "pandas.DataFrame":

@@ -140,7 +140,8 @@ class LiveSession:
         return self
 
     def __exit__(self, *error: Any) -> None:
-        self._told = self.warnings  # while the board can still be asked
+        if error[0] is None:
+            self._told = self.warnings  # while the board can still be asked
         self._entered = False
         torch.set_num_threads(self._threads)
         self._stack.__exit__(*error)

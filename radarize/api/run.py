@@ -17,7 +17,9 @@ from radarize.canvas import axes_or_new, png
 from radarize.errors import InputError, explained
 from radarize.evaluation.trajectory import fitted, moved
 from radarize.methods.configuration import Configuration
+from radarize.replacing import Replacement
 from radarize.runfolder import OccupancyMap, RunFolder
+from radarize.runfolder.reader import FILES
 from radarize.session import run_each
 from radarize.trajectory import Trajectory
 from radarize.tum import planar
@@ -34,6 +36,7 @@ class Run:
 
     Attributes:
         path: the folder; a temporary one goes with the object.
+        folder: its files, for programs that read them.
 
     Raises:
         InputError: it is no such folder, or not a whole one.
@@ -45,8 +48,8 @@ class Run:
     """
 
     def __init__(self, path: str | Path):
-        self._folder = RunFolder(path)
-        self.path = self._folder.path
+        self.folder = RunFolder(path)
+        self.path = self.folder.path
 
     def __repr__(self) -> str:
         made = ", ".join(f"{name} {value}" for name, value in self.methods.items())
@@ -55,16 +58,16 @@ class Run:
     @cached_property
     def trajectory(self) -> Trajectory:
         """Of SLAM, a pose for each scan; the first one lies near the origin."""
-        time, pose = self._folder.trajectory
-        return Trajectory(time, pose, self._folder.scans.get("trajectory_covariance"), name="SLAM")
+        time, pose = self.folder.trajectory
+        return Trajectory(time, pose, self.folder.scans.get("trajectory_covariance"), name="SLAM")
 
     @cached_property
     def odometry(self) -> Trajectory | None:
         """Of odometry alone, with velocities; None where the run had none."""
-        if (found := self._folder.odometry) is None:
+        if (found := self.folder.odometry) is None:
             return None
         time, pose = found
-        scans, claims = self._folder.scans, self._folder.claims
+        scans, claims = self.folder.scans, self.folder.claims
         return Trajectory(
             time, pose, None if claims is None else since_start(planar(pose), claims), scans.get("velocity"),
             scans.get("velocity_covariance"), name="odometry",
@@ -73,14 +76,14 @@ class Run:
     @cached_property
     def truth(self) -> Trajectory | None:
         """True poses, with the floor plan where it is known; None without truth."""
-        if (found := self._folder.reference) is None:
+        if (found := self.folder.reference) is None:
             return None
-        return Trajectory(*found, floor_plan=self._folder.scans.get("truth/floor_plan"), name="truth")
+        return Trajectory(*found, floor_plan=self.folder.scans.get("truth/floor_plan"), name="truth")
 
     @cached_property
     def map(self) -> OccupancyMap | None:
         """Occupancy, in the frame of `trajectory`."""
-        return self._folder.map
+        return self.folder.map
 
     @cached_property
     def scans(self) -> xarray.DataArray:
@@ -89,7 +92,7 @@ class Run:
         Raises:
             InputError: the run has no scans.
         """
-        scans = self._folder.scans
+        scans = self.folder.scans
         if "ranges" not in scans:
             raise InputError(f"{self.path}: has no scans.h5, expected a run with scans")
         axes = {
@@ -101,27 +104,33 @@ class Run:
     @property
     def facts(self) -> dict[str, object]:
         """Recording, settings, versions, timings: what ``run.json`` holds."""
-        return self._folder.facts
+        return self.folder.facts
 
     @property
     def methods(self) -> dict[str, str]:
         """Methods by what they are for: ``odometry``, ``scans``."""
-        return self._folder.methods
+        return self.folder.methods
 
     @property
     def warnings(self) -> list[str]:
         """What the pipeline noticed, such as unobservable motion."""
-        return self._folder.warnings
+        return self.folder.warnings
 
     def save(self, folder: str | Path) -> Path:
-        """Copy the run to a folder: trajectories (TUM), a ROS map, scans (HDF5), ``run.json``; and more, once made.
+        """Copy the run to a folder, in place of one that is there: trajectories (TUM), a ROS map, scans (HDF5), ...
 
         Raises:
             InputError: it cannot be written.
         """
         if Path(folder).resolve() != self.path.resolve():
-            with explained(f"{folder}: cannot be written", OSError):
-                shutil.copytree(self.path, folder, dirs_exist_ok=True)
+            files = Replacement(Path(folder), FILES)
+            try:
+                with explained(f"{folder}: cannot be written", OSError):
+                    for name in filter(self.folder.has, FILES):
+                        shutil.copyfile(self.path / name, files.part / name)
+                files.place()
+            finally:
+                files.discard()
         return Path(folder)
 
     def plot(self, axes: "Axes | None" = None, *, truth: Trajectory | None = None) -> "Axes":

@@ -119,10 +119,15 @@ def test_a_part_of_a_recording_runs_as_one(rec):
 def test_a_run_is_temporary_until_it_is_saved(rec, tmp_path):
     run = rz.run(rec, **PLAIN)
     temporary, trajectory = run.path, run.trajectory
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "metrics.json").write_text("{}")  # of another run
     run.save(tmp_path / "kept")
     del run
     assert not temporary.exists()
     kept = rz.Run(tmp_path / "kept")
+    assert {each.name for each in kept.path.iterdir()} == {
+        "trajectory.tum", "odometry.tum", "reference.tum", "map.pgm", "map.yaml", "scans.h5", "run.json",
+    }  # fmt: skip
     assert np.array_equal(kept.trajectory.pose, trajectory.pose) and kept.map.occupied.any()
     assert kept.truth.distance == pytest.approx(rec.truth.distance) and not kept.warnings
     assert kept.save(tmp_path / "kept") == tmp_path / "kept"

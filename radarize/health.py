@@ -38,14 +38,14 @@ class Health:
     """Watches what a pipeline gives; memory grows with the number of spans alone.
 
     Args:
-        radar: configuration, whose limits the advice names.
+        radar: configuration of the frames that are used, whose limits the advice names.
 
     Attributes:
         blindness: of the odometry.
     """
 
     def __init__(self, radar: RadarConfig):
-        self.radar, self.blindness = radar, Blindness()
+        self.radar, self.blindness = radar, Blindness(radar.frame_period)
         self._spans: dict[tuple[str, str], Spans] = {}  # by kind and advice
         self._first = self._last = np.nan
         self._aliased, self._far = ("aliased", self._too_fast()), ("out of reach", self._out_of_reach())
@@ -53,7 +53,7 @@ class Health:
     def add(self, result: Result) -> None:
         """Take in what the next frames gave."""
         track = result.track
-        self.blindness.add(result.frames, track)
+        self.blindness.add(track)
         if not len(track.time):
             return
         if np.isnan(self._last):

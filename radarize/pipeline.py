@@ -44,7 +44,7 @@ class Result:
     """What a batch gave.
 
     Attributes:
-        frames: numbers of its frames, counted as the radar delivered them.
+        frames: numbers of its frames as the radar sent them, see `radarize.radar.numbering`.
         track: of these frames: poses, covariances, velocities.
         ranges: scans on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen.
         flaws: of these frames; None where nobody looked.

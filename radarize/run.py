@@ -112,6 +112,7 @@ def run_each(
             made["frames"] = f"one of {every}"
         told = {
             "frames_lost": intake.lost,
+            "frames_missing": intake.numbering.missing,
             "chirps_disturbed": intake.disturbed,
             "methods": made,
             "configuration": inputs.configuration.model_dump(),

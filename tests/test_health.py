@@ -16,6 +16,7 @@ from radarize.pipeline import Result
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
 from radarize.report.run import report_run
+from radarize.run import run
 from radarize.runfolder import RunFolder
 from tests.echoes import record
 from tests.rooms import antenna_gain, furnished_room, walk
@@ -110,6 +111,23 @@ def test_run_and_report_say_it(tmp_path, capsys):
     for advice in told:
         assert advice in err and advice in page
     assert any("RX3 is dead" in advice for advice in told)
+
+
+def test_frames_that_never_came_are_a_gap(tmp_path):
+    """Whoever lost them: a recording has nothing but stamps to tell it, of two seconds and of one frame."""
+    rng = np.random.default_rng(0)
+    sent = np.r_[0:6, 7:10, 70:76]
+    times, room = sent * CONFIG.frame_period, furnished_room(rng, density=6.0, boxes=4)
+    adc = record(CONFIG, walk(rng, 2.0), *room, times, rng, 20.0, block=32, gain=antenna_gain)
+    with RecordingWriter(tmp_path / "walk.h5", CONFIG) as writer:
+        writer.append(adc, times)
+        assert writer.losses.warnings() == ["61 frames are missing between others"]
+    told = run(tmp_path / "walk.h5", tmp_path / "RUN", odometry="doppler", scans="first-echo")
+    facts = RunFolder(told).facts
+    gap = max(facts["blind"]["spans"], key=lambda span: span["stop_s"] - span["start_s"])
+    assert "frames lost" in gap["why"] and gap["stop_s"] - gap["start_s"] > 1.9 and facts["frames_missing"] == 61
+    assert any("frames did not arrive" in each["advice"] for each in facts["health"])
+    assert any("from 0.3 to 2.3 s" in warning for warning in facts["warnings"])
 
 
 def test_damaged_facts_are_one_sentence(tmp_path):

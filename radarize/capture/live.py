@@ -50,7 +50,7 @@ class Live:
         self.pipeline, self.page, self.foxglove = Workshop(inputs).pipeline(**methods, endless=True), page, foxglove
         self.intake = Intake(inputs.signal, inputs.every)
         self.view = View(self.pipeline, inputs.signal)
-        self.losses, self.health = Losses(), Health(inputs.radar)
+        self.losses, self.health = Losses(inputs.delivered.frame_period), Health(inputs.radar)
         self._keeper: Keeper | None = None
         self.busy = 0.0
         self._frame_due = self._map_due = self._stamp = 0.0
@@ -81,12 +81,12 @@ class Live:
         for came in follow(stream, stopping, most=TOGETHER, frames=frames):
             start = time.monotonic()
             adc, stamps, valid = came["adc"], came["time"], came["valid"]
-            if batch := self.intake.take(adc, stamps, valid, came["number"]):
+            if batch := self.intake.take(adc, stamps, valid):
                 result = self.pipeline.push(batch)
                 self.health.add(result)
                 with stage("page"):
                     self.view.add(result)
-            self.losses.add(valid)
+            self.losses.add(valid, stamps)
             if keeper:
                 keeper.append(adc, stamps, valid)
             with stage("page"):

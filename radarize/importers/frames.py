@@ -46,7 +46,7 @@ class Frames:
         self.times: list[float] = []
         self.raw: list[np.ndarray] = []
         self.last = -np.inf
-        self._odd = self._again = self._missing = 0
+        self._odd = self._again = 0
 
     def add(self, time: float, message: object) -> None:
         """Keep a frame, unless it has another size or does not come after the last one."""
@@ -58,8 +58,6 @@ class Frames:
         elif time <= self.last:
             self._again += 1
         else:
-            if np.isfinite(self.last):
-                self._missing += max(0, round((time - self.last) / self.config.frame_period) - 1)
             self.last = time
             self.times.append(time)
             self.raw.append(words.astype(np.int16, copy=False))
@@ -76,6 +74,5 @@ class Frames:
         counted = (
             (self._odd, f"frames have not the {self.words} words of the configuration and are left out"),
             (self._again, "frames came again or out of order and are left out"),
-            (self._missing, "frames are missing between others"),
         )
         return [f"{count} {what}" for count, what in counted if count]

@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import torch
-from jaxtyping import Shaped
+from jaxtyping import Int, Shaped
 
 from radarize import __version__, polar
 from radarize.errors import FULL, InputError, explained
@@ -86,7 +86,7 @@ class RunWriter:
             return
         self.health.add(result)
         self.extend("time", track.time, "s, burst middles")
-        self.extend("frames", result.frames, "numbers in the recording")
+        self.extend("frames", result.frames, "numbers, gaps counted")
         self.extend("ranges", result.ranges, "m, inf: nothing seen")
         self.extend("velocity", track.velocity, "m/s, sensor frame")
         self.extend("velocity_covariance", track.velocity_covariance, "m^2/s^2")
@@ -118,39 +118,39 @@ class RunWriter:
             "warnings": self.health.warnings(),
             "radar": recording.config.model_dump(mode="json"),
         }
+        rows = np.searchsorted(recording.times + recording.config.burst_center, times[:])
         self.put("azimuths", BEARINGS, "rad")
-        self._copy_truth(recording)
-        self._picture(recording, heatmaps)
+        self._copy_truth(recording, rows)
+        self._picture(recording, rows, heatmaps)
 
-    def _copy_truth(self, recording: Recording) -> None:
+    def _copy_truth(self, recording: Recording, used: Int[np.ndarray, "scan"]) -> None:
         def unit(name: str) -> str:
             return str(recording.describe(f"truth/{name}")["unit"])
 
         if poses := recording.true_poses():
             self.write_poses("reference", poses)
-        used = self._scans["frames"]
         for name in (name for name in _TRUTH if recording.has(f"truth/{name}")):
             if name not in ("velocity", "scan"):
                 self.put(f"truth/{name}", recording.read(f"truth/{name}"), unit(name))
                 continue
             for start in range(0, len(used), _FRAMES):  # a row for every frame
-                numbers = used[start : start + _FRAMES]
-                rows = recording.rows(f"truth/{name}", int(numbers[0]), int(numbers[-1]) + 1)
-                if len(rows) <= numbers[-1] - numbers[0]:
+                frames = used[start : start + _FRAMES]
+                rows = recording.rows(f"truth/{name}", int(frames[0]), int(frames[-1]) + 1)
+                if len(rows) <= frames[-1] - frames[0]:
                     raise InputError(f"{recording.path}: /truth/{name} ends before its frames, expected a row for each")
-                self.extend(f"truth/{name}", rows[numbers - numbers[0]], unit(name))
+                self.extend(f"truth/{name}", rows[frames - frames[0]], unit(name))
 
-    def _picture(self, recording: Recording, maps: Heatmaps) -> None:
-        shown = np.unique(np.linspace(0, len(self._scans["frames"]) - 1, _PICTURES).astype(int))
-        numbers = self._scans["frames"][shown]
+    def _picture(self, recording: Recording, used: Int[np.ndarray, "scan"], maps: Heatmaps) -> None:
+        shown = np.unique(np.linspace(0, len(used) - 1, _PICTURES).astype(int))
+        frames = used[shown]
         self.put("heatmaps/frames", shown, "index into /time")
         if not recording.has_samples:
-            pictures = np.concatenate([recording.rows(polar.PICTURE, k, k + 1) for k in numbers])
+            pictures = np.concatenate([recording.rows(polar.PICTURE, k, k + 1) for k in frames])
             self.put("heatmaps/range_azimuth", polar.power(pictures), "share of the strongest cell")
             self.put("heatmaps/ranges", polar.RANGES, "m")
             self.put("heatmaps/azimuths", polar.AZIMUTHS, "rad")
             return
-        spectrum = torch.cat([maps.spectrum(recording.adc(k, k + 1), recording.valid(k, k + 1)) for k in numbers])
+        spectrum = torch.cat([maps.spectrum(recording.adc(k, k + 1), recording.valid(k, k + 1)) for k in frames])
         self.put("heatmaps/range_azimuth", maps.range_azimuth_of(spectrum).numpy(), "counts^2")
         self.put("heatmaps/doppler_azimuth", maps.doppler_azimuth_of(spectrum).numpy(), "counts^2")
         if maps.pairs is not None:

@@ -53,7 +53,7 @@ def open_bag(path: Path, given: Given) -> Capture:
     """
     with Bag(path) as bag:
         radar, others, warnings = _topics(bag)
-        received, first = _first(bag, radar)
+        _, first = _first(bag, radar)
         config, assumed = _configure(path, first, given)
         config = _calibrated(config, first, str(path), warnings)
         companions = {}
@@ -63,11 +63,11 @@ def open_bag(path: Path, given: Given) -> Capture:
             except InputError as error:
                 warnings.append(f"{topic} is left out: {error}")
         _intrinsics(bag, companions)
-        count = bag.topics[radar][1]
+        received = bag.receipts(radar)
     taken = list(companions.values())
     check_layout(config)
     stamps = Stamps(config, first, received, given.latency)
-    capture = Capture(config, given.cfg_text, (), count, (*assumed, *stamps.assumed), warnings)
+    capture = Capture(config, given.cfg_text, (), len(received), (*assumed, *stamps.assumed), warnings)
     capture.attributes["stamps"] = str(stamps)
     capture.streams = {name: stream for companion in taken for name, stream in companion.streams.items()}
     capture.products = {name: product for companion in taken for name, product in companion.products.items()}

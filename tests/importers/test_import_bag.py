@@ -197,6 +197,23 @@ def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
             assert ("headers" in recording.attributes["stamps"]) == (name == "b.bag" and latency is None)
 
 
+def test_frames_that_a_computer_held_up_are_moved_to_the_radars_period(tmp_path):
+    """Receipts are late by 4 ms in the mean, once by 0.4 s; clocks differ by 80 ppm; three frames are missing."""
+    rng = np.random.default_rng(3)
+    starts = SMALL.frame_period * (1 + 80e-6) * np.delete(np.arange(600), [100, 101, 300])
+    received = starts + SMALL.burst_time + rng.exponential(4e-3, len(starts))
+    received[200:208] = received[208] - 1e-3 * np.arange(8, 0, -1)
+    assert (np.diff(received) > 0).all()
+    with BagWriter(tmp_path / "a.bag", 1) as bag:
+        for time, frame, at in zip(starts, noise(SMALL, len(starts)), received, strict=True):
+            bag.frame(time, frame, SMALL, latency=at - time)
+    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
+        assert recording.times - EPOCH == pytest.approx(starts, abs=1.5e-3)
+        assert np.std(recording.times - starts) < 0.2e-3
+        assert "3 frames are missing" in recording.attributes["warnings"]
+        assert "by 2.73 ms in the median and 392.98 ms at most" in recording.attributes["stamps"]
+
+
 def test_missing_frames_leave_a_gap_and_repeated_ones_are_dropped(tmp_path):
     times = np.array([0, 1, 2, 5, 5, 6]) * 0.05
     write(tmp_path / "a.bag", SMALL, times)

@@ -12,6 +12,7 @@ below them.
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import minimum_filter1d
+from scipy.stats import theilslopes
 
 from radarize.importers.companions import SAME_CLOCK, header_time
 from radarize.radar.config import RadarConfig
@@ -77,7 +78,8 @@ def periodic(received: Float[np.ndarray, "frame"], period: float) -> Float[np.nd
         least_late = min(least_late + _AGREE * step, at - numbers[k] * step)
     late = since - numbers * np.polyfit(numbers, punctual, 1)[0]
     least = [part[late[part].argmin()] for part in np.array_split(count, min(_PARTS, len(count)))]
-    line = np.polyval(np.polyfit(numbers[least], since[least], 1), numbers)
+    slope, start, *_ = theilslopes(since[least], numbers[least])  # whatever frames were numbered wrongly
+    line = start + slope * numbers
     return received[0] + line if np.median(np.abs(line - since)) < step / 2 else received
 
 

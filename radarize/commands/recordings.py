@@ -38,6 +38,17 @@ def _antennas(text: str | None, option: str) -> int | tuple[int, ...] | None:
     return numbers[0] if len(numbers) == 1 else tuple(number - 1 for number in numbers)
 
 
+def _angles(text: str | None, option: str) -> tuple[float, float, float] | None:
+    """Roll, pitch, yaw."""
+    if text is None:
+        return None
+    try:
+        roll, pitch, yaw = map(float, text.split())
+    except ValueError:
+        raise InputError(f"{option} is {text!r}, expected three numbers: roll pitch yaw in degrees") from None
+    return roll, pitch, yaw
+
+
 @app.command("import")
 def import_(
     source: Annotated[
@@ -61,6 +72,9 @@ def import_(
         typer.Option(
             help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
         ),
+    ] = None,
+    imu_turn: Annotated[
+        str | None, typer.Option(metavar="'ROLL PITCH YAW'", help="Of a bag's IMU on the radar, degrees.")
     ] = None,
     walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
     align: Annotated[
@@ -104,7 +118,10 @@ def import_(
     from radarize.recording import keeping
 
     radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk, align, encoding, layout)
+    given = Given(
+        radar, text, overrides, start_time, poses, shape, variable, latency, walk, align, encoding, layout,
+        _angles(imu_turn, "--imu-turn"),
+    )  # fmt: skip
     with keeping(output), progress("import") as report:
         tell(import_recording(source, output, given, progress=report))
 

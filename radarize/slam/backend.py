@@ -350,7 +350,8 @@ class Slam:
             motion = between(self.graph.poses[anchor], self.graph.poses[number])
             return near + unknown[number] + carried(unknown[anchor], motion)
 
-        for number in range(0, len(self.nodes), max(c.nodes // 2, 1)):
+        numbers = range(len(self.nodes))
+        for number in sorted({*numbers[:: max(c.nodes // 2, 1)], *numbers[-1:]}):  # a walk may close with its last node
             questions = self._questions(number, 2 * c.candidates, c.final_score, spread)
             self._search.ask([q for q in questions if (q.submap.anchor, number) not in done])
             self._hear(number - _AHEAD)  # what waits takes memory

@@ -118,7 +118,7 @@ def run_each(
             "configuration": inputs.configuration.model_dump(),
         }
         if len(pairs) == 1:  # what several share is nobody's
-            told["ms_per_frame"] = {name: 1e3 * seconds / len(source) for name, seconds in pipeline.seconds.items()}
+            told["ms_per_frame"] = {name: 1e3 * seconds / intake.taken for name, seconds in pipeline.seconds.items()}
         writer.finish(pipeline.slam, told)
 
     with Recording(recording) as source, ExitStack() as stack:

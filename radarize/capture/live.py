@@ -84,12 +84,11 @@ class Live:
             if batch := self.intake.take(adc, stamps, valid):
                 result = self.pipeline.push(batch)
                 self.health.add(result)
-                with stage("page"):
-                    self.view.add(result)
+                self.view.add(result)
             self.losses.add(valid, stamps)
             if keeper:
                 keeper.append(adc, stamps, valid)
-            with stage("page"):
+            with self.pipeline.stopwatch.running(), stage("page"):
                 self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
             self.busy += time.monotonic() - start
             progress(int(came["number"][-1]) + 1, frames or 0)
@@ -125,12 +124,9 @@ class Live:
             for name, pixels in pictures.items():
                 self.foxglove.picture(stamp, name, pixels)
         drawn = time.monotonic()
-        self.pipeline.seconds["page"] += drawn - now
         if now >= self._map_due and self.pipeline.slam.nodes:
             self._show_map()
-            took = time.monotonic() - drawn
-            self.pipeline.seconds["page"] += took
-            self._map_due = now + max(_MAP_INTERVAL, took / _MAP_SHARE)
+            self._map_due = now + max(_MAP_INTERVAL, (time.monotonic() - drawn) / _MAP_SHARE)
 
     def _show_map(self) -> None:
         slam = self.pipeline.slam

@@ -75,6 +75,7 @@ def test_a_replay_gives_what_the_file_gives(walk, tmp_path, every):
         live = Kept(inputs, CLASSICAL, page)
         with RecordingWriter(tmp_path / "again.h5", stream.config) as writer:
             live.run(stream, threading.Event(), keeper=Keeper(writer))
+    assert live.pipeline.seconds["page"] > 0
     offline, intake = Workshop(inputs).pipeline(**CLASSICAL), Intake(inputs.signal, every)
     with Recording(walk) as one, Recording(tmp_path / "again.h5") as other:
         # In the live view's own batches: on some processors sums are ordered otherwise in batches of another size.

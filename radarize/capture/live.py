@@ -2,11 +2,13 @@
 
 import time
 from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from threading import Event
 from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
+from jaxtyping import Float
 
 from radarize.batch import Intake
 from radarize.capture.page import Page
@@ -18,6 +20,8 @@ from radarize.mapping.scans import BEARINGS
 from radarize.methods.registry import Inputs, Workshop
 from radarize.recording import Losses
 from radarize.runfolder import OccupancyMap
+from radarize.slam.drawing import Drawing
+from radarize.slam.node import Node
 from radarize.slam.rehearsal import rehearse
 from radarize.stopwatch import stage
 
@@ -27,8 +31,9 @@ if TYPE_CHECKING:
 #: Frames at a time, at most. Libraries keep what they have made for every number of frames, the more the larger it is:
 #: up to so many all of it is there after `prepare`, and memory then grows with the map alone.
 TOGETHER = 4
-#: s between pictures of a frame, and of the map; redrawing the map takes at most this share of the time.
-_FRAME_INTERVAL, _MAP_INTERVAL, _MAP_SHARE = 0.2, 1.0, 0.05
+#: s between pictures of a frame, and of the map; share of the time that the map is drawn at most, and s of pause after
+#: every node, which itself takes half a millisecond.
+_FRAME_INTERVAL, _MAP_INTERVAL, _MAP_SHARE, _PAUSE = 0.2, 1.0, 0.25, 2e-3
 
 
 class Live:
@@ -54,6 +59,10 @@ class Live:
         self._keeper: Keeper | None = None
         self.busy = 0.0
         self._frame_due = self._map_due = self._stamp = 0.0
+        self._drawing = Drawing(inputs.configuration.slam.grid, _PAUSE)
+        self._painter = ThreadPoolExecutor(1, thread_name_prefix="map")
+        self._drawn: Future[None] = Future()
+        self._drawn.set_result(None)
 
     def run(
         self,
@@ -94,6 +103,8 @@ class Live:
             progress(int(came["number"][-1]) + 1, frames or 0)
         self.pipeline.finish()
         self._show_map()
+        self._drawn.result()
+        self._painter.shutdown()
         self.page.send("end", {"troubles": self.troubles(stream)})
 
     def troubles(self, stream: Stream) -> list[str]:
@@ -123,18 +134,25 @@ class Live:
             self.foxglove.scan(stamp, result.ranges[-1])
             for name, pixels in pictures.items():
                 self.foxglove.picture(stamp, name, pixels)
-        drawn = time.monotonic()
-        if now >= self._map_due and self.pipeline.slam.nodes:
+        if now >= self._map_due and self.pipeline.slam.nodes and self._drawn.done():
             self._show_map()
-            self._map_due = now + max(_MAP_INTERVAL, (time.monotonic() - drawn) / _MAP_SHARE)
 
     def _show_map(self) -> None:
+        """Have the map as it is now drawn and sent in a thread: frames wait for nothing."""
         slam = self.pipeline.slam
-        grid = slam.map()
-        self.page.send("map", self.view.map(grid))
+        self._drawn.result()
+        now = list(slam.nodes), slam.graph.poses.copy(), int(slam.graph.accepted.sum()), self._stamp
+        self._drawn = self._painter.submit(self._paint, *now)
+
+    def _paint(self, nodes: list[Node], poses: Float[np.ndarray, "node 3"], loops: int, stamp: float) -> None:
+        start = time.monotonic()
+        grid = self._drawing.of(nodes, poses)
+        self.page.send("map", self.view.map(grid, poses, loops))
         if self.foxglove:
-            self.foxglove.map(self._stamp, OccupancyMap.of(grid))
-            self.foxglove.path(self._stamp, slam.graph.poses)
+            self.foxglove.map(stamp, OccupancyMap.of(grid))
+            self.foxglove.path(stamp, poses)
+        end = time.monotonic()
+        self._map_due = end + max(_MAP_INTERVAL, (end - start) / _MAP_SHARE)
 
 
 def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:

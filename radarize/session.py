@@ -73,14 +73,13 @@ def run_each(
             made["frames"] = f"one of {frames.numbers.step}"
         told = {
             "frames_lost": intake.lost,
+            "frames_missing": intake.numbering.missing,
             "chirps_disturbed": intake.disturbed,
             "methods": made,
             "configuration": inputs.configuration.model_dump(),
         }
         if len(pairs) == 1:  # what several share is nobody's
-            told["ms_per_frame"] = {
-                name: 1e3 * seconds / len(frames.span) for name, seconds in pipeline.seconds.items()
-            }
+            told["ms_per_frame"] = {name: 1e3 * seconds / intake.taken for name, seconds in pipeline.seconds.items()}
         writer.finish(pipeline.slam, told)
 
     source = frames.recording

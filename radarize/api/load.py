@@ -45,6 +45,7 @@ class CaptureOptions(TypedDict, total=False):
     shape: str | None
     variable: str | None
     latency: float | None
+    imu_turn: str | tuple[float, float, float] | None
     walk: int | None
     align: bool
     samples: int | None
@@ -152,6 +153,8 @@ def _settings(capture: CaptureOptions) -> Given:
     config = given.pop("config", None)
     radar, text = (None, "") if config is None else load_config(config)
     own = {each.name: given.pop(each.name) for each in fields(Given) if each.name in given}
+    if "imu_turn" in own:
+        own["imu_turn"] = _angles(own["imu_turn"])
     overrides = {name: value for name, value in given.items() if value is not None}
     overrides |= {name: _antennas(overrides[name], name) for name in ("rx", "tx") if name in overrides}
     return Given(radar, text, overrides, **own)
@@ -166,3 +169,14 @@ def _antennas(value: object, name: str) -> object:
     except ValueError:
         raise InputError(f"--{name} is {value!r}, expected a count (3) or antenna numbers (1,3,2)") from None
     return numbers[0] if len(numbers) == 1 else tuple(number - 1 for number in numbers)
+
+
+def _angles(value: str | tuple[float, float, float] | None) -> tuple[float, float, float] | None:
+    """Roll, pitch, yaw, degrees."""
+    if not isinstance(value, str):
+        return value
+    try:
+        roll, pitch, yaw = map(float, value.split())
+    except ValueError:
+        raise InputError(f"--imu-turn is {value!r}, expected three numbers: roll pitch yaw in degrees") from None
+    return roll, pitch, yaw

@@ -50,6 +50,9 @@ def import_(
             help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
         ),
     ] = None,
+    imu_turn: Annotated[
+        str | None, typer.Option(metavar="'ROLL PITCH YAW'", help="Of a bag's IMU on the radar, degrees.")
+    ] = None,
     walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
     align: Annotated[
         bool, typer.Option("--align", help="Of a walk: the lidar's pictures of the same instants, not numbers.")

@@ -90,6 +90,8 @@ class RunWriter:
         self.extend("ranges", result.ranges, "m, inf: nothing seen")
         self.extend("velocity", track.velocity, "m/s, sensor frame")
         self.extend("velocity_covariance", track.velocity_covariance, "m^2/s^2")
+        self.extend("velocity_seen", track.velocity_seen, "False: nothing determined the velocity")
+        self.extend("turn_seen", track.turn_seen, "False: nothing determined the turn since the frame before")
         self.extend("step_covariance", track.covariance, "m^2, m rad, rad^2: of odometry since before")
         self.extend("claims/noise", track.claims.noise, "m^2, m rad, rad^2: of odometry since before")
         self.extend("claims/kept", track.claims.kept, "share of the heading's error before")

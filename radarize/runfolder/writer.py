@@ -86,7 +86,7 @@ class RunWriter:
             return
         self.health.add(result)
         self.extend("time", track.time, "s, burst middles")
-        self.extend("frames", result.frames, "numbers in the recording")
+        self.extend("frames", result.frames, "numbers, gaps counted")
         self.extend("ranges", result.ranges, "m, inf: nothing seen")
         self.extend("velocity", track.velocity, "m/s, sensor frame")
         self.extend("velocity_covariance", track.velocity_covariance, "m^2/s^2")

@@ -50,12 +50,13 @@ def compared(
     path: Path, played: Int16[np.ndarray, "frame loop tx rx sample 2"], arriving: Bool[np.ndarray, "frame loop tx"]
 ) -> tuple[Losses, int, int, str]:
     """A capture of frames that were played again and again: losses, chirps mismarked, chirps wrong, warnings."""
-    losses, wrong, mismarked = Losses(), 0, 0
+    wrong, mismarked = 0, 0
     with Recording(path) as recording:
+        losses = Losses(recording.config.frame_period)
         numbers = np.round((recording.times - recording.times[0]) / recording.config.frame_period).astype(int)
         for where, adc in recording.batches(LOOP):
             valid = recording.valid(where.start, where.stop)
-            losses.add(valid)
+            losses.add(valid, recording.times[where])
             mismarked += int((valid != arriving[numbers[where]]).sum())
             sent = played[numbers[where] % len(played)]
             wrong += int((adc[valid] != sent[valid]).any(axis=(1, 2, 3)).sum())

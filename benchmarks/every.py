@@ -11,6 +11,8 @@ from typing import NamedTuple
 import pandas as pd
 
 from benchmarks.results import Data, Page, performed, script
+from radarize.api.load import load
+from radarize.api.run import run
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.networks import Networks
 from radarize.benchmark.runs import Pair
@@ -18,7 +20,6 @@ from radarize.benchmark.table import with_error
 from radarize.evaluation.evaluate import evaluate
 from radarize.jobs import Report
 from radarize.methods.registry import BEST, CLASSICAL
-from radarize.run import run
 
 PAIRS, EVERY = (Pair(**BEST), Pair(**CLASSICAL)), (1, 2)
 
@@ -36,7 +37,7 @@ class Trial(NamedTuple):
     def figures(self, _: Report) -> dict[str, float]:
         """Errors (m, rad), and F1 of the map."""
         with tempfile.TemporaryDirectory() as folder:
-            found = evaluate(run(self.path, Path(folder) / "run", every=self.every, **asdict(self.pair)))
+            found = evaluate(run(load(self.path)[:: self.every], Path(folder) / "run", **asdict(self.pair)).path)
         errors = {name: found[name]["ate"] for name in ("odometry", "slam")}
         return {
             "odometry": errors["odometry"]["position"]["mean"],

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.results import FOLDER, SHARED, Data, Page, Walk, script
+from radarize.api.run import run
 from radarize.console import progress
 from radarize.features.maps import MapMaker, maps_of
 from radarize.methods.registry import best_methods
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
-from radarize.run import run
 from radarize.training.dataset import recordings
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.trajectory import Motion

@@ -16,8 +16,8 @@ from numba import njit
 from radarize.radar.array import azimuth_row
 from radarize.radar.config import RadarConfig
 
-#: A cell counts whose power is so many times the median cell's; so do bins beyond the transmitter's leakage.
-_THRESHOLD, _FIRST = 20.0, 6
+#: A cell counts whose power is so many times the median cell's, beyond the transmitter's leakage, m.
+_THRESHOLD, _LEAKAGE = 20.0, 0.25
 #: Another window must be likelier than that about zero by so many standard deviations, if all cells had any phase, and
 #: so large a share of the cells must agree with it.
 _SIGMAS, _AGREE = 4.0, 0.5
@@ -30,15 +30,21 @@ class Aliases:
 
     Args:
         config: of the radar; with a single transmitter in the azimuth row nothing tells.
+
+    Attributes:
+        fastest: m/s, speed up to which the speeds of echoes are told apart.
     """
 
     def __init__(self, config: RadarConfig):
+        self._first = int(np.searchsorted(config.ranges, _LEAKAGE))
         row, receivers = azimuth_row(config), len(config.rx)
         owner, slots = row // receivers, np.asarray(config.slot)
         same = owner[1:] == owner[:-1]
         self._steps = np.stack([row[:-1], row[1:]])[:, same]
         self._joints = np.stack([row[:-1], row[1:]])[:, ~same]
         later = (slots[owner[1:]] - slots[owner[:-1]])[~same]
+        self._tells = bool(self._joints.size and self._steps.size)
+        self.fastest = max(_FASTEST if self._tells else 0.0, config.max_velocity)
         # Windows of one span, the nearest to zero first, and what they make of bins.
         bins = np.arange(config.loops) - config.loops // 2
         most = max(0, int((_FASTEST - config.max_velocity) / config.velocity_resolution))
@@ -50,9 +56,9 @@ class Aliases:
 
     def of(self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"]) -> Int[np.ndarray, "frame doppler"]:
         """By how many unambiguous spans the speed of each bin is too low, as `Heatmaps.velocities` has it."""
-        if not self._joints.size or not self._steps.size:
+        if not self._tells:
             return np.zeros((len(spectrum), spectrum.shape[2]), int)
-        told, count = _told(spectrum.numpy(), self._steps, self._joints)
+        told, count = _told(spectrum.numpy(), self._first, self._steps, self._joints)
         likely = (told.reshape(len(spectrum), -1) @ self._turns.T).real
         best = likely.max(axis=1)
         sure = best - likely[:, 0] > _SIGMAS * np.sqrt(1.5 * count)
@@ -60,20 +66,20 @@ class Aliases:
 
 
 @njit(cache=True)
-def _told(spectrum, steps, joints):
+def _told(spectrum, first, steps, joints):
     """Sum of unit phasors that the joints turn by beyond what the steps within transmitters do, per (frame, doppler,
     joint); how many they are in each frame."""
     frames, ranges, bins, _ = spectrum.shape
     told, count = np.zeros((frames, bins, joints.shape[1]), np.complex128), np.zeros(frames)
     power = np.empty((ranges, bins), np.float32)
     for k in range(frames):
-        for r in range(_FIRST, ranges):
+        for r in range(first, ranges):
             for d in range(bins):
                 power[r, d] = 0.0
                 for value in spectrum[k, r, d]:
                     power[r, d] += value.real**2 + value.imag**2
-        level = _THRESHOLD * np.median(power[_FIRST::4])
-        for r in range(_FIRST, ranges):
+        level = _THRESHOLD * np.median(power[first::4])
+        for r in range(first, ranges):
             for d in range(bins):
                 if power[r, d] <= level:
                     continue

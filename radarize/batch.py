@@ -15,6 +15,7 @@ from radarize.features.maps import MapMaker
 from radarize.heatmaps import HeatmapConfig, Heatmaps
 from radarize.points import DENSE, PointClouds
 from radarize.radar.config import RadarConfig
+from radarize.radar.numbering import Numbering
 from radarize.receivers import Receivers
 from radarize.stopwatch import stage
 
@@ -56,7 +57,7 @@ class Batch:
         samples: raw I/Q; None where nothing but maps is known.
         stamps: starts of the frames' first chirps, s.
         valid: False where a chirp was lost; all true if None.
-        numbers: of the frames, counted as the radar delivered them; from 0 if None.
+        numbers: of the frames as the radar sent them, see `Numbering`; from 0 if None.
         maps: that are known already, such as pictures of a radar whose samples nobody kept.
 
     Attributes:
@@ -144,28 +145,23 @@ class Intake:
         taken: frames so far.
         lost: of these, frames that are lost, nearly lost, or silent: left out, for a gap says more than nothing does.
         disturbed: chirps that were disturbed, which count as lost.
+        numbering: of all frames, also of those that are not taken.
     """
 
     def __init__(self, signal: Signal, every: int = 1):
         self.signal, self.every = signal, every
         self.taken = self.lost = self.disturbed = 0
-        self._next = 0
+        self.numbering = Numbering(signal.radar.frame_period / every)
 
     def take(
         self,
         samples: Int16[np.ndarray, "frame loop tx rx sample 2"],
         stamps: Float[np.ndarray, "frame"],
         valid: Bool[np.ndarray, "frame loop tx"] | None = None,
-        numbers: Int[np.ndarray, "frame"] | None = None,
     ) -> Batch:
-        """The next frames, without those that are left out.
-
-        Args:
-            samples, stamps, valid: see `Batch`.
-            numbers: of the frames; if None, those after the frames before.
-        """
-        numbers = self._count(len(samples)) if numbers is None else numbers
+        """The next frames, see `Batch`, without those that are left out."""
         stamps = np.asarray(stamps, float)
+        numbers = self.numbering.of(stamps)
         valid = np.ones(samples.shape[:3], bool) if valid is None else valid
         if self.every > 1:
             wanted = numbers % self.every == 0
@@ -184,13 +180,8 @@ class Intake:
         self, maps: Mapping[str, Shaped[np.ndarray, "frame row azimuth"]], stamps: Float[np.ndarray, "frame"]
     ) -> Batch:
         """The next frames of a recording that holds maps and no samples."""
-        numbers = self._count(len(stamps))
+        numbers = self.numbering.of(stamps)
         wanted = numbers % self.every == 0
         self.taken += int(np.count_nonzero(wanted))
         shown = {name: each[wanted] for name, each in maps.items()}
         return Batch(self.signal, None, stamps[wanted], numbers=numbers[wanted], maps=shown)
-
-    def _count(self, frames: int) -> Int[np.ndarray, "frame"]:
-        """Numbers of the next frames."""
-        self._next += frames
-        return np.arange(self._next - frames, self._next)

@@ -5,6 +5,7 @@ import numpy as np
 from jaxtyping import Bool
 from pydantic import BaseModel
 
+from radarize.aliasing import Aliases
 from radarize.odometry.blindness import BLINK, Blindness, Finite, Spans
 from radarize.pipeline import Result
 from radarize.radar.config import RadarConfig
@@ -12,7 +13,7 @@ from radarize.radar.presets import PRESETS
 
 #: m/s, of people at ease.
 WALKING_PACE = 1.4
-#: Share of the unambiguous speed from which speeds are near enough to alias.
+#: Share of the speed up to which echoes are told apart from which speeds are near enough to alias.
 _NEAR = 0.9
 #: Few surfaces: a smaller share of a scan's bearings sees any. On 20 s walks through furnished rooms it is 0.06 at
 #: least by first echoes, and 0.39 by segmentation.
@@ -38,14 +39,14 @@ class Health:
     """Watches what a pipeline gives; memory grows with the number of spans alone.
 
     Args:
-        radar: configuration, whose limits the advice names.
+        radar: configuration of the frames that are used, whose limits the advice names.
 
     Attributes:
         blindness: of the odometry.
     """
 
     def __init__(self, radar: RadarConfig):
-        self.radar, self.blindness = radar, Blindness()
+        self.radar, self.blindness, self._fastest = radar, Blindness(radar.frame_period), Aliases(radar).fastest
         self._spans: dict[tuple[str, str], Spans] = {}  # by kind and advice
         self._first = self._last = np.nan
         self._aliased, self._far = ("aliased", self._too_fast()), ("out of reach", self._out_of_reach())
@@ -53,7 +54,7 @@ class Health:
     def add(self, result: Result) -> None:
         """Take in what the next frames gave."""
         track = result.track
-        self.blindness.add(result.frames, track)
+        self.blindness.add(track)
         if not len(track.time):
             return
         if np.isnan(self._last):
@@ -70,7 +71,7 @@ class Health:
         """Frames by kind and advice."""
         velocity = result.track.velocity
         found = {
-            self._aliased: np.hypot(velocity[:, 0], velocity[:, 1]) > _NEAR * self.radar.max_velocity,
+            self._aliased: np.hypot(velocity[:, 0], velocity[:, 1]) > _NEAR * self._fastest,
             self._far: np.isfinite(result.ranges).mean(axis=1) < _FEW,
         }
         if (flaws := result.flaws) is not None:
@@ -100,7 +101,7 @@ class Health:
     def warnings(self) -> list[str]:
         """A sentence on each kind, with times since the first frame, and on a limit that walking exceeds."""
         told = self.blindness.warnings()
-        if self.radar.max_velocity < WALKING_PACE:
+        if self._fastest < WALKING_PACE:
             told.append(self._slow())
         for (kind, advice), spans in self._spans.items():
             if found := spans.found:
@@ -117,7 +118,7 @@ class Health:
         return f"the configuration's speed limit of {self.radar.max_velocity:.2f} m/s is below walking pace"
 
     def _too_fast(self) -> str:
-        limit, (name, best) = self.radar.max_velocity, max(PRESETS.items(), key=lambda preset: preset[1].max_velocity)
+        limit, (name, best) = self._fastest, max(PRESETS.items(), key=lambda preset: preset[1].max_velocity)
         if limit < WALKING_PACE:
             return f"{self._slow()}: the `{name}` preset measures up to {best.max_velocity:.1f} m/s"
         return f"speeds alias beyond {limit:.2f} m/s: move more slowly, or use the `{name}` preset"

@@ -260,6 +260,14 @@ class Heatmaps:
         sharp = method == "capon" and not elevation_aware
         return self._capon(covariance) if sharp else self._bartlett(covariance, steering)
 
+    def range_doppler_of(self, spectrum: torch.Tensor) -> Float32[torch.Tensor, "frame range doppler"]:
+        """Power over range and speed of a spectrum at hand, averaged over all antennas."""
+        return spectrum.abs().square().mean(dim=-1)
+
     def range_profile(self, adc, valid=None) -> Float32[torch.Tensor, "frame range"]:
         """Power over range, summed over Doppler and averaged over all antennas."""
-        return self.spectrum(adc, valid).abs().square().sum(dim=2).mean(dim=-1) / self._loop_energy
+        return self.range_profile_of(self.spectrum(adc, valid))
+
+    def range_profile_of(self, spectrum: torch.Tensor) -> torch.Tensor:
+        """`range_profile` of a spectrum at hand."""
+        return spectrum.abs().square().sum(dim=2).mean(dim=-1) / self._loop_energy

@@ -44,7 +44,7 @@ class Result:
     """What a batch gave.
 
     Attributes:
-        frames: numbers of its frames, counted as the radar delivered them.
+        frames: numbers of its frames as the radar sent them, see `radarize.radar.numbering`.
         track: of these frames: poses, covariances, velocities.
         ranges: scans on `radarize.mapping.scans.BEARINGS`, m, inf where nothing is seen.
         flaws: of these frames; None where nobody looked.
@@ -67,21 +67,22 @@ class Pipeline:
 
     Attributes:
         slam: the back end.
+        stopwatch: of its stages.
         seconds: of each stage by name, so far.
     """
 
     def __init__(self, odometry: Follower, scanner: Scanner, slam: SlamConfig | None = None, endless: bool = False):
         self.odometry, self.scanner = odometry, scanner
         self.slam = Slam(slam or SlamConfig.preset("radar"), endless)
-        self._stopwatch = Stopwatch()
+        self.stopwatch = Stopwatch()
 
     @property
     def seconds(self) -> dict[str, float]:
-        return self._stopwatch.seconds
+        return self.stopwatch.seconds
 
     def push(self, batch: Batch) -> Result:
         """Follow the sensor over the next frames, and map what it saw."""
-        with self._stopwatch.running():
+        with self.stopwatch.running():
             track = batch.made(self.odometry.follow)
             used = np.isin(batch.centers, track.time)
             ranges = batch.made(self.scanner.scan)[used]
@@ -99,5 +100,5 @@ class Pipeline:
 
     def finish(self) -> None:
         """Close the last loops and optimise."""
-        with self._stopwatch.running(), stage("slam"):
+        with self.stopwatch.running(), stage("slam"):
             self.slam.finish()

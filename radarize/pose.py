@@ -6,6 +6,10 @@ from jaxtyping import Float
 Pose = Float[np.ndarray, "*#batch 3"]
 
 
+#: Quaternion x y z w of an optical frame (x right, y down, z forward: REP 103) in one with x forward, y left, z up.
+OPTICAL_TURN = (-0.5, 0.5, -0.5, 0.5)
+
+
 def wrap(angle: np.ndarray | float) -> np.ndarray | float:
     """Angle in [-pi, pi)."""
     return (angle + np.pi) % (2 * np.pi) - np.pi

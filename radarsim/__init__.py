@@ -1,4 +1,9 @@
-"""Ray-traced simulation of the IWR1843 radar in indoor meshes, written as raw int16 I/Q."""
+"""Ray-traced simulation of the IWR1843 radar in indoor meshes, written as raw int16 I/Q.
+
+import radarsim
+
+rec = radarsim.simulate("office", duration=10, seed=3)
+"""
 
 import os
 from pathlib import Path
@@ -13,3 +18,15 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
 
 drop_stale(Path(__file__).parent)
+
+__all__ = ["simulate"]
+
+
+def __getattr__(name: str) -> object:
+    """`simulate`, loaded at its first use."""
+    if name not in __all__:
+        raise AttributeError(f"module 'radarsim' has no attribute {name!r}")
+    from radarsim.api import simulate
+
+    globals()[name] = simulate
+    return simulate

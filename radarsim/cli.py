@@ -21,12 +21,9 @@ def _pose(about: str) -> Any:
     return typer.Option(metavar="'X Y Z ROLL PITCH YAW'", help=about)
 
 
-def _print_warnings(recording: Path) -> None:
-    from radarize.recording import Recording
-
-    with Recording(recording) as opened:
-        if opened.attributes["warnings"]:
-            print(f"warning: {opened.attributes['warnings']}")
+def _print_warnings(attributes: dict[str, object]) -> None:
+    if attributes["warnings"]:
+        print(f"warning: {attributes['warnings']}")
 
 
 @app.command()
@@ -60,22 +57,16 @@ def simulate(
     ] = None,
 ) -> None:
     """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
-    from radarize.recording import Recording, keeping
+    plan: Any = {name: value for name, value in locals().items() if name not in ("scene", "output")}
+    from radarize.recording import keeping
+    from radarsim.api import simulate
     from radarsim.motion.statistics import Statistics
-    from radarsim.motion.trajectory import Mounting
-    from radarsim.recording.simulate import simulate
 
     with keeping(output), progress(f"simulate {Path(scene).stem}") as report:
-        written = simulate(
-            scene, output, platform=platform, trajectory=trajectory, waypoints=waypoints, duration=duration, seed=seed,
-            people=people, mounting=Mounting.parse(mounting) if mounting else None, radar=radar, frontend=frontend,
-            sensors=[name.strip() for name in sensors.split(",") if name.strip()],
-            workers=workers, progress=report,
-        )  # fmt: skip
-    with Recording(written) as recording:
-        print(Statistics.from_json(str(recording.attributes["motion"])))
-    _print_warnings(written)
-    print(written)
+        recording = simulate(scene, output, progress=report, **plan)
+    print(Statistics.from_json(str(recording.attributes["motion"])))
+    _print_warnings(recording.attributes)
+    print(output)
 
 
 @app.command()
@@ -140,7 +131,7 @@ def twin(
     seed: Annotated[int, typer.Option(min=0, help="Of speckle and noise.")] = 0,
 ) -> None:
     """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
-    from radarize.recording import keeping
+    from radarize.recording import Recording, keeping
     from radarsim.motion.trajectory import Mounting
     from radarsim.twin.report import report_twin
     from radarsim.twin.twin import Options, make_twin
@@ -153,7 +144,8 @@ def twin(
             progress=lambda *done: report("simulate", *done),
         )  # fmt: skip
         page, sentences = report_twin(recording, made, progress=lambda *done: report("compare", *done))
-    _print_warnings(made)
+    with Recording(made) as twin_of:
+        _print_warnings(twin_of.attributes)
     print("\n".join(sentences))
     for path in (made, page, page.with_suffix(".json")):
         print(path)

@@ -51,3 +51,9 @@ def test_of_any_board(board):
     config = CONFIG.model_copy(update={"board": board})
     adc, _ = frame((0.5, 0.2), config)
     assert not Aliases(config).of(Heatmaps(config).spectrum(adc)).any()
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_leakage_is_as_far_as_it_is_whatever_the_bins(name):
+    aliases, ranges = Aliases(PRESETS[name]), PRESETS[name].ranges
+    assert ranges[aliases._first - 1] < 0.25 <= ranges[aliases._first]

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 #: Packages and modules of `radarize`, lowest first: each imports only what stands before it, or beside it.
 LAYERS = (
     "errors plain files locks replacing hdf5 yamlfile jsonfile npyfile pixels pose rightangles tum extras console "
-    "stopwatch jobs",
+    "stopwatch jobs canvas trajectory",
     "radar",
     "recording",
     "heatmaps disturbance aliasing receivers points effort contents polar clouds walks",
@@ -27,11 +27,12 @@ LAYERS = (
     "slam",
     "pipeline health runfolder",
     "methods",
-    "run log walkclock walkposes training",
+    "session log walkclock walkposes training",
     "evaluation",
     "report",
     "benchmark",
     "importers exporters foxglove capture shownmaps viewer mcap",
+    "api",
     "commands",
     "cli",
 )
@@ -45,7 +46,7 @@ SIMULATOR = (
     "scenario",
     "sensors",
     "recording",
-    "dataset emulator twin doctor webpreview",
+    "dataset emulator twin doctor webpreview api",
     "cli",
 )
 #: What the simulator may take: the sensor, files, and what it shares with a recording's maps and pages; its twins are

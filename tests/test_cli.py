@@ -137,7 +137,7 @@ def test_an_interrupt_says_what_was_kept(capsys, monkeypatch, tmp_path):
             writer.append(np.zeros((3, *config.frame_shape), np.int16), np.arange(3) / 30)
             raise KeyboardInterrupt
 
-    monkeypatch.setattr("radarsim.recording.simulate.simulate", interrupted)
+    monkeypatch.setattr("radarsim.api.simulate_to", interrupted)
     path = tmp_path / "walk.h5"
     code, _, err = call(capsys, "radarsim simulate", "office", "-o", path)
     assert code == 2 and f"stopped; 3 whole frames are kept in {path}" in " ".join(err.split())
@@ -146,7 +146,7 @@ def test_an_interrupt_says_what_was_kept(capsys, monkeypatch, tmp_path):
         raise KeyboardInterrupt
 
     # The old recording is not what this call kept.
-    monkeypatch.setattr("radarsim.recording.simulate.simulate", too_early)
+    monkeypatch.setattr("radarsim.api.simulate_to", too_early)
     code, _, err = call(capsys, "radarsim simulate", "office", "-o", path)
     assert code == 2 and "stopped; nothing was written" in err
 
@@ -158,7 +158,7 @@ def test_import_hands_over_what_was_typed(capsys, monkeypatch, tmp_path):
         seen.update(vars(given), source=source)
         return small_recording(output)
 
-    monkeypatch.setattr("radarize.importers.import_recording", record)
+    monkeypatch.setattr("radarize.api.load.import_recording", record)
     arguments = "--samples 256 --loops 16 --rx 1 --tx 1,3,2 --iq-order qqii --slope 80e12 --frame-period 0.1".split()
     code, out, _ = call(capsys, "radarize import", "a.bin", "-o", tmp_path / "a.h5", *arguments)
     assert code == 0 and "2 frames" in out

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from radarize.run import run
 
 from radarize.cli import app
 from radarize.console import run as run_app
@@ -12,7 +13,7 @@ from radarize.disturbance import Flaws
 from radarize.errors import InputError
 from radarize.health import Health
 from radarize.mapping.scans import BEARINGS
-from radarize.pipeline import Result
+from radarize.pipeline import Pipeline, Result
 from radarize.radar.presets import PRESETS
 from radarize.recording import RecordingWriter
 from radarize.report.run import report_run
@@ -21,7 +22,11 @@ from tests.echoes import record
 from tests.rooms import antenna_gain, furnished_room, walk
 
 CONFIG, PERIOD, COUNT = PRESETS["radarize"], 0.05, 200
-SLOW = CONFIG.model_copy(update={"idle_time": CONFIG.idle_time + CONFIG.chirp_time})
+#: A single transmitter at the same loop time, which cannot tell aliased speeds, and one half as fast.
+SINGLE, SLOW = (
+    CONFIG.model_copy(update={"tx_order": (0,), "idle_time": CONFIG.idle_time + more * CONFIG.chirp_time})
+    for more in (2, 5)
+)
 pytestmark = pytest.mark.usefixtures("one_thread")
 
 
@@ -63,7 +68,7 @@ def health(radar=CONFIG, **conditions):
     ],
 )
 def test_each_kind_has_its_span_and_advice(condition, kind, advice):
-    found = health(**{condition: range(40, 80), "start": 0.0})
+    found = health(SINGLE, **{condition: range(40, 80), "start": 0.0})
     (span,) = found.found
     assert (span.kind, span.start_s, span.stop_s) == (kind, pytest.approx(39 * PERIOD), pytest.approx(79 * PERIOD))
     assert advice in span.advice and "\n" not in span.advice
@@ -75,6 +80,13 @@ def test_nothing_is_said_of_a_walk_without_trouble_nor_of_blinks():
     assert health().found == [] and health().warnings() == []
     blinks = [*range(10, 15), *range(50, 55)]
     assert health(fast=blinks, empty=blinks, no_turn=blinks, hit=blinks, dead=blinks).found == []
+
+
+def test_speeds_that_transmitters_tell_apart_are_no_trouble():
+    """1.8 m/s is near the unambiguous speed of the preset, which tells speeds up to 3 m/s."""
+    assert health(fast=range(40, 80)).found == []
+    slower = CONFIG.model_copy(update={"idle_time": CONFIG.idle_time + CONFIG.chirp_time})
+    assert health(slower, fast=range(40, 80)).warnings() == []
 
 
 def test_the_receiver_has_the_boards_number():
@@ -110,6 +122,32 @@ def test_run_and_report_say_it(tmp_path, capsys):
     for advice in told:
         assert advice in err and advice in page
     assert any("RX3 is dead" in advice for advice in told)
+
+
+def test_frames_that_never_came_are_a_gap(tmp_path):
+    """Whoever lost them: a recording has nothing but stamps to tell it, of two seconds and of one frame."""
+    rng = np.random.default_rng(0)
+    sent = np.r_[0:6, 7:10, 70:76]
+    times, room = sent * CONFIG.frame_period, furnished_room(rng, density=6.0, boxes=4)
+    adc = record(CONFIG, walk(rng, 2.0), *room, times, rng, 20.0, block=32, gain=antenna_gain)
+    with RecordingWriter(tmp_path / "walk.h5", CONFIG) as writer:
+        writer.append(adc, times)
+        assert writer.losses.warnings() == ["61 frames are missing between others"]
+    told = run(tmp_path / "walk.h5", tmp_path / "RUN", odometry="doppler", scans="first-echo")
+    facts = RunFolder(told).facts
+    gap = max(facts["blind"]["spans"], key=lambda span: span["stop_s"] - span["start_s"])
+    assert "frames lost" in gap["why"] and gap["stop_s"] - gap["start_s"] > 1.9 and facts["frames_missing"] == 61
+    assert any("frames did not arrive" in each["advice"] for each in facts["health"])
+    assert any("from 0.3 to 2.3 s" in warning for warning in facts["warnings"])
+
+
+def test_time_per_frame_is_that_of_the_frames_used(tmp_path, monkeypatch):
+    monkeypatch.setattr(Pipeline, "seconds", {"slam": 1.0})
+    with RecordingWriter(tmp_path / "walk.h5", CONFIG) as writer:
+        noise = np.random.default_rng(0).integers(-200, 200, (8, *CONFIG.frame_shape), dtype=np.int16)
+        writer.append(noise, np.arange(8) * CONFIG.frame_period)
+    told = run(tmp_path / "walk.h5", tmp_path / "RUN", odometry="doppler", scans="first-echo", every=4)
+    assert RunFolder(told).facts["ms_per_frame"] == {"slam": 500.0}
 
 
 def test_damaged_facts_are_one_sentence(tmp_path):

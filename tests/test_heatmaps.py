@@ -65,6 +65,15 @@ def test_doppler_azimuth_peak(azimuth, speed):
     assert vertex(power.max(axis=1), maps.velocities) == pytest.approx(speed, abs=0.015)
 
 
+@pytest.mark.parametrize("speed", [-1.2, 0.4])
+def test_range_doppler_peak(speed):
+    maps = Heatmaps(CONFIG)
+    power = maps.range_doppler_of(maps.spectrum(frame(point(2.0, 0), velocity=(speed, 0, 0))))[0].numpy()
+    found_range, found_speed = peak(power, maps.ranges, maps.velocities)
+    assert found_range == pytest.approx(2.0, abs=0.6 * CONFIG.range_resolution)
+    assert found_speed == pytest.approx(speed, abs=0.6 * CONFIG.velocity_resolution)
+
+
 def test_what_aliases_has_its_azimuth_once_unfolded():
     """A slot's turn of 120 deg looks like another azimuth."""
     maps = Heatmaps(CONFIG)
@@ -132,6 +141,7 @@ def test_scaling():
     assert maps.doppler_azimuth(adc).max().item() == expected
     assert maps.beamformed(maps.spectrum(adc), maps.row, maps._steering).max().item() == expected
     assert maps.range_profile(adc).max().item() == expected
+    assert maps.range_doppler_of(maps.spectrum(adc)).max().item() == expected
     # Off the bins nothing is lost where an axis is summed over.
     moving = frame(on_bin, velocity=(0.437, 0, 0))
     assert maps.range_azimuth(moving).max().item() == pytest.approx(1000.0**2, rel=0.1)

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from radarize.api.run import run
 from radarize.batch import Intake
 from radarize.cli import app
 from radarize.console import run as command
@@ -18,7 +19,6 @@ from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter, Stream
 from radarize.report.run import methods
-from radarize.run import run
 from radarize.runfolder import RunFolder
 from radarize.tum import read_tum
 from radarsim.recording.simulate import simulate
@@ -32,7 +32,7 @@ def walk(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def finished(walk):
-    return run(walk, walk.parent / "run")
+    return run(walk, walk.parent / "run").path
 
 
 def test_writes_everything(finished):
@@ -174,7 +174,7 @@ def test_a_run_over_lost_frames_keeps_rows_and_truth_together(walk, tmp_path):
         adc[~valid] = 0
         with RecordingWriter(tmp_path / "gap.h5", source.config, streams=streams) as writer:
             writer.append(adc, source.times[:60], valid, rows={"truth/velocity": truth})
-    out = run(tmp_path / "gap.h5", tmp_path / "run", odometry="doppler", scans="first-echo")
+    out = run(tmp_path / "gap.h5", tmp_path / "run", odometry="doppler", scans="first-echo").path
     facts = json.loads((out / "run.json").read_text())
     assert facts["frames"] == 60 and facts["frames_lost"] == 10
     with h5py.File(out / "scans.h5") as file:
@@ -191,8 +191,9 @@ def test_every_second_frame_is_a_radar_of_half_the_rate(walk, tmp_path):
     for name, count in (("whole", 1), ("half", 2)):
         with RecordingWriter(tmp_path / f"{name}.h5", PRESETS["radarize"].every(count), streams=streams) as writer:
             writer.append(adc[::count], times[::count], rows={"truth/velocity": truth[::count]})
-    one = run(tmp_path / "whole.h5", tmp_path / "one", every=2)
-    other = run(tmp_path / "half.h5", tmp_path / "other")
+    with Recording(tmp_path / "whole.h5") as source:
+        one = run(source[::2], tmp_path / "one").path
+    other = run(tmp_path / "half.h5", tmp_path / "other").path
     facts = json.loads((one / "run.json").read_text())
     assert facts["frames"] == 60 and facts["frames_lost"] == 0
     found, wanted = RunFolder(one), RunFolder(other)

@@ -14,6 +14,7 @@ from radarize import __version__
 from radarize.extras import EXTRAS
 from radarize.radar.boards import BOARDS
 from radarsim.dataset import physics
+from tests.documents.pages import commands
 
 ROOT = Path(__file__).parents[1]
 #: What the locked packages bring along in any case: numba's and matplotlib's.
@@ -90,7 +91,8 @@ def test_the_wheel_holds_what_the_repository_does(wheel):
     weights = {f"radarize/weights/{path.name}" for path in (ROOT / "radarize" / "weights").iterdir()}
     boards = {f"radarize/radar/boards/{name}.yaml" for name in BOARDS}
     pages = {"radarize/capture/live.html", "radarize/report/templates/page.html"}
-    assert found >= scenes | weights | boards | pages
+    types = {f"{package}/{name}" for package in ("radarize", "radarsim") for name in ("__init__.pyi", "py.typed")}
+    assert found >= scenes | weights | boards | pages | types
     assert {name.split("/")[0] for name in found} == {"radarize", "radarsim", f"radarize-{__version__}.dist-info"}
     assert wheel.stat().st_size < 20e6
 
@@ -114,6 +116,16 @@ def test_simulate_run_and_report_anywhere(walked, installed):
     assert listed.returncode == 2 and "office" in listed.stderr and "stress/corner" in listed.stderr
     unknown = installed("radarsim dataset nothing -o data")
     assert unknown.returncode == 2 and "evaluation" in unknown.stderr
+
+
+def test_the_page_on_python_runs_anywhere(walked, installed):
+    """Each block of ``docs/python.md`` is a script, in order, on the walk that is there."""
+    blocks = [block for block in commands("docs/python.md") if block.script]
+    assert len(blocks) == 4
+    for block in blocks:
+        (walked / "block.py").write_text(block.text)
+        done = installed("python block.py")
+        assert done.returncode == 0, f"{block.text}\n{done.stderr}"
 
 
 def test_its_physics_are_the_checkouts(installed):

@@ -68,7 +68,7 @@ class RadarizeNode(Node):
         intake = Intake(self.inputs.signal, self.inputs.every)
         with self.stream:
             for came in follow(self.stream, stopping, most=TOGETHER):
-                if batch := intake.take(came["adc"], came["time"], came["valid"], came["number"]):
+                if batch := intake.take(came["adc"], came["time"], came["valid"]):
                     self.publish(self.pipeline.push(batch), batch.centers)
                 if not rclpy.ok():
                     stopping.set()

@@ -20,8 +20,8 @@ from radarize.evaluation.stress import missed, sources
 from radarize.methods.registry import ODOMETRY, SCANS, Inputs, Workshop
 from radarize.pipeline import Pipeline
 from radarize.recording import Recording
-from radarize.run import run_each
 from radarize.runfolder import RunFolder
+from radarize.session import run_each
 from radarize.slam.config import LoopConfig, SlamConfig
 
 #: Folder in a run's with the back end's result where no loops were closed.
@@ -96,7 +96,8 @@ class Run(_Step):
             report(share * done / total)
 
         found: dict[Path, dict[str, object] | str] = {}
-        failed = run_each(self.case.path, pairs, weights=self.networks.folder, progress=running)
+        with Recording(self.case.path) as recording:
+            failed = run_each(recording[:], pairs, weights=self.networks.folder, progress=running)
         for folder in places:
             try:
                 found[folder] = str(failed[folder]) if folder in failed else figures(folder, self.case.path)

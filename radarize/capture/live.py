@@ -1,23 +1,28 @@
 """The pipeline on a stream, with a page that shows it."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from threading import Event
 from typing import TYPE_CHECKING
 
 import numpy as np
 import torch
+from jaxtyping import Float
 
 from radarize.batch import Intake
-from radarize.capture.page import Page
+from radarize.capture.page import Page, Unwatched
 from radarize.capture.record import Keeper
 from radarize.capture.stream import Stream, follow
 from radarize.capture.view import View
 from radarize.health import Health
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.registry import Inputs, Workshop
+from radarize.pipeline import Result
 from radarize.recording import Losses
 from radarize.runfolder import OccupancyMap
+from radarize.slam.drawing import Drawing
+from radarize.slam.node import Node
 from radarize.slam.rehearsal import rehearse
 from radarize.stopwatch import stage
 
@@ -27,8 +32,9 @@ if TYPE_CHECKING:
 #: Frames at a time, at most. Libraries keep what they have made for every number of frames, the more the larger it is:
 #: up to so many all of it is there after `prepare`, and memory then grows with the map alone.
 TOGETHER = 4
-#: s between pictures of a frame, and of the map; redrawing the map takes at most this share of the time.
-_FRAME_INTERVAL, _MAP_INTERVAL, _MAP_SHARE = 0.2, 1.0, 0.05
+#: s between pictures of a frame, and of the map; share of the time that the map is drawn at most, and s of pause after
+#: every node, which itself takes half a millisecond.
+_FRAME_INTERVAL, _MAP_INTERVAL, _MAP_SHARE, _PAUSE = 0.2, 1.0, 0.25, 2e-3
 
 
 class Live:
@@ -46,14 +52,20 @@ class Live:
         busy: s spent on the frames so far, showing them included.
     """
 
-    def __init__(self, inputs: Inputs, methods: dict[str, str], page: Page, foxglove: "Server | None" = None):
+    def __init__(
+        self, inputs: Inputs, methods: dict[str, str], page: Page | Unwatched, foxglove: "Server | None" = None
+    ):
         self.pipeline, self.page, self.foxglove = Workshop(inputs).pipeline(**methods, endless=True), page, foxglove
         self.intake = Intake(inputs.signal, inputs.every)
         self.view = View(self.pipeline, inputs.signal)
-        self.losses, self.health = Losses(), Health(inputs.radar)
+        self.losses, self.health = Losses(inputs.delivered.frame_period), Health(inputs.radar)
         self._keeper: Keeper | None = None
         self.busy = 0.0
         self._frame_due = self._map_due = self._stamp = 0.0
+        self._drawing = Drawing(inputs.configuration.slam.grid, _PAUSE)
+        self._painter = ThreadPoolExecutor(1, thread_name_prefix="map")
+        self._drawn: Future[None] = Future()
+        self._drawn.set_result(None)
 
     def run(
         self,
@@ -64,6 +76,19 @@ class Live:
         keeper: Keeper | None = None,
         progress: Callable[[int, int], None] = lambda done, total: None,
     ) -> None:
+        """`follow` the stream to its end."""
+        for _ in self.follow(stream, stopping, frames=frames, keeper=keeper, progress=progress):
+            pass
+
+    def follow(
+        self,
+        stream: Stream,
+        stopping: Event,
+        *,
+        frames: int | None = None,
+        keeper: Keeper | None = None,
+        progress: Callable[[int, int], None] = lambda done, total: None,
+    ) -> Iterator[tuple[np.ndarray, Result]]:
         """Follow the stream until the user stops it, there are enough frames, or it ends; then finish the map.
 
         Args:
@@ -73,28 +98,34 @@ class Live:
             keeper: records the frames as well.
             progress: called with frames done and wanted (0: until stopped).
 
+        Yields:
+            frames that came together (`FrameRing.dtype`), and what the pipeline made of them, if it used any.
+
         Raises:
-            InputError: see `follow`.
+            InputError: see `radarize.capture.stream.follow`.
         """
         self._keeper = keeper
         self.page.send("facts", self.view.facts())
         for came in follow(stream, stopping, most=TOGETHER, frames=frames):
-            start = time.monotonic()
+            start, result = time.monotonic(), None
             adc, stamps, valid = came["adc"], came["time"], came["valid"]
-            if batch := self.intake.take(adc, stamps, valid, came["number"]):
+            if batch := self.intake.take(adc, stamps, valid):
                 result = self.pipeline.push(batch)
                 self.health.add(result)
-                with stage("page"):
-                    self.view.add(result)
-            self.losses.add(valid)
+                self.view.add(result)
+            self.losses.add(valid, stamps)
             if keeper:
                 keeper.append(adc, stamps, valid)
-            with stage("page"):
+            with self.pipeline.stopwatch.running(), stage("page"):
                 self._show(stream, adc[-1:], valid[-1:], float(stamps[-1]))
             self.busy += time.monotonic() - start
             progress(int(came["number"][-1]) + 1, frames or 0)
+            if result is not None:
+                yield came, result
         self.pipeline.finish()
         self._show_map()
+        self._drawn.result()
+        self._painter.shutdown()
         self.page.send("end", {"troubles": self.troubles(stream)})
 
     def troubles(self, stream: Stream) -> list[str]:
@@ -124,21 +155,25 @@ class Live:
             self.foxglove.scan(stamp, result.ranges[-1])
             for name, pixels in pictures.items():
                 self.foxglove.picture(stamp, name, pixels)
-        drawn = time.monotonic()
-        self.pipeline.seconds["page"] += drawn - now
-        if now >= self._map_due and self.pipeline.slam.nodes:
+        if now >= self._map_due and self.pipeline.slam.nodes and self._drawn.done():
             self._show_map()
-            took = time.monotonic() - drawn
-            self.pipeline.seconds["page"] += took
-            self._map_due = now + max(_MAP_INTERVAL, took / _MAP_SHARE)
 
     def _show_map(self) -> None:
+        """Have the map as it is now drawn and sent in a thread: frames wait for nothing."""
         slam = self.pipeline.slam
-        grid = slam.map()
-        self.page.send("map", self.view.map(grid))
+        self._drawn.result()
+        now = list(slam.nodes), slam.graph.poses.copy(), int(slam.graph.accepted.sum()), self._stamp
+        self._drawn = self._painter.submit(self._paint, *now)
+
+    def _paint(self, nodes: list[Node], poses: Float[np.ndarray, "node 3"], loops: int, stamp: float) -> None:
+        start = time.monotonic()
+        grid = self._drawing.of(nodes, poses)
+        self.page.send("map", self.view.map(grid, poses, loops))
         if self.foxglove:
-            self.foxglove.map(self._stamp, OccupancyMap.of(grid))
-            self.foxglove.path(self._stamp, slam.graph.poses)
+            self.foxglove.map(stamp, OccupancyMap.of(grid))
+            self.foxglove.path(stamp, poses)
+        end = time.monotonic()
+        self._map_due = end + max(_MAP_INTERVAL, (end - start) / _MAP_SHARE)
 
 
 def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:

@@ -17,6 +17,15 @@ _KEEP_ALIVE = 5.0
 _CLIENTS = 32
 
 
+class Unwatched:
+    """Stands for a page that nobody asked for."""
+
+    watched = False
+
+    def send(self, name: str, content: dict[str, object]) -> None:
+        """Nothing."""
+
+
 class Page:
     """Serves the page; use as a context manager.
 

@@ -105,9 +105,9 @@ class View:
         place = None if pose is None else [round(float(value), 4) for value in pose]
         return {"time": stamp, "pose": place, "load": self._load(), **shown}
 
-    def map(self, grid: OccupancyGrid) -> dict[str, object]:
-        """Map and path after the last loop closure."""
-        slam = self._pipeline.slam
+    @staticmethod
+    def map(grid: OccupancyGrid, poses: Float[np.ndarray, "node 3"], loops: int) -> dict[str, object]:
+        """Map, path of the nodes, and how many loops are closed."""
         chance = np.rint(255 * grid.probability[::-1] * grid.unit).astype(np.uint8)
         shade = 255 - chance
         colors = np.stack([shade, shade, shade, np.where(chance > 0, 255, 0).astype(np.uint8)], axis=-1)
@@ -116,8 +116,8 @@ class View:
             "picture": png(colors),
             "origin": [float(value) for value in grid.origin],
             "size": [columns * grid.resolution, rows * grid.resolution],
-            "path": np.round(slam.graph.poses[:, :2], 3).tolist(),
-            "loops": int(slam.graph.accepted.sum()),
+            "path": np.round(poses[:, :2], 3).tolist(),
+            "loops": loops,
         }
 
     def pose(self) -> Float[np.ndarray, "3"] | None:

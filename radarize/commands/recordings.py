@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -24,18 +24,6 @@ from radarize.commands.app import (
     warn,
 )
 from radarize.console import progress, until_interrupted, working
-from radarize.errors import InputError
-
-
-def _antennas(text: str | None, option: str) -> int | tuple[int, ...] | None:
-    """A count (``3``), or TI's antenna numbers (``1,3,2``) as 0-based ones."""
-    if text is None:
-        return None
-    try:
-        numbers = [int(part) for part in text.split(",")]
-    except ValueError:
-        raise InputError(f"{option} is {text!r}, expected a count (3) or antenna numbers (1,3,2)") from None
-    return numbers[0] if len(numbers) == 1 else tuple(number - 1 for number in numbers)
 
 
 @app.command("import")
@@ -61,6 +49,9 @@ def import_(
         typer.Option(
             help="From a frame's start to its receipt in a bag, s; else as headers say, or the burst's length."
         ),
+    ] = None,
+    imu_turn: Annotated[
+        str | None, typer.Option(metavar="'ROLL PITCH YAW'", help="Of a bag's IMU on the radar, degrees.")
     ] = None,
     walk: Annotated[int | None, typer.Option(help="Which walk of RadarHD's dataset_5.")] = None,
     align: Annotated[
@@ -92,21 +83,12 @@ def import_(
     start_time: Annotated[float | None, typer.Option(help="Stamp of the first frame, s.")] = None,
 ):
     """Make a recording from a capture of a real radar."""
-    fields = {
-        "samples": samples, "loops": loops, "rx": _antennas(rx, "--rx"), "tx": _antennas(tx, "--tx"),
-        "iq_order": iq_order, "board": board, "start_frequency": start_frequency, "slope": slope,
-        "sample_rate": sample_rate, "idle_time": idle_time, "adc_start_time": adc_start_time,
-        "ramp_end_time": ramp_end_time, "frame_period": frame_period,
-    }  # fmt: skip
-    overrides = {name: value for name, value in fields.items() if value is not None}
-    from radarize.importers import Given, import_recording
-    from radarize.radar.presets import load_config
+    given = dict(locals())  # all options, by name
+    from radarize.api.load import load
     from radarize.recording import keeping
 
-    radar, text = load_config(config) if config is not None else (None, "")
-    given = Given(radar, text, overrides, start_time, poses, shape, variable, latency, walk, align, encoding, layout)
     with keeping(output), progress("import") as report:
-        tell(import_recording(source, output, given, progress=report))
+        tell(load(**given, progress=report).path)
 
 
 @app.command()
@@ -124,15 +106,17 @@ def capture(
     overwrite: Overwrite = False,
 ):
     """Record a real radar: IWR1843BOOST with a DCA1000. Whatever ends it, Ctrl-C too, leaves a whole file."""
+    from radarize.api.live import frames_within, sensor
     from radarize.capture.record import record
     from radarize.recording import spare
 
     if not overwrite:
         spare(output, anything=True)
-    sensor = _sensor(config, port, baud, host, dca, command_port, data_port)
-    most = _frames_within(duration, frames, sensor.config.frame_period)
-    with until_interrupted() as stopping, progress("capture") as report, sensor:
-        record(sensor, output, stopping, frames=most, overwrite=overwrite, progress=report)
+    network: Any = {"host": host, "dca": dca, "command_port": command_port, "data_port": data_port}
+    radar = sensor(config, port, {"baud": baud, **network})
+    most = frames_within(duration, frames, radar.config.frame_period)
+    with until_interrupted() as stopping, progress("capture") as report, radar:
+        record(radar, output, stopping, frames=most, overwrite=overwrite, progress=report)
     tell(output)
 
 
@@ -161,44 +145,21 @@ def live(
     overwrite: Overwrite = False,
 ):
     """Run the pipeline on a real radar, or on a recording in real time, and show it on a local page. Ctrl-C ends it."""
-    from contextlib import ExitStack
+    given = dict(locals())  # all options, by name
+    from radarize.api.live import live
 
-    from radarize.capture.live import Live, prepare
-    from radarize.capture.page import Page
-    from radarize.capture.record import recording
-    from radarize.capture.replay import Replay
-    from radarize.methods.registry import Inputs, best_methods, pace
-    from radarize.recording import spare
-
-    if output and not overwrite:
-        spare(output, anything=True)
-    if replay and (config or port):
-        raise InputError(f"--replay {replay} is given with --config or --port, expected one of the two")
-    stream = Replay(replay) if replay else _sensor(config, port, baud, host, dca, command_port, data_port)
-    radar, methods = stream.config, best_methods(stream.config)[0]
-    chosen = {"odometry": odometry or methods["odometry"], "scans": scans or methods["scans"]}
-    keeper = None
-    with until_interrupted() as stopping, ExitStack() as stack:
+    with until_interrupted() as stopping:
         with working("warming up"):
-            inputs = prepare(Inputs(radar, every=every or pace(chosen["odometry"], radar)), chosen)
-        server = None
-        if foxglove is not None:
-            from radarize.foxglove import Server
-
-            server = stack.enter_context(Server(foxglove))
-        live = Live(inputs, chosen, stack.enter_context(Page(address)), server)
-        report = stack.enter_context(progress("live"))
-        stack.enter_context(stream)
-        print(f"page: {live.page.url}", flush=True)
-        if server is not None:
-            print(f"Foxglove: {server.url}", flush=True)
-        if output:
-            keeper = stack.enter_context(recording(stream, output, overwrite))
-        most = _frames_within(duration, frames, radar.frame_period)
-        live.run(stream, stopping, frames=most, keeper=keeper, progress=report)
-        warnings = live.troubles(stream)
-    warn([*warnings, *live.losses.warnings(), *live.pipeline.slam.warnings()])
-    print(f"{live.losses.frames} frames, {1e3 * live.busy / max(live.losses.frames, 1):.1f} ms each")
+            session = live(**given)
+        with progress("live") as report, session:
+            print(f"page: {session.url}", flush=True)
+            if session.server is not None:
+                print(f"Foxglove: {session.server.url}", flush=True)
+            for _ in session.frames(stopping, report):
+                pass
+    warn(session.warnings)
+    followed = session.live.losses.frames
+    print(f"{followed} frames, {1e3 * session.live.busy / max(followed, 1):.1f} ms each")
 
 
 @app.command()
@@ -210,24 +171,6 @@ def recover(
     from radarize.recording import recover
 
     tell(recover(part, output))
-
-
-def _sensor(config: str | None, port: str | None, baud: int, *network):
-    """The sensor that the options of `capture` and `live` describe."""
-    from radarize.capture.board import Network
-    from radarize.capture.sensor import Sensor
-    from radarize.radar.presets import load_config
-
-    for name, value in (("--config", config), ("--port", port)):
-        if value is None:
-            raise InputError(f"{name} is missing, expected {'a .cfg or a preset' if name == '--config' else 'a TTY'}")
-    radar, text = load_config(config)
-    return Sensor(radar, text, config, port, baud=baud, network=Network(*network))
-
-
-def _frames_within(duration: float | None, frames: int | None, period: float) -> int | None:
-    limits = [frames, None if duration is None else max(round(duration / period), 1)]
-    return min((limit for limit in limits if limit is not None), default=None)
 
 
 @app.command()

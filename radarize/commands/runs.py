@@ -1,6 +1,5 @@
 """Commands that make runs, and what comes after one."""
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -16,7 +15,6 @@ from radarize.commands.app import (
     warn,
 )
 from radarize.console import print_table, progress, working
-from radarize.errors import InputError
 
 
 @app.command("run")
@@ -39,28 +37,20 @@ def run_(
     every: Annotated[int, typer.Option(min=1, help="Use every so many-th frame.")] = 1,
 ):
     """Estimate trajectory and map of a recording."""
+    from radarize.api.load import load
+    from radarize.api.run import run
     from radarize.effort import effort
-    from radarize.methods.configuration import Configuration
-    from radarize.recording import Recording
-    from radarize.run import run
-    from radarize.runfolder import RunFolder
 
-    if settings == "published":
-        for option, value in (("--odometry", odometry), ("--scans", scans)):
-            if value not in (None, "published"):
-                raise InputError(f"{option} is {value!r}, expected none with --settings published, which has its own")
-        odometry = scans = "published"
-    configuration = Configuration() if config is None else Configuration.load(config)
-    with Recording(recording) as source:
+    with load(recording) as source:
         words = effort(source.config, len(source)) if source.has_samples else ""
-    warn([words] if words else [])
-    with progress("run", f"{output} is as it was before, and so is the recording") as report:
-        written = run(
-            recording, output, odometry=odometry, scans=scans, weights=weights, configuration=configuration,
-            every=every, progress=report,
-        )  # fmt: skip
-    warn(RunFolder(written).warnings)
-    print(written)
+        warn([words] if words else [])
+        with progress("run", f"{output} is as it was before, and so is the recording") as report:
+            made = run(
+                source[::every], output, odometry=odometry, scans=scans, settings=settings, weights=weights,
+                config=config, progress=report,
+            )  # fmt: skip
+    warn(made.warnings)
+    print(made.path)
 
 
 @app.command("config")
@@ -106,23 +96,20 @@ def evaluate(
     as_json: AsJson = False,
 ):
     """Compare a run with the truth; writes metrics.json."""
-    from radarize.evaluation.evaluate import evaluate
-    from radarize.report import words
-    from radarize.report.run import methods
-    from radarize.runfolder import RunFolder
+    from radarize.api.evaluation import evaluate
+    from radarize.report.words import beside as compared
 
     with working("evaluating"):
-        folder, others = RunFolder(run), [RunFolder(other) for other in beside or ()]
-        metrics = evaluate(folder, reference)
-        compared = [(methods(other), evaluate(other, reference)) for other in others]
-        folder.write_metrics(metrics)
+        found = evaluate(run, reference=reference)
+        others = [evaluate(other, reference=reference) for other in beside or ()]
+        found.save()
     if as_json:
-        print(json.dumps(metrics, indent=2))
+        print(found.to_json())
         return
-    for part in words.everything(metrics):
+    for part in found.tables:
         print(part) if isinstance(part, str) else print_table(*part)
-    if compared:
-        print_table(*words.beside([(methods(folder), metrics), *compared]))
+    if others:
+        print_table(*compared([(each.method, each) for each in (found, *others)]))
 
 
 @app.command()

@@ -22,7 +22,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.log import Log
 from radarize.odometry.claims import Unknown
 from radarize.points import COLUMNS
-from radarize.pose import between
+from radarize.pose import OPTICAL_TURN, between
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording
 from radarize.tum import planar_poses
@@ -31,8 +31,6 @@ from radarize.tum import planar_poses
 Event = tuple[float, str, object]
 BASE, ODOM, RADAR = "base_link", "odom", "radar"
 CAMERA, OPTICAL = "camera_depth_frame", "camera_depth_optical_frame"
-#: x right, y down, z forward, as cameras have it, in a frame with x forward, y left, z up.
-_OPTICAL_TURN = (-0.5, 0.5, -0.5, 0.5)
 _NOWHERE = np.array([0.0, 0, 0, 0, 0, 0, 1])
 _BATCH = 16
 _FLOAT32 = 7
@@ -163,7 +161,7 @@ def _middles(recording: Recording) -> Float[np.ndarray, "frame"]:
 def _mounts(recording: Recording) -> list[tuple[str, str, np.ndarray]]:
     """Places of the other sensors on the radar, where the recording has them."""
     found = [(BASE, frame, recording.read(name)) for name, frame in _MOUNTS.items() if recording.has(name)]
-    return [*found, (CAMERA, OPTICAL, np.array([0.0, 0, 0, *_OPTICAL_TURN]))]
+    return [*found, (CAMERA, OPTICAL, np.array([0.0, 0, 0, *OPTICAL_TURN]))]
 
 
 def _heatmaps(recording: Recording) -> Iterator[Event]:

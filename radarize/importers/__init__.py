@@ -141,8 +141,9 @@ def _open(source: Path, output: Path, given: Given) -> Capture:
     kind = _kind(source)
     if (given.shape or given.variable) and kind != "cube":
         raise InputError(f"{source}: is no array, but shape or variable is given, expected {', '.join(_ARRAYS)}")
-    if given.latency is not None and kind != "bag":
-        raise InputError(f"{source}: is no ROS bag, but latency is {given.latency:g} s, expected none")
+    for name in ("latency", "imu_turn"):
+        if (value := getattr(given, name)) is not None and kind != "bag":
+            raise InputError(f"{source}: is no ROS bag, but {name} is {value}, expected none")
     for name, usual in (("encoding", "signed"), ("layout", "pairs")):
         if (value := getattr(given, name)) != usual and kind not in ("studio", "bin"):
             raise InputError(f"{source}: is no .bin, but {name} is {value}, expected none")

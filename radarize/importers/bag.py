@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from radarize.errors import InputError, explained
 from radarize.importers.bin import all_zero
@@ -53,7 +54,7 @@ def open_bag(path: Path, given: Given) -> Capture:
     """
     with Bag(path) as bag:
         radar, others, warnings = _topics(bag)
-        received, first = _first(bag, radar)
+        _, first = _first(bag, radar)
         config, assumed = _configure(path, first, given)
         config = _calibrated(config, first, str(path), warnings)
         companions = {}
@@ -63,11 +64,12 @@ def open_bag(path: Path, given: Given) -> Capture:
             except InputError as error:
                 warnings.append(f"{topic} is left out: {error}")
         _intrinsics(bag, companions)
-        count = bag.topics[radar][1]
+        received = bag.receipts(radar)
+    unknown = _turned(companions, given)
     taken = list(companions.values())
     check_layout(config)
     stamps = Stamps(config, first, received, given.latency)
-    capture = Capture(config, given.cfg_text, (), count, (*assumed, *stamps.assumed), warnings)
+    capture = Capture(config, given.cfg_text, (), len(received), (*assumed, *stamps.assumed, *unknown), warnings)
     capture.attributes["stamps"] = str(stamps)
     capture.streams = {name: stream for companion in taken for name, stream in companion.streams.items()}
     capture.products = {name: product for companion in taken for name, product in companion.products.items()}
@@ -160,6 +162,15 @@ def _intrinsics(bag: Bag, companions: dict[str, Companion]) -> None:
                 if matrix[0] > 0:
                     companion.calibrate((matrix[0], matrix[4], matrix[2], matrix[5]))
                 break
+
+
+def _turned(companions: dict[str, Companion], given: Given) -> tuple[str, ...]:
+    """Turn the IMU as the user says; returns ``imu/mount`` if nobody says how it stands."""
+    sensors = [companion for companion in companions.values() if isinstance(companion, InertialSensor)]
+    for sensor in sensors:
+        if given.imu_turn is not None:
+            sensor.turn(Rotation.from_euler("xyz", given.imu_turn, degrees=True), "given")
+    return ("imu/mount",) if any(not sensor.products for sensor in sensors) else ()
 
 
 def _batches(

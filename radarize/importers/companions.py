@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from radarize.errors import InputError
 from radarize.pixels import read_picture
 from radarize.points import COLUMNS
+from radarize.pose import OPTICAL_TURN
 from radarize.radar.config import RadarConfig
 from radarize.recording import Product, Stream
 
@@ -239,13 +240,28 @@ def _millimetres(metres: np.ndarray) -> UInt16[np.ndarray, "row column"]:
 
 
 class InertialSensor(Companion):
-    """Specific force and angular velocity at the sensor's own rate."""
+    """Specific force and angular velocity at the sensor's own rate.
+
+    Its axes are the radar's, unless its frame is named an optical one (z ahead, x right: REP 103), or `turn` is called.
+    """
 
     streams = {
         "imu/time": Stream((), "f8", "s", "instants of the IMU's samples", "imu/time"),
         "imu/accelerometer": Stream((3,), "f4", "m/s^2", "specific force x y z: +g upward at rest", "imu/time"),
         "imu/gyroscope": Stream((3,), "f4", "rad/s", "angular velocity x y z", "imu/time"),
     }
+
+    def __init__(self, config: RadarConfig, first: object):
+        super().__init__(config, first)
+        frame = str(getattr(first.header, "frame_id", ""))
+        if "optical" in frame:
+            self.turn(Rotation.from_quat(OPTICAL_TURN), f"its frame is {frame}")
+
+    def turn(self, rotation: Rotation, why: str) -> None:
+        """Set how it stands on the radar."""
+        place = np.array([0.0, 0, 0, *rotation.as_quat()])
+        about = f"x y z qx qy qz qw of the IMU in the radar's frame; {why}; its place is not known"
+        self.products = {"imu/mount": Product(place, "m, quaternion", about)}
 
     def read(self, message: object) -> tuple:
         """Both vectors."""

@@ -4,12 +4,22 @@ They are stamped as their headers say. The Radarize data set's publisher leaves 
 receipt less a latency, by default the burst's length, since no frame is received before its last chirp. That is the
 least; a recorder that waits for a frame's last packet, which the DCA1000 fills with the next frame's beginning, has a
 frame period.
+
+Receipts are late by what the computer did meanwhile; the radar's timer is periodic. So receipts are moved to a line
+below them.
 """
 
 import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import minimum_filter1d
+from scipy.stats import theilslopes
 
 from radarize.importers.companions import SAME_CLOCK, header_time
 from radarize.radar.config import RadarConfig
+
+#: s that a computer may hold frames up, parts of a recording whose least late frames make the line, and share by which
+#: receipts may be apart otherwise than configured.
+_HELD_UP, _PARTS, _AGREE = 2.0, 32, 0.01
 
 
 class Stamps:
@@ -17,7 +27,7 @@ class Stamps:
 
     Args:
         first: the first frame.
-        received: when that was, s.
+        received: when each frame was, s.
         latency: given by the user, s.
 
     Attributes:
@@ -25,17 +35,52 @@ class Stamps:
         assumed: what nobody said.
     """
 
-    def __init__(self, config: RadarConfig, first: object, received: float, latency: float | None):
-        from_headers = latency is None and abs(header_time(first) - received) < SAME_CLOCK
+    def __init__(self, config: RadarConfig, first: object, received: Float[np.ndarray, "frame"], latency: float | None):
+        from_headers = latency is None and abs(header_time(first) - received[0]) < SAME_CLOCK
         self.assumed = ("latency",) if latency is None and not from_headers else ()
         self.latency = None if from_headers else config.burst_time if latency is None else latency
+        self._received = np.unique(received)
+        self._periodic = self._received if from_headers else periodic(self._received, config.frame_period)
 
     def __call__(self, message: object, received: float) -> float:
         """Of a frame, s."""
-        return header_time(message) if self.latency is None else received - self.latency
+        if self.latency is None:
+            return header_time(message)
+        return float(self._periodic[np.searchsorted(self._received, received)]) - self.latency
 
     def __str__(self) -> str:
-        return "headers" if self.latency is None else f"receipt, less a latency of {1e3 * self.latency:.2f} ms"
+        if self.latency is None:
+            return "headers"
+        moved = 1e3 * np.abs(self._received - self._periodic)
+        return (
+            f"receipt, moved to the period of the radar's timer by {np.median(moved):.2f} ms in the median and "
+            f"{moved.max():.2f} ms at most, less a latency of {1e3 * self.latency:.2f} ms"
+        )
+
+
+def periodic(received: Float[np.ndarray, "frame"], period: float) -> Float[np.ndarray, "frame"]:
+    """Receipts, s and ascending, on the line through those that are least late, a whole number of frame periods apart;
+    as they are where no line is within half a period of half of them.
+
+    A frame that is held up is received with those behind it, which say when it could have been. The line's slope is the
+    period by the bag's clock; the configured `period` says which frames are missing, unless receipts contradict it.
+    """
+    if len(received) < 3:
+        return received
+    since, count = received - received[0], np.arange(len(received))
+    between = float(np.median(np.diff(since)))
+    step = period if abs(between / period - 1) < _AGREE else between
+    window = 1 + min(round(_HELD_UP / step), len(since))
+    punctual = minimum_filter1d(since - count * step, window, mode="nearest", origin=-(window // 2)) + count * step
+    numbers, least_late = count - len(count), 0.0
+    for k, at in enumerate(punctual):
+        numbers[k] = max(numbers[k - 1] + 1, round((at - least_late) / step))
+        least_late = min(least_late + _AGREE * step, at - numbers[k] * step)
+    late = since - numbers * np.polyfit(numbers, punctual, 1)[0]
+    least = [part[late[part].argmin()] for part in np.array_split(count, min(_PARTS, len(count)))]
+    slope, start, *_ = theilslopes(since[least], numbers[least])  # whatever frames were numbered wrongly
+    line = start + slope * numbers
+    return received[0] + line if np.median(np.abs(line - since)) < step / 2 else received
 
 
 class Frames:
@@ -46,7 +91,7 @@ class Frames:
         self.times: list[float] = []
         self.raw: list[np.ndarray] = []
         self.last = -np.inf
-        self._odd = self._again = self._missing = 0
+        self._odd = self._again = 0
 
     def add(self, time: float, message: object) -> None:
         """Keep a frame, unless it has another size or does not come after the last one."""
@@ -58,8 +103,6 @@ class Frames:
         elif time <= self.last:
             self._again += 1
         else:
-            if np.isfinite(self.last):
-                self._missing += max(0, round((time - self.last) / self.config.frame_period) - 1)
             self.last = time
             self.times.append(time)
             self.raw.append(words.astype(np.int16, copy=False))
@@ -76,6 +119,5 @@ class Frames:
         counted = (
             (self._odd, f"frames have not the {self.words} words of the configuration and are left out"),
             (self._again, "frames came again or out of order and are left out"),
-            (self._missing, "frames are missing between others"),
         )
         return [f"{count} {what}" for count, what in counted if count]

@@ -41,6 +41,7 @@ class Given:
         variable: which array of an ``.npz`` or ``.mat``.
         latency: from a frame's start to its receipt in a ROS bag, s; by default what the headers say, else the burst's
             length.
+        imu_turn: roll, pitch, yaw of a ROS bag's IMU on the radar, degrees; by default what its frame's name says.
         walk: number of a walk in a data set of pictures.
         align: take, as truth of a walk's frame, the lidar's picture of the same instant, not of the same number.
         encoding: of a .bin's words, ``signed`` or ``offset-binary``.
@@ -59,6 +60,7 @@ class Given:
     align: bool = False
     encoding: str = "signed"
     layout: str = "pairs"
+    imu_turn: tuple[float, float, float] | None = None
 
     def or_else(self, config: RadarConfig, cfg_text: str) -> "Given":
         """The same with a configuration, and its text, unless there is one."""

@@ -12,6 +12,8 @@ from io import BytesIO
 from pathlib import Path
 from reprlib import repr as shortened
 
+import numpy as np
+from jaxtyping import Float
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag1.reader import Header, RecordType, read_bytes, read_uint32
@@ -132,13 +134,26 @@ class Bag:
         Raises:
             InputError: the bag is damaged, or a message is not as its definition says.
         """
-        connections = [connection for connection in self._reader.connections if connection.topic in topics]
         decode = self._types.deserialize_ros1 if self._ros1 else self._types.deserialize_cdr
         with explained(f"{self.path}: is no readable ROS bag"):
-            for connection, time, data in self._reader.messages(connections=connections):
-                if not isinstance(time, int):
-                    raise ValueError(f"a message on {connection.topic} has no number for its time, {shortened(time)}")
+            for connection, time, data in self._packed(topics):
                 yield connection.topic, time, decode(data, connection.msgtype)
+
+    def receipts(self, topic: str) -> Float[np.ndarray, "message"]:
+        """Times of receipt of a topic's messages, s; their content is not looked at.
+
+        Raises:
+            InputError: the bag is damaged.
+        """
+        with explained(f"{self.path}: is no readable ROS bag"):
+            return np.array([1e-9 * time for _, time, _ in self._packed([topic])])
+
+    def _packed(self, topics: Collection[str]) -> Iterator[tuple]:
+        connections = [connection for connection in self._reader.connections if connection.topic in topics]
+        for connection, time, data in self._reader.messages(connections=connections):
+            if not isinstance(time, int):
+                raise ValueError(f"a message on {connection.topic} has no number for its time, {shortened(time)}")
+            yield connection, time, data
 
 
 def is_frame(kind: str) -> bool:

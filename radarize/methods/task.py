@@ -59,6 +59,7 @@ class Task(ABC):
         share: of all windows, which an epoch takes, drawn anew each time: neighbours among long ones are nearly alike.
         reach: s, from one frame of a window to the next, at most; None: the very next. Drawn for every item; the
             farthest is what is validated.
+        least_frames: of a window, for what it estimates.
         optimiser: algorithm.
         steepest: norm of the gradient from which it is cut; most are about as large. A likelihood has no bounds: a
             single item that a network is wrongly sure of would undo many steps.
@@ -71,6 +72,7 @@ class Task(ABC):
     truth: tuple[Reading, ...]
     share: float = 1.0
     reach: float | None = None
+    least_frames: int = 1
     optimiser: type[torch.optim.Optimizer] = torch.optim.Adam
     steepest: float = 1.0
     defaults: Settings

@@ -1,0 +1,20 @@
+"""Radar odometry. ``radarize.odometry(recording)`` estimates it, see `radarize.estimate_odometry`; the modules here are
+what it is made of.
+"""
+
+import sys
+from types import ModuleType
+from typing import Any
+
+
+class _Odometry(ModuleType):
+    """The package, which is called as the function of the same name: importing a module of it would hide that."""
+
+    def __call__(self, *arguments: Any, **options: Any) -> Any:
+        """See `radarize.estimate_odometry`."""
+        import radarize
+
+        return radarize.estimate_odometry(*arguments, **options)
+
+
+sys.modules[__name__].__class__ = _Odometry

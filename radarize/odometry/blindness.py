@@ -9,10 +9,10 @@ from collections.abc import Iterable
 from typing import Annotated
 
 import numpy as np
-from jaxtyping import Int
 from pydantic import BaseModel, Field, PlainSerializer
 
 from radarize.odometry.integration import Track
+from radarize.radar.numbering import Numbering
 
 #: s
 BLINK = 0.3
@@ -73,26 +73,29 @@ class Spans:
 class Blindness:
     """Finds the spans of a stream; memory grows with their number alone.
 
+    Args:
+        period: between frames that odometry uses, s.
+
     Attributes:
         way: m, of odometry so far.
     """
 
-    def __init__(self):
+    def __init__(self, period: float):
         self.way = 0.0
+        self._numbering = Numbering(period)
         self._spans = Spans()
         self._first = 0.0
         self._last: tuple[int, float] | None = None  # number and time of the frame before
 
-    def add(self, frames: Int[np.ndarray, "frame"], track: Track) -> None:
-        """Take in the next frames, by their numbers in the recording."""
+    def add(self, track: Track) -> None:
+        """Take in the next frames."""
         ways = np.hypot(track.step[:, 0], track.step[:, 1])
         self.way += float(ways.sum())
-        seen = track.velocity_seen, track.turn_seen
-        for number, time, way, velocity, turn in zip(frames, track.time, ways, *seen, strict=True):
+        numbers, seen = self._numbering.of(track.time), (track.velocity_seen, track.turn_seen)
+        for number, time, way, velocity, turn in zip(numbers, track.time, ways, *seen, strict=True):
             if self._last is None:
                 self._first, self._last = float(time), (number - 1, time)
             before, since = self._last
-            # Frames that are left out on purpose come at a pace.
             lost = number - before > 1 and time - since >= BLINK
             if not velocity or not turn or lost:
                 flags = not velocity, not turn, lost

@@ -19,6 +19,8 @@ GRAVITY = 9.80665  # m/s^2
 #: 1/s, at which specific force, which averages to gravity, pulls the axes upright (Mahony, Hamel and Pflimlin,
 #: "Nonlinear complementary filters on the special orthogonal group", 2008).
 _UPRIGHT = 0.1
+#: Cosine of the angle to z up to which specific force may be that of a sensor that looks ahead.
+_UPWARD = 0.7
 #: s between samples in the mean, and m/s^2 or rad/s: beyond, it is no IMU.
 _LONGEST, _STRONGEST = 1.0, 1e4
 _STREAMS = ("imu/time", "imu/accelerometer", "imu/gyroscope")
@@ -82,6 +84,11 @@ class Imu:
         if recording.has("imu/mount"):
             mount = Rotation.from_quat(recording.read("imu/mount")[3:])
             force, turn = mount.apply(force), mount.apply(turn)
+        elif (up := force.mean(axis=0))[2] < _UPWARD * np.linalg.norm(up):
+            raise InputError(
+                f"{recording.path}: has no /imu/mount, and gravity is felt along {np.round(up, 1).tolist()} m/s^2, "
+                "expected along z of the radar's axes; `import --imu-turn` says how the IMU stands on the radar"
+            )
         return cls(time, force, turn)
 
     def latest(self, instants: Float[np.ndarray, "frame"], count: int) -> Float[np.ndarray, "frame count 6"]:

@@ -96,7 +96,7 @@ class VelocityFilter:
     def __init__(self, settings: VelocityConfig | None = None):
         self.settings = settings or VelocityConfig()
         self._time: float | None = None
-        self._velocity, self._covariance = np.zeros(2), np.eye(2)
+        self._velocity, self._covariance = np.zeros(2), self.settings.fastest**2 * np.eye(2)
 
     def filter(self, times: Float[np.ndarray, "frame"], measured: Velocities) -> Velocities:
         """Filtered velocities of the next frames."""

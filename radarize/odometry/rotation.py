@@ -123,6 +123,10 @@ class RotationConfig(Frozen):
         "what bearings are believed on 15 walks: heading is off by 0.9 deg on average instead of 3.0", ge=1
     )  # fmt: skip
     least_correlation: float = setting(0.15, "a match below it is not believed", ge=0, lt=1)
+    right_angles: bool = setting(
+        True, "walls that are seen again correct the heading, most of a building's being at right angles; false for "
+        "buildings whose walls are not"
+    )  # fmt: skip
     unseen: float = setting(
         np.radians(40.0), "rad/s^0.5, by how much yaw is claimed to wander where neither matches nor bearings tell it, "
         "beside what the filter says: whoever turns there turns by 40 to 80 deg", ge=0
@@ -154,7 +158,7 @@ class MapRotation:
         self._ranges = heatmaps.ranges[:_RANGES][self._first :]
         self._map = LocalMap(self._ranges[-1], s.cell)
         self._state = Gaussian(np.array([0.0, s.fastest**2, 0.0]))
-        self._echoes, self._bearings = Echoes(heatmaps, self._first), Bearings(heatmaps, self._state)
+        self._echoes, self._bearings = Echoes(heatmaps, self._first), Bearings(heatmaps, self._state, s.right_angles)
         self._noise, self.lag = (s.yaw_noise, LAG) if prior is None else (s.guided_yaw_noise, 0.0)
         self._time: float | None = None
         self._velocity = self._position = np.zeros(2)

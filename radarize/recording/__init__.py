@@ -17,8 +17,12 @@ without a clock were written once.
 from radarize.recording.captured import spare
 from radarize.recording.interrupted import keeping
 from radarize.recording.losses import Losses
-from radarize.recording.reader import Recording
+from radarize.recording.reader import Clip, Recording
 from radarize.recording.recover import recover
+from radarize.recording.temporary import in_temporary_file
 from radarize.recording.writer import Product, RecordingWriter, Stream, add
 
-__all__ = ["Losses", "Product", "Recording", "RecordingWriter", "Stream", "add", "keeping", "recover", "spare"]
+__all__ = [
+    "Clip", "Losses", "Product", "Recording", "RecordingWriter", "Stream", "add", "in_temporary_file", "keeping",
+    "recover", "spare",
+]  # fmt: skip

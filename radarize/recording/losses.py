@@ -1,14 +1,16 @@
 """How much of a recording never arrived."""
 
-from dataclasses import dataclass
-
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
+
+from radarize.radar.numbering import Numbering
 
 
-@dataclass
 class Losses:
-    """Counts of chirps and frames with lost samples.
+    """Counts of chirps and frames with lost samples, and of frames that never came.
+
+    Args:
+        period: between frames, s.
 
     Attributes:
         frames, chirps: seen in all.
@@ -16,14 +18,13 @@ class Losses:
         hit_frames, lost_frames: frames with such chirps, and with nothing else.
     """
 
-    frames: int = 0
-    chirps: int = 0
-    lost_chirps: int = 0
-    hit_frames: int = 0
-    lost_frames: int = 0
+    def __init__(self, period: float):
+        self.frames = self.chirps = self.lost_chirps = self.hit_frames = self.lost_frames = 0
+        self._numbering = Numbering(period)
 
-    def add(self, valid: Bool[np.ndarray, "frame loop tx"]) -> None:
+    def add(self, valid: Bool[np.ndarray, "frame loop tx"], stamps: Float[np.ndarray, "frame"]) -> None:
         """Count more frames."""
+        self._numbering.of(stamps)
         whole = valid.reshape(len(valid), int(np.prod(valid.shape[1:])))
         self.frames += len(valid)
         self.chirps += whole.size
@@ -32,11 +33,13 @@ class Losses:
         self.lost_frames += int((~whole.any(axis=1)).sum())
 
     def warnings(self) -> list[str]:
-        """One sentence, or none if nothing was lost."""
-        if not self.lost_chirps:
-            return []
-        share = self.lost_chirps / self.chirps
-        return [
-            f"{self.lost_chirps} of {self.chirps} chirps ({share:.2%}) in {self.hit_frames} of {self.frames} frames "
-            f"lost samples, {self.lost_frames} frames all of them; these are zero and the chirps marked in /radar/valid"
-        ]
+        """A sentence on missing frames, and one on lost samples, where there are any."""
+        missing, share = self._numbering.missing, self.lost_chirps / max(self.chirps, 1)
+        told = [f"{missing} frames are missing between others"] if missing else []
+        if self.lost_chirps:
+            told.append(
+                f"{self.lost_chirps} of {self.chirps} chirps ({share:.2%}) in {self.hit_frames} of {self.frames} "
+                f"frames lost samples, {self.lost_frames} frames all of them; these are zero and the chirps marked in "
+                "/radar/valid"
+            )
+        return told

@@ -1,6 +1,6 @@
 """Reading a recording, finished, growing, or left behind by a crash."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,17 +15,24 @@ from radarize.files import regular
 from radarize.hdf5 import dataset, open_hdf5
 from radarize.radar.config import RadarConfig
 from radarize.recording.growing import GrowingFile, is_growing
+from radarize.trajectory import Trajectory
 
 #: s, of stamps, also such as count from 1970.
 _LATEST = 1e11
 
 
-@dataclass
+@dataclass(eq=False, repr=False)
 class Recording:
-    """A recording opened for reading; use as a context manager.
+    """A recording opened for reading; use as a context manager, or keep it open.
+
+    ``recording[100]`` and ``recording[100:110]`` are frames, see `Clip`; ``len(recording)`` is how many there are.
 
     Args:
         path: an ``.h5`` file, finished, growing, or left behind by a crash.
+
+    Attributes:
+        config: of the radar.
+        times: (frame,) s, starts of the frames' first chirps.
 
     Raises:
         InputError: missing file, not a recording, or a broken configuration.
@@ -75,6 +82,23 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    def __getitem__(self, frames: int | slice) -> "Clip":
+        """Some frames; none of them is read before it is asked for.
+
+        Raises:
+            IndexError: there is no frame of this number.
+            InputError: the frames are not in ascending order.
+        """
+        return Clip(self, range(len(self)))[frames]
+
+    def __repr__(self) -> str:
+        c, scene = self.config, self.attributes.get("scene", "")
+        return (
+            f"<recording {self.path.name}: {len(self)} frames of {1e3 * c.frame_period:.4g} ms"
+            f"{f', scene {scene}' if scene else ''}; {c.loops} loops, {len(c.tx)} transmitters, {len(c.rx)} receivers, "
+            f"{c.samples} samples; {c.range_resolution:.3g} m to {c.max_range:.3g} m, +-{c.max_velocity:.3g} m/s>"
+        )
 
     def __enter__(self) -> "Recording":
         return self
@@ -145,6 +169,16 @@ class Recording:
         seen = np.isfinite(poses[:shared]).all(axis=1)  # a tracking camera may have been blind for a while
         return times[:shared][seen], poses[:shared][seen]
 
+    @property
+    def truth(self) -> Trajectory | None:
+        """True poses where they are known, with velocities and floor plan where these are; None without truth."""
+        if (poses := self.true_poses()) is None:
+            return None
+        velocity = self.read("truth/velocity") if self.has("truth/velocity") else np.zeros((0, 3))
+        plan = self.read("truth/floor_plan") if self.has("truth/floor_plan") else None
+        known = velocity if len(velocity) == len(poses[0]) else None
+        return Trajectory(*poses, velocity=known, floor_plan=plan, name="truth")
+
     def rows(self, name: str, start: int, stop: int) -> np.ndarray:
         """Rows of a stream that belong to frames start...stop-1.
 
@@ -213,3 +247,76 @@ class Recording:
             InputError: there is no data set of that name.
         """
         return tuple(map(str, self._dataset(name).attrs.get("labels", ())))
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """Some frames of a recording, by ``recording[start:stop:step]``, or one of them, by ``recording[number]``. Samples
+    are read when they are asked for.
+
+    Attributes:
+        recording: that they are of.
+        numbers: of the frames, counted from 0.
+        alone: it is one frame, and what is made of it has no axis of frames.
+    """
+
+    recording: Recording
+    numbers: range
+    alone: bool = False
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __getitem__(self, frames: int | slice) -> "Clip":
+        if not isinstance(frames, slice):
+            number = self.numbers[frames]
+            return Clip(self.recording, range(number, number + 1), alone=True)
+        if frames.step is not None and frames.step < 1:
+            raise InputError(f"{self.recording.path}: frames step by {frames.step}, expected 1 (all frames) or more")
+        return Clip(self.recording, self.numbers[frames])
+
+    def __repr__(self) -> str:
+        which = f"frame {self.numbers[0]}" if self.alone else f"frames {list(self.numbers)}"
+        if len(self) > 4:
+            which = f"{len(self)} frames {self.numbers[0]}, {self.numbers[1]} ... {self.numbers[-1]}"
+        return f"<{which} of {self.recording.path.name}>"
+
+    @property
+    def span(self) -> range:
+        """Numbers of the frames, those included that lie between every N-th."""
+        return range(self.numbers.start, self.numbers.stop)
+
+    @property
+    def config(self) -> RadarConfig:
+        """Of a radar that delivers no more frames than these."""
+        return self.recording.config.every(self.numbers.step)
+
+    @property
+    def times(self) -> Float[np.ndarray, "frame"]:
+        """Starts of the frames' first chirps, s."""
+        return self.recording.times[self.numbers.start : self.numbers.stop : self.numbers.step]
+
+    @property
+    def samples(self) -> Int16[np.ndarray, "frame loop tx rx sample 2"]:
+        """Raw I/Q, ADC counts.
+
+        Raises:
+            InputError: see `Recording.adc`.
+        """
+        return self._every(self.recording.adc)
+
+    @property
+    def valid(self) -> Bool[np.ndarray, "frame loop tx"]:
+        """Per chirp: False where samples were lost."""
+        return self._every(self.recording.valid)
+
+    @property
+    def truth(self) -> Trajectory | None:
+        """The part of `Recording.truth` from the first frame's start until the frame after the last starts."""
+        if (truth := self.recording.truth) is None or not len(self):
+            return truth
+        first, last = self.recording.times[[self.numbers[0], self.numbers[-1]]]
+        return truth.where((truth.time >= first) & (truth.time < last + self.recording.config.frame_period))
+
+    def _every(self, read: Callable[[int, int], np.ndarray]) -> np.ndarray:
+        return read(self.numbers.start, self.numbers.stop)[:: self.numbers.step]

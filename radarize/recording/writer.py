@@ -101,7 +101,7 @@ class RecordingWriter:
         self.path = Path(path)
         self.part = self.path.with_name(self.path.name + ".part")
         self.config = config
-        self.frames, self.raw, self.losses = 0, raw, Losses()
+        self.frames, self.raw, self.losses = 0, raw, Losses(config.frame_period)
         self._file: h5py.File | None = None
         self._notes: dict[str, object] = {}
         self._pending: list[tuple] = []
@@ -171,8 +171,9 @@ class RecordingWriter:
             for name, data in rows.items():
                 self._extend(name, data)
             self._extend("radar/valid", valid)
-            self.losses.add(np.asarray(valid))
-            self._pending.append(np.asarray(time, float))
+            stamps = np.asarray(time, float)
+            self.losses.add(np.asarray(valid), stamps)
+            self._pending.append(stamps)
             self._unflushed += len(time)
             if self._unflushed >= self.config.frame_rate:
                 self.flush()

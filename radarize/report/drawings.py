@@ -3,12 +3,9 @@
 import matplotlib
 import numpy as np
 from jaxtyping import Float
+from matplotlib.figure import Figure
 
-matplotlib.use("agg")
-
-import matplotlib.pyplot as plt  # noqa: E402
-
-from radarize.report.page import COLORS, INK  # noqa: E402
+from radarize.report.page import COLORS, INK
 
 _STYLE = {
     "text.color": INK,
@@ -28,10 +25,11 @@ _MAP = "magma"
 
 
 def canvas(columns: int, rows: int = 1, width: float = 11.0, height: float = 2.6):
-    """A figure in the page's style and its axes as an array (rows, columns)."""
-    with plt.rc_context(_STYLE):
-        figure, axes = plt.subplots(rows, columns, figsize=(width, height * rows), squeeze=False, layout="constrained")
-    return figure, axes
+    """A figure in the page's style and its axes as an array (rows, columns). It is none of pyplot's: a notebook that
+    draws a report keeps its own figures and backend."""
+    with matplotlib.rc_context(_STYLE):
+        figure = Figure(figsize=(width, height * rows), layout="constrained")
+        return figure, figure.subplots(rows, columns, squeeze=False)
 
 
 def decibels(power: np.ndarray, reference: float | None = None) -> np.ndarray:
@@ -84,6 +82,20 @@ def draw_doppler(
     axis.set_xticks(-ticks, ticks)
     axis.set_xlim(-np.degrees(azimuths[-1]), -np.degrees(azimuths[0]))
     axis.set_box_aspect(0.6)  # about that of a fan, so that a row of pictures is one
+
+
+def draw_range_doppler(
+    axis,
+    power: Float[np.ndarray, "range doppler"],
+    ranges: Float[np.ndarray, "range"],
+    velocities: Float[np.ndarray, "doppler"],
+    title: str,
+) -> None:
+    """Range-Doppler power; closing is right."""
+    far = ranges >= LEAKAGE
+    level = decibels(power, np.nanmax(power[far], initial=0.0) if far.any() else None)
+    _draw_cells(axis, _edges(velocities), _edges(ranges), level)
+    axis.set(title=title, xlabel="closing speed, m/s", ylabel="range, m")
 
 
 def draw_scan(axis, azimuths: np.ndarray, ranges: np.ndarray, kind: str, label: str) -> None:

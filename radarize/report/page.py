@@ -75,12 +75,9 @@ class Page:
         self._add("columns", parts=tables, numbers=numbers)
 
     def picture(self, figure, caption: str = "") -> None:
-        """A matplotlib figure as a transparent PNG; it is closed."""
-        import matplotlib.pyplot as plt
-
+        """A matplotlib figure as a transparent PNG."""
         buffer = io.BytesIO()
         figure.savefig(buffer, format="png", dpi=130, transparent=True, bbox_inches="tight")
-        plt.close(figure)
         self._add("picture", data=base64.b64encode(buffer.getvalue()).decode(), caption=caption)
 
     def plot(self, figure, height: int = 380) -> None:

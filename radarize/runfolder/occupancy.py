@@ -8,13 +8,14 @@ the lower left corner.
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 import yaml
 from jaxtyping import Bool, Float, UInt8
 from pydantic import BaseModel, Field, ValidationError
 
+from radarize.canvas import axes_or_new, png
 from radarize.errors import InputError
 from radarize.files import read_bytes
 from radarize.pixels import MOST_PIXELS
@@ -23,6 +24,9 @@ from radarize.pose import transform
 from radarize.replacing import replacing
 from radarize.slam.grid import OccupancyGrid
 from radarize.yamlfile import read_yaml
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 #: Bytes of a description, and of a picture's header, comments included.
@@ -117,6 +121,18 @@ class OccupancyMap:
         row, column = np.nonzero(cells)
         inside = np.column_stack([column + 0.5, len(self.pixels) - row - 0.5]) * self.resolution
         return transform(np.array(self.origin), inside)
+
+    def plot(self, axes: "Axes | None" = None) -> "Axes":
+        """Draw it, in m in its own axes (`origin` without the yaw)."""
+        axes = axes_or_new(axes)
+        (left, low, _), (rows, columns) = self.origin, self.pixels.shape
+        extent = (left, left + columns * self.resolution, low, low + rows * self.resolution)
+        axes.imshow(self.pixels, cmap="gray", vmin=0, vmax=255, extent=extent)
+        axes.set(xlabel="x, m", ylabel="y, m")
+        return axes
+
+    def _repr_png_(self) -> bytes:
+        return png(self.plot)
 
     def save(self, description: Path) -> Path:
         """Write it as ``NAME.yaml`` and ``NAME.pgm``, as ROS map_server reads them.

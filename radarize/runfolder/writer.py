@@ -12,7 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import torch
-from jaxtyping import Shaped
+from jaxtyping import Int, Shaped
 
 from radarize import __version__, polar
 from radarize.errors import FULL, InputError, explained
@@ -21,7 +21,7 @@ from radarize.heatmaps import Heatmaps
 from radarize.mapping.scans import BEARINGS
 from radarize.pipeline import Result
 from radarize.radar.config import RadarConfig
-from radarize.recording import Recording
+from radarize.recording import Clip, Recording
 from radarize.replacing import Replacement
 from radarize.runfolder.occupancy import OccupancyMap
 from radarize.runfolder.reader import FILES, Poses, Scans
@@ -44,7 +44,7 @@ class RunWriter:
         with RunWriter(folder, radar) as writer:
             for result in pipeline.follow(batches):
                 writer.add(result)
-            writer.describe(recording, heatmaps)
+            writer.describe(recording[:], heatmaps)
             writer.finish(pipeline.slam, facts)
 
     Args:
@@ -86,71 +86,74 @@ class RunWriter:
             return
         self.health.add(result)
         self.extend("time", track.time, "s, burst middles")
-        self.extend("frames", result.frames, "numbers in the recording")
+        self.extend("frames", result.frames, "numbers, gaps counted")
         self.extend("ranges", result.ranges, "m, inf: nothing seen")
         self.extend("velocity", track.velocity, "m/s, sensor frame")
         self.extend("velocity_covariance", track.velocity_covariance, "m^2/s^2")
+        self.extend("velocity_seen", track.velocity_seen, "False: nothing determined the velocity")
+        self.extend("turn_seen", track.turn_seen, "False: nothing determined the turn since the frame before")
         self.extend("step_covariance", track.covariance, "m^2, m rad, rad^2: of odometry since before")
         self.extend("claims/noise", track.claims.noise, "m^2, m rad, rad^2: of odometry since before")
         self.extend("claims/kept", track.claims.kept, "share of the heading's error before")
         self.extend("claims/held", track.claims.held, "rad^2: of the heading's error")
         self.write_poses("odometry", (track.time, planar_poses(track.pose)))
 
-    def describe(self, recording: Recording, heatmaps: Heatmaps) -> None:
-        """Say what recording the run is of, with what is true of its frames, and keep heat maps of some for reports.
+    def describe(self, frames: Clip, heatmaps: Heatmaps) -> None:
+        """Say what frames the run is of, with what is true of them, and keep heat maps of some for reports.
 
         Raises:
             InputError: the recording is damaged.
         """
+        recording, span = frames.recording, frames.span
         times, period, name = self._scans["time"], recording.config.frame_period, recording.path.name
         attributes = {k: v for k, v in recording.attributes.items() if isinstance(v, str | int | float)}
-        centers = recording.times[[0, -1]] + recording.config.burst_center
+        centers = recording.times[[span.start, span.stop - 1]] + recording.config.burst_center
         blindness = self.health.blindness
         blindness.lost(float(centers[0]), float(times[0]))
         blindness.lost(float(times[-1]), float(centers[1]))
         self._facts |= {
             "recording": name,
             "recording_attributes": attributes,
-            "frames": len(recording),
+            "frames": len(span),
             "duration_s": float(times[-1] - times[0] + period),
             "blind": blindness.found.model_dump(),
             "health": [each.model_dump() for each in self.health.found],
             "warnings": self.health.warnings(),
             "radar": recording.config.model_dump(mode="json"),
         }
+        rows = np.searchsorted(recording.times + recording.config.burst_center, times[:])
         self.put("azimuths", BEARINGS, "rad")
-        self._copy_truth(recording)
-        self._picture(recording, heatmaps)
+        self._copy_truth(recording, rows)
+        self._picture(recording, rows, heatmaps)
 
-    def _copy_truth(self, recording: Recording) -> None:
+    def _copy_truth(self, recording: Recording, used: Int[np.ndarray, "scan"]) -> None:
         def unit(name: str) -> str:
             return str(recording.describe(f"truth/{name}")["unit"])
 
         if poses := recording.true_poses():
             self.write_poses("reference", poses)
-        used = self._scans["frames"]
         for name in (name for name in _TRUTH if recording.has(f"truth/{name}")):
             if name not in ("velocity", "scan"):
                 self.put(f"truth/{name}", recording.read(f"truth/{name}"), unit(name))
                 continue
             for start in range(0, len(used), _FRAMES):  # a row for every frame
-                numbers = used[start : start + _FRAMES]
-                rows = recording.rows(f"truth/{name}", int(numbers[0]), int(numbers[-1]) + 1)
-                if len(rows) <= numbers[-1] - numbers[0]:
+                frames = used[start : start + _FRAMES]
+                rows = recording.rows(f"truth/{name}", int(frames[0]), int(frames[-1]) + 1)
+                if len(rows) <= frames[-1] - frames[0]:
                     raise InputError(f"{recording.path}: /truth/{name} ends before its frames, expected a row for each")
-                self.extend(f"truth/{name}", rows[numbers - numbers[0]], unit(name))
+                self.extend(f"truth/{name}", rows[frames - frames[0]], unit(name))
 
-    def _picture(self, recording: Recording, maps: Heatmaps) -> None:
-        shown = np.unique(np.linspace(0, len(self._scans["frames"]) - 1, _PICTURES).astype(int))
-        numbers = self._scans["frames"][shown]
+    def _picture(self, recording: Recording, used: Int[np.ndarray, "scan"], maps: Heatmaps) -> None:
+        shown = np.unique(np.linspace(0, len(used) - 1, _PICTURES).astype(int))
+        frames = used[shown]
         self.put("heatmaps/frames", shown, "index into /time")
         if not recording.has_samples:
-            pictures = np.concatenate([recording.rows(polar.PICTURE, k, k + 1) for k in numbers])
+            pictures = np.concatenate([recording.rows(polar.PICTURE, k, k + 1) for k in frames])
             self.put("heatmaps/range_azimuth", polar.power(pictures), "share of the strongest cell")
             self.put("heatmaps/ranges", polar.RANGES, "m")
             self.put("heatmaps/azimuths", polar.AZIMUTHS, "rad")
             return
-        spectrum = torch.cat([maps.spectrum(recording.adc(k, k + 1), recording.valid(k, k + 1)) for k in numbers])
+        spectrum = torch.cat([maps.spectrum(recording.adc(k, k + 1), recording.valid(k, k + 1)) for k in frames])
         self.put("heatmaps/range_azimuth", maps.range_azimuth_of(spectrum).numpy(), "counts^2")
         self.put("heatmaps/doppler_azimuth", maps.doppler_azimuth_of(spectrum).numpy(), "counts^2")
         if maps.pairs is not None:

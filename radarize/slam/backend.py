@@ -14,6 +14,7 @@ from radarize.errors import InputError
 from radarize.pose import Pose, between, carried, compose, interpolate, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
+from radarize.slam.drawing import Drawing
 from radarize.slam.grid import OccupancyGrid
 from radarize.slam.loops import Jury, LoopSearch, Question, uncertainty
 from radarize.slam.matcher import match, thin
@@ -191,11 +192,7 @@ class Slam:
 
     def map(self) -> OccupancyGrid:
         """Occupancy grid of all nodes, drawn anew at their optimised poses."""
-        grid = OccupancyGrid.empty(self.config.grid.map_resolution)
-        for node, pose in zip(self.nodes, self.graph.poses, strict=True):
-            origins, ends, hits = node.rays
-            grid.insert(transform(pose, origins), transform(pose, ends), hits, self.config.grid)
-        return grid.crop(margin=4)
+        return Drawing(self.config.grid).of(self.nodes, self.graph.poses)
 
     # --- the algorithm, step by step ---------------------------------------------------------------------------------
     def _drain(self, final: bool = False) -> None:
@@ -350,7 +347,8 @@ class Slam:
             motion = between(self.graph.poses[anchor], self.graph.poses[number])
             return near + unknown[number] + carried(unknown[anchor], motion)
 
-        for number in range(0, len(self.nodes), max(c.nodes // 2, 1)):
+        numbers = range(len(self.nodes))
+        for number in sorted({*numbers[:: max(c.nodes // 2, 1)], *numbers[-1:]}):  # a walk may close with its last node
             questions = self._questions(number, 2 * c.candidates, c.final_score, spread)
             self._search.ask([q for q in questions if (q.submap.anchor, number) not in done])
             self._hear(number - _AHEAD)  # what waits takes memory

@@ -77,7 +77,7 @@ def train(
     begun, before = load(options.start, task.network) if options.start else (None, None)
     if before is not None:
         settings = replace(settings, width=before.width, frames=before.frames)
-    _check(kind, settings, output)
+    _check(task, settings, output)
     checkpoint, log = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
     if checkpoint.exists() and not options.resume:
         raise InputError(f"{checkpoint}: is left of a training that did not end; --resume goes on, or remove it")
@@ -143,12 +143,12 @@ def _read(
     return task.table(parts[0] + parts[1], options.workers, progress, grid).divide(len(parts[0]))
 
 
-def _check(kind: str, settings: Settings, output: Path) -> None:
+def _check(task: Task, settings: Settings, output: Path) -> None:
     for name in ("width", "frames", "epochs", "batch", "rate", "plateau", "patience"):
         if not (value := getattr(settings, name)) > 0:
             raise InputError(f"{name} is {value}, expected a positive number")
-    if kind in ("rotation", "milliego") and settings.frames < 2:
-        raise InputError(f"frames is {settings.frames}, expected at least two to move between")
+    if settings.frames < task.least_frames:
+        raise InputError(f"frames is {settings.frames}, expected at least {task.least_frames} to move between")
     for name, known in (("schedule", ("plateau", "cosine", "steps")), ("precision", ("float32", "bfloat16"))):
         if (value := getattr(settings, name)) not in known:
             raise InputError(f"{name} is {value!r}, expected one of: {', '.join(known)}")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from benchmarks import transfer
+from radarize.api.run import run
 from radarize.benchmark.dataset import DataSet
 from radarize.benchmark.followed import Followed
 from radarize.benchmark.runs import figures
 from radarize.evaluation.motion import velocity_errors
-from radarize.run import run
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
 
@@ -26,7 +26,7 @@ def recording(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def judged(recording, tmp_path_factory) -> tuple[Path, dict]:
     """A run, and its figures."""
-    folder = run(recording, tmp_path_factory.mktemp("run"), odometry="doppler", scans="first-echo")
+    folder = run(recording, tmp_path_factory.mktemp("run"), odometry="doppler", scans="first-echo").path
     return folder, figures(folder, recording)
 
 

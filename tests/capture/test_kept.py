@@ -101,7 +101,9 @@ def test_a_disk_that_fills_and_empties(small_disk, capsys):
     with Recording(small_disk / "a.h5") as recording:
         assert np.array_equal(recording.adc(0, 99), ADC[kept])
         assert np.array_equal(recording.times, np.array(kept) * SMALL.frame_period)
-        assert recording.attributes["warnings"] == "the fan is loud; 5 frames are left out, since the disk was full"
+        assert recording.attributes["warnings"] == (
+            "the fan is loud; 5 frames are left out, since the disk was full; 5 frames are missing between others"
+        )
     assert os.listdir(small_disk) == ["a.h5"]
 
 

@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 import urllib.request
 
 import numpy as np
@@ -15,11 +16,14 @@ from radarize.capture.record import Keeper
 from radarize.capture.replay import Replay
 from radarize.cli import app
 from radarize.errors import InputError
+from radarize.mapping.scans import BEARINGS
 from radarize.methods.registry import CLASSICAL, Inputs, Workshop
 from radarize.pipeline import Result
 from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter
+from radarize.slam.drawing import Drawing
+from radarize.slam.node import Node, Scan
 from tests import virtual
 from tests.capture.browser import CHROMIUM, Browser
 from tests.virtual import SMALL, emulated
@@ -75,6 +79,7 @@ def test_a_replay_gives_what_the_file_gives(walk, tmp_path, every):
         live = Kept(inputs, CLASSICAL, page)
         with RecordingWriter(tmp_path / "again.h5", stream.config) as writer:
             live.run(stream, threading.Event(), keeper=Keeper(writer))
+    assert live.pipeline.seconds["page"] > 0
     offline, intake = Workshop(inputs).pipeline(**CLASSICAL), Intake(inputs.signal, every)
     with Recording(walk) as one, Recording(tmp_path / "again.h5") as other:
         # In the live view's own batches: on some processors sums are ordered otherwise in batches of another size.
@@ -209,3 +214,31 @@ def test_a_recording_that_cannot_be_played(tmp_path):
         pass
     with pytest.raises(InputError, match="has no whole frame"):
         Replay(tmp_path / "empty.h5")
+
+
+def test_the_map_of_an_hour_is_drawn_beside_the_frames(monkeypatch):
+    """7,000 nodes: the frame loop waits for none of them; of the next map only what is new is drawn."""
+    monkeypatch.setattr("radarize.capture.live._PAUSE", 0.0)
+    config, angles = Inputs(SMALL).configuration.slam, np.linspace(0, 200, 7000)
+    ranges = np.full(len(BEARINGS), 2.0)
+    nodes = [Node.gather([Scan(float(k), np.zeros(3), BEARINGS, ranges)], config) for k in range(len(angles))]
+    poses = np.stack([9 * np.cos(angles), 9 * np.sin(angles), angles], axis=1)
+    with Page("127.0.0.1:0") as page:
+        live = Live(Inputs(SMALL), CLASSICAL, page)
+        slam, took = live.pipeline.slam, []
+        for count in (6990, 7000):
+            for pose in poses[len(slam.nodes) : count]:
+                slam.graph.add_node(pose)
+            slam.nodes[:] = nodes[:count]
+            start = time.perf_counter()
+            live._show_map()
+            waited = time.perf_counter() - start
+            live._drawn.result()
+            took.append((waited, time.perf_counter() - start))
+        assert max(waited for waited, _ in took) < 0.03
+        assert took[1][1] < took[0][1] / 5
+        whole = Drawing(config.grid).of(slam.nodes, slam.graph.poses)
+        assert np.array_equal(live._drawing.of(slam.nodes, slam.graph.poses).probability, whole.probability)
+        slam.graph._poses.values[:, 0] += 1.0  # a loop is closed: nothing is where it was drawn
+        moved = live._drawing.of(slam.nodes, slam.graph.poses)
+        assert moved.origin[0] == pytest.approx(whole.origin[0] + 1.0, abs=2 * config.grid.map_resolution)

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 FIRST = "README.md"
 THEN = (
     ("docs/tutorial.md", "docs/simulating.md", "docs/radar.md", "docs/ros2.md", "docs/physics.md"),
-    ("docs/learning.md", "docs/comparing.md"),
+    ("docs/python.md", "docs/learning.md", "docs/comparing.md"),
 )
 PAGES = (FIRST, *THEN[0], *THEN[1])
 _FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)

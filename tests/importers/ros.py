@@ -98,9 +98,9 @@ class BagWriter:
             twist=self.make("geometry_msgs/msg/TwistWithCovariance", twist=still, covariance=unknown),
         )  # fmt: skip
 
-    def imu(self, time: float, force: np.ndarray, turn: np.ndarray) -> None:
+    def imu(self, time: float, force: np.ndarray, turn: np.ndarray, frame: str = "map") -> None:
         self.write(
-            IMU, "sensor_msgs/msg/Imu", time, header=self.header(time),
+            IMU, "sensor_msgs/msg/Imu", time, header=self.header(time, frame),
             orientation=self.vector([0, 0, 0, 1], "geometry_msgs/msg/Quaternion"),
             orientation_covariance=np.zeros(9), angular_velocity=self.vector(turn),
             angular_velocity_covariance=np.zeros(9), linear_acceleration=self.vector(force),

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 from rosbags.rosbag2 import StoragePlugin
 
+from radarize.api.run import run
 from radarize.errors import InputError
 from radarize.importers import Given, import_recording
 from radarize.importers.bag import open_bag
 from radarize.importers.companions import depth_picture
+from radarize.odometry.inertial import Imu
 from radarize.points import PointClouds
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter, Stream
-from radarize.run import run
 from radarize.tum import planar, planar_poses, read_tum
 from tests.echoes import record
 from tests.importers.ros import EPOCH, RADAR, BagWriter, write_published
@@ -98,7 +99,7 @@ def test_samples_and_stamps_are_the_same(original, imported):
         assert b.valid(0, len(b)).all()
         assert b.config == a.config
         assert b.attributes["warnings"] == ""
-        assert b.attributes["assumed"] == "configuration: preset radarize, iq_order, latency"
+        assert b.attributes["assumed"] == "configuration: preset radarize, iq_order, latency, imu/mount"
 
 
 def test_other_sensors_come_along(original, imported):
@@ -134,7 +135,7 @@ def test_the_same_trajectory_comes_out(original, bag, imported, tmp_path):
         pytest.skip("the samples are the same, as another test says: one bag is enough")
     found = []
     for path in (original, imported):
-        out = run(path, tmp_path / path.stem, odometry="doppler", scans="first-echo")
+        out = run(path, tmp_path / path.stem, odometry="doppler", scans="first-echo").path
         times, pose = read_tum(out / "trajectory.tum")
         found.append((times - times[0], planar(pose)))
     assert found[0][0] == pytest.approx(found[1][0], abs=1e-6)
@@ -197,6 +198,23 @@ def test_stamps_are_the_receipt_less_the_latency_or_the_headers(tmp_path):
             assert ("headers" in recording.attributes["stamps"]) == (name == "b.bag" and latency is None)
 
 
+def test_frames_that_a_computer_held_up_are_moved_to_the_radars_period(tmp_path):
+    """Receipts are late by 4 ms in the mean, once by 0.4 s; clocks differ by 80 ppm; three frames are missing."""
+    rng = np.random.default_rng(3)
+    starts = SMALL.frame_period * (1 + 80e-6) * np.delete(np.arange(600), [100, 101, 300])
+    received = starts + SMALL.burst_time + rng.exponential(4e-3, len(starts))
+    received[200:208] = received[208] - 1e-3 * np.arange(8, 0, -1)
+    assert (np.diff(received) > 0).all()
+    with BagWriter(tmp_path / "a.bag", 1) as bag:
+        for time, frame, at in zip(starts, noise(SMALL, len(starts)), received, strict=True):
+            bag.frame(time, frame, SMALL, latency=at - time)
+    with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", Given(config=SMALL))) as recording:
+        assert recording.times - EPOCH == pytest.approx(starts, abs=1.5e-3)
+        assert np.std(recording.times - starts) < 0.2e-3
+        assert "3 frames are missing" in recording.attributes["warnings"]
+        assert "by 2.92 ms in the median and 393.18 ms at most" in recording.attributes["stamps"]
+
+
 def test_missing_frames_leave_a_gap_and_repeated_ones_are_dropped(tmp_path):
     times = np.array([0, 1, 2, 5, 5, 6]) * 0.05
     write(tmp_path / "a.bag", SMALL, times)
@@ -204,6 +222,37 @@ def test_missing_frames_leave_a_gap_and_repeated_ones_are_dropped(tmp_path):
         assert recording.times - EPOCH == pytest.approx(np.unique(times), abs=1e-6)
         assert "2 frames are missing" in recording.attributes["warnings"]
         assert "1 frames came again" in recording.attributes["warnings"]
+
+
+def test_an_imu_is_read_on_the_radars_axes(tmp_path):
+    """As a tracking camera has it: in an optical frame. Where neither the frame's name nor the user says so, it is
+    no IMU on the radar's axes, for gravity is felt along another."""
+    force, turn = np.array([0.3, -0.2, 9.8]), np.array([0.1, 0.2, 0.5])
+    optical = np.array([[0, -1, 0], [0, 0, -1], [1, 0, 0]])  # x right, y down, z ahead
+    named, given = Given(config=SMALL), Given(config=SMALL, imu_turn=(-90.0, 0.0, -90.0))
+    for frame, told, known in (
+        ("tracking_imu_optical_frame", named, True),
+        ("imu", given, True),
+        ("imu", named, False),
+    ):
+        with BagWriter(tmp_path / "a.bag", 1) as bag:
+            for k, each in enumerate(noise(SMALL, 20)):
+                bag.frame(0.05 * k, each, SMALL)
+                for tick in 0.05 * k + 0.005 * np.arange(10):
+                    bag.imu(tick, optical @ force, optical @ turn, frame)
+        (tmp_path / "a.h5").unlink(missing_ok=True)
+        with Recording(import_recording(tmp_path / "a.bag", tmp_path / "a.h5", told)) as recording:
+            assert ("imu/mount" in recording.attributes["assumed"]) == (not known)
+            if known:
+                found = Imu.of(recording).samples
+                assert found == pytest.approx(np.tile([*force, *turn], (len(found), 1)), abs=1e-5)
+            else:
+                with pytest.raises(InputError, match=r"no /imu/mount, and gravity is felt along \[0.2, -9.8, 0.3\]"):
+                    Imu.of(recording)
+        (tmp_path / "a.bag").unlink()
+    with pytest.raises(InputError, match="is no ROS bag, but imu_turn is"):
+        (tmp_path / "a.bin").write_bytes(bytes(9))
+        import_recording(tmp_path / "a.bin", tmp_path / "b.h5", given)
 
 
 def test_poses_are_unknown_where_tracking_was_lost(tmp_path):

@@ -7,6 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from radarize import polar
+from radarize.api.run import run
 from radarize.batch import Batch, Signal
 from radarize.cli import app
 from radarize.errors import InputError
@@ -17,7 +18,6 @@ from radarize.methods.pictures.scans import on_bearings
 from radarize.methods.registry import Workshop
 from radarize.radar.presets import PRESETS
 from radarize.recording import Recording, RecordingWriter, Stream
-from radarize.run import run
 from radarize.runfolder import RunFolder
 
 RADAR = PRESETS["radarhd"]
@@ -54,7 +54,7 @@ def test_a_real_walk_goes_through_the_pipeline(recordings, tmp_path):
     """The first three seconds of walk 227, from pictures to report; left is left."""
     clone, poses = recordings / "radarhd" / "pictures", recordings / "radarhd" / "poses" / "227.tum"
     walk = import_recording(clone, tmp_path / "227.h5", Given(walk=227, poses=poses))
-    folder = RunFolder(run(walk, tmp_path / "run"))
+    folder = RunFolder(run(walk, tmp_path / "run").path)
     facts = json.loads((tmp_path / "run" / "run.json").read_text())
     assert facts["methods"] == {"odometry": "pictures", "scans": "pictures"} and facts["frames_lost"] == 0
     scans, lidar = folder.scans["ranges"], folder.scans["truth/scan"]

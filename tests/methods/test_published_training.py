@@ -8,6 +8,7 @@ import torch
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from radarize.api.run import run
 from radarize.batch import Intake, Signal
 from radarize.cli import app
 from radarize.errors import InputError
@@ -24,7 +25,6 @@ from radarize.nets.weights import Header, build, example, header_of, load, save
 from radarize.pipeline import Pipeline
 from radarize.radar.presets import PRESETS
 from radarize.recording import Product, Recording, RecordingWriter, Stream
-from radarize.run import run
 from radarize.tum import read_tum
 from tests.batches import stream
 

@@ -10,7 +10,7 @@ from radarize.odometry.bearings import YAW, Bearings
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
 from radarize.odometry.gaussian import Gaussian
-from radarize.odometry.rotation import MapRotation, Rotations
+from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
 from radarize.radar.presets import PRESETS
 from tests.batches import of_spectrum
 
@@ -47,10 +47,10 @@ def normal(degrees):
     return np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
 
 
-def followed(world, places, yaws, told, seed=1, blind=(0.0, 0.0)):
+def followed(world, places, yaws, told, seed=1, blind=(0.0, 0.0), right_angles=True):
     """Heading by `told` and the bearings, its claim, and the `Bearings`; nothing is seen between two instants, s."""
     rng, state = np.random.default_rng(seed), Gaussian(np.zeros(OWN))
-    bearings, found, claims = Bearings(MAPS, state), np.zeros(len(yaws)), np.zeros(len(yaws))
+    bearings, found, claims = Bearings(MAPS, state, right_angles), np.zeros(len(yaws)), np.zeros(len(yaws))
     velocities = np.gradient(places, DT, axis=0)
     cos, sin = np.cos(yaws), np.sin(yaws)
     velocities = np.stack(
@@ -152,6 +152,26 @@ def test_an_echo_out_of_sight_is_forgotten():
     for time in (0.0, 0.1, 0.5):
         bearings.see(time, [Echo(2.0, 0.0, 0.1)] if time < 0.5 else [], np.zeros(2))
     assert not bearings._followed and len(state.mean) == OWN
+
+
+@pytest.mark.parametrize("every", [1, 7, 15])
+def test_an_echo_is_followed_at_any_frame_rate(every):
+    """Down to two frames a second: the next one is no time without detection."""
+    slow = CONFIG.every(every)
+    bearings = Bearings(Heatmaps(slow), Gaussian(np.zeros(OWN)))
+    for k in range(4):
+        bearings.see(k * slow.frame_period, [Echo(2.0, 0.0, 0.1)], np.zeros(2))
+    assert [each.frames for each in bearings._followed] == [4]
+    bearings.see(4 * slow.frame_period + max(0.21, 3 * slow.frame_period), [], np.zeros(2))
+    assert not bearings._followed
+
+
+def test_right_angles_can_be_switched_off():
+    places, yaw = slide()
+    world, told = World(walls=[(normal(0), 1.3)]), np.diff(yaw)
+    walls = [len(followed(world, places, yaw, told, right_angles=on)[2]._walls) for on in (True, False)]
+    assert walls == [1, 0]
+    assert not MapRotation(MAPS, RotationConfig(right_angles=False))._bearings._right_angles
 
 
 def spectra(ranges, speeds, bearings, rng, second=0.0):

@@ -23,10 +23,10 @@ def track(count, start=0.0, no_velocity=(), no_turn=()):
     )
 
 
-def found(*tracks, numbers=None):
-    blind = Blindness()
+def found(*tracks, period=PERIOD):
+    blind = Blindness(period)
     for each in tracks:
-        blind.add(np.arange(len(each.time)) if numbers is None else numbers, each)
+        blind.add(each)
     return blind
 
 
@@ -53,10 +53,12 @@ def test_lost_frames_are_blind_and_frames_left_out_on_purpose_are_not():
     rows = np.r_[0:10, 25:40]
     gap = SimpleNamespace(**{name: values[rows] for name, values in vars(whole).items()})
     gap.step[10] *= 16
-    (span,) = found(gap, numbers=rows).found.spans
+    (span,) = found(gap).found.spans
     assert span.why == "frames lost" and span.way_m == pytest.approx(16 * PERIOD)
     assert (span.start_s, span.stop_s) == pytest.approx((9 * PERIOD, 25 * PERIOD))
-    assert found(whole, numbers=2 * np.arange(40)).found.spans == []
+    whole.time *= 10
+    assert found(whole, period=10 * PERIOD).found.spans == []
+    whole.time /= 10
     at_the_end = found(whole)
     at_the_end.lost(39 * PERIOD, 5.0)
     at_the_end.lost(-1.0, 0.0)
@@ -66,10 +68,10 @@ def test_lost_frames_are_blind_and_frames_left_out_on_purpose_are_not():
 
 def test_batches_do_not_matter():
     whole = track(120, no_velocity=range(7, 31), no_turn=range(28, 90))
-    parts = Blindness()
+    parts = Blindness(PERIOD)
     for k in range(0, 120, 7):
         part = SimpleNamespace(**{name: values[k : k + 7] for name, values in vars(whole).items()})
-        parts.add(np.arange(k, k + len(part.time)), part)
+        parts.add(part)
     assert parts.found.model_dump() == found(whole).found.model_dump() and len(parts.found.spans) == 1
 
 

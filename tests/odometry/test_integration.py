@@ -273,3 +273,12 @@ def test_velocity_is_forgotten_by_the_second_not_by_the_frame(rate):
     filtered = VelocityFilter().filter(np.arange(count) / rate, measured)
     assert filtered.covariance[-1, 0, 0] == pytest.approx(VelocityConfig().wander ** 2, rel=1e-3)
     assert (filtered.seen == ~blind).all()
+
+
+@pytest.mark.parametrize("fastest", [0.5, 2.0, 6.0])
+def test_a_velocity_not_known_at_all_is_as_fast_as_configured(fastest):
+    """The first measurement, as uncertain as what is known before, halves the variance."""
+    measured = Velocities(np.array([[1.0, 0.0]]), fastest**2 * np.eye(2)[None], np.ones(1, int), np.ones(1, bool))
+    found = VelocityFilter(VelocityConfig(fastest=fastest)).filter(np.zeros(1), measured)
+    assert found.covariance[0] == pytest.approx(fastest**2 / 2 * np.eye(2))
+    assert found.velocity[0] == pytest.approx([0.5, 0.0])

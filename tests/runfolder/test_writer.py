@@ -59,7 +59,8 @@ def test_what_is_written_is_read(tmp_path):
     results = [result(0, 16), result(16, 5), result(30, 40)]  # frames 21...29 were lost
     writer = write(tmp_path / "a" / "RUN", results)
     run = RunFolder(tmp_path / "a" / "RUN")
-    for name, of in {"time": "time", "velocity": "velocity", "step_covariance": "covariance"}.items():
+    named = {name: name for name in ("time", "velocity", "velocity_seen", "turn_seen")}
+    for name, of in (named | {"step_covariance": "covariance"}).items():
         assert np.array_equal(run.scans[name], np.concatenate([getattr(each.track, of) for each in results]))
     for name in ("noise", "kept", "held"):
         claimed = np.concatenate([getattr(each.track.claims, name) for each in results])

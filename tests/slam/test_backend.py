@@ -101,6 +101,20 @@ def test_loop_with_radar():
     assert ate(truth, poses) < 0.5 * ate(truth, odometry)
 
 
+def test_the_last_node_is_searched():
+    """There a walk closes, whatever the number of its nodes."""
+    rng = np.random.default_rng(3)
+    truth, azimuths, scans = radar_walk([*LOOP[:5], (4.5, 1.5)], rng)
+    odometry, counts = drifting(truth, rng, 0.01, 0.02, bias=0.03), set()
+    for cut in (0, 3, 6, 9):
+        stop = len(truth) - cut
+        slam = run(SlamConfig.preset("radar"), np.arange(stop) * 0.1, odometry[:stop], azimuths, scans[:stop])
+        last = len(slam.nodes) - 1
+        assert any(node == last for _, node in slam.graph.closures)
+        counts.add(last % (SlamConfig.preset("radar").loop.nodes // 2))
+    assert len(counts) > 1
+
+
 def test_radar_does_no_harm_to_good_odometry():
     rng = np.random.default_rng(4)
     truth, azimuths, scans = radar_walk([(1.5, 1.5), (10.5, 1.5), (10.5, 10.0)], rng)

@@ -26,6 +26,7 @@ class MilliEgo(Task):
     network, truth = MilliEgoNet, (POSE,)
     sensed = (Reading("panorama", "radar/adc", seen), Reading("imu", "imu/time", _latest))
     share = 1 / 5
+    least_frames = 2
     defaults = Settings(width=8, frames=6, epochs=201, batch=32, rate=1e-5, schedule="steps", patience=201)
 
     def optimise(self, parameters: Iterable[nn.Parameter], settings: Settings) -> torch.optim.Optimizer:

@@ -66,6 +66,7 @@ class PictureTurns(PictureTask, Motion):
 
     network, truth = PictureTurnNet, (YAW,)
     error, size = "rmse_rad", "rms_turn_rad"
+    least_frames = 2
     defaults = Settings(width=8, frames=5, epochs=24, batch=64, rate=1e-3, schedule="cosine")
 
     def label(self, table: Table, frames: Tensor) -> Float[Tensor, "item 1"]:

@@ -65,6 +65,7 @@ class PublishedRotation(Plain):
     network, error, size, reach = PublishedRotationNet, Rotation.error, Rotation.size, Rotation.reach
     maps, truth = tuple(RANGE), (YAW,)
     optimiser = torch.optim.AdamW
+    least_frames = 2
     defaults = Settings(width=64, patience=30)
 
     def label(self, table: Table, frames: Tensor) -> Tensor:

@@ -48,6 +48,7 @@ class Rotation(Motion):
     error, size = "rmse_rad", "rms_turn_rad"
     maps = ("range_azimuth",)
     reach = 4 / 15
+    least_frames = 2
     defaults = Settings()
     #: m, standard deviation of the travel that is told.
     doubt = 0.01

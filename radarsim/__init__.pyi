@@ -1,0 +1,1 @@
+from radarsim.api import simulate as simulate

@@ -1,0 +1,79 @@
+"""`import radarize as rz`: what it offers, what that is called, and the examples of its docstrings."""
+
+import ast
+import doctest
+import inspect
+import re
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+import radarize as rz
+import radarsim
+
+ROOT = Path(__file__).parents[2]
+#: What is called, by the name that it has in docstrings.
+PUBLIC = {name: getattr(rz, name) for name in rz._HOMES if name not in ("InputError", "Recording", "Trajectory")}
+PUBLIC["simulate"] = radarsim.simulate
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_examples(name, walk, rec, monkeypatch):
+    """Of every public function; a class may have its example where it is made."""
+    monkeypatch.chdir(walk.parent)
+    names = {"rz": rz, "radarsim": radarsim, "rec": rec}
+    found = doctest.DocTestFinder(recurse=False).find(PUBLIC[name], name, globs=names)
+    examples = [each for each in found if each.examples]
+    assert examples or inspect.isclass(PUBLIC[name])
+    said: list[str] = []
+    runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
+    assert not sum(runner.run(each, out=said.append).failed for each in examples), "".join(said)
+
+
+@pytest.mark.parametrize("name", [name for name, each in PUBLIC.items() if not inspect.isclass(each)])
+def test_docstrings_say_what_comes_out_and_what_goes_wrong(name):
+    text = inspect.getdoc(PUBLIC[name])
+    assert all(f"\n{part}:\n" in text for part in ("Args", "Returns", "Raises", "Example"))
+    signature = inspect.signature(PUBLIC[name])
+    assert signature.return_annotation is not inspect.Parameter.empty
+    for parameter in signature.parameters.values():
+        assert parameter.annotation is not inspect.Parameter.empty
+        assert parameter.name in text
+
+
+@pytest.mark.parametrize("package", ["radarize", "radarsim"])
+def test_type_checkers_see_what_is_there(package):
+    """The stub names what the module offers, from the same places."""
+    stub = ast.parse((ROOT / package / "__init__.pyi").read_text())
+    places = {
+        alias.asname: (node.module, alias.name)
+        for node in ast.walk(stub) if isinstance(node, ast.ImportFrom) for alias in node.names
+    }  # fmt: skip
+    names = {*places, *re.findall(r"^(\w+) = ", ast.unparse(stub), re.MULTILINE)}
+    assert names == {*import_module(package).__all__} - {"__version__"}
+    for name, (module, there) in places.items():
+        assert getattr(import_module(package), name) is getattr(import_module(module), there)
+
+
+def test_import_loads_nothing_heavy():
+    code = "import radarize, radarsim, sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    heavy = {"numpy", "torch", "scipy", "numba", "h5py", "gtsam", "matplotlib", "pandas", "xarray", "pydantic", "typer"}
+    assert "radarize" in done.stdout and not heavy & {*done.stdout.split()}
+
+
+def test_what_is_not_there_is_an_attribute_error():
+    for module in (rz, radarsim):
+        assert {*module.__all__} <= {*dir(module)} | {"odometry"}
+        with pytest.raises(AttributeError, match="has no attribute 'magic'"):
+            module.magic  # noqa: B018
+
+
+def test_odometry_stays_a_package():
+    """Whatever was imported first."""
+    from radarize.odometry import claims
+
+    assert rz.odometry.claims is claims and callable(rz.odometry)

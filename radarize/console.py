@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Annotated
@@ -18,6 +19,8 @@ from radarize.files import OUTSIDE
 FAILED = 2
 #: Options that every command takes, and the environment variables that say so to its jobs.
 _EVERYWHERE = {"--debug": DEBUG, "--allow-outside": OUTSIDE}
+#: s between lines of progress where stderr is no terminal.
+_PACE = 10.0
 #: Letters of a word that a table does not cut.
 _WORD = 32
 
@@ -83,11 +86,22 @@ def _sentence(error: BaseException) -> str:
 
 @contextmanager
 def progress(label: str, stopped: str = "") -> Iterator[Callable[..., None]]:
-    """Progress bars on stderr, moved by calling what this yields with (done, in all) or (stage, done, in all).
+    """Progress on stderr, moved by calling what this yields with (done, in all) or (stage, done, in all).
 
-    Until the first call, while things are being prepared, a spinner turns; so an error then comes without a bar. Ctrl-C
-    becomes an InputError of what `stopped` says.
+    In a terminal these are bars, elsewhere a line every `_PACE` s.
+
+    Ctrl-C becomes an InputError of what `stopped` says.
     """
+    with (_bars if sys.stderr.isatty() else _lines)(label) as move:
+        try:
+            yield move
+        except KeyboardInterrupt:
+            raise InputError(f"stopped; {stopped}") if stopped else KeyboardInterrupt from None
+
+
+@contextmanager
+def _bars(label: str) -> Iterator[Callable[..., None]]:
+    """Until the first call, while things are being prepared, a spinner turns; so an error then comes without a bar."""
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
     from rich.progress import TimeRemainingColumn as TimeLeftColumn
@@ -111,16 +125,52 @@ def progress(label: str, stopped: str = "") -> Iterator[Callable[..., None]]:
     spinner.start()
     try:
         yield move
-    except KeyboardInterrupt:
-        raise InputError(f"stopped; {stopped}") if stopped else KeyboardInterrupt from None
     finally:
         spinner.stop()
         bars.stop()
 
 
 @contextmanager
+def _lines(label: str) -> Iterator[Callable[..., None]]:
+    """What, how much, how long so far and how long still, for logs."""
+    start, ended, moved = time.monotonic(), threading.Event(), [""]
+    begun: dict[str, tuple[float, float]] = {}  # by stage: when, and how much was done then
+
+    def move(*where) -> None:
+        *stage, done, total = where
+        name, now = (f"{label}, {stage[0]}" if stage else label), time.monotonic()
+        since, before = begun.setdefault(name, (now, done))
+        share = f" of {total} ({done / total:.0%})" if total else ""
+        left = (total - done) * (now - since) / (done - before) if total and done > before else None
+        moved[:] = [f"{name}: {done}{share}", f", {_clock(left)} to go" if left is not None else ""]
+
+    def tell() -> None:
+        while not ended.wait(_PACE):
+            what, *left = moved
+            sofar = f"{_clock(time.monotonic() - start)} so far"
+            print(f"{what or label}, {sofar}{''.join(left)}", file=sys.stderr, flush=True)
+
+    thread = threading.Thread(target=tell, daemon=True)
+    thread.start()
+    try:
+        yield move
+    finally:
+        ended.set()
+        thread.join()
+
+
+def _clock(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    return f"{minutes // 60}:{minutes % 60:02}:{seconds:02}"
+
+
+@contextmanager
 def working(label: str) -> Iterator[None]:
-    """A spinner on stderr for steps that cannot say how far they are."""
+    """A spinner on stderr, or lines, for steps that cannot say how far they are."""
+    if not sys.stderr.isatty():
+        with _lines(label):
+            yield
+        return
     from rich.console import Console
 
     with Console(stderr=True).status(label):

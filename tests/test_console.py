@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import time
 
 import pytest
 import trimesh
@@ -10,8 +11,9 @@ import typer
 
 import radarize.cli
 import radarsim.cli
-from radarize.console import new_app, print_table, run
+from radarize.console import new_app, print_table, progress, run, working
 from radarize.contents import show
+from radarize.errors import InputError
 from radarsim import doctor
 
 METHODS = ("scan-matching + segmentation", "published + published", "doppler + radarhd")
@@ -129,3 +131,25 @@ def test_help_cuts_no_word(app, printed):
             check(below, (*path, name))
 
     check(typer.main.get_command(app), ())
+
+
+def test_progress_without_a_terminal_is_lines(monkeypatch, capsys):
+    """Every so often, of what was done last, whether it moves or not; and nothing of what is quickly done."""
+    with progress("simulate") as report:
+        report(1, 4)
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr("radarize.console._PACE", 0.1)
+    with progress("train") as report:
+        time.sleep(0.15)
+        report("reading", 0, 8)
+        time.sleep(0.1)
+        report("reading", 2, 8)
+        time.sleep(0.2)
+    first, *_, last = capsys.readouterr().err.splitlines()
+    assert first == "train, 0:00:00 so far"
+    assert last == "train, reading: 2 of 8 (25%), 0:00:00 so far, 0:00:00 to go"
+    with working("evaluating"):
+        time.sleep(0.15)
+    assert capsys.readouterr().err == "evaluating, 0:00:00 so far\n"
+    with pytest.raises(InputError, match="stopped; nothing is lost"), progress("run", "nothing is lost"):
+        raise KeyboardInterrupt

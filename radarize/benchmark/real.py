@@ -74,6 +74,10 @@ SHOWN = (
 )  # fmt: skip
 
 
+#: Figures of a walk that are said as soon as it is done.
+_SAID = ("chamfer_m", "yaw_rmse_deg", "ate_m")
+
+
 @dataclass(frozen=True)
 class Options:
     """What is compared.
@@ -103,6 +107,7 @@ def real(
     options: Options = Options(),  # noqa: B008
     *,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    say: Callable[[str], None] = lambda line: None,
 ) -> Results:
     """Compare what methods make of real pictures with a lidar's points.
 
@@ -111,6 +116,7 @@ def real(
         output: folder to write: real.json and real.md.
         options: what is compared.
         progress: called with (frames done, frames in all).
+        say: takes a line for every method on a walk that is done.
 
     Raises:
         InputError: no such walk, or a damaged picture.
@@ -124,6 +130,9 @@ def real(
             raise InputError(news.error)
         if news.ended:
             found[news.name] = news.result
+            for row in news.result.rows:
+                figures = (f"{name} {row[name]:.3g}" for name in _SAID if np.isfinite(row.get(name, np.nan)))
+                say(f"{news.name}, {row['method']}: {', '.join(figures)}")
         else:
             done[news.name] = int(news.done)
         progress(sum(done.values()), total)

@@ -134,6 +134,6 @@ def _benchmark_real(
     others = {name: Path(each) for name, each in named.items()}
     options = Options([int(number) for number in numbers], others, weights, poses, workers, ray)
     with progress("real") as report:
-        results = real(data, out, options, progress=report)
+        results = real(data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
     print_table(*results.tables[0].in_terminal(SHOWN))
     print(out / "real.md")

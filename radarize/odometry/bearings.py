@@ -32,9 +32,9 @@ YAW = 0
 _RANGE, _SPEED, _SIGMAS = 0.06, 0.25, 2.5
 #: Standard deviation of a sine as a share of the beam's width, and rad/s^0.5: what a bearing in the world wanders.
 _NOISE, _WANDER = 0.04, np.radians(0.3)
-#: Maximum number of echoes; s without detection after which one is no longer followed, and frames that this takes at
-#: least, whatever the frame rate; nearer to each other, m and rad, they are one.
-_MOST, _LOST, _FRAMES, _APART = 8, 0.21, 2.5, (0.1, np.radians(10.0))
+#: Maximum number of echoes; s without detection after which one is no longer followed; nearer to each other, m and rad,
+#: they are one. Below 4.8 frames a second so none is followed: what is taken for the same echo there is often another.
+_MOST, _LOST, _APART = 8, 0.21, (0.1, np.radians(10.0))
 #: Shares of parallax: standard deviations by which those of flashes and posts may differ from 0 and 1 until it is
 #: known which of them they are, and from then on, the post's for a range of 1 m beside `_OFF`, m, of its range.
 _SHARES, _ROUGH, _EXACT, _OFF = np.array([0.0, 1.0]), np.array([0.02, 0.06]), np.array([0.003, 0.015]), 0.02
@@ -80,7 +80,6 @@ class Bearings:
     def __init__(self, heatmaps: Heatmaps, state: Gaussian, right_angles: bool = True):
         self._state, self._first = state, len(state.mean)
         self._span, self._right_angles = 2 * heatmaps.config.max_velocity, right_angles
-        self._lost = max(_LOST, _FRAMES * heatmaps.config.frame_period)
         self._range = max(_RANGE, (heatmaps.ranges[1] - heatmaps.ranges[0]) / 2)
         self._noise = _NOISE * 2 / max(len(heatmaps.row), 1)  # antennas stand half a wavelength apart
         self._walls: list[int] = []  # how many had each of the directions
@@ -105,7 +104,7 @@ class Bearings:
     def see(self, time: float, echoes: Sequence[Echo], velocity: Float[np.ndarray, "2"]) -> bool:
         """Correct the filter by a frame's echoes; False if nothing known is among them, so that they tell no turn."""
         self._time, told = time, False
-        self._keep([k for k, each in enumerate(self._followed) if time - each.seen < self._lost])
+        self._keep([k for k, each in enumerate(self._followed) if time - each.seen < _LOST])
         new = [echo for echo in echoes if self._stands(echo, velocity)]
         for k, each in enumerate(self._followed):
             if (echo := self._again(k, each, new)) is not None:

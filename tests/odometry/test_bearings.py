@@ -154,18 +154,6 @@ def test_an_echo_out_of_sight_is_forgotten():
     assert not bearings._followed and len(state.mean) == OWN
 
 
-@pytest.mark.parametrize("every", [1, 7, 15])
-def test_an_echo_is_followed_at_any_frame_rate(every):
-    """Down to two frames a second: the next one is no time without detection."""
-    slow = CONFIG.every(every)
-    bearings = Bearings(Heatmaps(slow), Gaussian(np.zeros(OWN)))
-    for k in range(4):
-        bearings.see(k * slow.frame_period, [Echo(2.0, 0.0, 0.1)], np.zeros(2))
-    assert [each.frames for each in bearings._followed] == [4]
-    bearings.see(4 * slow.frame_period + max(0.21, 3 * slow.frame_period), [], np.zeros(2))
-    assert not bearings._followed
-
-
 def test_right_angles_can_be_switched_off():
     places, yaw = slide()
     world, told = World(walls=[(normal(0), 1.3)]), np.diff(yaw)

@@ -5,8 +5,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from radarize.run import run
 
+from radarize.api.load import load
+from radarize.api.run import run
 from radarize.cli import app
 from radarize.console import run as run_app
 from radarize.disturbance import Flaws
@@ -133,7 +134,7 @@ def test_frames_that_never_came_are_a_gap(tmp_path):
     with RecordingWriter(tmp_path / "walk.h5", CONFIG) as writer:
         writer.append(adc, times)
         assert writer.losses.warnings() == ["61 frames are missing between others"]
-    told = run(tmp_path / "walk.h5", tmp_path / "RUN", odometry="doppler", scans="first-echo")
+    told = run(tmp_path / "walk.h5", tmp_path / "RUN", odometry="doppler", scans="first-echo").path
     facts = RunFolder(told).facts
     gap = max(facts["blind"]["spans"], key=lambda span: span["stop_s"] - span["start_s"])
     assert "frames lost" in gap["why"] and gap["stop_s"] - gap["start_s"] > 1.9 and facts["frames_missing"] == 61
@@ -146,7 +147,8 @@ def test_time_per_frame_is_that_of_the_frames_used(tmp_path, monkeypatch):
     with RecordingWriter(tmp_path / "walk.h5", CONFIG) as writer:
         noise = np.random.default_rng(0).integers(-200, 200, (8, *CONFIG.frame_shape), dtype=np.int16)
         writer.append(noise, np.arange(8) * CONFIG.frame_period)
-    told = run(tmp_path / "walk.h5", tmp_path / "RUN", odometry="doppler", scans="first-echo", every=4)
+    with load(tmp_path / "walk.h5") as recording:
+        told = run(recording[::4], tmp_path / "RUN", odometry="doppler", scans="first-echo").path
     assert RunFolder(told).facts["ms_per_frame"] == {"slam": 500.0}
 
 

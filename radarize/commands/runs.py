@@ -38,16 +38,18 @@ def run_(
 ):
     """Estimate trajectory and map of a recording."""
     from radarize.api.load import load
+    from radarize.api.odometry import configuration
     from radarize.api.run import run
     from radarize.effort import effort
 
+    tuned = configuration(config)
     with load(recording) as source:
         words = effort(source.config, len(source)) if source.has_samples else ""
         warn([words] if words else [])
         with progress("run", f"{output} is as it was before, and so is the recording") as report:
             made = run(
                 source[::every], output, odometry=odometry, scans=scans, settings=settings, weights=weights,
-                config=config, progress=report,
+                config=tuned, progress=report,
             )  # fmt: skip
     warn(made.warnings)
     print(made.path)

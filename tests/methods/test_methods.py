@@ -81,7 +81,7 @@ def test_pipelines_of_a_workshop_share_what_they_can(noise, monkeypatch):
     times = np.arange(4) * CONFIG.frame_period
     together = [[] for _ in pairs]
     for k in range(2):
-        taken = intake.take(adc, times + k)
+        taken = intake.take(adc, times + 4 * k * CONFIG.frame_period)
         for pipeline, results in zip(shared, together, strict=True):
             results.append(pipeline.push(taken))
     assert len(spectra) == 2 and sorted(asked) == 2 * ["first-echo"] + 2 * ["threshold"]
@@ -93,7 +93,7 @@ def test_pipelines_of_a_workshop_share_what_they_can(noise, monkeypatch):
         alone, intake = Workshop(own).pipeline(*pair), Intake(own.signal)
         for k, result in enumerate(results):
             samples[:] = adc  # a reader may use the same memory again
-            other = alone.push(intake.take(samples, times + k))
+            other = alone.push(intake.take(samples, times + 4 * k * CONFIG.frame_period))
             assert np.array_equal(result.frames, other.frames) and list(other.frames) == [4 * k, 4 * k + 1, 4 * k + 2]
             assert np.array_equal(result.ranges, other.ranges)
             here, there = (vars(each.track) | vars(each.track.claims) for each in (result, other))

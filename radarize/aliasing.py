@@ -32,7 +32,7 @@ class Aliases:
         config: of the radar; with a single transmitter in the azimuth row nothing tells.
 
     Attributes:
-        fastest: m/s, speed up to which the speeds of echoes are told apart.
+        fastest: m/s, largest speed at which aliased speeds are resolved.
     """
 
     def __init__(self, config: RadarConfig):

@@ -1,4 +1,4 @@
-"""Matplotlib axes for whoever has none, and pictures for notebooks."""
+"""Matplotlib axes where none are given, and PNG pictures for notebooks."""
 
 import io
 from collections.abc import Callable

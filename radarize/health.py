@@ -13,7 +13,7 @@ from radarize.radar.presets import PRESETS
 
 #: m/s, of people at ease.
 WALKING_PACE = 1.4
-#: Share of the speed up to which echoes are told apart from which speeds are near enough to alias.
+#: Share of the largest resolved speed from which on speeds count as near aliasing.
 _NEAR = 0.9
 #: Few surfaces: a smaller share of a scan's bearings sees any. On 20 s walks through furnished rooms it is 0.06 at
 #: least by first echoes, and 0.39 by segmentation.

@@ -126,7 +126,7 @@ def test_run_and_report_say_it(tmp_path, capsys):
 
 
 def test_frames_that_never_came_are_a_gap(tmp_path):
-    """Whoever lost them: a recording has nothing but stamps to tell it, of two seconds and of one frame."""
+    """Stamps alone show that frames are missing: two seconds of them, and one frame."""
     rng = np.random.default_rng(0)
     sent = np.r_[0:6, 7:10, 70:76]
     times, room = sent * CONFIG.frame_period, furnished_room(rng, density=6.0, boxes=4)

@@ -1,4 +1,4 @@
-"""Numbers of frames by their stamps, so that frames that never came leave a gap, whoever lost them."""
+"""Frame numbers from stamps: lost frames leave a gap."""
 
 import numpy as np
 from jaxtyping import Float, Int

@@ -2,7 +2,7 @@
 
 import errno
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 #: Environment variable of processes that show tracebacks.
@@ -25,6 +25,17 @@ class InputError(Exception):
         text = super().__str__()
         text = text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]} ... {text[-_LONGEST // 2 :]}"
         return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
+
+
+def refuse_unknown(given: Mapping[str, object], options: type) -> None:
+    """Refuse keywords that a `TypedDict` of options does not have.
+
+    Raises:
+        InputError: there are some.
+    """
+    known = options.__annotations__
+    if unknown := given.keys() - known.keys():
+        raise InputError(f"{min(unknown)} is given, expected some of {', '.join(known)}")
 
 
 class DiskFull(InputError):

@@ -7,7 +7,7 @@ from typing import Literal, TypedDict, Unpack
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import InputError
+from radarize.errors import refuse_unknown
 from radarize.radar.config import RadarConfig
 from radarize.recording import Recording, in_temporary_file
 from radarsim.motion.trajectory import Mounting
@@ -63,8 +63,7 @@ def simulate(
         >>> len(walk), walk[0].samples.dtype, walk.attributes["seed"]
         (3, dtype('int16'), 3)
     """
-    if unknown := plan.keys() - Plan.__annotations__.keys():
-        raise InputError(f"{min(unknown)} is given, expected some of {', '.join(Plan.__annotations__)}")
+    refuse_unknown(plan, Plan)
     given = dict(plan)
     if isinstance(mounting := given.get("mounting"), str):
         given["mounting"] = Mounting.parse(mounting) if mounting else None

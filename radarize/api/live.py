@@ -19,7 +19,7 @@ from radarize.capture.replay import Replay
 from radarize.capture.sensor import Sensor
 from radarize.capture.stream import Stream
 from radarize.capture.uart import BAUD
-from radarize.errors import InputError
+from radarize.errors import InputError, refuse_unknown
 from radarize.mapping.scans import BEARINGS
 from radarize.methods.registry import Inputs, best_methods, pace
 from radarize.pipeline import Result
@@ -246,8 +246,7 @@ def live(
         >>> frame.number, pose.shape, power.dims
         (7, (3,), ('range', 'azimuth'))
     """
-    if unknown := options.keys() - LiveOptions.__annotations__.keys():
-        raise InputError(f"{min(unknown)} is given, expected some of {', '.join(LiveOptions.__annotations__)}")
+    refuse_unknown(options, LiveOptions)
     if (output := options.get("output")) and not options.get("overwrite"):
         spare(Path(output), anything=True)
     if replay and (config or port):

@@ -7,7 +7,7 @@ from typing import Any, Literal, Protocol, TypedDict, Unpack, cast
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.errors import InputError, refuse_unknown
 from radarize.importers import Given, import_recording
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config
@@ -147,8 +147,7 @@ def _is_recording(path: Path) -> bool:
 
 
 def _settings(capture: CaptureOptions) -> Given:
-    if unknown := capture.keys() - CaptureOptions.__annotations__.keys():
-        raise InputError(f"{min(unknown)} is given, expected some of {', '.join(CaptureOptions.__annotations__)}")
+    refuse_unknown(capture, CaptureOptions)
     given: dict[str, Any] = dict(capture)
     config = given.pop("config", None)
     radar, text = (None, "") if config is None else load_config(config)

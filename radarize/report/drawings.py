@@ -39,6 +39,12 @@ def decibels(power: np.ndarray, reference: float | None = None) -> np.ndarray:
     return 10 * np.log10(np.maximum(power, top * 10 ** (-DEPTH / 10 - 2)) / top) if top > 0 else np.zeros(power.shape)
 
 
+def _relative_to_echoes(power: Float[np.ndarray, "range other"], ranges: Float[np.ndarray, "range"]) -> np.ndarray:
+    """Power in dB relative to the largest beyond the leakage."""
+    far = ranges >= LEAKAGE
+    return decibels(power, np.nanmax(power[far], initial=0.0) if far.any() else None)
+
+
 def draw_fan(
     axis,
     power: Float[np.ndarray, "range azimuth"],
@@ -48,8 +54,7 @@ def draw_fan(
     reach: float | None = None,
 ) -> None:
     """Range-azimuth power from above: forward is up, left is left."""
-    far = ranges >= LEAKAGE
-    level = decibels(power, np.nanmax(power[far], initial=0.0) if far.any() else None)
+    level = _relative_to_echoes(power, ranges)
     edges_r, edges_a = _edges(ranges), _edges(azimuths)
     x, y = -edges_r[:, None] * np.sin(edges_a), edges_r[:, None] * np.cos(edges_a)
     _draw_cells(axis, x, y, level)
@@ -92,9 +97,7 @@ def draw_range_doppler(
     title: str,
 ) -> None:
     """Range-Doppler power; closing is right."""
-    far = ranges >= LEAKAGE
-    level = decibels(power, np.nanmax(power[far], initial=0.0) if far.any() else None)
-    _draw_cells(axis, _edges(velocities), _edges(ranges), level)
+    _draw_cells(axis, _edges(velocities), _edges(ranges), _relative_to_echoes(power, ranges))
     axis.set(title=title, xlabel="closing speed, m/s", ylabel="range, m")
 
 

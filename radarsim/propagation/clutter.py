@@ -33,7 +33,7 @@ from radarize.errors import InputError
 from radarsim.propagation.hashgrid import Grid
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.world.scene import Scene
-from radarsim.world.shapes import scattered
+from radarsim.world.shapes import areas, scattered
 
 #: Objects a square metre at level 1: on walls (plugs, handles, screws, cables), on what stands at the height of desks
 #: and shelves (pens, clips, keys), under ceilings (nozzles, hangers, grids), on the floor. Before larger ones were
@@ -57,7 +57,7 @@ class Clutter:
     """All small objects of a scene.
 
     Args:
-        scene: the world; its `life.clutter` scales the densities.
+        scene: the world; its `surface_settings.clutter` scales the densities.
         rng: draws them.
 
     Raises:
@@ -66,17 +66,15 @@ class Clutter:
 
     def __init__(self, scene: Scene, rng: np.random.Generator):
         corners, normals = scene.triangles, scene.normals
-        sides = corners[:, 1:] - corners[:, :1]
-        area = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
         middles, level = corners.mean(axis=1), scene.surface_settings.clutter
-        mean = level * densities(scene, middles, normals) * area
+        mean = level * densities(scene, middles, normals) * areas(corners)
         if mean.sum() > MOST:
             raise InputError(
                 f"scene {scene.name}: clutter is {level:g}, which makes {mean.sum():.2g} points, expected "
                 f"at most {MOST:g}"
             )
         count = rng.poisson(mean)
-        on = np.repeat(np.arange(len(area)), count)
+        on = np.repeat(np.arange(len(corners)), count)
         place = scattered(corners[on], rng)
         place += (NEAREST + rng.exponential(STANDOFF, len(on)))[:, None] * normals[on]
         size = rng.exponential(1.0, len(on))

@@ -30,7 +30,7 @@ from radarsim.propagation.media import as_slab, layer, mirror, sweep_share, wind
 from radarsim.propagation.observation import Observation
 from radarsim.propagation.table import Table
 from radarsim.world.scene import Scene
-from radarsim.world.shapes import scattered
+from radarsim.world.shapes import areas, scattered
 
 #: Walks that begin on a square metre that scatters all that falls on it; walks of a scene at most.
 DENSITY, MOST = 40.0, 1_000_000
@@ -71,10 +71,9 @@ class Detours(Table):
         """
         surfaces = Albedos(scene, config)
         corners, normals, albedo = scene.triangles, scene.normals, surfaces.albedo
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-        scattering = albedo * area * np.where(surfaces.two_sided, 2, 1)
+        scattering = albedo * areas(corners) * np.where(surfaces.two_sided, 2, 1)
         density = min(DENSITY, MOST / max(scattering.sum(), 1e-9))
-        on = np.repeat(np.arange(len(area)), rng.poisson(density * scattering))
+        on = np.repeat(np.arange(len(corners)), rng.poisson(density * scattering))
         behind = surfaces.two_sided[on] & (rng.random(len(on)) < 0.5)
         normal = np.where(behind, -1.0, 1.0)[:, None] * normals[on]
         begin = scattered(corners[on], rng) + NEAREST * normal

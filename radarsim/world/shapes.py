@@ -134,6 +134,12 @@ def joined(*shapes: trimesh.Trimesh) -> trimesh.Trimesh:
     return trimesh.Trimesh(np.concatenate([s.vertices for s in shapes]), np.concatenate(faces), process=False)
 
 
+def areas(triangles: Float[np.ndarray, "n 3 3"]) -> Float[np.ndarray, "n"]:
+    """Areas of triangles, m^2."""
+    sides = triangles[:, 1:] - triangles[:, :1]
+    return np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / 2
+
+
 def scattered(corners: Float[np.ndarray, "n 3 3"], rng: np.random.Generator) -> Float[np.ndarray, "n 3"]:
     """A random place on each of some triangles, m."""
     share = rng.random((len(corners), 2))

@@ -1,7 +1,7 @@
 """What the shipped networks gained when they went on learning from many radars: walks of `any-radar` that validate.
 
     radarsim dataset any-radar -o any-radar
-    mkdir former && git archive 57c7245 radarize/weights | tar -x --strip-components 2 -C former
+    mkdir former && git archive 57c7245 radarize/learning/weights | tar -x --strip-components 2 -C former
     python -m benchmarks.any_radar --data any-radar --former former
 
 The former networks had learned from the preset alone.
@@ -14,11 +14,10 @@ from pathlib import Path
 import torch
 
 from benchmarks.results import Data, Page, script, tracked
-from radarize.benchmark.networks import Networks
-from radarize.methods.registry import find_task
-from radarize.methods.task import Task
-from radarize.nets.weights import load
-from radarize.training.dataset import recordings
+from radarize.evaluation.benchmark.networks import Networks
+from radarize.learning.nets.weights import load
+from radarize.learning.task import Task, find_task
+from radarize.learning.training.dataset import recordings
 
 #: By network: what of its metrics is told, in which unit, and by how much that is more.
 TOLD = {

@@ -14,10 +14,10 @@ import psutil
 from jaxtyping import Bool, Int16
 
 from benchmarks.results import Data, Page, script, surroundings
+from radarize.io.recording import Losses, Recording, RecordingWriter
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import MAX_PAYLOAD
 from radarize.radar.presets import load_config
-from radarize.recording import Losses, Recording, RecordingWriter
 from radarsim.emulator.disturbance import Disturbance
 from tests.virtual import emulator
 

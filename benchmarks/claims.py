@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.results import Page, script, tracked
-from radarize.batch import Intake
-from radarize.benchmark.dataset import Case, DataSet, groups
-from radarize.benchmark.networks import Networks
-from radarize.effort import BATCH
+from radarize.evaluation.benchmark.dataset import Case, DataSet, groups
+from radarize.evaluation.benchmark.networks import Networks
 from radarize.evaluation.scans import true_ranges
-from radarize.mapping import echoes
-from radarize.mapping.scans import BEARINGS
-from radarize.methods.radarize.learned import LearnedRotation, LearnedVelocity
-from radarize.methods.radarize.scans import LEAST, NEAR, Segmentation, likeliest
-from radarize.methods.registry import Inputs
-from radarize.pose import wrap
-from radarize.recording import Recording
-from radarize.tum import planar
+from radarize.io.pose import wrap
+from radarize.io.recording import Recording
+from radarize.io.tum import planar
+from radarize.odometry.learned import LearnedRotation, LearnedVelocity
+from radarize.pipeline.method import Inputs
+from radarize.scans import echoes
+from radarize.scans.segmentation import LEAST, NEAR, Segmentation, likeliest
+from radarize.signal.batch import Preprocessor
+from radarize.signal.bearings import BEARINGS
+from radarize.signal.effort import BATCH
 
 #: Claimed probabilities of a range, from each to the next.
 CLAIMS = (LEAST, 0.8, 0.9, 0.97, 1.0)
@@ -37,7 +37,7 @@ def judge(case: Case, networks: Networks) -> tuple[dict[str, float], np.ndarray]
     """
     with Recording(case.path) as recording:
         inputs = Inputs(recording.config, weights=networks.weights, recording=recording)
-        intake = Intake(inputs.signal)
+        preprocessor = Preprocessor(inputs.signal)
         velocity, rotation = (
             network(inputs.radar, inputs.weights.of(kind))
             for network, kind in ((LearnedVelocity, "translation"), (LearnedRotation, "rotation"))
@@ -45,7 +45,7 @@ def judge(case: Case, networks: Networks) -> tuple[dict[str, float], np.ndarray]
         scans = Segmentation(inputs.radar, inputs.weights.of("segmentation"))
         turns, ranges = [], []
         for frames, adc in recording.batches(BATCH):
-            batch = intake.take(adc, recording.times[frames], recording.valid(frames.start, frames.stop))
+            batch = preprocessor.process(adc, recording.times[frames], recording.valid(frames.start, frames.stop))
             told, _ = rotation.turns(batch, velocity.estimate(batch))
             turns.append(told)
             ranges.append(likeliest(scans.occupancy(batch)))

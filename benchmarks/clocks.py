@@ -1,7 +1,7 @@
 """How far RadarHD's radar and lidar pictures of one number are apart in time, walk by walk.
 
-Clocks are told by how alike pictures are (`radarize.walkclock`). A second witness, which they know nothing of: turns by
-shifting the radar's pictures against each other, compared with those of the lidar's poses, by number and by instant.
+Clocks are estimated by how alike pictures are (`radarize.baselines.walks.clock`). An independent check: turns
+by shifting the radar's pictures against each other, compared with those of the lidar's poses, by number and by instant.
 """
 
 import argparse
@@ -12,11 +12,12 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from benchmarks.results import CLONE, POSES, Page, radarhd, script, tracked
-from radarize.benchmark.real import clocked_turn_errors
-from radarize.benchmark.realmotion import shifted_turns, smoothed
-from radarize.walkclock import APART, Alike, Clock, alike
-from radarize.walkposes import poses_of
-from radarize.walks import PERIOD, TRAINING, Walk
+from radarize.baselines.real.motion import shifted_turns, smoothed
+from radarize.baselines.real.real import clocked_turn_errors
+from radarize.baselines.walks.clock import APART, Alike, Clock, alike
+from radarize.baselines.walks.poses import poses_of
+from radarize.baselines.walks.walks import PERIOD, Walk
+from radarize.evaluation.benchmark.choices import TRAINING
 
 #: Walks that are drawn: two of the building of the training, two of another.
 SHOWN = (118, 132, 227, 237)

@@ -12,20 +12,20 @@ import yaml
 
 from benchmarks.hardships import CONDITIONS, Samples
 from benchmarks.results import Data, Page, performed, script
-from radarize.batch import Intake
-from radarize.benchmark.networks import Networks
-from radarize.benchmark.runs import Pair
-from radarize.benchmark.table import NONE, with_error
-from radarize.effort import BATCH
+from radarize.evaluation.benchmark.networks import Networks
+from radarize.evaluation.benchmark.runs import Pair
+from radarize.evaluation.benchmark.table import NONE, with_error
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory
-from radarize.evaluation.trajectory import trajectory
-from radarize.health import Health
-from radarize.jobs import Report
-from radarize.methods.method import Inputs
-from radarize.methods.registry import BEST, Workshop
+from radarize.io.alignment import trajectory
+from radarize.io.jobs import Report
+from radarize.io.recording import Recording
+from radarize.io.tum import planar_poses
+from radarize.pipeline.health import Health
+from radarize.pipeline.method import Inputs
+from radarize.pipeline.methods import BEST, make_pipeline
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording
-from radarize.tum import planar_poses
+from radarize.signal.batch import Preprocessor
+from radarize.signal.effort import BATCH
 from radarsim.motion.walk import Walk
 from radarsim.recording.batches import Batches
 from radarsim.recording.simulate import record
@@ -62,12 +62,12 @@ class Trial(NamedTuple):
         """Of the whole pipeline."""
         hurt, rng, tracks = CONDITIONS[self.condition].hurt, np.random.default_rng(0), []
         with Recording(self.recording) as recording:
-            workshop = Workshop(Inputs(recording.config))
-            pipeline, intake = workshop.pipeline(**BEST), Intake(workshop.inputs.signal)
+            inputs = Inputs(recording.config)
+            pipeline, preprocessor = make_pipeline(inputs, **BEST), Preprocessor(inputs.signal)
             health, truth = Health(recording.config), trajectory(*recording.true_poses())
             for frames, adc in recording.batches(BATCH):
                 samples = Samples(adc, recording.times[frames], recording.valid(frames.start, frames.stop))
-                if len(batch := intake.take(*(hurt(samples, rng) if hurt else samples))):
+                if len(batch := preprocessor.process(*(hurt(samples, rng) if hurt else samples))):
                     result = pipeline.push(batch)
                     health.add(result)
                     tracks.append(result.track)

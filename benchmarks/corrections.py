@@ -8,19 +8,19 @@ import numpy as np
 import torch
 
 from benchmarks.results import Data, Page, script
-from radarize.batch import Intake, Signal
-from radarize.features.maps import MapMaker, maps_of
-from radarize.features.occupancy import SURFACE
-from radarize.heatmaps import Heatmaps
-from radarize.methods.published import labels
-from radarize.methods.published import maps as published
-from radarize.methods.published.training import pooled_dice
-from radarize.methods.radarize.segmentation import SegmentationNet
-from radarize.methods.task import first_cell
-from radarize.nets.losses import surfaces
+from radarize.baselines.published import labels
+from radarize.baselines.published import maps as published
+from radarize.baselines.published.training import pooled_dice
+from radarize.io.recording import Recording
+from radarize.learning.features.occupancy import SURFACE
+from radarize.learning.nets.losses import surfaces
+from radarize.learning.nets.segmentation import SegmentationNet
+from radarize.learning.task import first_cell
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording
+from radarize.signal.batch import Preprocessor, Signal
+from radarize.signal.heatmaps import Heatmaps
+from radarize.signal.maps import MapMaker, maps_of
 from radarsim.motion.walk import Walk
 from radarsim.recording.simulate import simulate
 from radarsim.sensors.scan import AZIMUTHS, level_rays
@@ -192,7 +192,7 @@ def ego_velocity(source: Recording) -> list[dict]:
     def median(maps: Heatmaps) -> float:
         signal = Signal(source.config)
         signal.heatmaps = maps
-        found = DopplerVelocity(maps).estimate(Intake(signal).take(source.adc(0, count), source.times[:count]))
+        found = DopplerVelocity(maps).estimate(Preprocessor(signal).process(source.adc(0, count), source.times[:count]))
         return np.median(np.linalg.norm(found.velocity - truth, axis=1))
 
     variants = {

@@ -15,9 +15,9 @@ import pandas as pd
 import psutil
 
 from benchmarks.results import Data, Page, script, timed
-from radarize.jobs import perform
+from radarize.io.jobs import perform
+from radarize.io.recording import RecordingWriter
 from radarize.radar.presets import PRESETS
-from radarize.recording import RecordingWriter
 from radarsim.dataset.run import making
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Task

@@ -11,15 +11,15 @@ from typing import NamedTuple
 import pandas as pd
 
 from benchmarks.results import Data, Page, performed, script
-from radarize.api.load import load
-from radarize.api.run import run
-from radarize.benchmark.dataset import DataSet
-from radarize.benchmark.networks import Networks
-from radarize.benchmark.runs import Pair
-from radarize.benchmark.table import with_error
+from radarize.evaluation.benchmark.dataset import DataSet
+from radarize.evaluation.benchmark.networks import Networks
+from radarize.evaluation.benchmark.runs import Pair
+from radarize.evaluation.benchmark.table import with_error
 from radarize.evaluation.evaluate import evaluate
-from radarize.jobs import Report
-from radarize.methods.registry import BEST, CLASSICAL
+from radarize.io.jobs import Report
+from radarize.io.load import load
+from radarize.pipeline.methods import BEST, CLASSICAL
+from radarize.pipeline.run import run
 
 PAIRS, EVERY = (Pair(**BEST), Pair(**CLASSICAL)), (1, 2)
 

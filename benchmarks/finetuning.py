@@ -1,9 +1,9 @@
 """What simulation saves of reality: the network for RadarHD's pictures trained on real walks alone, and the same walks
 shown to one that was trained in simulation first.
 
-Pictures are paired by instant (`radarize.walkclock`), and judged by instant and by number. Only training walks are
-shown, and only test walks judge. The weights stay with whoever makes them, and those that are there already are not
-made again. Made for a GPU; `--steps 10` tries it on two cores.
+Pictures are paired by instant (`radarize.baselines.walks.clock`), and judged by instant and by number. Only training
+walks are shown, and only test walks judge. The weights stay with whoever makes them, and those that are there already
+are not made again. Made for a GPU; `--steps 10` tries it on two cores.
 """
 
 import argparse
@@ -20,17 +20,18 @@ from jaxtyping import UInt8
 from torch import Generator, Tensor
 
 from benchmarks.results import CLONE, Network, Page, radarhd, script, tracked
-from radarize.clouds import Apart
-from radarize.console import progress
-from radarize.features.maps import Maps
-from radarize.methods.method import Weights
-from radarize.methods.pictures.network import PictureNet
-from radarize.methods.pictures.points import points
-from radarize.methods.pictures.training import DENSE, elsewhere, entropy, unpacked
-from radarize.nets.weights import Header, build, load, save
+from radarize.baselines.pictures.network import PictureNet
+from radarize.baselines.pictures.points import points
+from radarize.baselines.pictures.training import DENSE, elsewhere, entropy, unpacked
+from radarize.baselines.walks.clock import Clock
+from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.walks import FIRST, PERIOD, Walk
+from radarize.evaluation.benchmark.choices import TRAINING
+from radarize.io.console import progress
+from radarize.learning.nets.weights import Header, build, load, save
+from radarize.pipeline.method import Weights
 from radarize.radar.presets import PRESETS
-from radarize.walkclock import Clock
-from radarize.walks import FIRST, PERIOD, TRAINING, Walk
+from radarize.signal.maps import Maps
 
 
 class Distances(NamedTuple):

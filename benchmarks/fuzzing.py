@@ -24,8 +24,8 @@ from rich.progress import track
 import radarize
 import radarsim
 from benchmarks.results import Data, Page, same, script, surroundings
-from radarize.benchmark.results import commit
-from radarize.replacing import replacing
+from radarize.evaluation.benchmark.results import commit
+from radarize.io.replacing import replacing
 from tests.fuzzing.reader import MOST_MEMORY, MOST_SECONDS, MOST_TIMES, Attempt, Reader, attempt
 from tests.fuzzing.readers import READERS
 

@@ -17,8 +17,8 @@ import numpy as np
 import yaml
 
 from benchmarks.results import Data, Page, same, script, surroundings, timed
+from radarize.io.recording import Recording, recover
 from radarize.radar.presets import load_config
-from radarize.recording import Recording, recover
 from tests.virtual import emulator, record
 
 #: What a data set of seconds is made of.

@@ -18,14 +18,15 @@ from pathlib import Path
 import psutil
 
 from benchmarks.results import Data, Page, same, script, surroundings
-from radarize.benchmark.networks import Networks
-from radarize.benchmark.runs import Pair
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page as LivePage
 from radarize.capture.replay import Replay
-from radarize.methods.registry import CLASSICAL, Inputs, best_methods, pace
-from radarize.recording import Losses, Recording
-from radarize.stopwatch import Stopwatch
+from radarize.evaluation.benchmark.networks import Networks
+from radarize.evaluation.benchmark.runs import Pair
+from radarize.io.recording import Losses, Recording
+from radarize.io.stopwatch import Stopwatch
+from radarize.pipeline.method import Inputs
+from radarize.pipeline.methods import CLASSICAL, best_methods, pace
 from radarsim.recording.simulate import simulate
 from tests.capture.browser import Browser
 from tests.virtual import emulator

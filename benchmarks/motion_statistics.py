@@ -8,7 +8,7 @@ import pandas as pd
 from rich.progress import track
 
 from benchmarks.results import Data, Page, script, walked
-from radarize.benchmark.table import PAPER
+from radarize.evaluation.benchmark.table import PAPER
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.platforms import PLATFORMS
 from radarsim.motion.statistics import Statistics

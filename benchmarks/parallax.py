@@ -15,11 +15,12 @@ from jaxtyping import Float, UInt8
 from scipy.ndimage import convolve1d, maximum_filter
 
 from benchmarks.results import CLONE, POSES, Page, radarhd, script, tracked
-from radarize.polar import AZIMUTHS, LEAKAGE, RANGES
-from radarize.pose import wrap
-from radarize.walkclock import Clock
-from radarize.walkposes import by_instant, poses_of
-from radarize.walks import PERIOD, TRAINING, Walk
+from radarize.baselines.walks.clock import Clock
+from radarize.baselines.walks.poses import by_instant, poses_of
+from radarize.baselines.walks.walks import PERIOD, Walk
+from radarize.evaluation.benchmark.choices import TRAINING
+from radarize.io.pose import wrap
+from radarize.signal.polar import AZIMUTHS, LEAKAGE, RANGES
 
 #: Least value of a strong cell (255: the strongest of a frame), so many of a frame at most, and m that a radar's
 #: picture reads too far.

@@ -2,7 +2,7 @@
 out once.
 
 Real walks are training walks, so that nothing is chosen on test walks; points are judged by instant
-(`radarize.walkclock`). The networks are smaller, and trained for less, than the shipped one.
+(`radarize.baselines.walks.clock`). The networks are smaller, and trained for less, than the shipped one.
 """
 
 import argparse
@@ -20,19 +20,20 @@ from jaxtyping import Bool, UInt8
 
 from benchmarks.finetuning import window
 from benchmarks.results import CLONE, Page, performed, radarhd, script
-from radarize.clouds import Apart
-from radarize.features.table import Table
-from radarize.jobs import Report
-from radarize.methods.pictures import roughening, training
-from radarize.methods.pictures.network import PictureNet
-from radarize.methods.pictures.points import points
-from radarize.methods.pictures.training import DENSE, Pictures
-from radarize.methods.task import Settings
-from radarize.recording import Recording
-from radarize.training.dataset import recordings
-from radarize.walkclock import Clock
-from radarize.walks import FIRST, TRAINING, Walk
-from radarize.yamlfile import read_yaml
+from radarize.baselines.pictures import roughening, training
+from radarize.baselines.pictures.network import PictureNet
+from radarize.baselines.pictures.points import points
+from radarize.baselines.pictures.training import DENSE, Pictures
+from radarize.baselines.walks.clock import Clock
+from radarize.baselines.walks.clouds import Apart
+from radarize.baselines.walks.walks import FIRST, Walk
+from radarize.evaluation.benchmark.choices import TRAINING
+from radarize.io.jobs import Report
+from radarize.io.recording import Recording
+from radarize.io.yamlfile import read_yaml
+from radarize.learning.features.table import Table
+from radarize.learning.task import Settings
+from radarize.learning.training.dataset import recordings
 from radarsim.world.description import shipped
 
 #: Frames of a window, as the shipped network has them.

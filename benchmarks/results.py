@@ -1,5 +1,5 @@
 """What all scripts share: their options, and where they put their figures, a page each, with all that
-`radarize.benchmark.results` wants it to say."""
+`radarize.evaluation.benchmark.results` wants it to say."""
 
 import argparse
 import inspect
@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from radarize.benchmark.results import Data, Network, Results, Walk, command, machine
-from radarize.benchmark.table import Beside, Table
-from radarize.console import progress
-from radarize.errors import InputError
-from radarize.jobs import Job, perform
+from radarize.evaluation.benchmark.results import Data, Network, Results, Walk, command, machine
+from radarize.evaluation.benchmark.table import Beside, Table
+from radarize.io.console import progress
+from radarize.io.errors import InputError
+from radarize.io.jobs import Job, perform
 from radarsim.motion.statistics import Statistics
 from radarsim.motion.trajectory import Motion
 
@@ -113,7 +113,7 @@ def performed(jobs: Mapping[str, Job], workers: int | None, title: str) -> list:
 
 
 def radarhd(title: str, walks: Sequence) -> Data:
-    """Data of RadarHD's walks (`radarize.walks.Walk`)."""
+    """Data of RadarHD's walks (`radarize.baselines.walks.walks.Walk`)."""
     return Data(title, tuple(Walk.radarhd(walk.number) for walk in walks))
 
 

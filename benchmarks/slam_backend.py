@@ -11,16 +11,16 @@ import pandas as pd
 from rich.progress import track
 
 from benchmarks.results import SHARED, Data, Page, Walk, memory_mb, script, timed
-from radarize.benchmark.networks import Networks
-from radarize.benchmark.runs import Pair
-from radarize.benchmark.table import Beside
-from radarize.jsonfile import read_json
-from radarize.log import Log
-from radarize.methods.registry import BEST
-from radarize.pose import between, compose, wrap
+from radarize.evaluation.benchmark.networks import Networks
+from radarize.evaluation.benchmark.runs import Pair
+from radarize.evaluation.benchmark.table import Beside
+from radarize.io.jsonfile import read_json
+from radarize.io.pose import between, compose, wrap
+from radarize.io.tum import planar, read_tum
+from radarize.pipeline.log import Log
+from radarize.pipeline.methods import BEST
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig, WallsConfig
-from radarize.tum import planar, read_tum
 from tests.slam.world import align, ate, lap
 
 RADISH = SHARED / "radish"

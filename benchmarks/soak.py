@@ -16,11 +16,11 @@ import psutil
 
 from benchmarks.capture_speed import chirps_that_arrive, compared
 from benchmarks.results import Data, Page, memory_mb, same, script, surroundings
-from radarize.mapping.scans import BEARINGS
-from radarize.pose import between, compose
+from radarize.io.pose import between, compose
+from radarize.io.recording import Recording
 from radarize.radar.dca1000 import MAX_PAYLOAD
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording
+from radarize.signal.bearings import BEARINGS
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from radarsim.emulator.disturbance import Disturbance

@@ -13,13 +13,13 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.results import FOLDER, SHARED, Data, Page, Walk, script
-from radarize.api.run import run
-from radarize.console import progress
-from radarize.features.maps import MapMaker, maps_of
-from radarize.methods.registry import best_methods
+from radarize.io.console import progress
+from radarize.io.recording import Recording
+from radarize.learning.training.dataset import recordings
+from radarize.pipeline.methods import best_methods
+from radarize.pipeline.run import run
 from radarize.radar.config import RadarConfig
-from radarize.recording import Recording
-from radarize.training.dataset import recordings
+from radarize.signal.maps import MapMaker, maps_of
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.trajectory import Motion
 from radarsim.receiver.calibrate import calibrate
@@ -27,7 +27,7 @@ from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.scenario import Scenario
 from radarsim.twin.likeness import frechet_distance, patch_statistics
 from radarsim.world.scene import Scene
-from tests.importers.public import captures
+from tests.io.importers.public import captures
 
 SCENES = ("office", "visitors", "buildings/b")
 

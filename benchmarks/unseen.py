@@ -16,21 +16,21 @@ from jaxtyping import Float
 from matplotlib.figure import Figure
 
 from benchmarks.results import FOLDER, SHARED, script
-from radarize.benchmark.dataset import DataSet
-from radarize.benchmark.followed import Followed, joined, true_poses
-from radarize.benchmark.results import command
-from radarize.benchmark.study import Benchmark, Chosen, Options, Study, carry_out
-from radarize.benchmark.table import Table, with_error, with_median
-from radarize.console import progress
+from radarize.evaluation.benchmark.dataset import DataSet
+from radarize.evaluation.benchmark.followed import Followed, joined, true_poses
+from radarize.evaluation.benchmark.results import command
+from radarize.evaluation.benchmark.study import Benchmark, Chosen, Options, Study, carry_out
+from radarize.evaluation.benchmark.table import Table, with_error, with_median
 from radarize.evaluation.claims import normalised
 from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.evaluation.motion import velocity_errors
-from radarize.evaluation.trajectory import trajectory, yaws
-from radarize.methods.registry import BEST
+from radarize.io.alignment import trajectory, yaws
+from radarize.io.console import progress
+from radarize.io.pose import Pose, between, wrap
+from radarize.io.tum import planar
 from radarize.odometry.claims import Claims
-from radarize.pose import Pose, between, wrap
-from radarize.runfolder import RunFolder
-from radarize.tum import planar
+from radarize.pipeline.methods import BEST
+from radarize.pipeline.runfolder import RunFolder
 from radarsim.dataset.run import make
 from radarsim.dataset.specification import Specification
 from radarsim.world.importers import import_scene

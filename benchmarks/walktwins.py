@@ -19,12 +19,12 @@ from jaxtyping import Float, UInt8
 from benchmarks.likeness.pictures import CONFIG
 from benchmarks.likeness.statistics import shares
 from benchmarks.results import CLONE, POSES, Page, radarhd, script, tracked
-from radarize import polar
-from radarize.tum import planar_poses, write_tum
-from radarize.walkclock import Clock
-from radarize.walkposes import BEARINGS, poses_of, scan, stamps
-from radarize.walks import PERIOD, Walk
-from radarize.yamlfile import read_yaml
+from radarize.baselines.walks.clock import Clock
+from radarize.baselines.walks.poses import BEARINGS, poses_of, scan, stamps
+from radarize.baselines.walks.walks import PERIOD, Walk
+from radarize.io.tum import planar_poses, write_tum
+from radarize.io.yamlfile import read_yaml
+from radarize.signal import polar
 from radarsim.motion.trajectory import motion_from_tum
 from radarsim.recording.batches import TOGETHER
 from radarsim.scenario import Scenario
@@ -161,9 +161,9 @@ def main(options: argparse.Namespace) -> Page:
         rows,
         data=radarhd("RadarHD's training walks", walks),
         notes=[
-            "Correlation of the twin's pictures (`radarize.polar`, four antennas) with real ones of the same instants, "
-            "of the same walk backwards, and of another walk; the twin's are moved by as much as fits best (bias). "
-            "Instants are those of the radar, whose clock is not the lidar's (`radarize.walkclock`).",
+            "Correlation of the twin's pictures (`radarize.signal.polar`, four antennas) with real ones of the same "
+            "instants, of the same walk backwards, and of another walk; the twin's are moved by as much as fits best "
+            "(bias). Instants are those of the radar, whose clock is not the lidar's (`baselines.walks.clock`).",
             "MS-SSIM: of the same instants, and of another walk. Range profile: correlation of shares of cells kept "
             "over range. Level: mean of the cells kept, between the least (0) and the largest (1) of a picture.",
             "The lidar's plane is all that is known of a room: nothing above or below it, no glass, no material.",

@@ -12,10 +12,10 @@ import numpy as np
 from PIL import Image
 
 from radarize.evaluation.evaluate import trajectory_errors
-from radarize.heatmaps import Heatmaps
-from radarize.recording import Recording
-from radarize.report.drawings import draw_doppler, draw_fan, draw_scan
-from radarize.runfolder import RunFolder
+from radarize.evaluation.report.drawings import draw_doppler, draw_fan, draw_scan
+from radarize.io.recording import Recording
+from radarize.pipeline.runfolder import RunFolder
+from radarize.signal.heatmaps import Heatmaps
 from radarsim.world.preview.figures import preview
 from radarsim.world.scene import Scene
 

@@ -7,34 +7,56 @@
     run = rz.run(rec)
     print(rz.evaluate(run))
 
-What stands here is loaded at its first use. ``docs/python.md`` shows it; ``__init__.pyi`` has the types.
+What stands here is loaded at its first use. ``docs/python.md`` shows it.
 """
 
 from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from radarize.capture.api import live as live
+    from radarize.evaluation.evaluation import Evaluation as Evaluation
+    from radarize.evaluation.evaluation import evaluate as evaluate
+    from radarize.evaluation.plot import plot as plot
+    from radarize.io.errors import InputError as InputError
+    from radarize.io.load import load as load
+    from radarize.io.recording import Recording as Recording
+    from radarize.io.trajectory import Trajectory as Trajectory
+    from radarize.learning.torch_dataset import torch_dataset as torch_dataset
+    from radarize.pipeline.maps import doppler_azimuth as doppler_azimuth
+    from radarize.pipeline.maps import range_azimuth as range_azimuth
+    from radarize.pipeline.maps import range_doppler as range_doppler
+    from radarize.pipeline.maps import range_profile as range_profile
+    from radarize.pipeline.odometry import estimate_odometry as estimate_odometry
+    from radarize.pipeline.odometry import estimate_odometry as odometry
+    from radarize.pipeline.pointcloud import PointCloud as PointCloud
+    from radarize.pipeline.pointcloud import point_cloud as point_cloud
+    from radarize.pipeline.run import Run as Run
+    from radarize.pipeline.run import run as run
 
 #: Of both packages: pyproject.toml takes it from here.
 __version__ = "1.1.0.dev0"
 
 #: The face: where each name stands.
 _HOMES = {
-    "InputError": "radarize.errors",
-    "Recording": "radarize.recording",
-    "Trajectory": "radarize.trajectory",
-    "Evaluation": "radarize.api.evaluation",
-    "PointCloud": "radarize.api.points",
-    "Run": "radarize.api.run",
-    "doppler_azimuth": "radarize.api.maps",
-    "estimate_odometry": "radarize.api.odometry",
-    "evaluate": "radarize.api.evaluation",
-    "live": "radarize.api.live",
-    "load": "radarize.api.load",
-    "plot": "radarize.api.plot",
-    "point_cloud": "radarize.api.points",
-    "range_azimuth": "radarize.api.maps",
-    "range_doppler": "radarize.api.maps",
-    "range_profile": "radarize.api.maps",
-    "run": "radarize.api.run",
-    "torch_dataset": "radarize.api.learning",
+    "InputError": "io.errors",
+    "Recording": "io.recording",
+    "Trajectory": "io.trajectory",
+    "Evaluation": "evaluation.evaluation",
+    "PointCloud": "pipeline.pointcloud",
+    "Run": "pipeline.run",
+    "doppler_azimuth": "pipeline.maps",
+    "estimate_odometry": "pipeline.odometry",
+    "evaluate": "evaluation.evaluation",
+    "live": "capture.api",
+    "load": "io.load",
+    "plot": "evaluation.plot",
+    "point_cloud": "pipeline.pointcloud",
+    "range_azimuth": "pipeline.maps",
+    "range_doppler": "pipeline.maps",
+    "range_profile": "pipeline.maps",
+    "run": "pipeline.run",
+    "torch_dataset": "learning.torch_dataset",
 }
 __all__ = ["__version__", "odometry", *_HOMES]  # noqa: F822  odometry is a package that can be called
 
@@ -44,7 +66,7 @@ def __getattr__(name: str) -> object:
         return import_module("radarize.odometry")
     if name not in _HOMES:
         raise AttributeError(f"module 'radarize' has no attribute {name!r}")
-    globals()[name] = found = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = found = getattr(import_module(f"radarize.{_HOMES[name]}"), name)
     return found
 
 

@@ -7,6 +7,7 @@ rec = radarsim.simulate("office", duration=10, seed=3)
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from radarsim.machine.kernels import drop_stale
 
@@ -18,6 +19,9 @@ os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 os.environ.setdefault("NUMBA_THREADING_LAYER_PRIORITY", "omp tbb workqueue")
 
 drop_stale(Path(__file__).parent)
+
+if TYPE_CHECKING:
+    from radarsim.api import simulate as simulate
 
 __all__ = ["simulate"]
 

@@ -7,9 +7,9 @@ from typing import Literal, TypedDict, Unpack
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import refuse_unknown
+from radarize.io.errors import refuse_unknown
+from radarize.io.recording import Recording, in_temporary_file
 from radarize.radar.config import RadarConfig
-from radarize.recording import Recording, in_temporary_file
 from radarsim.motion.trajectory import Mounting
 from radarsim.receiver.frontend_config import FrontEndConfig
 from radarsim.recording.simulate import simulate as simulate_to

@@ -5,8 +5,8 @@ from typing import Annotated, Any, Literal
 
 import typer
 
-from radarize.console import new_app, print_table, progress, run, working
-from radarize.errors import InputError
+from radarize.io.console import new_app, print_table, progress, run, working
+from radarize.io.errors import InputError
 
 app = new_app("Ray-traced simulation of an IWR1843 radar in indoor scenes, as raw int16 I/Q.")
 scene_app = typer.Typer(help="Look at a scene without simulating it.", no_args_is_help=True)
@@ -58,7 +58,7 @@ def simulate(
 ) -> None:
     """Simulate a walk through SCENE and write it as a recording with its truth. Killed, the same command goes on."""
     plan: Any = {name: value for name, value in locals().items() if name not in ("scene", "output")}
-    from radarize.recording import keeping
+    from radarize.io.recording import keeping
     from radarsim.api import simulate
     from radarsim.motion.statistics import Statistics
 
@@ -131,7 +131,7 @@ def twin(
     seed: Annotated[int, typer.Option(min=0, help="Of speckle and noise.")] = 0,
 ) -> None:
     """Simulate a recording again, frame by frame, in a model of its place, and compare the two."""
-    from radarize.recording import Recording, keeping
+    from radarize.io.recording import Recording, keeping
     from radarsim.motion.trajectory import Mounting
     from radarsim.twin.report import report_twin
     from radarsim.twin.twin import Options, make_twin
@@ -255,7 +255,7 @@ def export(
     output: Annotated[Path, typer.Option("--output", "-o", help="What to write (.bin, a folder, .tum).")],
 ) -> None:
     """Write a recording in another format, as `radarize export` does."""
-    from radarize.exporters import export
+    from radarize.io.exporters import export
 
     with progress("export") as report:
         written = export(recording, {"dca1000": "bin", "rosbag": "ros2"}.get(to, to), output, progress=report)

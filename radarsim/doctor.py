@@ -19,7 +19,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.machine import llvm
 
 #: Shared libraries that Python packages load from the system (all of them open3d's), and their Debian packages.
@@ -206,7 +206,7 @@ def describe() -> str:
 
 def examine() -> bool:
     """Print the findings as a table; whether everything that is needed is there."""
-    from radarize.console import print_table, working
+    from radarize.io.console import print_table, working
 
     with working("examining this machine"):
         found = findings()

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Complex, Float, Int, Int16, UInt8
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarsim.machine.rng import keyed_rng
 from radarsim.machine.threads import one_blas_thread

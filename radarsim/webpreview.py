@@ -6,8 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 from jaxtyping import Float, UInt8
 
+from radarize.evaluation.report.page import COLORS, INK, Page
 from radarize.radar.presets import PRESETS
-from radarize.report.page import COLORS, INK, Page
 from radarsim.motion.walk import Walk
 from radarsim.propagation.path_types import PathType
 from radarsim.propagation.paths import Paths

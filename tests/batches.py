@@ -5,8 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 import torch
 
-from radarize.batch import Batch, Intake, Signal
 from radarize.radar.config import RadarConfig
+from radarize.signal.batch import Batch, Preprocessor, Signal
 
 
 def batch(radar: RadarConfig | Signal, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None = None) -> Batch:
@@ -37,9 +37,9 @@ def parts(signal: Signal, spectrum: torch.Tensor, times: np.ndarray, cuts: list[
 
 
 def stream(
-    intake: Intake, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None = None, size: int = 16
+    preprocessor: Preprocessor, adc: np.ndarray, times: np.ndarray, valid: np.ndarray | None = None, size: int = 16
 ) -> Iterator[Batch]:
     """What a radar delivers, some frames at a time."""
     for start in range(0, len(adc), size):
         part = slice(start, start + size)
-        yield intake.take(adc[part], times[part], None if valid is None else valid[part])
+        yield preprocessor.process(adc[part], times[part], None if valid is None else valid[part])

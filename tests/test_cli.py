@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from radarize import cli as radarize_cli
-from radarize.console import run
-from radarize.errors import InputError
+from radarize.io.console import run
+from radarize.io.errors import InputError
+from radarize.io.recording import RecordingWriter
 from radarize.radar.presets import PRESETS
-from radarize.recording import RecordingWriter
 from radarsim import cli as radarsim_cli
 from tests.disk import disk
 
@@ -117,7 +117,7 @@ def test_errors_of_libraries_are_one_sentence(capsys, monkeypatch, tmp_path, err
     def fail(*_, **__):
         raise error
 
-    monkeypatch.setattr("radarize.exporters.export", fail)
+    monkeypatch.setattr("radarize.io.exporters.export", fail)
     code, _, err = call(capsys, "radarsim export", tmp_path / "a.h5", "--to", "tum", "-o", tmp_path / "b")
     assert code == 2 and expected in err and "Traceback" not in err
     with pytest.raises((type(error), SystemExit)):
@@ -158,7 +158,7 @@ def test_import_hands_over_what_was_typed(capsys, monkeypatch, tmp_path):
         seen.update(vars(given), source=source)
         return small_recording(output)
 
-    monkeypatch.setattr("radarize.api.load.import_recording", record)
+    monkeypatch.setattr("radarize.io.load.import_recording", record)
     arguments = "--samples 256 --loops 16 --rx 1 --tx 1,3,2 --iq-order qqii --slope 80e12 --frame-period 0.1".split()
     code, out, _ = call(capsys, "radarize import", "a.bin", "-o", tmp_path / "a.h5", *arguments)
     assert code == 0 and "2 frames" in out

@@ -5,7 +5,7 @@ from importlib.metadata import EntryPoint
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
 from radarsim.motion.trajectory import Motion
@@ -45,7 +45,7 @@ MECHANISMS.append(find)
 BAROMETER = '''
 """A barometer: the sensor's height."""
 
-from radarize.recording import Stream
+from radarize.io.recording import Stream
 from radarsim.sensors.sensor import Sensor
 from radarsim.sensors.suite import SENSORS
 

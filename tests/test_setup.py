@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from radarize import __version__
-from radarize.extras import EXTRAS
+from radarize.io.extras import EXTRAS
 from radarsim import doctor
 from radarsim.machine import llvm
 

@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from radarize import polar
-from radarize.pose import inverse, transform
-from radarize.walks import Walk
+from radarize.baselines.walks.walks import Walk
+from radarize.io.pose import inverse, transform
+from radarize.signal import polar
 
 #: Points of the world, m.
 POINTS = np.random.default_rng(0).uniform(-12, 12, (150, 2))

@@ -15,9 +15,9 @@ import numpy as np
 import tests.interruptible  # noqa: F401
 from radarize.capture.board import Network
 from radarize.capture.sensor import Sensor
+from radarize.io.recording import RecordingWriter
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
-from radarize.recording import RecordingWriter
 from radarsim.emulator.board import Addresses
 from radarsim.emulator.emulator import Emulator
 from radarsim.emulator.source import Playback, Source

@@ -22,7 +22,7 @@ from benchmarks.references.hollow_walls import NEAR, PANES, RANGES, pane, peak, 
 from benchmarks.references.poles import wall_past_pole
 from benchmarks.references.reciprocity import DOOR
 from benchmarks.references.rigs import Rig, burst
-from radarize.heatmaps import Heatmaps
+from radarize.signal.heatmaps import Heatmaps
 from radarsim.propagation.antenna import ISOTROPIC, gain_pattern
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.media import layer, mirror, sweep_share, window

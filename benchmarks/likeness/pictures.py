@@ -1,7 +1,7 @@
 """Bursts of radar pictures along walks: RadarHD's real ones, and simulated ones by cart with the same chirps.
 
-A burst is five frames, so that what motion does over 0.05 to 1.2 s is seen. Pictures are those of `radarize.polar`, of
-one transmitter.
+A burst is five frames, so that what motion does over 0.05 to 1.2 s is seen. Pictures are those of
+`radarize.signal.polar`, of one transmitter.
 """
 
 import io
@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import UInt8
 
-from radarize import polar
-from radarize.jobs import Report
+from radarize.io.jobs import Report
 from radarize.radar.presets import PRESETS
+from radarize.signal import polar
 from radarsim.motion.platforms import PLATFORMS
 from radarsim.motion.walk import Walk
 from radarsim.recording.batches import TOGETHER

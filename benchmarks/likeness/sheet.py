@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.likeness.discriminator import Judged
 from benchmarks.likeness.pictures import Bursts
-from radarize import polar
+from radarize.signal import polar
 
 #: Pictures of each kind on a sheet, each of another walk.
 COLUMNS = 10

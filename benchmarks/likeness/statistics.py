@@ -8,7 +8,7 @@ from scipy.ndimage import maximum_filter
 from scipy.spatial import cKDTree
 
 from benchmarks.likeness.pictures import TIMES, Bursts
-from radarize import polar
+from radarize.signal import polar
 
 #: dB, that a picture shows below its largest.
 DEPTH = -20 * np.log10(polar.THRESHOLD)

@@ -3,8 +3,8 @@
 import numpy as np
 
 from benchmarks.references.rigs import burst
-from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
+from radarize.signal.heatmaps import Heatmaps
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.frontend import FrontEnd

@@ -21,17 +21,18 @@ from rclpy.time import Time
 from sensor_msgs.msg import LaserScan
 from tf2_msgs.msg import TFMessage
 
-from radarize.batch import Intake
 from radarize.capture.live import TOGETHER, prepare
 from radarize.capture.replay import Replay
 from radarize.capture.sensor import Sensor
 from radarize.capture.stream import follow
-from radarize.mapping.scans import BEARINGS
-from radarize.methods.registry import Inputs, Workshop, best_methods, pace
+from radarize.io.pose import between, compose, inverse
 from radarize.odometry.claims import Unknown
-from radarize.pose import between, compose, inverse
+from radarize.pipeline.method import Inputs
+from radarize.pipeline.methods import best_methods, make_pipeline, pace
+from radarize.pipeline.runfolder import OccupancyMap
 from radarize.radar.presets import load_config
-from radarize.runfolder import OccupancyMap
+from radarize.signal.batch import Preprocessor
+from radarize.signal.bearings import BEARINGS
 
 MAP, ODOM, BASE, RADAR = "map", "odom", "base_link", "radar"
 #: s between maps.
@@ -56,7 +57,7 @@ class RadarizeNode(Node):
         radar, best = self.stream.config, best_methods(self.stream.config)[0]
         methods = {kind: given[kind] or best[kind] for kind in ("odometry", "scans")}
         self.inputs = prepare(Inputs(radar, every=pace(methods["odometry"], radar)), methods)
-        self.pipeline = Workshop(self.inputs).pipeline(**methods, endless=True)
+        self.pipeline = make_pipeline(self.inputs, **methods, endless=True)
         self.scans = self.create_publisher(LaserScan, "scan", 10)
         self.odometry = self.create_publisher(Odometry, "odom", 10)
         self.transforms = self.create_publisher(TFMessage, "/tf", 10)
@@ -65,10 +66,10 @@ class RadarizeNode(Node):
 
     def run(self, stopping: threading.Event) -> None:
         """Follow the radar until it ends or ROS does."""
-        intake = Intake(self.inputs.signal, self.inputs.every)
+        preprocessor = Preprocessor(self.inputs.signal, self.inputs.every)
         with self.stream:
             for came in follow(self.stream, stopping, most=TOGETHER):
-                if batch := intake.take(came["adc"], came["time"], came["valid"]):
+                if batch := preprocessor.process(came["adc"], came["time"], came["valid"]):
                     self.publish(self.pipeline.push(batch), batch.centers)
                 if not rclpy.ok():
                     stopping.set()

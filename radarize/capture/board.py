@@ -5,7 +5,7 @@ import socket
 import time
 from dataclasses import dataclass
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import DATA_PORT
 from radarize.radar.dca1000_commands import (

@@ -10,24 +10,25 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from radarize.batch import Intake
 from radarize.capture.page import Page, Unwatched
 from radarize.capture.record import Keeper
 from radarize.capture.stream import Stream, follow
 from radarize.capture.view import View
-from radarize.health import Health
-from radarize.mapping.scans import BEARINGS
-from radarize.methods.registry import Inputs, Workshop
-from radarize.pipeline import Result
-from radarize.recording import Losses
-from radarize.runfolder import OccupancyMap
+from radarize.io.recording import Losses
+from radarize.io.stopwatch import stage
+from radarize.pipeline.health import Health
+from radarize.pipeline.method import Inputs
+from radarize.pipeline.methods import make_pipeline
+from radarize.pipeline.pipeline import Result
+from radarize.pipeline.runfolder import OccupancyMap
+from radarize.signal.batch import Preprocessor
+from radarize.signal.bearings import BEARINGS
 from radarize.slam.drawing import Drawing
 from radarize.slam.node import Node
 from radarize.slam.rehearsal import rehearse
-from radarize.stopwatch import stage
 
 if TYPE_CHECKING:
-    from radarize.foxglove import Server
+    from radarize.evaluation.foxglove import Server
 
 #: Frames at a time, at most. Libraries keep what they have made for every number of frames, the more the larger it is:
 #: up to so many all of it is there after `prepare`, and memory then grows with the map alone.
@@ -55,8 +56,8 @@ class Live:
     def __init__(
         self, inputs: Inputs, methods: dict[str, str], page: Page | Unwatched, foxglove: "Server | None" = None
     ):
-        self.pipeline, self.page, self.foxglove = Workshop(inputs).pipeline(**methods, endless=True), page, foxglove
-        self.intake = Intake(inputs.signal, inputs.every)
+        self.pipeline, self.page, self.foxglove = make_pipeline(inputs, **methods, endless=True), page, foxglove
+        self.preprocessor = Preprocessor(inputs.signal, inputs.every)
         self.view = View(self.pipeline, inputs.signal)
         self.losses, self.health = Losses(inputs.delivered.frame_period), Health(inputs.radar)
         self._keeper: Keeper | None = None
@@ -109,7 +110,7 @@ class Live:
         for came in follow(stream, stopping, most=TOGETHER, frames=frames):
             start, result = time.monotonic(), None
             adc, stamps, valid = came["adc"], came["time"], came["valid"]
-            if batch := self.intake.take(adc, stamps, valid):
+            if batch := self.preprocessor.process(adc, stamps, valid):
                 result = self.pipeline.push(batch)
                 self.health.add(result)
                 self.view.add(result)
@@ -180,12 +181,12 @@ def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
     """Make a pipeline fast from its first frame on: another one runs on noise before, and SLAM, which noise does not
     move, through a room of its own, so that whatever is compiled or loaded at first use is there."""
     torch.set_num_threads(1)  # a frame is too little to share out: threads that wait for each other cost more
-    pipeline, intake, radar = Workshop(inputs).pipeline(**methods), Intake(inputs.signal), inputs.radar
+    pipeline, preprocessor, radar = make_pipeline(inputs, **methods), Preprocessor(inputs.signal), inputs.radar
     view, rng = View(pipeline, inputs.signal), np.random.default_rng(0)
     for frames in range(1, TOGETHER + 1):
         adc = rng.integers(-200, 200, (frames, *radar.frame_shape), dtype=np.int16)
-        stamps = (intake.taken + np.arange(frames)) * radar.frame_period
-        view.add(pipeline.push(intake.take(adc, stamps)))
+        stamps = (preprocessor.taken + np.arange(frames)) * radar.frame_period
+        view.add(pipeline.push(preprocessor.process(adc, stamps)))
     view.frame(view.pictures(adc[-1:], np.ones((1, *adc.shape[1:3]), bool)), 0.0)
     rehearse(pipeline.slam.config, BEARINGS)
     return inputs

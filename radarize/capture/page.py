@@ -8,8 +8,8 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from urllib.parse import urlsplit
 
-from radarize.errors import InputError
-from radarize.report.page import STYLE
+from radarize.evaluation.report.page import STYLE
+from radarize.io.errors import InputError
 
 #: Events (HTML standard, section 9.2); a comment now and then tells whether the browser is still there.
 _KEEP_ALIVE = 5.0

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int16
 
 from radarize.capture.stream import Stream, follow
-from radarize.errors import DiskFull, InputError, first_line
-from radarize.recording import RecordingWriter
+from radarize.io.errors import DiskFull, InputError, first_line
+from radarize.io.recording import RecordingWriter
 
 #: Frames written at once, at most.
 _BATCH = 16

@@ -4,9 +4,9 @@ import time
 from pathlib import Path
 
 from radarize.capture.stream import GLANCE, Outlet, Stream
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarize.radar.assembler import PacketCounts
-from radarize.recording import Recording
 
 
 class Replay(Stream):

@@ -8,11 +8,11 @@ from radarize.capture.board import Board, Network
 from radarize.capture.receiver import buffer_warning, enlarge, receive
 from radarize.capture.stream import Stream
 from radarize.capture.uart import BAUD, Uart, text_for
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording.captured import FROM_RADAR
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000_commands import Status
 from radarize.radar.limits import check_limits
-from radarize.recording.captured import FROM_RADAR
 
 #: s: the board holds the end of the last frame back for 2 s, in the hope of filling a packet.
 _LAST_PACKET = 3.0

@@ -11,7 +11,7 @@ from threading import Event
 import numpy as np
 
 from radarize.capture.ring import CONTEXT, FrameRing
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.assembler import PacketCounts
 from radarize.radar.config import RadarConfig
 

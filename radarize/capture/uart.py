@@ -11,7 +11,7 @@ import time
 import serial
 from serial.tools import list_ports
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
 

@@ -10,11 +10,11 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image
 
-from radarize.batch import Signal
-from radarize.heatmaps import Heatmaps
-from radarize.pipeline import Pipeline, Result
-from radarize.pose import between, compose
-from radarize.report.drawings import DEPTH, LEAKAGE, decibels
+from radarize.evaluation.report.drawings import DEPTH, LEAKAGE, decibels
+from radarize.io.pose import between, compose
+from radarize.pipeline.pipeline import Pipeline, Result
+from radarize.signal.batch import Signal
+from radarize.signal.heatmaps import Heatmaps
 from radarize.slam.grid import OccupancyGrid
 
 #: Pixels across the fan, and s over which figures are averaged.

@@ -5,8 +5,8 @@ from evo.core.trajectory import PoseTrajectory3D
 from jaxtyping import Float
 
 from radarize.evaluation.metrics import TrajectoryErrors
-from radarize.evaluation.trajectory import yaws
-from radarize.pose import between
+from radarize.io.alignment import yaws
+from radarize.io.pose import between
 
 #: s from the start on, in which hardly anything is uncertain yet.
 EARLY = 5.0

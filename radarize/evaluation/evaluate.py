@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 from evo.core.trajectory import PoseTrajectory3D
 
-from radarize.errors import InputError
 from radarize.evaluation.claims import pose_nees
 from radarize.evaluation.mapping import free_space_iou, map_errors, scan_endpoints
 from radarize.evaluation.metrics import TrajectoryErrors, evaluate_trajectory, without_nan
 from radarize.evaluation.motion import velocity_errors
 from radarize.evaluation.scans import scan_errors, true_ranges
-from radarize.evaluation.trajectory import Association, load, matched, trajectory, yaws
-from radarize.runfolder import RunFolder
+from radarize.io.alignment import Association, load, matched, trajectory, yaws
+from radarize.io.errors import InputError
+from radarize.pipeline.runfolder import RunFolder
 
 
 def trajectory_errors(
@@ -23,7 +23,7 @@ def trajectory_errors(
 
     Args:
         reference: TUM file of the truth; by default the run's ``reference.tum``.
-        association: see `radarize.evaluation.trajectory.matched`.
+        association: see `radarize.io.alignment.matched`.
 
     Raises:
         InputError: not a run, no reference, or nothing that matches.

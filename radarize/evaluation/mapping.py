@@ -6,8 +6,8 @@ from jaxtyping import Float
 from scipy.spatial import cKDTree
 
 from radarize.evaluation.metrics import over
-from radarize.pose import inverse, transform
-from radarize.runfolder import OccupancyMap
+from radarize.io.pose import inverse, transform
+from radarize.pipeline.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid
 

@@ -13,7 +13,7 @@ from evo.core.trajectory import PoseTrajectory3D
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from radarize.evaluation.trajectory import Association, alignment, matched, moved, planar
+from radarize.io.alignment import Association, alignment, matched, moved, planar
 
 #: Relative errors are taken between poses this far apart; a pair counts if it is within this share of it.
 SECOND, METRE, TOLERANCE = 1.0, 1.0, 0.1
@@ -97,9 +97,9 @@ def evaluate_trajectory(
     """Errors of an estimate against a reference.
 
     Args:
-        estimate, reference: see `radarize.evaluation.trajectory.load`.
+        estimate, reference: see `radarize.io.alignment.load`.
         in_plane: compare x, y and yaw only, for an estimate that knows no more; else all six degrees of freedom.
-        association: see `radarize.evaluation.trajectory.matched`.
+        association: see `radarize.io.alignment.matched`.
         names: what errors call the two.
 
     Raises:

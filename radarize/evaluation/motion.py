@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from radarize.evaluation.claims import normalised
 from radarize.evaluation.metrics import Statistics, over
-from radarize.pose import wrap
+from radarize.io.pose import wrap
 
 #: m/s: from this speed on, there is a direction of motion.
 MOVING = 0.1

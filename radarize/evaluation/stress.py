@@ -14,7 +14,7 @@ from radarize.evaluation.figures import Figure
 from radarize.evaluation.mapping import TOLERANCE
 from radarize.evaluation.metrics import over
 from radarize.evaluation.scans import wrong_by_cause
-from radarize.recording import Recording
+from radarize.io.recording import Recording
 
 #: What wrong returns come from, by labels of /truth/cause.
 SOURCES = {
@@ -24,7 +24,7 @@ SOURCES = {
     "clutter": ("direct", "floor_ceiling"),
     "noise": ("leakage", "noise"),
 }
-#: Figures by name, of `radarize.benchmark.runs.figures`.
+#: Figures by name, of `radarize.evaluation.benchmark.runs.figures`.
 FIGURES = {
     "ghosts": Figure("ghosts", "sources.ghosts", "% of returns", 100),
     "behind": Figure("seen through a slab", "sources.behind", "% of returns", 100),

@@ -19,11 +19,11 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from radarize.heatmaps import Heatmaps
+from radarize.io.pose import wrap
 from radarize.odometry.echoes import Echo
 from radarize.odometry.gaussian import Gaussian, Row
-from radarize.pose import wrap
-from radarize.rightangles import past_right_angle, recognised
+from radarize.odometry.rightangles import past_right_angle, recognised
+from radarize.signal.heatmaps import Heatmaps
 
 #: Place of the heading in the filter.
 YAW = 0

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from radarize.pose import adjoint, between, compose, inverse
+from radarize.io.pose import adjoint, between, compose, inverse
 
 #: Share of a way by which it comes out too short or too long as a whole: by hand, where the sensor nods, it is 0.4 to
-#: 0.5 % too short (chosen on the walks of `radarize.benchmark.choices.CLAIMS`).
+#: 0.5 % too short (chosen on the walks of `radarize.evaluation.benchmark.choices.CLAIMS`).
 _SCALE = 0.004
 
 

@@ -6,11 +6,11 @@ cloned states. Windows overlap, so that as many of them as fit into one are beli
 
 import numpy as np
 
-from radarize.features.windows import spaced
+from radarize.io.pose import between
+from radarize.learning.features.windows import spaced
 from radarize.odometry.claims import Claims
 from radarize.odometry.integration import Track
 from radarize.odometry.ties import Ties
-from radarize.pose import between
 
 #: m/s^1.5 and m/s: by how much a walker's speed wanders in a second, and standard deviation of one not known at all.
 _WANDER, _FASTEST = 0.37, 1.0

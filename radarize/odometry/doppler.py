@@ -23,11 +23,11 @@ import torch
 from jaxtyping import Bool, Complex64, Float, Int
 from numba import njit
 
-from radarize.batch import Batch
-from radarize.heatmaps import Heatmaps
+from radarize.io.plain import Frozen, setting
 from radarize.odometry.parabola import vertex
-from radarize.plain import Frozen, setting
 from radarize.radar.array import ROW, virtual_positions
+from radarize.signal.batch import Batch
+from radarize.signal.heatmaps import Heatmaps
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Complex64, Float
 from numba import njit
 
-from radarize.heatmaps import Heatmaps
 from radarize.odometry.parabola import vertex
+from radarize.signal.heatmaps import Heatmaps
 
 #: The power of a cell over the median's from which on it counts, and the share of it that comes from a single
 #: direction: two echoes in a cell have a bearing that wanders as they beat.

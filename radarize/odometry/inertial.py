@@ -10,8 +10,8 @@ from numba import njit
 from scipy.integrate import cumulative_trapezoid
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError
-from radarize.recording import Recording
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 
 #: s, from sample to sample.
 PERIOD = 0.01

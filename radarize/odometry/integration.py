@@ -6,15 +6,15 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Bool, Float
 
-from radarize.batch import Batch
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.plain import Frozen, setting
+from radarize.io.pose import compose, exponential
+from radarize.io.stopwatch import stage
 from radarize.odometry.claims import Claims, half_turned
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.rotation import Rotations
-from radarize.plain import Frozen, setting
-from radarize.pose import compose, exponential
 from radarize.radar.config import RadarConfig
-from radarize.stopwatch import stage
+from radarize.signal.batch import Batch
 
 #: m/s^1.5 and s: between two frames velocity is a random walk whose ends are known, and a smooth one over less than a
 #: second. What that adds to a step is within a fifth of what true velocities by hand do, over 0.2 to 2 s (data set
@@ -25,7 +25,7 @@ _STEADY = 0.1
 #: s, for which errors of velocities last, as exp(-t / it), those in a row being of the same echoes: so claims of steps
 #: add up to those of a way (chosen on seven walks of 60 s, by hand in A to D of seeds 301 to 304 and by cart in A to C,
 #: where claims of independent errors had a NEES of 4 to 19 over a second). Less where claims know of each other, and of
-#: what lasts longer (chosen on the walks of `radarize.benchmark.choices.CLAIMS`).
+#: what lasts longer (chosen on the walks of `radarize.evaluation.benchmark.choices.CLAIMS`).
 _LASTING, _LASTING_BESIDE = 0.25, 0.08
 
 
@@ -135,7 +135,7 @@ class Odometry:
         self._pose = np.zeros(3)
         self._last: tuple[float, np.ndarray, np.ndarray] | None = None  # time, velocity, covariance
 
-    def follow(self, batch: Batch) -> Track:
+    def update(self, batch: Batch) -> Track:
         """Poses of the next frames.
 
         Raises:

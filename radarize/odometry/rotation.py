@@ -25,8 +25,8 @@ import torch
 from jaxtyping import Bool, Complex64, Float, Float32
 from torch.nn.functional import avg_pool1d
 
-from radarize.batch import Batch
-from radarize.heatmaps import Heatmaps
+from radarize.io.plain import Frozen, setting
+from radarize.io.pose import compose
 from radarize.odometry.bearings import YAW, Bearings
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
@@ -34,8 +34,8 @@ from radarize.odometry.gaussian import Gaussian
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.parabola import vertex
 from radarize.odometry.ties import wandered
-from radarize.plain import Frozen, setting
-from radarize.pose import compose
+from radarize.signal.batch import Batch
+from radarize.signal.heatmaps import Heatmaps
 
 #: Range and Doppler bins at most: what a frame takes is bounded for every chirp that the chip can send.
 _RANGES, _SPEEDS = 256, 64
@@ -51,7 +51,7 @@ _ASTRAY = np.radians(45.0)
 #: rad/s^0.5: what every step claims, taken for independent.
 _JITTER = np.radians(0.6)
 #: rad^0.5: what a heading is off by that nothing takes back, for what it has turned: 0.6 degrees a quarter turn. A
-#: sensor that stands or goes straight hardly drifts (chosen on the walks of `radarize.benchmark.choices.CLAIMS`).
+#: sensor that stands or goes straight hardly drifts (chosen on the walks of `benchmark.choices.CLAIMS`).
 _DRIFT = 0.0086
 #: m to either side of a wall's flash, where it hides the rest.
 _RING = 0.1

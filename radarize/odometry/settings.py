@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from radarize.plain import Frozen, setting
+from radarize.io.plain import Frozen, setting
 
 
 class FusionConfig(Frozen):
-    """Two estimates of the same samples (`radarize.methods.radarize.fused`)."""
+    """Two estimates of the same samples (`radarize.odometry.fused`)."""
 
     correlation: float = setting(
         0.06, "of the errors of both, each in units of its own claims; fitted on data set odometry-choice, six walks "
@@ -20,7 +20,7 @@ class FusionConfig(Frozen):
 
 
 class TurnConfig(Frozen):
-    """Turns by the network over several spacings (`radarize.methods.radarize.learned`)."""
+    """Turns by the network over several spacings (`radarize.odometry.learned`)."""
 
     spacings: tuple[int, ...] = setting(
         (1, 2, 4), "of the network's frames, over which turns are measured; of these, the ones it was trained on",

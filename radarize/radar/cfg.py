@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
-from radarize.errors import InputError
-from radarize.files import read_bytes
-from radarize.jsonfile import parse_json
+from radarize.io.errors import InputError
+from radarize.io.files import read_bytes
+from radarize.io.jsonfile import parse_json
 from radarize.radar.boards import BOARDS, Board, board_of
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig
 

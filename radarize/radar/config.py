@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Complex, Float
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator, model_validator
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.boards import BOARDS, SUFFIXES, Board, expected, load_board
 
 SPEED_OF_LIGHT = 299_792_458.0

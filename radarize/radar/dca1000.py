@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int16
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.config import RadarConfig
 
 DATA_PORT = 4098

@@ -8,7 +8,7 @@ import struct
 from dataclasses import dataclass
 from enum import IntEnum, IntFlag
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.dca1000 import HEADER, MAX_PAYLOAD
 
 COMMAND_PORT = 4096

@@ -6,7 +6,7 @@ mmWaveLink ICD; memory: SDK demo with its radar cube in 1 MiB of L3. Finished re
 
 from collections.abc import Iterator
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.cfg import parse_cfg, read_text, write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.studio import load_studio

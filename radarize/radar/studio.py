@@ -6,8 +6,8 @@ Field names: mmWave Studio user's guide and the mmWaveLink ICD; numbers come as 
 from decimal import Decimal
 from pathlib import Path
 
-from radarize.errors import InputError
-from radarize.jsonfile import parse_json
+from radarize.io.errors import InputError
+from radarize.io.jsonfile import parse_json
 from radarize.radar.boards import board_of
 from radarize.radar.cfg import distinct_order, read_text
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig

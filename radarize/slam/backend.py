@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import InputError
-from radarize.pose import Pose, between, carried, compose, interpolate, transform
+from radarize.io.errors import InputError
+from radarize.io.pose import Pose, between, carried, compose, interpolate, transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.correlation import Pyramid, search
 from radarize.slam.drawing import Drawing

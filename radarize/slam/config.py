@@ -5,9 +5,9 @@ Defaults are the preset ``lidar``; values without a source are ours.
 
 from pathlib import Path
 
-from radarize.errors import InputError
-from radarize.plain import Frozen, setting
-from radarize.yamlfile import read_settings
+from radarize.io.errors import InputError
+from radarize.io.plain import Frozen, setting
+from radarize.io.yamlfile import read_settings
 
 
 class OdometryConfig(Frozen):
@@ -172,7 +172,7 @@ PRESETS: dict[str, SlamConfig] = {
         ),
         node=NodeConfig(distance=0.3, angle=0.2, duration=3.0, scans=10, min_points=25),
         # Cartographer's settings published with Radarize: ranges from 0.3 m. Cells, how many err alike, and what
-        # closures need were chosen on `radarize.benchmark.choices.CLOSURES`, what matches and closures count for, since
+        # closures need were chosen on `benchmark.choices.CLOSURES`, what matches and closures count for, since
         # odometry's headings are better than theirs, on `BEARINGS` and the real walks of `CLOSURES`; how right matches
         # are at best, and what closures count for, since ranges are better, on `EVERY` and the same real walks; walls,
         # since then, on `WALLS` and those.

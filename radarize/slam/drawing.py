@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from radarize.pose import between, transform
+from radarize.io.pose import between, transform
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid
 from radarize.slam.node import Node

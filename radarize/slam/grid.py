@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.slam.config import GridConfig
 
 _MARGIN = 32  # cells added around whatever a grid has to hold when it grows

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import chdtri
 
-from radarize.pose import between, compose
+from radarize.io.pose import between, compose
 from radarize.slam.config import LoopConfig
 from radarize.slam.correlation import Pyramid, scatter, search
 from radarize.slam.grid import OccupancyGrid

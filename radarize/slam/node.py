@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
-from radarize.pose import between, transform
+from radarize.io.pose import between, transform
 from radarize.slam.config import GridConfig, SlamConfig
 from radarize.slam.matcher import thin
 

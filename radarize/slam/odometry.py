@@ -7,8 +7,8 @@ from itertools import islice
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import InputError
-from radarize.pose import adjoint, between, carried, interpolate
+from radarize.io.errors import InputError
+from radarize.io.pose import adjoint, between, carried, interpolate
 from radarize.slam.config import OdometryConfig
 from radarize.slam.rows import Rows
 

@@ -13,7 +13,7 @@ import gtsam
 import numpy as np
 from jaxtyping import Float
 
-from radarize.pose import between, carried
+from radarize.io.pose import between, carried
 from radarize.slam.rows import Rows
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from radarize.pose import transform
+from radarize.io.pose import transform
 from radarize.slam.config import SlamConfig
 from radarize.slam.grid import OccupancyGrid
 from radarize.slam.node import Node

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 from jaxtyping import Float
 
-from radarize.rightangles import past_right_angle, recognised
+from radarize.odometry.rightangles import past_right_angle, recognised
 from radarize.slam.config import WallsConfig
 
 #: rad: directions that are tried, and those that count as the same.

@@ -1,6 +1,6 @@
 """The plan of a data set: its distributions, and what they gave for each recording."""
 
-from radarize.console import print_table
+from radarize.io.console import print_table
 from radarsim.dataset.specification import Specification
 
 #: Columns and their fields. Materials have two numbers each, and stand in the index beside the recordings.

@@ -22,8 +22,8 @@ import numpy as np
 from pydantic import ValidationInfo, field_serializer, field_validator
 from scipy.special import ndtr, ndtri
 
-from radarize.plain import MOST, Frozen
-from radarize.yamlfile import read_beside
+from radarize.io.plain import MOST, Frozen
+from radarize.io.yamlfile import read_beside
 from radarsim.machine.rng import keyed_rng
 from radarsim.motion.platforms import PLATFORMS
 from radarsim.motion.trajectory import Mounting

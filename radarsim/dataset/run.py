@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 
 from radarize import __version__
-from radarize.errors import FULL, DiskFull, InputError, explained
-from radarize.jobs import Job, Report, perform
-from radarize.locks import hold
-from radarize.replacing import replacing
+from radarize.io.errors import FULL, DiskFull, InputError, explained
+from radarize.io.jobs import Job, Report, perform
+from radarize.io.locks import hold
+from radarize.io.replacing import replacing
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.task import Stale, Task
 from radarsim.machine.threads import default_workers

@@ -39,13 +39,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
-from radarize.errors import InputError
-from radarize.files import within
-from radarize.plain import Frozen
+from radarize.io.errors import InputError
+from radarize.io.files import within
+from radarize.io.plain import Frozen
+from radarize.io.yamlfile import read_yaml
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
-from radarize.yamlfile import read_yaml
 from radarsim.dataset.randomise import OF_SENSOR, Platform, Randomise
 from radarsim.dataset.splits import Split
 from radarsim.dataset.task import Task, content

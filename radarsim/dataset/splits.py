@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from radarize.errors import InputError
-from radarize.plain import Frozen
+from radarize.io.errors import InputError
+from radarize.io.plain import Frozen
 from radarsim.dataset.task import Task
 
 Members = dict[str, list[str]]

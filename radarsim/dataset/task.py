@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from radarize import __version__
-from radarize.errors import InputError, explained
+from radarize.io.errors import InputError, explained
+from radarize.io.recording import Recording
 from radarize.radar.presets import load_config
-from radarize.recording import Recording
 from radarsim.dataset import physics
 from radarsim.dataset.randomise import OF_SENSOR, mounting
 from radarsim.dataset.variant import Attributes, Variant
@@ -139,7 +139,7 @@ class Task:
         Raises:
             InputError: with the task's name.
         """
-        from radarize.features.keeping import keep_maps
+        from radarize.learning.features.keeping import keep_maps
         from radarsim.machine.threads import share_with_drjit
         from radarsim.motion.statistics import Statistics
         from radarsim.recording.add_sensors import accompany

@@ -5,11 +5,11 @@ from typing import Annotated
 
 from pydantic import Field, field_validator
 
-from radarize.plain import Frozen
+from radarize.io.plain import Frozen
+from radarize.io.yamlfile import changed
 from radarize.radar.boards import BOARDS, Board, load_board
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS, load_config
-from radarize.yamlfile import changed
 from radarsim.motion.trajectory import Mounting
 from radarsim.receiver.frontend_config import FrontEndConfig
 

@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable
 from typing import NamedTuple
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.dca1000 import DATA_PORT, MAX_PAYLOAD
 from radarize.radar.dca1000_commands import (
     COMMAND_PORT,

@@ -7,7 +7,7 @@ finds wrong with the chirps is said in this project's words, where the firmware 
 from collections.abc import Callable
 from typing import Protocol
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.cfg import FIELDS, parse_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits

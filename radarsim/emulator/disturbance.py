@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 
 #: How many packets overtake one that is reordered, or delayed, from and to. Delayed ones are still within the 1 MiB in
 #: which `FrameAssembler` takes late packets.

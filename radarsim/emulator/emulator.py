@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarsim.emulator.board import Addresses, Board, BoardSockets
 from radarsim.emulator.commandline import CommandLine

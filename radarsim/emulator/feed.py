@@ -6,7 +6,7 @@ import threading
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.config import RadarConfig
 from radarsim.emulator.source import Source
 

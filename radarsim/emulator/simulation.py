@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import load_config

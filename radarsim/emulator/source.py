@@ -9,10 +9,10 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Int16
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import encode
-from radarize.recording import Recording
 
 #: What does not change the samples that the radar sends: corrections for whoever reads them.
 NOT_IN_SAMPLES = {"board", "range_bias", "channel_calibration"}

@@ -9,7 +9,7 @@ import tty
 from collections.abc import Callable
 from pathlib import Path
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.emulator.commandline import BANNER, PROMPT
 
 BAUD, _SPEED = 115200, termios.B115200

@@ -10,7 +10,7 @@ import glob
 import os
 import re
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 
 OLDEST = 19
 PACKAGE = "libllvm19"

@@ -20,7 +20,7 @@ def default_workers() -> int:
 
 
 def share_with_drjit() -> None:
-    """Give Dr.Jit as many threads as Numba has here, this process's share of the cores (`radarize.jobs`)."""
+    """Give Dr.Jit as many threads as Numba has here, this process's share of the cores (`radarize.io.jobs`)."""
     llvm.require()
     import drjit
 

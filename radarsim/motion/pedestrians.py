@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.machine.rng import keyed_rng
 from radarsim.motion.tour import Ground
 from radarsim.motion.trajectory import Motion

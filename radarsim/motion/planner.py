@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.motion.drive import drive
 from radarsim.motion.platforms import PLATFORMS, Platform
 from radarsim.motion.tour import SLACK, route, tour

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from radarize.yamlfile import read_beside
+from radarize.io.yamlfile import read_beside
 from radarsim.world.clearance import LOWEST
 
 

@@ -10,7 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import cKDTree
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.motion.band import SLACK, relax
 from radarsim.world.clearance import RESOLUTION, Clearance
 

@@ -13,8 +13,8 @@ from jaxtyping import Float
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from radarize.errors import InputError
-from radarize.tum import read_tum
+from radarize.io.errors import InputError
+from radarize.io.tum import read_tum
 
 _FASTEST = 20.0  # m/s between two poses of a file: beyond it, they are no positions in m or no times in s
 _SHARPEST = np.deg2rad(120)  # between two poses: beyond it, nobody knows which way round

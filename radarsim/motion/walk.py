@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.machine.rng import keyed_rng
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.platforms import PLATFORMS

@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Float
 from numpy.typing import ArrayLike
 
-from radarize.errors import InputError
-from radarize.files import read_text
-from radarize.tum import read_tum
-from radarize.yamlfile import read_yaml
+from radarize.io.errors import InputError
+from radarize.io.files import read_text
+from radarize.io.tum import read_tum
+from radarize.io.yamlfile import read_yaml
 
 _APART = 0.5  # m between the way-points taken from a trajectory
 

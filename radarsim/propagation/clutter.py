@@ -29,7 +29,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.special import gammaincc
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.propagation.hashgrid import Grid
 from radarsim.propagation.scatterers import BOUNCE_STRIDE, Scatterers
 from radarsim.world.scene import Scene

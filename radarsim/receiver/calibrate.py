@@ -13,13 +13,13 @@ import numpy as np
 from jaxtyping import Complex, Float
 from scipy.optimize import minimize, minimize_scalar
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarize.radar.array import virtual_positions
 from radarize.radar.boards import load_board
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
 from radarize.radar.windows import periodic
-from radarize.recording import Recording
 from radarsim.receiver.frontend import BOLTZMANN, ROOM_TEMPERATURE, FrontEnd
 from radarsim.receiver.frontend_config import Band, Channel, FrontEndConfig, Leakage, Mismatch, MountEcho, PhaseNoise
 from radarsim.receiver.phasenoise import density

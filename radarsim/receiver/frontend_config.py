@@ -11,11 +11,11 @@ import yaml
 from jaxtyping import Complex, Float
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.replacing import replacing
+from radarize.io.yamlfile import changed, read_yaml
 from radarize.radar.boards import Board, load_board
 from radarize.radar.config import SPEED_OF_LIGHT
-from radarize.replacing import replacing
-from radarize.yamlfile import changed, read_yaml
 from radarsim.propagation.antenna import ISOTROPIC, Antenna
 from radarsim.world.validation import format_validation_error
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.errors import InputError
-from radarize.recording import Recording, add
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording, add
 from radarsim.recording.batches import Batches
 from radarsim.scenario import Scenario
 from radarsim.sensors.suite import Suite

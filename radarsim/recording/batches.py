@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int16
 
-from radarize.errors import InputError
-from radarize.jobs import Report, perform
+from radarize.io.errors import InputError
+from radarize.io.jobs import Report, perform
 from radarsim.machine.threads import default_workers, share_with_drjit
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.suite import Suite

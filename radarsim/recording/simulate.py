@@ -11,11 +11,11 @@ import numpy as np
 from llvmlite.binding import get_host_cpu_name
 
 from radarize import __version__
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording, RecordingWriter, spare
 from radarize.radar.config import RadarConfig
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import load_config
-from radarize.recording import Recording, RecordingWriter, spare
 from radarsim.motion.pedestrians import crowded
 from radarsim.motion.statistics import Statistics, crossings
 from radarsim.motion.walk import Walk

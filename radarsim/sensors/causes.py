@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radarize.recording import Stream
+from radarize.io.recording import Stream
 from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, UInt16
 
-from radarize.recording import Product, Stream
+from radarize.io.recording import Product, Stream
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 

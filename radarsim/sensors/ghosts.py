@@ -1,11 +1,11 @@
 """Path type of each cell of the range-azimuth map: direct echoes, ghosts, floor and ceiling, moving objects.
 
-The map of each path type is that of `radarize.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its part of
-the I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the window's
-transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; and of the burst's
-loops a few instants suffice, for the map sums over Doppler, which is the mean over loops. Without noise, converter and
-channel mismatch, which calibration removes; and without the smear over azimuth of echoes that close faster than
-`RadarConfig.max_velocity`, whose delays between transmitters the map takes out at the wrong speed.
+The map of each path type is that of `radarize.signal.heatmaps.Heatmaps.range_azimuth` (Bartlett, same windows) of its
+part of the I/Q, at a fraction of the cost: it needs neither samples nor transforms. An echo's range spectrum is the
+window's transform about its beat frequency, eight bins wide, so each echo adds eight numbers per antenna; and of the
+burst's loops a few instants suffice, for the map sums over Doppler, which is the mean over loops. Without noise,
+converter and channel mismatch, which calibration removes; and without the smear over azimuth of echoes that close
+faster than `RadarConfig.max_velocity`, whose delays between transmitters the map takes out at the wrong speed.
 """
 
 from typing import NamedTuple
@@ -14,10 +14,10 @@ import numpy as np
 from jaxtyping import Complex, Float, Float32, Int, UInt8
 from numba import njit, prange
 
+from radarize.io.recording import Stream
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT, RadarConfig
 from radarize.radar.windows import taylor
-from radarize.recording import Stream
 from radarsim.propagation.burst import BurstClock
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.synthesis import _sincos_cycles

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from radarize.recording import Product, Stream
+from radarize.io.recording import Product, Stream
 from radarsim.motion.trajectory import turned
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.depth import MOUNT, mount

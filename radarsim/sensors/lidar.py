@@ -1,9 +1,9 @@
-"""A lidar beside the radar, as pictures of its points at its own height (`radarize.polar`)."""
+"""A lidar beside the radar, as pictures of its points at its own height (`radarize.signal.polar`)."""
 
 import numpy as np
 from jaxtyping import Float
 
-from radarize import polar
+from radarize.signal import polar
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.scan import headings
 from radarsim.sensors.sensor import Sensor

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radarize.recording import Stream
+from radarize.io.recording import Stream
 from radarsim.propagation.burst import BurstClock
 from radarsim.propagation.path_types import PathType
 from radarsim.scenario import Frames, Scenario

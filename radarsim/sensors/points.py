@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radarize.recording import Stream
+from radarize.io.recording import Stream
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 
@@ -11,7 +11,7 @@ class ChipPoints(Sensor):
     """TI's point cloud of every frame, from the simulated samples."""
 
     def __init__(self, scenario: Scenario):
-        from radarize.points import COLUMNS, PointClouds  # loads PyTorch: two seconds that few recordings need
+        from radarize.signal.points import COLUMNS, PointClouds  # loads PyTorch: two seconds that few recordings need
 
         super().__init__(scenario)
         self._clouds = PointClouds(scenario.config)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radarize.recording import Stream
+from radarize.io.recording import Stream
 from radarsim.motion.trajectory import turned
 from radarsim.scenario import Frames
 from radarsim.sensors.sensor import Sensor

@@ -10,8 +10,8 @@ from enum import IntEnum
 import numpy as np
 from jaxtyping import Float, UInt8
 
+from radarize.io.recording import Product, Stream
 from radarize.radar.config import RadarConfig
-from radarize.recording import Product, Stream
 from radarsim.motion.trajectory import Motion, turned
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor

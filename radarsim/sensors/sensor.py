@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from radarize.recording import Product, Stream
+from radarize.io.recording import Product, Stream
 from radarsim.scenario import Frames, Scenario
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.machine.threads import one_blas_thread
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.causes import AdcByCause, CauseCounts

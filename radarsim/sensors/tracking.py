@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from radarize.recording import Stream
+from radarize.io.recording import Stream
 from radarsim.scenario import Frames, Scenario
 from radarsim.sensors.sensor import Sensor
 

@@ -1,7 +1,7 @@
 """Comparison of a recording with its twin, frame by frame: the same radar on the same walk, in the real place and in a
 model of it (`radarsim twin`).
 
-Maps are those that networks see (`radarize.features.maps`), in dB over their own median, so that the receiver's gain,
+Maps are those that networks see (`radarize.signal.maps`), in dB over their own median, so that the receiver's gain,
 which is a figure of its own, and the noise of empty cells drop out. Velocities and scans are made without networks, of
 single frames (Doppler least squares; Capon's maps, first echo), so that any radar has them.
 """
@@ -15,14 +15,14 @@ import numpy as np
 import pandas as pd
 from jaxtyping import Float, Int
 
-from radarize.batch import Batch, Signal
-from radarize.errors import InputError
-from radarize.features.maps import MAPS
-from radarize.mapping.scans import Maps, ScanConfig
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarize.odometry.doppler import DopplerVelocity
 from radarize.radar.config import RadarConfig
 from radarize.radar.noise import noise_floor, noise_profile
-from radarize.recording import Recording
+from radarize.scans.extraction import Maps, ScanConfig
+from radarize.signal.batch import Batch, Signal
+from radarize.signal.maps import MAPS
 from radarsim.twin.likeness import correlation, foreground, frechet_distance, patch_statistics, similarity
 
 #: What is compared of every frame, with unit and meaning. Those of maps end in the map's name.

@@ -64,7 +64,7 @@ def similarity(
 
 def patch_statistics(maps: Float[np.ndarray, "frame row column"]) -> Float[np.ndarray, "frame patch 5"]:
     """What patches that overlap by half look like: quantiles of their levels about the map's mean, as the networks see
-    them (`radarize.nets.maps.level`), and mean absolute steps from row to row and from column to column, dB.
+    them (`radarize.learning.nets.maps.level`), and mean absolute steps from row to row and from column to column, dB.
 
     Args:
         maps: dB, at least `PATCH` large.

@@ -9,13 +9,13 @@ import numpy as np
 from plotly.colors import qualitative
 from plotly.subplots import make_subplots
 
-from radarize.heatmaps import Heatmaps
-from radarize.mapping.scans import BEARINGS
-from radarize.recording import Recording
-from radarize.replacing import write_whole
-from radarize.report.drawings import canvas, draw_doppler, draw_fan, draw_profiles, draw_scan
-from radarize.report.page import COLORS, INK, Page
-from radarize.report.plots import line, panels
+from radarize.evaluation.report.drawings import canvas, draw_doppler, draw_fan, draw_profiles, draw_scan
+from radarize.evaluation.report.page import COLORS, INK, Page
+from radarize.evaluation.report.plots import line, panels
+from radarize.io.recording import Recording
+from radarize.io.replacing import write_whole
+from radarize.signal.bearings import BEARINGS
+from radarize.signal.heatmaps import Heatmaps
 from radarsim.twin.comparison import FIGURES, Comparison, compare
 
 #: Range profiles over time: a picture has no room for more.

@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarize.radar.boards import load_board
 from radarize.radar.config import RadarConfig
-from radarize.recording import Recording
 from radarsim.motion.statistics import crossings
 from radarsim.motion.trajectory import Motion, Mounting, motion_through
 from radarsim.receiver.calibrate import calibrate

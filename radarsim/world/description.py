@@ -42,9 +42,9 @@ import numpy as np
 import trimesh
 from pydantic import BaseModel, ConfigDict, Field, create_model, field_validator
 
-from radarize.errors import InputError
-from radarize.files import within
-from radarize.yamlfile import read_yaml
+from radarize.io.errors import InputError
+from radarize.io.files import within
+from radarize.io.yamlfile import read_yaml
 from radarsim.world import plugins, shapes
 from radarsim.world.fields import Length, Name, Strict, Vector
 from radarsim.world.generators.buildings import Building, Office

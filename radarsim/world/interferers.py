@@ -16,9 +16,9 @@ from jaxtyping import Float
 from pydantic import Field, field_validator
 from scipy.spatial.transform import Rotation
 
+from radarize.io.yamlfile import changed
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS
-from radarize.yamlfile import changed
 from radarsim.world.fields import Name, Strict
 
 Number = Annotated[float, Field(ge=-1e4, le=1e4)]

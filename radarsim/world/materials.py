@@ -26,9 +26,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Complex, Float
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.yamlfile import read_beside
 from radarize.radar.config import SPEED_OF_LIGHT
-from radarize.yamlfile import read_beside
 
 EPS0 = 8.8541878128e-12
 _BAND = 77e9  # Hz, where what is scattered is weighed against what is reflected

@@ -19,7 +19,7 @@ from jaxtyping import Float
 from pydantic import Field, field_validator, model_validator
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.world import shapes
 from radarsim.world.fields import Length, Name, Number, Strict
 from radarsim.world.fields import Vector as Point

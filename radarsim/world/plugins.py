@@ -13,7 +13,7 @@ files that a radar's configuration names by path.
 from functools import cache
 from importlib.metadata import entry_points
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 
 GROUP = "radarsim.plugins"
 

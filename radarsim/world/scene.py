@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from numba import njit
 from numpy.typing import ArrayLike
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.machine import llvm
 from radarsim.world import shapes
 from radarsim.world.description import built, find, read, split_level

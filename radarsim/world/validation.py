@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import pytest
 
 import radarize as rz
 import radarsim
-from radarize.tum import planar_poses, write_tum
+from radarize.io.tum import planar_poses, write_tum
 
 #: m/s, along x.
 SPEED = 0.5

@@ -10,11 +10,11 @@ import typer
 import radarize as rz
 import radarsim
 from radarize import cli as radarize_cli
-from radarize.api.live import LiveOptions
-from radarize.api.load import CaptureOptions
+from radarize.capture.api import LiveOptions
 from radarize.capture.board import Network
 from radarize.capture.uart import BAUD
-from radarize.importers import Given
+from radarize.io.importers import Given
+from radarize.io.load import CaptureOptions
 from radarsim import cli as radarsim_cli
 from radarsim.api import Plan
 from radarsim.motion.walk import Walk

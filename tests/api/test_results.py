@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 
 import radarize as rz
 import radarsim
-from radarize.exporters import export
-from radarize.heatmaps import Heatmaps
-from radarize.recording import RecordingWriter
-from radarize.tum import read_tum
+from radarize.io.exporters import export
+from radarize.io.recording import RecordingWriter
+from radarize.io.tum import read_tum
+from radarize.signal.heatmaps import Heatmaps
 from tests.api.conftest import SPEED
 
 PLAIN = {"odometry": "doppler", "scans": "first-echo"}
@@ -202,7 +202,7 @@ def test_notebooks_show_pictures_and_tables(rec, walk):
         (lambda rec: rz.point_cloud("missing.h5"), "missing.h5: no such file"),
         (lambda rec: rz.plot(3), "int cannot be drawn"),
         (lambda rec: rz.plot(rz.range_azimuth(rec[:2])), "axes are frame, range, azimuth, expected a map of one frame"),
-        (lambda rec: rz.odometry(rec, "magic"), "odometry is 'magic', expected one of fused"),
+        (lambda rec: rz.odometry(rec, "magic"), "odometry is 'magic', expected one of doppler"),
         (lambda rec: rz.odometry(rec[:0]), "has no whole frame"),
         (lambda rec: rz.run(rec, scans="magic"), "scans is 'magic', expected one of"),
         (lambda rec: rz.run(rec, settings="old"), "settings is 'old', expected corrected or published"),

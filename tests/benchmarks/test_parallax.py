@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.parallax import _FAR, followed, row, strong
-from radarize.polar import AZIMUTHS, RANGES
+from radarize.signal.polar import AZIMUTHS, RANGES
 
 
 def picture(echoes):

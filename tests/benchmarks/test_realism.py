@@ -5,8 +5,8 @@ import pytest
 
 from benchmarks.likeness import discriminator, statistics
 from benchmarks.likeness.pictures import CONFIG, TIMES, buildings
-from radarize import polar
 from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.signal import polar
 
 
 def test_the_chirps_are_those_of_the_walks():

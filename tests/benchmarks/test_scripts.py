@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import results
-from radarize.benchmark.results import Results
+from radarize.evaluation.benchmark.results import Results
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
 

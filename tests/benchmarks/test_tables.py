@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from benchmarks import transfer
-from radarize.api.run import run
-from radarize.benchmark.dataset import DataSet
-from radarize.benchmark.followed import Followed
-from radarize.benchmark.runs import figures
+from radarize.evaluation.benchmark.dataset import DataSet
+from radarize.evaluation.benchmark.followed import Followed
+from radarize.evaluation.benchmark.runs import figures
 from radarize.evaluation.motion import velocity_errors
+from radarize.pipeline.run import run
 from radarsim.recording.simulate import simulate
 from radarsim.world.scene import Scene
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.unseen import pose_nees
+from radarize.io.pose import compose
 from radarize.odometry.claims import Claims
-from radarize.pose import compose
 
 FRAMES, WALKS = 40, 400
 

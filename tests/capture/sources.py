@@ -6,7 +6,7 @@ import time
 import numpy as np
 
 from radarize.capture.stream import Outlet
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.assembler import PacketCounts
 from radarize.radar.config import RadarConfig
 

@@ -6,7 +6,7 @@ import threading
 import pytest
 
 from radarize.capture.board import Board, Network
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings
 from radarize.radar.presets import PRESETS
 from tests.virtual import SMALL, network

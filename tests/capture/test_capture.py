@@ -15,12 +15,12 @@ from radarize.capture import stream
 from radarize.capture.receiver import buffer_warning
 from radarize.capture.record import record
 from radarize.capture.sensor import Sensor
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarize.radar.assembler import FrameAssembler
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.dca1000 import MAX_PAYLOAD, decode, encode
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording
 from radarsim.emulator.disturbance import Disturbance
 from tests import virtual
 from tests.packets import packets

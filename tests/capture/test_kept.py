@@ -19,12 +19,13 @@ from radarize.capture.record import record
 from radarize.capture.stream import StreamCounts
 from radarize.capture.uart import Uart
 from radarize.cli import app
-from radarize.console import until_interrupted
-from radarize.errors import InputError
-from radarize.methods.registry import CLASSICAL, Inputs
+from radarize.io.console import until_interrupted
+from radarize.io.errors import InputError
+from radarize.io.recording import Product, Recording, RecordingWriter, Stream, recover
+from radarize.io.recording import writer as writer_module
+from radarize.pipeline.method import Inputs
+from radarize.pipeline.methods import CLASSICAL
 from radarize.radar.assembler import PacketCounts
-from radarize.recording import Product, Recording, RecordingWriter, Stream, recover
-from radarize.recording import writer as writer_module
 from tests.disk import fill
 from tests.virtual import SMALL
 
@@ -245,9 +246,9 @@ def test_what_was_simulated_may_be_replaced(tmp_path):
 
 def test_a_live_pipeline_takes_no_more_frames_at_a_time_than_it_was_prepared_for(monkeypatch):
     """What libraries keep for each number of frames is there before the first one comes."""
-    sizes, take, asked = [], live.Intake.take, []
+    sizes, take, asked = [], live.Preprocessor.process, []
     monkeypatch.setattr(
-        live.Intake, "take", lambda self, adc, *more: (sizes.append(len(adc)), take(self, adc, *more))[1]
+        live.Preprocessor, "process", lambda self, adc, *more: (sizes.append(len(adc)), take(self, adc, *more))[1]
     )
     live.prepare(Inputs(SMALL), CLASSICAL)
     monkeypatch.setattr(live, "follow", lambda *_, most, **__: asked.append(most) or [])

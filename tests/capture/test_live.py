@@ -9,19 +9,20 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from radarize.batch import Intake
 from radarize.capture.live import Live, prepare
 from radarize.capture.page import Page
 from radarize.capture.record import Keeper
 from radarize.capture.replay import Replay
 from radarize.cli import app
-from radarize.errors import InputError
-from radarize.mapping.scans import BEARINGS
-from radarize.methods.registry import CLASSICAL, Inputs, Workshop
-from radarize.pipeline import Result
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording, RecordingWriter
+from radarize.pipeline.method import Inputs
+from radarize.pipeline.methods import CLASSICAL, make_pipeline
+from radarize.pipeline.pipeline import Result
 from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording, RecordingWriter
+from radarize.signal.batch import Preprocessor
+from radarize.signal.bearings import BEARINGS
 from radarize.slam.drawing import Drawing
 from radarize.slam.node import Node, Scan
 from tests import virtual
@@ -80,23 +81,23 @@ def test_a_replay_gives_what_the_file_gives(walk, tmp_path, every):
         with RecordingWriter(tmp_path / "again.h5", stream.config) as writer:
             live.run(stream, threading.Event(), keeper=Keeper(writer))
     assert live.pipeline.seconds["page"] > 0
-    offline, intake = Workshop(inputs).pipeline(**CLASSICAL), Intake(inputs.signal, every)
+    offline, preprocessor = make_pipeline(inputs, **CLASSICAL), Preprocessor(inputs.signal, every)
     with Recording(walk) as one, Recording(tmp_path / "again.h5") as other:
         # In the live view's own batches: on some processors sums are ordered otherwise in batches of another size.
         ends = [*(each.frames[-1] + 1 for each in live.results[:-1]), FRAMES]
         spans = zip([0, *ends[:-1]], ends, strict=True)
-        results = [offline.push(intake.take(one.adc(a, b), one.times[a:b], one.valid(a, b))) for a, b in spans]
+        results = [offline.push(preprocessor.process(one.adc(a, b), one.times[a:b], one.valid(a, b))) for a, b in spans]
         assert np.array_equal(one.adc(0, FRAMES), other.adc(0, FRAMES))
         assert np.array_equal(one.valid(0, FRAMES), other.valid(0, FRAMES)) and np.array_equal(one.times, other.times)
     assert poses(live.results) == pytest.approx(poses(results), abs=1e-6)
     frames = [np.concatenate([each.frames for each in some]) for some in (live.results, results)]
     wanted = [k for k in range(0, FRAMES, every) if k != FRAMES - 2]
-    assert frames[0].tolist() == frames[1].tolist() == wanted and live.intake.lost == intake.lost == 1
-    assert live.losses.lost_frames == 1 and live.intake.taken == FRAMES // every and stream.counts.dropped == 0
+    assert frames[0].tolist() == frames[1].tolist() == wanted and live.preprocessor.lost == preprocessor.lost == 1
+    assert live.losses.lost_frames == 1 and live.preprocessor.taken == FRAMES // every and stream.counts.dropped == 0
 
 
 def test_foxglove_gets_what_the_page_gets(walk):
-    """The protocol itself: tests/test_foxglove.py."""
+    """The protocol itself: tests/evaluation/test_foxglove.py."""
     sent = []
 
     class Server:

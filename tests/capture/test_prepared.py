@@ -9,7 +9,8 @@ import sys
 import numpy as np
 
 from radarize.capture.live import prepare
-from radarize.methods.registry import CLASSICAL, Inputs
+from radarize.pipeline.method import Inputs
+from radarize.pipeline.methods import CLASSICAL
 from radarize.radar.presets import PRESETS
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig

@@ -11,7 +11,7 @@ import pytest
 
 from radarize.capture.ring import FrameRing
 from radarize.capture.stream import Stream, follow
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from tests.capture import sources
 from tests.virtual import SMALL
 

@@ -9,7 +9,7 @@ import pytest
 import serial
 
 from radarize.capture.uart import PROMPT, Uart, commands, text_for
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
 from radarsim.emulator.commandline import CommandLine

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import RecordingWriter
 from radarize.radar.presets import PRESETS
-from radarize.recording import RecordingWriter
 from radarsim.dataset.task import ATTRIBUTE, Task
 from tests.disk import fill
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from radarize.errors import DiskFull, InputError
-from radarize.jobs import News
-from radarize.recording import Recording
+from radarize.io.errors import DiskFull, InputError
+from radarize.io.jobs import News
+from radarize.io.recording import Recording
 from radarsim.dataset import physics, run
 from radarsim.dataset.run import make
 from tests.dataset.fakes import FakeSpecification, fake

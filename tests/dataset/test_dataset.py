@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from radarize.console import run
-from radarize.errors import InputError
-from radarize.features.maps import MAPS
-from radarize.recording import Recording
+from radarize.io.console import run
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
+from radarize.signal.maps import MAPS
 from radarsim.cli import app
 from radarsim.motion.walk import Walk
 from radarsim.world.scene import Scene

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.recording import Recording
+from radarize.io.recording import Recording
 from radarsim.dataset.task import Stale
 from tests.dataset import hall
 

@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest, lognorm, norm, truncnorm, uniform
 
-from radarize.console import run
-from radarize.errors import InputError
-from radarize.recording import Recording
+from radarize.io.console import run
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarsim.cli import app
 from radarsim.dataset.randomise import LIMITS, Distribution, Randomise, mounting
 from radarsim.dataset.run import INDEX, make

@@ -8,11 +8,11 @@ import pytest
 import trimesh
 import yaml
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.yamlfile import read_yaml
 from radarize.radar.array import azimuth_row, virtual_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS, load_config
-from radarize.yamlfile import read_yaml
 from radarsim.dataset import specification
 from radarsim.dataset.specification import Specification
 from radarsim.receiver.frontend_config import Channel, FrontEndConfig, Leakage

@@ -11,13 +11,13 @@ import trimesh
 import yaml
 from PIL import Image
 
-from radarize.exporters import export
-from radarize.methods.configuration import Configuration
-from radarize.recording import Recording
+from radarize.io.exporters import export
+from radarize.io.recording import Recording
+from radarize.pipeline.config import Configuration
 from radarsim.world.description import shipped
-from tests.importers.ros import write_published
-from tests.importers.rover import write_sequence
-from tests.importers.test_import_pcap import pcap, stream
+from tests.io.importers.ros import write_published
+from tests.io.importers.rover import write_sequence
+from tests.io.importers.test_import_pcap import pcap, stream
 
 #: Of data sets: recordings that are made of them, by building and platform; two variants, of `SECONDS` each. What their
 #: buildings are called is their own, what is walked through is `PLACE`, which takes no time to build and to plan in.

@@ -43,7 +43,7 @@ TYPED_INSTEAD = (
     (r"^(radarize train radarhd-pictures .*)$", r"\1 --frames 3"),  # two seconds are more than the walks have
     (r"--nproc-per-node 4", "--nproc-per-node 1"),
     (r"^(radarize (?:capture|live) .*)$", r"\1 --duration 0.5"),
-    # A cluster: tests/jobs and tests/dataset have one.
+    # A cluster: tests/io/jobs and tests/dataset have one.
     (r" --ray auto", ""),
     # The virtual radar in place of a real one, on ports that are free, its recording left alone.
     (r"--port \S+( --host \S+ --dca \S+)?", "--port {tty} --host 127.0.0.1 --dca 127.0.0.2 {ports}"),

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS, load_config

@@ -7,9 +7,9 @@ import sys
 import numpy as np
 import pytest
 
-from radarize.console import run
+from radarize.io.console import run
+from radarize.io.recording import Recording
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording
 from radarsim.cli import app
 from tests.emulator.client import SMALL
 from tests.virtual import BOARD, COMPUTER, CONFIG, emulator, record

@@ -7,11 +7,11 @@ import time
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarize.radar.cfg import write_cfg
 from radarize.radar.dca1000 import Packet, decode, encode
 from radarize.radar.dca1000_commands import Command, Reply, Request, Status
-from radarize.recording import Recording
 from radarsim.emulator.commandline import PROMPT
 from radarsim.emulator.disturbance import Disturbance
 from radarsim.emulator.simulation import Simulation

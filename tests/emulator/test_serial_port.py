@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.dca1000_commands import Command, Reply
 from radarsim.emulator.commandline import PROMPT
 from tests.emulator.client import SMALL, attached

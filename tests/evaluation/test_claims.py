@@ -5,9 +5,9 @@ import pytest
 
 from radarize.evaluation.claims import pose_nees
 from radarize.evaluation.metrics import evaluate_trajectory
-from radarize.evaluation.trajectory import trajectory
-from radarize.pose import compose, inverse
-from radarize.tum import planar_poses
+from radarize.io.alignment import trajectory
+from radarize.io.pose import compose, inverse
+from radarize.io.tum import planar_poses
 
 TIMES = np.arange(0.0, 400.0)
 

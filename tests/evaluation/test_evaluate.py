@@ -6,11 +6,11 @@ import h5py
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
 from radarize.evaluation.evaluate import evaluate
 from radarize.evaluation.mapping import distance_to_plan, segment_points
-from radarize.runfolder import OccupancyMap, RunFolder
-from radarize.runfolder.occupancy import read_pgm
+from radarize.io.errors import InputError
+from radarize.pipeline.runfolder import OccupancyMap, RunFolder
+from radarize.pipeline.runfolder.occupancy import read_pgm
 from tests.evaluation.fake_run import PLAN, write_run
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from radarize.evaluation.mapping import free_space_iou
-from radarize.runfolder import OccupancyMap
+from radarize.pipeline.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid
 

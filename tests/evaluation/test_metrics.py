@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError
 from radarize.evaluation.metrics import evaluate_trajectory
-from radarize.evaluation.trajectory import load, matched, trajectory
+from radarize.io.alignment import load, matched, trajectory
+from radarize.io.errors import InputError
 from tests.evaluation.fake_run import write_run
 
 FREIBURG = Path(__file__).parents[3] / "shared" / "recordings" / "tum-freiburg1"

@@ -6,9 +6,9 @@ import pytest
 
 from radarize.evaluation.scans import true_ranges
 from radarize.evaluation.stress import SOURCES, missed, sources
+from radarize.io.recording import Product, RecordingWriter, Stream
+from radarize.pipeline.runfolder.reader import Scans
 from radarize.radar.presets import PRESETS
-from radarize.recording import Product, RecordingWriter, Stream
-from radarize.runfolder.reader import Scans
 from tests.evaluation.fake_run import write_run
 
 CONFIG = PRESETS["radarize"].model_copy(update={"loops": 2, "samples": 8})

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarize.methods.registry import CLASSICAL
-from radarize.pose import compose
+from radarize.io.pose import compose
+from radarize.io.recording import RecordingWriter
+from radarize.pipeline.methods import CLASSICAL
+from radarize.pipeline.runfolder import OccupancyMap
+from radarize.pipeline.runfolder.occupancy import MapFile
 from radarize.radar.presets import PRESETS
-from radarize.recording import RecordingWriter
-from radarize.runfolder import OccupancyMap
-from radarize.runfolder.occupancy import MapFile
 from tests.examples import ros
 
 NODE = Path(__file__).parents[2] / "examples" / "ros2" / "radarize_node.py"

@@ -10,19 +10,19 @@ import numpy as np
 from hypothesis import strategies as st
 from scipy.io import savemat
 
-import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
-from radarize.errors import InputError
-from radarize.importers import import_recording
+import radarize.io.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
+from radarize.io.errors import InputError
+from radarize.io.importers import import_recording
+from radarize.io.tum import read_tum
 from radarize.radar.assembler import FrameAssembler
 from radarize.radar.cfg import write_cfg
 from radarize.radar.dca1000 import decode, encode
 from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings, read_packet_settings
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import PRESETS, load_config
-from radarize.tum import read_tum
 from tests.fuzzing.damage import damaged, misspelled
 from tests.fuzzing.reader import CONFIG, CUBE, FRAMES, RECORDINGS, Reader, file, importing, use
-from tests.importers.test_import_pcap import pcap, pcapng, udp
+from tests.io.importers.test_import_pcap import pcap, pcapng, udp
 from tests.packets import packets
 
 

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 from hypothesis import strategies as st
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.cfg import write_cfg
 from radarize.radar.dca1000_commands import RAW_TWO_LANES, Command, Request, packet_settings
 from radarsim.emulator.board import Board

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 from hypothesis.strategies import SearchStrategy
 
-import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
-from radarize.contents import contents
-from radarize.errors import InputError
-from radarize.importers import Given, import_recording
+import radarize.io.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
+from radarize.evaluation.report.contents import contents
+from radarize.io.errors import InputError
+from radarize.io.importers import Given, import_recording
+from radarize.io.recording import Recording
 from radarize.radar.config import RadarConfig
-from radarize.recording import Recording
 
 RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 #: A reader may take so much processor time (s), and memory (bytes): buffers of a fixed size, and so many times the

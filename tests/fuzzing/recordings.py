@@ -9,13 +9,13 @@ import numpy as np
 from hypothesis import strategies as st
 from rosbags.rosbag2 import StoragePlugin
 
-import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
+import radarize.io.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
+from radarize.io.recording import Product, RecordingWriter, Stream
 from radarize.radar.cfg import write_cfg
-from radarize.recording import Product, RecordingWriter, Stream
 from tests.fuzzing.damage import damaged
 from tests.fuzzing.hdf5 import RECORDING, altered, edits
 from tests.fuzzing.reader import CONFIG, FRAMES, Reader, file, importing, use
-from tests.importers.ros import write_published
+from tests.io.importers.ros import write_published
 
 
 @functools.cache

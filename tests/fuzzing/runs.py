@@ -8,17 +8,17 @@ import numpy as np
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-import radarize.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
+import radarize.io.importers.bag  # noqa: F401 -- imported at first use, and what its libraries take is no input's memory
 from radarize.evaluation.evaluate import evaluate
-from radarize.features.grid import Grid
-from radarize.features.maps import MapMaker
-from radarize.log import Log
-from radarize.methods.radarize.motion import RotationNet
-from radarize.nets.weights import Header, build, save
-from radarize.nets.weights import load as load_weights
+from radarize.learning.features.grid import Grid
+from radarize.learning.nets.motion import RotationNet
+from radarize.learning.nets.weights import Header, build, save
+from radarize.learning.nets.weights import load as load_weights
+from radarize.pipeline.log import Log
+from radarize.pipeline.runfolder import RunFolder
+from radarize.pipeline.runfolder.reader import SHAPES
 from radarize.radar.presets import PRESETS
-from radarize.runfolder import RunFolder
-from radarize.runfolder.reader import SHAPES
+from radarize.signal.maps import MapMaker
 from tests.evaluation.fake_run import write_run
 from tests.fuzzing.damage import damaged, misspelled
 from tests.fuzzing.hdf5 import altered, edits

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 from PIL import Image
 
-from radarize.methods.configuration import Configuration
+from radarize.pipeline.config import Configuration
 from radarize.slam.config import SlamConfig
 from radarsim.dataset.specification import Specification
 from radarsim.motion.waypoints import read_waypoints
@@ -109,7 +109,7 @@ def gltf() -> Reader:
 
 
 def _scene(path: Path) -> None:
-    from radarize.yamlfile import read_yaml
+    from radarize.io.yamlfile import read_yaml
 
     data = read_yaml(path)
     for level in (0, 1):

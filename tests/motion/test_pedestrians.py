@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarsim.motion.pedestrians import crowded
 from radarsim.motion.walk import Walk

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.motion.drive import STANDSTILL
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.platforms import PLATFORMS

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from radarize.errors import InputError
-from radarize.recording import Recording
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.platforms import PLATFORMS
 from radarsim.motion.waypoints import read_waypoints

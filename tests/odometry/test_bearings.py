@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 import torch
 
-from radarize.batch import Signal
-from radarize.heatmaps import Heatmaps
 from radarize.odometry.bearings import YAW, Bearings
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.echoes import Echo, Echoes
 from radarize.odometry.gaussian import Gaussian
 from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
 from radarize.radar.presets import PRESETS
+from radarize.signal.batch import Signal
+from radarize.signal.heatmaps import Heatmaps
 from tests.batches import of_spectrum
 
 CONFIG, FIRST = PRESETS["radarize"], 5

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from radarize.heatmaps import Heatmaps
 from radarize.odometry.doppler import DopplerVelocity, _fit
 from radarize.radar.presets import PRESETS
+from radarize.signal.heatmaps import Heatmaps
 from tests.batches import batch
 from tests.echoes import record
 from tests.rooms import antenna_gain, furnished_room

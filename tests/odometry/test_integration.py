@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from radarize.batch import Signal
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.pose import between, compose, exponential
 from radarize.odometry.doppler import DopplerVelocity, Velocities
 from radarize.odometry.integration import Odometry, VelocityConfig, VelocityFilter
 from radarize.odometry.rotation import MapRotation, Rotations
-from radarize.pose import between, compose, exponential
 from radarize.radar.presets import PRESETS
+from radarize.signal.batch import Signal
 from tests.batches import batch, of_spectrum
 from tests.echoes import record
 from tests.rooms import antenna_gain, furnished_room, walk
@@ -46,7 +46,7 @@ def walked():
 def track(walked):
     adc, stamps, _ = walked
     odometry = classical()
-    return [odometry.follow(batch(SIGNAL, adc[i : i + 50], stamps[i : i + 50])) for i in range(0, len(adc), 50)]
+    return [odometry.update(batch(SIGNAL, adc[i : i + 50], stamps[i : i + 50])) for i in range(0, len(adc), 50)]
 
 
 def test_walk(walked, track):
@@ -78,7 +78,7 @@ def test_covariance_of_steps(walked, track):
 def test_batch_size_does_not_matter(walked, track):
     adc, stamps, _ = walked
     odometry = classical()
-    parts = [odometry.follow(batch(SIGNAL, adc[i : i + 7], stamps[i : i + 7])) for i in range(0, 42, 7)]
+    parts = [odometry.update(batch(SIGNAL, adc[i : i + 7], stamps[i : i + 7])) for i in range(0, 42, 7)]
     np.testing.assert_allclose(np.concatenate([p.pose for p in parts]), track[0].pose[:42], atol=1e-4)
 
 
@@ -91,7 +91,7 @@ def test_standing_still_does_not_turn():
         return np.broadcast_to([3.0, 2.0, 0.0], (*t.shape, 3)), np.zeros(t.shape)
 
     adc = record(CONFIG, still, points, amplitudes, stamps, rng, 20.0, block=16, gain=antenna_gain)
-    result = classical().follow(batch(SIGNAL, adc, stamps))
+    result = classical().update(batch(SIGNAL, adc, stamps))
     assert np.abs(result.pose[:, :2]).max() < 1e-3
     assert np.abs(np.degrees(result.pose[:, 2])).max() < 0.5  # of a map match; it does not add up
 
@@ -106,7 +106,7 @@ def test_turning_on_the_spot_either_way():
             return np.broadcast_to([3.0, 2.0, 0.0], (*t.shape, 3)), rate * t
 
         adc = record(CONFIG, turning, points, amplitudes, stamps, rng, 20.0, block=16, gain=antenna_gain)
-        result = classical().follow(batch(SIGNAL, adc, stamps))
+        result = classical().update(batch(SIGNAL, adc, stamps))
         expected = rate * (stamps[-1] - stamps[0])
         assert result.pose[-1, 2] == pytest.approx(expected, rel=0.06)
 
@@ -116,7 +116,7 @@ def test_lost_frames_are_bridged(walked):
     adc, valid = adc[:80].copy(), np.ones((80, *CONFIG.frame_shape[:2]), bool)
     adc[40:43], valid[40:43] = 0, False
     adc[60, 10:20], valid[60, 10:20] = 0, False
-    result = classical().follow(batch(SIGNAL, adc, stamps[:80], valid))
+    result = classical().update(batch(SIGNAL, adc, stamps[:80], valid))
     assert np.isfinite(result.pose).all() and np.isfinite(result.covariance).all()
     assert np.linalg.norm(result.pose[-1, :2] - truth[79, :2]) < 0.06
     assert result.covariance[42, 2, 2] > 2 * result.covariance[39, 2, 2]
@@ -125,9 +125,9 @@ def test_lost_frames_are_bridged(walked):
 def test_times_must_ascend(walked):
     adc, stamps, _ = walked
     odometry = classical()
-    odometry.follow(batch(SIGNAL, adc[:2], stamps[:2]))
+    odometry.update(batch(SIGNAL, adc[:2], stamps[:2]))
     with pytest.raises(InputError, match="ascending"):
-        odometry.follow(batch(SIGNAL, adc[:2], stamps[:2]))
+        odometry.update(batch(SIGNAL, adc[:2], stamps[:2]))
 
 
 def test_estimators_can_be_swapped(walked):
@@ -140,7 +140,7 @@ def test_estimators_can_be_swapped(walked):
             n, seen = len(batch), np.ones(len(batch), bool)
             return Velocities(np.tile([1.0, 0.0], (n, 1)), np.tile(1e-4 * np.eye(2), (n, 1, 1)), np.ones(n, int), seen)
 
-    result = classical(velocity=Forward()).follow(batch(SIGNAL, adc[:20], stamps[:20]))
+    result = classical(velocity=Forward()).update(batch(SIGNAL, adc[:20], stamps[:20]))
     np.testing.assert_allclose(result.velocity[5:], np.tile([1.0, 0.0], (15, 1)), atol=0.02)
 
 
@@ -177,7 +177,7 @@ def test_a_turn_that_nothing_is_seen_of_is_claimed():
             return Rotations.independent(np.zeros(len(batch)), np.full(len(batch), 1e-8), np.ones(len(batch), bool))
 
     adc = record(CONFIG, nowhere, np.array([[2.0, 0.0, 0.0]]), np.zeros(1), stamps, rng, 20.0, block=16)
-    result = classical(rotation=MapRotation(SIGNAL.heatmaps, prior=Sure())).follow(batch(SIGNAL, adc, stamps))
+    result = classical(rotation=MapRotation(SIGNAL.heatmaps, prior=Sure())).update(batch(SIGNAL, adc, stamps))
     # People turn by 20 deg in a second, and more; and it is noise, so some frames match by chance.
     assert np.sqrt(result.covariance[1:, 2, 2].sum()) > np.radians(15)
 
@@ -212,7 +212,7 @@ def test_the_antennas_swing_about_the_origin():
     """Their middle is 1 cm to the left: turning to the left at 1.5 rad/s, it goes backward by 1.5 cm/s."""
     times = np.arange(60) * CONFIG.frame_period
     odometry = Odometry(CONFIG, Told(1.0 - 0.015, lever=0.01).velocity(), Told(rate=1.5).rotation())
-    found = odometry.follow(of_spectrum(SIGNAL, times, times))
+    found = odometry.update(of_spectrum(SIGNAL, times, times))
     assert found.velocity[30:, 0] == pytest.approx(1.0, abs=1e-3)
     antennas = DopplerVelocity(SIGNAL.heatmaps).lever
     # Eight of them half a wavelength apart, of which each is the sum of a transmitter's place and a receiver's.
@@ -230,7 +230,7 @@ def test_errors_that_last_add_up_to_what_is_claimed(period):
     right = told.estimate
     told.estimate = lambda batch: replace(right(batch), velocity=right(batch).velocity + wrong)
     times = np.arange(frames) * period
-    found = Odometry(CONFIG, told, heading).follow(of_spectrum(SIGNAL, times, times))
+    found = Odometry(CONFIG, told, heading).update(of_spectrum(SIGNAL, times, times))
     for span in (2.0, 10.0):
         each = round(span / period)
         ends = found.pose[::each, :2] - np.outer(times[::each], [1.0, 0.0])
@@ -242,7 +242,7 @@ def test_errors_that_last_add_up_to_what_is_claimed(period):
 def test_a_gap_is_claimed_by_its_length(gap):
     """As much as walks by hand change their speed meanwhile; within it, no step claims more than its velocities'."""
     times = np.concatenate([np.arange(10) * CONFIG.frame_period, 9 * CONFIG.frame_period + gap * np.array([1.0])])
-    found = Odometry(CONFIG, Told().velocity(), Told().rotation()).follow(of_spectrum(SIGNAL, times, times))
+    found = Odometry(CONFIG, Told().velocity(), Told().rotation()).update(of_spectrum(SIGNAL, times, times))
     spread = np.sqrt(found.covariance[:, 0, 0])
     by_hand = {0.2: 0.0015, 0.5: 0.018, 1.0: 0.072, 2.0: 0.263}
     assert spread[10] == pytest.approx(by_hand[gap], rel=0.25)
@@ -258,7 +258,7 @@ def test_an_unknown_turn_leaves_the_direction_unknown():
         turns = Rotations.independent(np.array([0, told]), np.array([0, spread**2]), np.ones(2, bool))
         rotation = SimpleNamespace(lag=0.0, estimate=lambda *_, turns=turns: turns)
         times = np.array([0.0, 1.0])
-        found.append(Odometry(CONFIG, Told().velocity(), rotation).follow(of_spectrum(SIGNAL, times, times)))
+        found.append(Odometry(CONFIG, Told().velocity(), rotation).update(of_spectrum(SIGNAL, times, times)))
     otherwise = [exponential(np.array([1.0, 0.0]), told + sigma * draw) for draw in draws]
     scatter = np.cov(np.stack([between(found[0].step[1], each) for each in otherwise]).T)
     assert np.abs(found[1].covariance[1] - found[0].covariance[1] - scatter).max() < 0.15 * scatter[1, 2]

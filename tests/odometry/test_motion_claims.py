@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from radarize.io.pose import between, compose, exponential
 from radarize.odometry.claims import _SCALE, Claims, Unknown, half_turned
-from radarize.pose import between, compose, exponential
 
 FRAMES, WALKS = 60, 10_000
 STEP = exponential(np.array([0.04, 0.01]), 0.03)

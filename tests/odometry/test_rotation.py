@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, map_coordinates
 
-from radarize.batch import Signal
+from radarize.io.pose import wrap
 from radarize.odometry.bearings import YAW
 from radarize.odometry.claims import Claims
 from radarize.odometry.doppler import Velocities
 from radarize.odometry.localmap import LocalMap, View
 from radarize.odometry.rotation import MapRotation, RotationConfig, Rotations
-from radarize.pose import wrap
 from radarize.radar.presets import PRESETS
+from radarize.signal.batch import Signal
 from tests.batches import of_spectrum
 
 CONFIG = PRESETS["radarize"]

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 from scipy.special import gamma
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.antenna import ISOTROPIC
 from radarsim.propagation.clutter import (

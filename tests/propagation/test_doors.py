@@ -21,7 +21,7 @@ from benchmarks.references.doors import (
     swinging,
 )
 from benchmarks.references.rigs import field
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.array import rx_positions, tx_positions
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.media import as_slab, lag

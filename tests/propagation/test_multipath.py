@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from benchmarks.references.brute_force import kirchhoff_mirror, transfer_matrix
 from benchmarks.references.reciprocity import CONFIG, DOOR, LAMBDA, sheet, there_and_back
 from benchmarks.references.rigs import ELEMENT, Rig, burst
-from radarize.heatmaps import Heatmaps
 from radarize.radar.config import SPEED_OF_LIGHT
+from radarize.signal.heatmaps import Heatmaps
 from radarsim.propagation.antenna import ISOTROPIC as ISOTROPIC_ANTENNA
 from radarsim.propagation.antenna import Antenna, amplitude_gain
 from radarsim.propagation.finder import PathFinder

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.boards import BOARDS
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import HIGH_PASS_1, HIGH_PASS_2, RadarConfig

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.assembler import FrameAssembler
 from radarize.radar.config import RadarConfig
 from radarize.radar.dca1000 import Packet, decode, encode, range_balance

@@ -1,6 +1,6 @@
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import PRESETS, load_config
 

@@ -3,7 +3,7 @@ import json
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.boards import BOARDS
 from radarize.radar.presets import load_config
 from radarize.radar.studio import parse_studio

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 
 from benchmarks.references.rigs import polar
-from radarize.errors import InputError
-from radarize.heatmaps import Heatmaps
-from radarize.importers.parameters import Given
+from radarize.io.errors import InputError
+from radarize.io.importers.parameters import Given
+from radarize.io.recording import Recording
 from radarize.radar.array import rx_positions, tx_positions
 from radarize.radar.boards import BOARDS, load_board
 from radarize.radar.cfg import parse_cfg, write_cfg
 from radarize.radar.config import RadarConfig
 from radarize.radar.presets import PRESETS, load_config
-from radarize.recording import Recording
+from radarize.signal.heatmaps import Heatmaps
 from radarsim.dataset.specification import Specification
 from radarsim.dataset.variant import Variant
 from radarsim.emulator.simulation import Simulation

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from benchmarks.references.rigs import Rig, polar
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording, RecordingWriter
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording, RecordingWriter
 from radarsim.propagation.finder import PathFinder
 from radarsim.propagation.scatterers import Scatterers
 from radarsim.receiver.calibrate import calibrate
@@ -14,7 +14,7 @@ from radarsim.receiver.frontend import FrontEnd
 from radarsim.receiver.frontend_config import Band, FrontEndConfig, Leakage, Mismatch, MountEcho
 from radarsim.receiver.synthesis import Synthesizer
 from radarsim.recording.simulate import simulate
-from tests.importers import public
+from tests.io.importers import public
 
 CONFIG = PRESETS["radarize"]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.references.front_end import CONFIG, PHASE_NOISE, db, law, noise_factor, power_by_bin, rng, skirt, tone
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarsim.propagation.antenna import ISOTROPIC, Antenna, amplitude_gain, gain_pattern
 from radarsim.receiver.frontend import FrontEnd

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from benchmarks.references.interferers import CASES, CONFIG, FAR, IDEAL, brute_force, facing, scenario
-from radarize.disturbance import find_flaws
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarize.radar.array import rx_positions
 from radarize.radar.config import SPEED_OF_LIGHT
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording
+from radarize.signal.disturbance import find_flaws
 from radarsim.motion.trajectory import Motion
 from radarsim.receiver.frontend_config import Band, FrontEndConfig
 from radarsim.recording.simulate import simulate

@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarize.console import run
-from radarize.features.keeping import keep_maps
-from radarize.recording import Recording
+from radarize.io.console import run
+from radarize.io.recording import Recording
+from radarize.learning.features.keeping import keep_maps
 from radarsim.cli import app
 from radarsim.dataset.run import INDEX, make
 from radarsim.dataset.specification import Specification

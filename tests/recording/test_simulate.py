@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording
 from radarsim.motion.planner import plan_motion
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from radarize.heatmaps import Heatmaps
 from radarize.radar.presets import PRESETS
+from radarize.signal.heatmaps import Heatmaps
 from radarsim.motion.walk import Walk
 from radarsim.propagation.path_types import PathType
 from radarsim.receiver.frontend_config import FrontEndConfig

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize import polar
+from radarize.signal import polar
 from radarsim.motion.trajectory import Motion
 from radarsim.sensors.lidar import Lidar
 from tests.sensors.mounting import beside, box, rows

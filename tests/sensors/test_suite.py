@@ -6,10 +6,10 @@ import h5py
 import numpy as np
 import pytest
 
-from radarize.contents import contents
-from radarize.errors import InputError
-from radarize.recording import Recording, RecordingWriter, Stream
-from radarize.report.recording import report_recording
+from radarize.evaluation.report.contents import contents
+from radarize.evaluation.report.recording import report_recording
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording, RecordingWriter, Stream
 from radarsim.recording.simulate import simulate
 from radarsim.sensors.suite import SENSORS, chosen
 

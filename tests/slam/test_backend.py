@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
-from radarize.log import Log
-from radarize.pose import between, compose
+from radarize.io.errors import InputError
+from radarize.io.pose import between, compose
+from radarize.io.tum import planar, read_tum
+from radarize.pipeline.log import Log
 from radarize.slam.backend import Slam
 from radarize.slam.config import PRESETS, SlamConfig
-from radarize.tum import planar, read_tum
 from tests.slam.world import align, ate, box, ring, scan, walk
 
 RADISH = Path(__file__).parents[3] / "shared" / "recordings" / "radish"

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from radarize.errors import InputError
-from radarize.log import Log
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording, RecordingWriter, Stream
+from radarize.io.tum import read_tum
 from radarize.odometry.inertial import Imu
+from radarize.pipeline.log import Log
 from radarize.radar.presets import PRESETS
-from radarize.recording import Recording, RecordingWriter, Stream
 from radarize.slam.backend import Slam
 from radarize.slam.config import GridConfig, SlamConfig
-from radarize.tum import read_tum
 
 AHEAD = np.zeros(3)
 

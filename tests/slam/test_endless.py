@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.pose import between, compose
+from radarize.io.pose import between, compose
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig
 from tests.slam.world import RATE, box, lap, play, ring, walk

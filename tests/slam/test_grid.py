@@ -5,8 +5,8 @@ import pytest
 import yaml
 from matplotlib import pyplot
 
-from radarize.errors import InputError
-from radarize.runfolder import OccupancyMap
+from radarize.io.errors import InputError
+from radarize.pipeline.runfolder import OccupancyMap
 from radarize.slam.config import GridConfig
 from radarize.slam.grid import OccupancyGrid, cross
 

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from radarize.pose import transform, wrap
+from radarize.io.pose import transform, wrap
 from radarize.slam.config import GridConfig
 from radarize.slam.correlation import Pyramid, scatter, search
 from radarize.slam.grid import OccupancyGrid

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.pose import between, compose
+from radarize.io.pose import between, compose
 from radarize.slam.config import OdometryConfig
 from radarize.slam.odometry import Drift, Odometry
 

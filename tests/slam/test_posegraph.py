@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.pose import between, compose
+from radarize.io.pose import between, compose
 from radarize.slam.posegraph import PoseGraph
 from tests.slam.world import SIGMA, ate, lap
 

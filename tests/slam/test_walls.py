@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from radarize.pose import transform
-from radarize.rightangles import past_right_angle, recognised
+from radarize.io.pose import transform
+from radarize.odometry.rightangles import past_right_angle, recognised
 from radarize.slam.backend import Slam
 from radarize.slam.config import SlamConfig, WallsConfig
 from radarize.slam.walls import Direction, Walls

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from radarize.pose import between, compose
+from radarize.io.pose import between, compose
 from radarize.slam.posegraph import PoseGraph
 
 #: Hz, and rad: of a radar's scans.

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording, RecordingWriter
 from radarize.radar.presets import PRESETS, load_config
-from radarize.recording import Recording, RecordingWriter
 from radarsim.motion.trajectory import Mounting
 from radarsim.recording.simulate import simulate
 from radarsim.twin.comparison import compare
@@ -21,7 +21,7 @@ from radarsim.twin.report import report_twin
 from radarsim.twin.twin import Options, make_twin
 from radarsim.world.materials import MATERIALS
 from radarsim.world.scene import Scene
-from tests.importers.public import captures
+from tests.io.importers.public import captures
 from tests.twin.poses import altered, shaken
 
 

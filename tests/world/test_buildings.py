@@ -7,7 +7,7 @@ import pytest
 import shapely
 from scipy import ndimage
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.motion.platforms import PLATFORMS
 from radarsim.world.clearance import RESOLUTION, Clearance
 from radarsim.world.generators.buildings import Building

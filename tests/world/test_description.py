@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.world import shapes
 from radarsim.world.scene import Scene
 from radarsim.world.surface_settings import SurfaceSettings

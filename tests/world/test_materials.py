@@ -5,7 +5,7 @@ import pickle
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarize.radar.presets import PRESETS
 from radarsim.propagation.media import layer, mirror, window
 from radarsim.world.materials import MATERIALS, Material, constant, itu_permittivity, material, skin

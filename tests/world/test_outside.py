@@ -3,8 +3,8 @@
 import pytest
 from PIL import Image
 
-from radarize.errors import InputError
-from radarize.files import OUTSIDE
+from radarize.io.errors import InputError
+from radarize.io.files import OUTSIDE
 from radarize.radar.cfg import write_cfg
 from radarize.radar.presets import PRESETS
 from radarsim.dataset.specification import Specification

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.world import shapes
 from radarsim.world.materials import MATERIALS
 from radarsim.world.objects import SceneObject

@@ -12,9 +12,9 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator
 
-from radarize.errors import InputError
-from radarize.plain import Frozen, complaint
-from radarize.yamlfile import read_yaml
+from radarize.io.errors import InputError
+from radarize.io.plain import Frozen, complaint
+from radarize.io.yamlfile import read_yaml
 
 _FOLDER = Path(__file__).parent
 SUFFIXES = (".yaml", ".yml")

@@ -3,7 +3,7 @@
 import numpy as np
 from shapely.geometry import box as area
 
-from radarize.yamlfile import read_beside
+from radarize.io.yamlfile import read_beside
 from radarsim.world import shapes
 from radarsim.world.generators.furniture import Piece, evaluate, make, value
 from radarsim.world.generators.layout import FloorPlan

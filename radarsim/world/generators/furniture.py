@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from radarize.yamlfile import read_beside
+from radarize.io.yamlfile import read_beside
 from radarsim.world import shapes
 
 #: What formulas in the file may use beside a piece's variables.

@@ -12,8 +12,8 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from radarize.errors import InputError
-from radarize.yamlfile import read_beside
+from radarize.io.errors import InputError
+from radarize.io.yamlfile import read_beside
 from radarsim.world.generators.furniture import evaluate, make
 from radarsim.world.generators.spots import WALLS, Spots, Surroundings
 from radarsim.world.materials import MATERIALS

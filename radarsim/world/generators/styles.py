@@ -6,7 +6,7 @@ relative.
 
 from dataclasses import dataclass, field
 
-from radarize.yamlfile import read_beside
+from radarize.io.yamlfile import read_beside
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ import numpy as np
 import trimesh
 import yaml
 
-from radarize.errors import InputError, explained
-from radarize.replacing import replacing
+from radarize.io.errors import InputError, explained
+from radarize.io.replacing import replacing
 from radarsim.world.clearance import lowest_level
 from radarsim.world.importers import carmen, floorplan, meshes, mitsuba, rosmap
 from radarsim.world.importers.cleaning import clean, decimate, edges_of_many

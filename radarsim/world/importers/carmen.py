@@ -16,10 +16,10 @@ from jaxtyping import Float
 from numba import njit
 from scipy.spatial.transform import Rotation
 
-from radarize.errors import InputError, explained
-from radarize.files import read_bytes
-from radarize.npyfile import read_npz
-from radarize.tum import read_tum
+from radarize.io.errors import InputError, explained
+from radarize.io.files import read_bytes
+from radarize.io.npyfile import read_npz
+from radarize.io.tum import read_tum
 from radarsim.world.importers.occupancy import OccupancyGrid
 from radarsim.world.importers.part import unreported
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import trimesh
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.world.importers.part import Part, unreported
 from radarsim.world.shapes import closest
 

@@ -9,7 +9,7 @@ from jaxtyping import Bool
 from scipy import ndimage
 from shapely.geometry import MultiPolygon, Polygon
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.world import shapes
 from radarsim.world.importers.faces import Face, faces, rooms
 from radarsim.world.importers.occupancy import OccupancyGrid

@@ -3,9 +3,9 @@
 import struct
 from pathlib import Path
 
-from radarize.errors import explained
-from radarize.files import read_bytes
-from radarize.jsonfile import parse_json
+from radarize.io.errors import explained
+from radarize.io.files import read_bytes
+from radarize.io.jsonfile import parse_json
 
 #: Bytes of a file, and corners that all places of its meshes have together.
 _BYTES, _CORNERS = 512 << 20, 15_000_000

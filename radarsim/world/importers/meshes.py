@@ -12,9 +12,9 @@ import numpy as np
 import trimesh
 from trimesh.resolvers import FilePathResolver
 
-from radarize.errors import InputError, explained
-from radarize.files import OUTSIDE, read_text, within
-from radarize.jsonfile import parse_json
+from radarize.io.errors import InputError, explained
+from radarize.io.files import OUTSIDE, read_text, within
+from radarize.io.jsonfile import parse_json
 from radarsim.world.importers import gltf
 from radarsim.world.importers.part import Part
 

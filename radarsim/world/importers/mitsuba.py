@@ -11,8 +11,8 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from radarize.errors import InputError
-from radarize.files import read_bytes, within
+from radarize.io.errors import InputError
+from radarize.io.files import read_bytes, within
 from radarsim.world import shapes
 from radarsim.world.importers import meshes
 from radarsim.world.importers.naming import Choice, meaning

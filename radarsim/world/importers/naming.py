@@ -4,8 +4,8 @@ import re
 from fnmatch import fnmatchcase
 from pathlib import Path
 
-from radarize.errors import InputError
-from radarize.yamlfile import read_beside, read_yaml
+from radarize.io.errors import InputError
+from radarize.io.yamlfile import read_beside, read_yaml
 from radarsim.world.description import CustomMaterial
 from radarsim.world.importers.part import Part
 from radarsim.world.materials import MATERIALS, material

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.errors import InputError
-from radarize.files import within
-from radarize.pixels import read_picture
-from radarize.runfolder.occupancy import MapFile
-from radarize.yamlfile import read_yaml
+from radarize.io.errors import InputError
+from radarize.io.files import within
+from radarize.io.pixels import read_picture
+from radarize.io.yamlfile import read_yaml
+from radarize.pipeline.runfolder.occupancy import MapFile
 from radarsim.world.importers.occupancy import OccupancyGrid
 
 #: That map_server reads and writes, as Pillow calls them.

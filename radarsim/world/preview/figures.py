@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from radarize.replacing import replacing
+from radarize.io.replacing import replacing
 from radarsim.world.preview.blueprint import blueprint
 from radarsim.world.preview.rendering import render
 from radarsim.world.scene import Scene

@@ -8,8 +8,8 @@ import pytest
 import trimesh
 import yaml
 
-from radarize.console import run
-from radarize.errors import InputError
+from radarize.io.console import run
+from radarize.io.errors import InputError
 from radarsim.cli import app
 from radarsim.world import shapes
 from radarsim.world.importers import Options, import_scene

@@ -11,9 +11,9 @@ from PIL import Image
 from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from radarize.errors import InputError
-from radarize.heatmaps import Heatmaps
+from radarize.io.errors import InputError
 from radarize.radar.presets import PRESETS
+from radarize.signal.heatmaps import Heatmaps
 from radarsim.motion.planner import plan_motion
 from radarsim.motion.trajectory import Motion
 from radarsim.propagation.reflectors import Reflectors

@@ -6,7 +6,7 @@ import shapely
 import trimesh
 
 from benchmarks.references.rigs import field
-from radarize.console import run
+from radarize.io.console import run
 from radarize.radar.presets import PRESETS
 from radarsim.cli import app
 from radarsim.motion.planner import plan_motion

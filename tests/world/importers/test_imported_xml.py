@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from radarize.errors import InputError
+from radarize.io.errors import InputError
 from radarsim.world import shapes
 from radarsim.world.importers import Options, import_scene
 from radarsim.world.scene import Scene

@@ -1,0 +1,1 @@
+"""A method and a file format of one's own."""

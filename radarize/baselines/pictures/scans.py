@@ -1,0 +1,69 @@
+"""Scans by the network on polar pictures."""
+
+import numpy as np
+import torch
+from jaxtyping import Float
+
+from radarize.baselines.pictures.maps import PictureMaker
+from radarize.baselines.pictures.network import COLUMNS, PictureNet
+from radarize.baselines.pictures.points import first_surfaces
+from radarize.io.stopwatch import stage
+from radarize.learning.features.windows import Shown
+from radarize.learning.nets.weights import Network, load
+from radarize.pipeline.method import Inputs, Method
+from radarize.signal.batch import Batch
+from radarize.signal.bearings import BEARINGS
+from radarize.signal.polar import azimuths
+
+
+class PictureStream:
+    """A network, and the windows of a stream's pictures that it sees: of those that a recording holds, or as samples
+    make them.
+
+    Args:
+        kind: of the network.
+
+    Attributes:
+        net: the network.
+        spacing: frames from one picture of a window to the next.
+
+    Raises:
+        InputError: no such weights, or they are for another radar.
+    """
+
+    def __init__(self, inputs: Inputs, kind: type[Network]):
+        self.net, header = load(inputs.weights.of(kind.kind), kind, inputs.radar)
+        self._windows, self._maker = header.windows(inputs.radar, self.net.maker), PictureMaker(inputs.radar)
+        self.spacing = self._windows.spacings[0]
+
+    def windows(self, batch: Batch) -> Shown:
+        """Of the next frames."""
+        return self._windows.push({"picture": self._maker.of(batch)}, batch.stamps)[0]
+
+
+class PictureScans:
+    """Scans of a stream's frames.
+
+    Raises:
+        InputError: see `PictureStream`.
+    """
+
+    def __init__(self, inputs: Inputs):
+        self._stream = PictureStream(inputs, PictureNet)
+
+    @torch.inference_mode()
+    def extract(self, batch: Batch) -> Float[np.ndarray, "frame bearing"]:
+        """Ranges on `radarize.signal.bearings.BEARINGS`, m, inf where nothing is seen."""
+        with stage("scans"):
+            likely = self._stream.net.estimate(self._stream.windows(batch).maps)
+            return on_bearings(first_surfaces(likely), BEARINGS)
+
+
+def on_bearings(
+    ranges: Float[np.ndarray, "frame column"], bearings: Float[np.ndarray, "bearing"]
+) -> Float[np.ndarray, "frame bearing"]:
+    """Ranges of the columns next to some bearings, rad."""
+    return ranges[:, np.abs(azimuths(COLUMNS)[:, None] - bearings).argmin(axis=0)]
+
+
+METHOD = Method("network on polar pictures", PictureScans, ("pictures",), pictures=True)

@@ -1,0 +1,138 @@
+"""Training on simulated walks: pictures roughened anew in every step, labels by the lidar beside the radar."""
+
+from collections.abc import Iterable
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Generator, Tensor, nn
+
+from radarize.baselines.pictures import roughening
+from radarize.baselines.pictures.network import COLUMNS, PictureNet
+from radarize.baselines.pictures.points import points
+from radarize.baselines.pictures.roughening import uniform
+from radarize.baselines.pictures.task import PictureTask
+from radarize.baselines.walks.clouds import Apart
+from radarize.learning.features.augment import chosen, mirrored
+from radarize.learning.features.table import Reading
+from radarize.learning.task import Settings
+from radarize.signal import polar
+from radarize.signal.maps import Maps
+
+#: Choices for the probability from which on every cell has a point.
+DENSE = (0.015, 0.02, 0.025, 0.03, 0.035, 0.04, 0.05, 0.06)
+#: By how much rooms are larger or smaller, and columns of a picture by which they are turned, at most.
+ZOOM, TURN = 0.25, 8
+#: m: the radar reads too far by range bias and lever arm of the data set's rig, on its training walks.
+BIAS = (0.17, 0.34)
+#: Of cells of a label.
+UNKNOWN = -1.0
+
+
+class Pictures(PictureTask):
+    """Points of a lidar from polar pictures; labels are its pictures, packed.
+
+    Attributes:
+        columns: that the network answers in.
+    """
+
+    network, truth, columns = PictureNet, (Reading("lidar", "truth/lidar"),), COLUMNS
+    defaults = Settings(width=12, frames=5, epochs=20, batch=64, rate=2e-3, schedule="cosine")
+
+    def augment(
+        self, maps: Maps, label: Tensor, generator: Generator
+    ) -> tuple[Float[Tensor, "item frame 1 range column"], Tensor]:
+        pictures, label = elsewhere(roughening.rough(maps, generator), unpacked(label, self.columns), generator)
+        return biased(pictures[:, :, 0], uniform(generator, *BIAS, len(maps))), label
+
+    def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
+        return entropy(net(maps), label)
+
+    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
+        logits, label = net(validated(maps)), unpacked(label)
+        return torch.stack([entropy(logits, label), chamfer(points(logits.exp(), net.dense), label)], dim=1)
+
+    def metrics(self, means: Float[Tensor, "number"]) -> dict[str, float]:
+        loss, chamfer = means.tolist()
+        return {"loss": loss, "chamfer_m": chamfer}
+
+    def calibrate(self, net: nn.Module, batches: Iterable[tuple[Maps, Tensor]]) -> None:
+        """Choose the probability from which on every cell has a point: the least mean Chamfer distance."""
+        total = torch.zeros(len(DENSE), device=net.dense.device)
+        for maps, label in batches:
+            probability, label = net.estimate(validated(maps)), unpacked(label)
+            total += torch.stack([chamfer(points(probability, dense), label).sum() for dense in DENSE])
+        net.dense.fill_(DENSE[int(total.argmin())])
+
+
+def chamfer(found: Bool[Tensor, "item row column"], label: Float[Tensor, "item row other"]) -> Float[Tensor, "item"]:
+    """Distance of points from a lidar's, m; half the reach of a picture where either has none."""
+    clouds = zip(found.cpu().numpy(), label.bool().cpu().numpy(), strict=True)
+    apart = np.nan_to_num([Apart.of_pictures(*each).chamfer for each in clouds], nan=polar.REACH / 2)
+    return torch.tensor(apart, dtype=torch.float32, device=label.device)
+
+
+def validated(maps: Maps) -> Float[Tensor, "item frame 1 range column"]:
+    """The same roughening in every epoch, and the middle of the bias."""
+    seed = int(maps.abs().double().sum()) % 2**31
+    pictures = roughening.rough(maps, Generator(maps.device).manual_seed(seed))
+    return biased(pictures[:, :, 0], torch.full((len(maps),), sum(BIAS) / 2, device=maps.device))
+
+
+def elsewhere(
+    pictures: Maps, label: Float[Tensor, "item row column"], generator: Generator
+) -> tuple[Maps, Float[Tensor, "item row column"]]:
+    """Pictures and labels of other worlds: mirrored, larger or smaller, and turned."""
+    left = chosen(pictures, generator)
+    pictures = torch.where(left, mirrored(pictures), pictures)[:, :, 0]
+    label = torch.where(left[:, 0, 0], label.flip(2), label)[:, None]
+    factor = uniform(generator, 1 - ZOOM, 1 + ZOOM, len(label))
+    turn = uniform(generator, -TURN, TURN, len(label)).round().long()
+    finer = label.shape[3] // pictures.shape[3]
+    pictures, label = rolled(zoomed(pictures, factor), turn, 0.0), rolled(zoomed(label, factor), finer * turn, UNKNOWN)
+    return pictures[:, :, None], label[:, 0]
+
+
+def biased(pictures: Float[Tensor, "item frame row column"], metres: Float[Tensor, "item"]) -> Maps:
+    """Pictures that read so much too far."""
+    rows = (metres / polar.RANGES[1]).round().long()
+    return _gathered(pictures, torch.arange(polar.ROWS, device=pictures.device) - rows[:, None])[:, :, None]
+
+
+def zoomed(
+    pictures: Float[Tensor, "item frame row column"], factor: Float[Tensor, "item"]
+) -> Float[Tensor, "item frame row column"]:
+    """Of a world that is so much larger."""
+    rows = torch.arange(polar.ROWS, device=pictures.device)
+    return _gathered(pictures, (rows / factor[:, None]).round().long())
+
+
+def rolled(
+    pictures: Float[Tensor, "item frame row column"], columns: Int[Tensor, "item"], beyond: float
+) -> Float[Tensor, "item frame row column"]:
+    """Of a world that is turned by so many columns; `beyond` is what nobody has seen."""
+    place = torch.arange(pictures.shape[3], device=pictures.device) - columns[:, None]
+    inside = (place >= 0) & (place < pictures.shape[3])
+    index = place.clamp(0, pictures.shape[3] - 1)[:, None, None].expand_as(pictures)
+    return pictures.gather(3, index).masked_fill(~inside[:, None, None], beyond)
+
+
+def _gathered(pictures: Tensor, place: Int[Tensor, "item row"]) -> Tensor:
+    """Rows of pictures, 0 where there is none."""
+    inside = (place >= 0) & (place < polar.ROWS)
+    found = pictures.gather(2, place.clamp(0, polar.ROWS - 1)[:, None, :, None].expand_as(pictures))
+    return found * inside[:, None, :, None]
+
+
+def unpacked(label: Tensor, columns: int = COLUMNS) -> Float[Tensor, "item row column"]:
+    """Pictures of a lidar on a network's columns: 1 where any of its beams has a point."""
+    bits = (label[..., None].to(torch.uint8) >> torch.arange(7, -1, -1, dtype=torch.uint8, device=label.device)) & 1
+    return bits.flatten(2).unflatten(2, (columns, -1)).amax(dim=3).float()
+
+
+def entropy(logits: Float[Tensor, "item 257 column"], label: Float[Tensor, "item row column"]) -> Float[Tensor, "item"]:
+    """Cross-entropy to the lidar's points of each known column, evenly, or to nothing."""
+    known = label[:, 0] != UNKNOWN
+    count = label.sum(dim=1)
+    rows = (label * logits[:, :-1]).sum(dim=1) / count.clamp_min(1)
+    return -(torch.where(count > 0, rows, logits[:, -1]) * known).sum(dim=1) / known.sum(dim=1)

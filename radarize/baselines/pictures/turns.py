@@ -1,0 +1,88 @@
+"""Turns from polar pictures: a picture's columns are even in azimuth, so a turn shifts all of them alike."""
+
+from collections.abc import Sequence
+
+import torch
+from jaxtyping import Float
+from torch import Generator, Tensor, nn
+
+from radarize.baselines.pictures import roughening
+from radarize.baselines.pictures.maps import PictureMaker
+from radarize.baselines.pictures.task import PictureTask
+from radarize.learning.features import augment
+from radarize.learning.features.table import YAW, Table
+from radarize.learning.nets import losses
+from radarize.learning.nets.correlation import Correlation
+from radarize.learning.nets.gaussian import Gaussian
+from radarize.learning.nets.maps import coordinates
+from radarize.learning.nets.resnet import ResNet18
+from radarize.learning.nets.weights import Network
+from radarize.learning.task import Motion, Settings, turns
+from radarize.signal import polar
+from radarize.signal.maps import Maps
+
+#: Columns by which pictures are shifted against each other: 34 deg to either side.
+_SHIFTS = 12
+
+
+class PictureTurnNet(Network):
+    """Polar pictures to the change of yaw from the picture before the newest to the newest, rad, positive to the left.
+
+    Args:
+        frames: of a window.
+        maps: names of a frame's maps.
+        width: of the ResNet.
+
+    Attributes:
+        spread: logarithm of what standard deviations are multiplied with; training fits it.
+    """
+
+    kind, outputs = "picture-turns", ("turn", "covariance")
+    maker = PictureMaker
+
+    def __init__(self, frames: int, maps: Sequence[str], width: int = 8):
+        super().__init__(frames, maps, width)
+        self.correlation = Correlation(len(self.maps), polar.COLUMNS, turns=_SHIFTS)
+        self.resnet = ResNet18(
+            (frames - 1) * self.correlation.channels + 2, Gaussian.numbers(1), width, (1, 2), pool=False
+        )
+        self.register_buffer("spread", torch.zeros(()))
+
+    def forward(self, maps: Maps) -> Gaussian:
+        """Turns of all windows."""
+        image = self.correlation(maps / 255)
+        return Gaussian.of(self.resnet(torch.cat([image, coordinates(image)], dim=1)), 1)
+
+    def estimate(self, maps: Maps) -> tuple[Float[Tensor, "item 1"], Float[Tensor, "item 1 1"]]:
+        """Mean and covariance, averaged over a window and its mirror image, whose turn is the other way."""
+        found, mirrored = self(maps), self(augment.mirrored(maps))
+        covariance = (found.covariance + mirrored.covariance) / 2 * (2 * self.spread).exp()
+        return (found.mean - mirrored.mean) / 2, covariance
+
+
+class PictureTurns(PictureTask, Motion):
+    """Turn from the picture before the newest to the newest, rad. Pictures are as simulated, but for the share of them
+    that is kept: echoes that are added at random turn with nothing."""
+
+    network, truth = PictureTurnNet, (YAW,)
+    error, size = "rmse_rad", "rms_turn_rad"
+    least_frames = 2
+    defaults = Settings(width=8, frames=5, epochs=24, batch=64, rate=1e-3, schedule="cosine")
+
+    def label(self, table: Table, frames: Tensor) -> Float[Tensor, "item 1"]:
+        return turns(table, frames[:, -2:])
+
+    def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:
+        pictures, left = self._pictures(maps, generator), augment.chosen(maps, generator)
+        pictures = torch.where(left, augment.mirrored(pictures), pictures)
+        return pictures, torch.where(left.flatten(1), -label, label)
+
+    def loss(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item"]:
+        return losses.likelihood(net(maps), label)
+
+    def judge(self, net: nn.Module, maps: Maps, label: Tensor) -> Float[Tensor, "item number"]:
+        return super().judge(net, self._pictures(maps, Generator(maps.device).manual_seed(0)), label)
+
+    @staticmethod
+    def _pictures(maps: Maps, generator: Generator) -> Maps:
+        return roughening.kept(roughening.levels(roughening.antennas_of(maps)), generator)

@@ -1,0 +1,73 @@
+"""Labels as the published artefact makes them, from true poses and depth pictures."""
+
+import numpy as np
+from jaxtyping import Bool, Float, UInt8, UInt16
+from scipy.spatial.transform import Rotation
+
+from radarize.io.recording import Recording
+
+#: Cells of the occupancy label: 4.51 cm where the radar's bins have 4.46 cm, and bearings (rad, ascending to the left)
+#: beside those of its maps.
+RANGES, BEARINGS = np.linspace(0.0, 4.284, 96), np.radians(np.linspace(-43.0, 43.0, 88))
+#: m, above and below the sensor's own plane, which is not levelled.
+SLAB = 0.03
+_BATCH = 64
+
+
+def velocity(recording: Recording, frames: slice) -> Float[np.ndarray, "frame 2"]:
+    """Displacement since the frame before over the time since then, in the sensor frame of then: forward, left, m/s.
+
+    Raises:
+        InputError: the recording has no true poses.
+    """
+    return finite_difference(recording.read("truth/pose")[frames], recording.times[frames]).astype(np.float32)
+
+
+def finite_difference(
+    pose: Float[np.ndarray, "frame 7"], times: Float[np.ndarray, "frame"]
+) -> Float[np.ndarray, "frame 2"]:
+    """See `velocity`; the first frame, which has none before, gets the second's."""
+    moved = Rotation.from_quat(pose[:-1, 3:]).inv().apply(np.diff(pose[:, :3], axis=0))
+    speed = (moved / np.diff(times)[:, None])[:, :2]
+    return np.concatenate([speed[:1], speed])
+
+
+def occupancy(recording: Recording, frames: slice) -> UInt8[np.ndarray, "frame range bearing"]:
+    """Whether cells hold a point of the depth picture; radar frame i is paired with picture i + 1.
+
+    Raises:
+        InputError: the recording has no depth pictures or does not say through which lens.
+    """
+    pinhole = recording.read("truth/depth_intrinsics")
+    pictures = np.minimum(np.arange(len(recording))[frames] + 1, len(recording) - 1)
+    parts = []
+    for k in range(0, len(pictures), _BATCH):
+        some = pictures[k : k + _BATCH]
+        first = int(some[0])
+        depth = recording.rows("truth/depth", first, int(some[-1]) + 1)
+        parts.append(occupied(depth[some - first], pinhole))
+    return np.concatenate(parts).astype(np.uint8)
+
+
+def occupied(
+    depth: UInt16[np.ndarray, "frame row column"], pinhole: Float[np.ndarray, "4"]
+) -> Bool[np.ndarray, "frame range bearing"]:
+    """Cells with a point in the camera's plane.
+
+    Args:
+        depth: along the optical axis, mm, 0 where there is none.
+        pinhole: fx, fy, cx, cy, pixels.
+    """
+    fx, fy, cx, cy = pinhole
+    frames, rows, columns = depth.shape
+    across, down = (np.arange(columns) - cx) / fx, (np.arange(rows) - cy) / fy
+    forward = depth * 1e-3
+    distance = forward * np.hypot(1, across)
+    cell = np.rint(distance / (RANGES[1] - RANGES[0])).astype(int)
+    column = np.rint((-np.arctan(across) - BEARINGS[0]) / (BEARINGS[1] - BEARINGS[0])).astype(int)
+    seen = (depth > 0) & (np.abs(forward * down[:, None]) <= SLAB) & (cell < len(RANGES))
+    seen &= (column >= 0) & (column < len(BEARINGS))
+    frame, _, at = seen.nonzero()
+    label = np.zeros((frames, len(RANGES), len(BEARINGS)), bool)
+    label[frame, cell[seen], column[at]] = True
+    return label

@@ -1,0 +1,52 @@
+"""The methods, put together."""
+
+import numpy as np
+from jaxtyping import Float
+from torch import nn
+
+from radarize.baselines.published.maps import PublishedMaps, PublishedStream
+from radarize.baselines.published.networks import (
+    PublishedRotationNet,
+    PublishedSegmentationNet,
+    PublishedTranslationNet,
+)
+from radarize.baselines.published.odometry import CHAINS, PublishedOdometry
+from radarize.baselines.published.scans import PublishedScans
+from radarize.io.errors import InputError
+from radarize.io.tum import planar
+from radarize.learning.nets.weights import Network, load
+from radarize.pipeline.method import Inputs, Method
+
+
+def odometry(inputs: Inputs) -> PublishedOdometry:
+    """Like the artefact, from true headings where the recording has them."""
+    nets = (_load(inputs, network) for network in (PublishedTranslationNet, PublishedRotationNet))
+    return PublishedOdometry(PublishedStream(inputs.radar), *nets, _headings(inputs))
+
+
+def scans(inputs: Inputs) -> PublishedScans:
+    """By the artefact's segmentation."""
+    return PublishedScans(PublishedStream(inputs.radar), _load(inputs, PublishedSegmentationNet))
+
+
+def _load(inputs: Inputs, network: type[Network]) -> nn.Module:
+    if inputs.weights.folder is None:
+        raise InputError(
+            "published odometry and scans come without weights: train them (`radarize train published-translation` and "
+            "so on) and name their folder with --weights"
+        )
+    return load(inputs.weights.of(f"published-{network.kind}"), network, inputs.radar)[0]
+
+
+def _headings(inputs: Inputs) -> Float[np.ndarray, "4"] | None:
+    """True yaws of the first frames that are used."""
+    source = inputs.recording
+    if source is None or not source.has("truth/pose"):
+        return None
+    stride = PublishedMaps.stride(inputs.radar)
+    yaws = planar(source.rows("truth/pose", 0, CHAINS * stride)[::stride])[:, 2]
+    return yaws if len(yaws) == CHAINS and np.isfinite(yaws).all() else None
+
+
+ODOMETRY = Method("as published", odometry, ("published-translation", "published-rotation"))
+SCANS = Method("as published", scans, ("published-segmentation",))

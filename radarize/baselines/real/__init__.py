@@ -1,0 +1,1 @@
+"""`radarize benchmark real`: methods on RadarHD's real walks."""

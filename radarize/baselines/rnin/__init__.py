@@ -1,0 +1,1 @@
+"""RNIN (Chen et al., ISMAR 2021): an IMU alone."""

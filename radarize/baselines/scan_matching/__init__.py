@@ -1,0 +1,1 @@
+"""Odometry from scans alone, whatever they are made with."""

@@ -1,4 +1,0 @@
-"""Comparisons of methods on folders of recordings: the paper's tables, maps, multipath, ablations.
-
-Start reading at `radarize.benchmark.registry`, all of them, and `study`: what one is, and how it is carried out.
-"""

@@ -1,0 +1,5 @@
+"""``python -m radarize.cli``."""
+
+from radarize.cli import main
+
+main()

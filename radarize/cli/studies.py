@@ -1,0 +1,139 @@
+"""Commands that train networks and compare methods."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from radarize.cli.app import Reading, app
+from radarize.io.console import print_table, progress
+from radarize.io.errors import InputError
+
+
+@app.command()
+def train(
+    task: Annotated[
+        str, typer.Argument(metavar="TASK", help="translation, rotation, segmentation, radarhd, milliego or rnin.")
+    ],
+    data: Annotated[Path, typer.Option(help="Folder of recordings, see `radarsim dataset`.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Weights to write (.safetensors).")],
+    split: Annotated[str | None, typer.Option(help="Of the data set; else every tenth recording validates.")] = None,
+    width: Annotated[int | None, typer.Option(help="Of the network (16); the paper's is 64.")] = None,
+    frames: Annotated[int | None, typer.Option(help="That the network sees (2, 2, 1).")] = None,
+    epochs: Annotated[int | None, typer.Option(help="At most (30, 30, 5).")] = None,
+    batch: Annotated[int | None, typer.Option(help="Items of a step (128, 128, 48).")] = None,
+    rate: Annotated[float | None, typer.Option(help="Learning rate (1e-3, 1e-3, 1e-4).")] = None,
+    schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, steps, or cosine for few epochs.")] = None,
+    patience: Annotated[int | None, typer.Option(help="Epochs without progress before it ends (15).")] = None,
+    precision: Annotated[str | None, typer.Option(help="Of convolutions: float32, or bfloat16.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Of everything random (0).")] = None,
+    device: Annotated[str | None, typer.Option(help="cpu or cuda; a GPU where there is one.")] = None,
+    workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on where a training was stopped.")] = False,
+    onnx: Annotated[bool, typer.Option("--onnx", help="Write the network as ONNX as well.")] = False,
+    start: Annotated[
+        Path | None, typer.Option(help="Weights to begin with; recordings may then be of any radars.")
+    ] = None,
+    settings: Annotated[Reading, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
+):
+    """Train a network on recordings; figures in brackets are the three tasks' defaults.
+
+    On several GPUs: torchrun --nproc-per-node 4 -m radarize.cli train ...
+    """
+    from dataclasses import replace
+
+    from radarize.learning.task import find_task
+    from radarize.learning.training.train import Options, train
+
+    if onnx:
+        import onnxscript  # noqa: F401  missed now, not after the training
+
+    choices = {
+        "width": width, "frames": frames, "epochs": epochs, "batch": batch, "rate": rate, "schedule": schedule,
+        "patience": patience, "precision": precision, "seed": seed,
+    }  # fmt: skip
+    given = {name: value for name, value in choices.items() if value is not None}
+    task = f"published-{task}" if settings == "published" and not task.startswith("published-") else task
+    hyper = replace(find_task(task).defaults, **given)
+    with progress("train", "with --resume the same command goes on after the last whole epoch") as report:
+        written = train(
+            task, data, output, hyper, Options(split, device, workers, resume, onnx, start),
+            progress=report, say=lambda line: typer.echo(line, err=True),
+        )  # fmt: skip
+    print(written)
+
+
+@app.command()
+def benchmark(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="list, all, or a benchmark of the list.")],
+    data: Annotated[Path | None, typer.Option(help="Folder of recordings, see `radarsim dataset`.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder to write; goes on where it was left.")] = None,
+    methods: Annotated[
+        list[str] | None,
+        typer.Option(help="Odometry and scans to compare; by default all that read samples: fused,doppler,threshold."),
+    ] = None,
+    weights: Annotated[
+        Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
+    ] = None,
+    train: Annotated[bool, typer.Option("--train", help="Train networks on each split first.")] = False,
+    epochs: Annotated[int | None, typer.Option(min=1, help="Of that training, at most.")] = None,
+    protocol: Annotated[str | None, typer.Option(help="paper, or mended; both by default.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; by default one per core.")] = None,
+    ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A Ray cluster; auto: of this machine.")] = None,
+    walks: Annotated[str | None, typer.Option(help="real: walks to judge, 227,230; by default all that test.")] = None,
+    predictions: Annotated[
+        list[str] | None, typer.Option(metavar="NAME=FOLDER", help="real: what another program says of the walks.")
+    ] = None,
+    poses: Annotated[Path | None, typer.Option(help="real: folder of true poses, WALK.tum; else by the lidar.")] = None,
+):
+    """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
+    import os
+
+    from radarize.evaluation.benchmark.registry import BENCHMARKS
+
+    if name == "list":
+        listed = [(each, about.about) for each, about in BENCHMARKS.items()]
+        real = ("real", "Points, turns and maps of real walks against a lidar (RadarHD's repository).")
+        return print_table(("benchmark", "what it compares"), [*listed, real])
+    for option, value in (("--data", data), ("--out", out)):
+        if value is None:
+            raise InputError(f"{option} is missing, expected a folder")
+    if name == "real":
+        return _benchmark_real(data, out, weights, walks, predictions or [], poses, workers, ray)
+    from radarize.evaluation.benchmark.run import benchmark as compare
+    from radarize.evaluation.benchmark.study import Options
+
+    chosen = [method for word in methods or () for method in word.split(",")]
+    options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
+    with progress("benchmark", f"what has ended is kept in {out}, and the same command goes on after it") as report:
+        published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
+    for each in published:
+        print(out / f"{each}.html")
+    print(out / "index.html")
+
+
+def _benchmark_real(
+    data: Path,
+    out: Path,
+    weights: Path | None,
+    walks: str | None,
+    predictions: list[str],
+    poses: Path | None,
+    workers: int | None,
+    ray: str | None,
+) -> None:
+    from radarize.baselines.real.real import SHOWN, Options, real
+
+    numbers = [number.strip() for number in walks.split(",")] if walks else []
+    if wrong := [number for number in numbers if not number.isdecimal()]:
+        raise InputError(f"--walks names {wrong[0]!r}, expected numbers as in 227,230")
+    named = dict(each.partition("=")[::2] for each in predictions)
+    for name, folder in named.items():
+        if not (name and folder and Path(folder).is_dir()):
+            raise InputError(f"--predictions is {name}={folder}, expected NAME=FOLDER of a folder that is there")
+    others = {name: Path(each) for name, each in named.items()}
+    options = Options([int(number) for number in numbers], others, weights, poses, workers, ray)
+    with progress("real") as report:
+        results = real(data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
+    print_table(*results.tables[0].in_terminal(SHOWN))
+    print(out / "real.md")

@@ -1,0 +1,120 @@
+"""Odometry by every method: trajectories (the paper's tables 2 and 3), velocities, turns, claimed uncertainties."""
+
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+import pandas as pd
+
+from radarize.evaluation.benchmark.followed import Followed, joined, turn_nees, turned
+from radarize.evaluation.benchmark.protocol import figures_of
+from radarize.evaluation.benchmark.study import Study
+from radarize.evaluation.benchmark.table import Table, with_median
+from radarize.evaluation.benchmark.trajectories import trajectory_tables
+from radarize.evaluation.metrics import Statistics
+from radarize.evaluation.motion import velocity_errors
+
+#: s: span that the paper's network tells a turn over.
+WINDOW = 4 / 15
+#: The paper's tables 2 and 3: ATE in m and rad, RE between frames in m.
+PAPER = {
+    "milliego": (4.100, 1.054, 0.059),
+    "rnin": (2.993, 0.542, 0.018),
+    "learned": (0.805, 0.366, 0.014),
+    "fused": (0.805, 0.366, 0.014),
+}
+PAPER_PLATFORMS = {
+    "milliego": (3.977, 0.817, 0.050),
+    "rnin": (5.122, 1.927, 0.019),
+    "learned": (1.121, 0.565, 0.013),
+    "fused": (1.121, 0.565, 0.013),
+}
+#: Columns: where the figure stands in `Study.of`.
+ABSOLUTE = {"ATE m": "odometry.ate.position.mean", "ATE rad": "odometry.ate.rotation.mean"}
+RELATIVE = {
+    f"RE per {span}, m, rad": {kind: f"odometry.re.{span}.{kind}.mean" for kind in ("position", "rotation")}
+    for span in ("frame", "second", "metre")
+}
+NOTES = (
+    "ATE: mean error after alignment without scale, mean over trajectories; RE: true relative errors, means. Bias: "
+    "along the motion, positive: too fast.",
+    "NEES: squared error over the claimed variance, per dimension, 1 if that is right; in brackets the median over its "
+    "expectation.",
+    "To reach: ATE 0.4 m and 0.18 rad, on unseen platforms 0.56 m and 0.28 rad; velocity RMSE 0.05 m/s, yaw over "
+    "0.27 s 1 deg, NEES 0.8 to 1.25.",
+)
+SEEN = "Shipped networks learned from walks by hand, by cart and by robot; with --train none has seen these platforms."
+#: s: spans of turns; 0: from frame to frame.
+HORIZONS = (0, 4 / 15, 1, 5, 15, 40)
+CLAIMS = (
+    "NEES: squared error over the claimed variance, per dimension, 1 if that is right, of all frames (no mean over "
+    "recordings); median: over its expectation.",
+    "Turns over any time: what methods claim of errors of headings that they take back later is no drift "
+    "(`radarize.odometry.claims`); of methods that say nothing of it, claims of frames are added as if independent.",
+    "To reach: 0.9 to 1.1 for velocities, mean and median, on every platform.",
+)
+
+
+def tables(study: Study, paper: dict[str, tuple[float, ...]] = PAPER) -> list[Table]:
+    """Trajectories by each protocol; figures of all frames, by platform and building."""
+    known = {pair: paper[pair.odometry] for pair in study.pairs if pair.odometry in paper}
+    labels = {pair: {"odometry": pair.odometry} for pair in study.pairs}
+    return [*trajectory_tables(study, "odometry", labels, known, "Odometry"), steps_table(study)]
+
+
+def platform_tables(study: Study) -> list[Table]:
+    """As `tables`, beside the paper's figures, whose networks had seen the handheld platform alone."""
+    found = tables(study, PAPER_PLATFORMS)
+    if study.options.shipped:
+        found[0].notes.append(SEEN)
+    return found
+
+
+def steps_table(study: Study) -> Table:
+    """Figures of all frames, by platform, by building and of all."""
+    read = cache(lambda run: Followed.read(study.output / run.place))
+    rows = [
+        {"odometry": pair.odometry, **group, **row(runs, list(map(read, runs["run"])))}
+        for pair, group, runs in study.by_group()
+    ]
+    return Table("Steps and trajectories, by platform and building", rows, list(NOTES))
+
+
+def row(runs: pd.DataFrame, found: Sequence[Followed]) -> dict[str, object]:
+    """Figures of several recordings: of all their frames, and means over trajectories."""
+    frames, turns = joined(found), Statistics.of(turned(found, WINDOW)[0])
+    velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
+    relative = {name: figures_of(runs, columns).mean() for name, columns in RELATIVE.items()}
+    known = np.isfinite(velocity["nees"])
+    return {
+        "velocity RMSE m/s": velocity["rmse"],
+        "median": velocity["median"],
+        "90 %": velocity["p90"],
+        "bias": velocity["bias"],
+        "yaw over 0.27 s, RMSE deg": float(np.rad2deg(turns.rmse)),
+        **figures_of(runs, ABSOLUTE).mean(),
+        **{name: ", ".join(f"{value:.4f}" for value in values) for name, values in relative.items()},
+        "NEES velocity (median)": with_median(velocity["nees"], velocity["nees_median"]) if known else None,
+        "NEES yaw step": turn_nees(found, 0),
+        "NEES yaw over 0.27 s": turn_nees(found, WINDOW),
+    }
+
+
+def claims_tables(study: Study) -> list[Table]:
+    """A row for every odometry on each platform, in each building and on all."""
+    read = cache(lambda run: Followed.read(study.output / run.place))
+    rows = [
+        {"odometry": pair.odometry, **group, **_claims(list(map(read, runs["run"])))}
+        for pair, group, runs in study.by_group()
+    ]
+    return [Table("Claimed uncertainty against errors", rows, list(CLAIMS))]
+
+
+def _claims(found: list[Followed]) -> dict[str, float]:
+    frames = joined(found)
+    velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
+    row = {"velocity": velocity["nees"], "velocity, median": velocity["nees_median"]}
+    for seconds in HORIZONS:
+        name = f"turn over {seconds:.2g} s" if seconds else "turn from frame to frame"
+        row[name] = turn_nees(found, seconds)
+    return row

@@ -1,0 +1,121 @@
+"""`radarize benchmark`: compare methods on a folder of recordings and publish what came of it."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+from matplotlib import pyplot
+
+from radarize.evaluation.benchmark.dataset import DataSet
+from radarize.evaluation.benchmark.registry import BENCHMARKS
+from radarize.evaluation.benchmark.results import Results, machine
+from radarize.evaluation.benchmark.study import Options, Study, carry_out
+from radarize.evaluation.benchmark.table import cell
+from radarize.evaluation.report.page import Link, Page
+from radarize.io.errors import InputError
+from radarize.io.jsonfile import read_json
+from radarize.io.replacing import replacing
+
+#: All that the data is fit for.
+ALL = "all"
+
+
+def benchmark(
+    name: str,
+    data: Path,
+    output: Path,
+    options: Options = Options(),  # noqa: B008
+    *,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+    say: Callable[[str], None] = lambda line: None,
+) -> dict[str, Results]:
+    """Compare methods. Whatever ends it, the same call goes on after the last run that ended.
+
+    Args:
+        name: a key of `BENCHMARKS`, or ``all``.
+        data: folder of recordings.
+        output: folder to write: NAME.json, NAME.md and NAME.html for each benchmark (NAME.png where it has curves),
+            index.html over all; ``runs``, ``timings`` and ``weights``, which are used again.
+        options: what is compared, and with what.
+        progress: called with (frames done, frames in all).
+        say: takes a line on each benchmark that the data is not fit for.
+
+    Returns:
+        what was published, by name.
+
+    Raises:
+        InputError: an unknown name, or data that is not fit for it.
+    """
+    if name != ALL and name not in BENCHMARKS:
+        raise InputError(f"benchmark is {name!r}, expected one of: {', '.join((*BENCHMARKS, ALL))}")
+    options.check()
+    machine()  # as things are now: sources may change while it runs
+    found, output = DataSet.load(data), Path(output)
+    studies: dict[str, Study] = {}
+    for each in BENCHMARKS if name == ALL else (name,):
+        try:
+            studies[each] = Study.plan(BENCHMARKS[each], found, output, options)
+        except InputError as error:
+            if name != ALL:
+                raise
+            say(f"{each}: left out, {error}")
+    if not studies:
+        raise InputError(f"{data}: is fit for no benchmark")
+    carry_out(list(studies.values()), progress)
+    published = {each: _publish(each, study) for each, study in studies.items()}
+    write_index(output)
+    return published
+
+
+def _publish(name: str, study: Study) -> Results:
+    results = study.publish()
+    if (figure := study.benchmark.picture(results.tables)) is not None:
+        with replacing(study.output / f"{name}.png") as part:
+            figure.savefig(part, format="png", dpi=70, bbox_inches="tight")
+        pyplot.close(figure)
+        results.notes.append(f"![Curves]({name}.png)")
+    results.write(study.output, name)
+    write_page(study, results, study.output / f"{name}.html")
+    return results
+
+
+def write_page(study: Study, results: Results, path: Path) -> Path:
+    """Tables that sort on click, then the benchmark's drawings.
+
+    Raises:
+        InputError: it cannot be written, or a run's file is damaged.
+    """
+    page = Page(results.title, study.benchmark.about)
+    for table in results.tables:
+        page.section(table.title)
+        if table.rows:
+            rows = [tuple(map(cell, row)) for row in table.frame.itertuples(index=False)]
+            page.table(tuple(table.frame), rows, table.numbers(), sortable=True)
+        for note in table.notes:
+            page.text(note)
+    study.benchmark.draw(study, page)
+    page.section("Data, networks, machine")
+    for note in results.notes:
+        page.text(note)
+    for name, words in results.facts.items():
+        page.text(f"{name}: {words}.")
+    return page.write(path)
+
+
+def write_index(folder: Path) -> Path:
+    """A page that leads to those of a folder.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    page = Page("Benchmarks", f"Comparisons in {folder.resolve().name}")
+    rows = []
+    for path in sorted(folder.glob("*.html")):
+        try:
+            about = read_json(path.with_suffix(".json"))
+        except InputError:
+            continue
+        if "tables" in about:
+            made = about.get("machine", {})
+            rows.append((Link(about["title"], path.name), made.get("commit", "-"), made.get("processor", "-")))
+    page.table(("benchmark", "commit", "processor"), rows)
+    return page.write(folder / "index.html")

@@ -1,0 +1,52 @@
+"""SLAM by combinations of odometry and scans: the paper's table 4, and its table 5 building by building."""
+
+from radarize.evaluation.benchmark.runs import Pair
+from radarize.evaluation.benchmark.study import Chosen, Study
+from radarize.evaluation.benchmark.table import PAPER, Table
+from radarize.evaluation.benchmark.trajectories import beside, split_rows, trajectory_tables
+from radarize.pipeline.methods import BEST
+
+#: The paper's combinations: ATE in m and rad, RE between frames in m. RadarHD alone is scan matching on its scans.
+COMBINATIONS = {
+    Pair("scan-matching", "radarhd"): (4.833, 0.751, 0.045),
+    Pair("milliego", "radarhd"): (3.900, 0.808, 0.022),
+    Pair("rnin", "radarhd"): (3.299, 0.541, 0.020),
+    Pair(BEST["odometry"], "radarhd"): (0.658, 0.154, 0.018),
+    Pair(**BEST): (0.606, 0.116, 0.017),
+}
+#: The same of its own method in a building that it was not trained in, and the mean of these.
+BUILDINGS = {
+    "A": (0.635, 0.102, 0.018), "B": (0.696, 0.179, 0.016), "C": (0.492, 0.105, 0.016), "mean": (0.608, 0.129, 0.017),
+}  # fmt: skip
+
+
+def pairs(chosen: Chosen) -> list[Pair]:
+    """The paper's combinations, every odometry with the scans of choice, and all scans with the odometry of choice."""
+    paper = [pair for pair in COMBINATIONS if pair.odometry in chosen.odometry and pair.scans in chosen.scans]
+    return [*paper, *chosen.by_odometry(), *chosen.by_scans()]
+
+
+def tables(study: Study) -> list[Table]:
+    """SLAM's trajectories by each protocol."""
+    label = {pair: {"odometry": pair.odometry, "scans": pair.scans} for pair in study.pairs}
+    return trajectory_tables(study, "slam", label, COMBINATIONS, "SLAM")
+
+
+def building_tables(study: Study) -> list[Table]:
+    """Each building, then their mean, for every odometry by each protocol."""
+    found = []
+    for protocol in study.options.protocols:
+        rows = []
+        for pair in study.pairs:
+            for split, runs in split_rows(study, pair).items():
+                building = split.removeprefix("building-")
+                label = {"odometry": pair.odometry, "scans": pair.scans, "building": building}
+                paper = BUILDINGS.get(building) if pair == Pair(**BEST) else None
+                rows.append({**label, **protocol.average(runs, pair, "slam"), **beside(paper)})
+        notes = [
+            protocol.note,
+            protocol.loops,
+            "Buildings are this data set's, not those of the paper that go by the same letter.",
+        ]
+        found.append(Table(f"SLAM in each building, {protocol.title}", rows, notes, (PAPER,)))
+    return found

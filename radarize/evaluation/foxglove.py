@@ -1,0 +1,147 @@
+"""What a pipeline finds as Foxglove's messages, and a server of them.
+
+    /tf         map -> odom -> base_link -> radar, as ROS has them (REP 105)
+    /scan       LaserScan, in `radar`        /path  PosesInFrame, in `map`
+    /map        Grid, in `map`: occupancy of 0, 100 or -1, as in nav_msgs/OccupancyGrid
+    /radar/...  heat maps as images
+
+``base_link`` is the radar: x forward, y left, z up (REP 103). Poses lie in a plane.
+"""
+
+import math
+
+import foxglove
+import numpy as np
+from foxglove import channels, messages
+from jaxtyping import Float, UInt8
+
+from radarize.io.errors import InputError
+from radarize.io.pose import compose, inverse
+from radarize.pipeline.runfolder import OccupancyMap
+from radarize.signal.bearings import BEARINGS
+
+_HERE = np.zeros(3)
+_OCCUPANCY = messages.PackedElementField(name="occupancy", offset=0, type=messages.PackedElementFieldNumericType.Int8)
+
+
+class Messages:
+    """What is shown, as Foxglove's messages; times are stamps, s.
+
+    Args:
+        context: what the messages go to.
+    """
+
+    def __init__(self, context: foxglove.Context):
+        self._context = context
+        self._tf = channels.FrameTransformsChannel("/tf", context=context)
+        self._scan = channels.LaserScanChannel("/scan", context=context)
+        self._path = channels.PosesInFrameChannel("/path", context=context)
+        self._map = channels.GridChannel("/map", context=context)
+        self._pictures: dict[str, channels.RawImageChannel] = {}
+
+    def pose(self, time: float, slam: Float[np.ndarray, "3"], odometry: Float[np.ndarray, "3"]) -> None:
+        """Where the radar is by SLAM (in `map`) and by odometry alone (in `odom`)."""
+        links = (
+            ("map", "odom", compose(slam, inverse(odometry))),
+            ("odom", "base_link", odometry),
+            ("base_link", "radar", _HERE),
+        )
+        transforms = [
+            messages.FrameTransform(
+                timestamp=_stamp(time), parent_frame_id=parent, child_frame_id=child,
+                translation=messages.Vector3(x=float(pose[0]), y=float(pose[1]), z=0.0), rotation=_turn(pose[2]),
+            )
+            for parent, child, pose in links
+        ]  # fmt: skip
+        self._tf.log(messages.FrameTransforms(transforms=transforms), log_time=_nanoseconds(time))
+
+    def scan(
+        self, time: float, ranges: Float[np.ndarray, "beam"], azimuths: Float[np.ndarray, "beam"] = BEARINGS
+    ) -> None:
+        """Ranges, m, inf where nothing is seen, at azimuths that are equally far apart, rad."""
+        self._scan.log(
+            messages.LaserScan(
+                timestamp=_stamp(time), frame_id="radar", pose=_pose(_HERE), start_angle=float(azimuths[0]),
+                end_angle=float(azimuths[-1]), ranges=[float(r) for r in ranges], intensities=[],
+            ),
+            log_time=_nanoseconds(time),
+        )  # fmt: skip
+
+    def path(self, time: float, poses: Float[np.ndarray, "node 3"]) -> None:
+        """The way so far, in `map`."""
+        way = messages.PosesInFrame(timestamp=_stamp(time), frame_id="map", poses=[_pose(pose) for pose in poses])
+        self._path.log(way, log_time=_nanoseconds(time))
+
+    def map(self, time: float, found: OccupancyMap) -> None:
+        """The map so far."""
+        rows, columns = found.pixels.shape
+        cells = np.where(found.occupied, 100, np.where(found.free, 0, -1)).astype(np.int8)[::-1]
+        self._map.log(
+            messages.Grid(
+                timestamp=_stamp(time), frame_id="map", pose=_pose(np.array(found.origin)), column_count=columns,
+                cell_size=messages.Vector2(x=found.resolution, y=found.resolution), row_stride=columns, cell_stride=1,
+                fields=[_OCCUPANCY], data=cells.tobytes(),
+            ),
+            log_time=_nanoseconds(time),
+        )  # fmt: skip
+
+    def picture(self, time: float, name: str, pixels: UInt8[np.ndarray, "row column color"]) -> None:
+        """A heat map; colours are red, green, blue and maybe alpha."""
+        if name not in self._pictures:
+            self._pictures[name] = channels.RawImageChannel(f"/radar/{name}", context=self._context)
+        rows, columns, colors = pixels.shape
+        image = messages.RawImage(
+            timestamp=_stamp(time), frame_id="radar", width=columns, height=rows,
+            encoding="rgba8" if colors == 4 else "rgb8", step=colors * columns,
+            data=np.ascontiguousarray(pixels).tobytes(),
+        )  # fmt: skip
+        self._pictures[name].log(image, log_time=_nanoseconds(time))
+
+
+class Server(Messages):
+    """Serves what is shown to Foxglove; use as a context manager.
+
+    Args:
+        address: to listen on, ``HOST:PORT``; port 0 takes a free one.
+
+    Attributes:
+        url: for "Open connection" in Foxglove.
+
+    Raises:
+        InputError: the address cannot be used.
+    """
+
+    def __init__(self, address: str = "127.0.0.1:8765"):
+        context = foxglove.Context()
+        super().__init__(context)
+        host, _, port = address.rpartition(":")
+        try:
+            self._server = foxglove.start_server(
+                name="radarize", host=host or "127.0.0.1", port=int(port), context=context
+            )
+        except (OSError, ValueError, OverflowError, RuntimeError) as error:
+            raise InputError(f"--foxglove {address}: {error}, expected HOST:PORT to be found at") from error
+        self.url = f"ws://{host or '127.0.0.1'}:{self._server.port}"
+
+    def __enter__(self) -> "Server":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.stop()
+
+
+def _nanoseconds(time: float) -> int:
+    return round(1e9 * time)
+
+
+def _stamp(time: float) -> messages.Timestamp:
+    return messages.Timestamp(*divmod(_nanoseconds(time), 10**9))
+
+
+def _turn(yaw: float) -> messages.Quaternion:
+    return messages.Quaternion(x=0.0, y=0.0, z=math.sin(yaw / 2), w=math.cos(yaw / 2))
+
+
+def _pose(pose: Float[np.ndarray, "3"]) -> messages.Pose:
+    position = messages.Vector3(x=float(pose[0]), y=float(pose[1]), z=0.0)
+    return messages.Pose(position=position, orientation=_turn(float(pose[2])))

@@ -1,0 +1,70 @@
+"""Files that say nothing of this package: raw samples as an IWR1843 with a DCA1000 leaves them (``NAME.bin`` and
+``NAME.cfg``), trajectories as TUM files, maps for ROS's map_server."""
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
+from radarize.io.replacing import replacing
+from radarize.io.tum import write_tum
+from radarize.pipeline.runfolder import RunFolder
+from radarize.radar.cfg import parse_cfg, write_cfg
+from radarize.radar.dca1000 import encode
+
+_BATCH_BYTES = 16 << 20
+
+
+def export_bin(source: Path, output: Path, *, run: None, progress: Callable[[int, int], None]) -> Path:
+    """Write a recording's samples; ``.bin`` and ``.cfg`` are put in place of either suffix of `output`.
+
+    Raises:
+        InputError: no recording, or a file cannot be written.
+    """
+    with Recording(source) as recording:
+        config = recording.config
+        # A suffix such as .v2 belongs to the name.
+        stem = output.with_suffix("") if output.suffix in (".bin", ".cfg") else output
+        binary, settings = stem.with_name(stem.name + ".bin"), stem.with_name(stem.name + ".cfg")
+        text = write_cfg(config)
+        with suppress(InputError):
+            if recording.cfg_text and parse_cfg(recording.cfg_text) == config:
+                text = recording.cfg_text  # with its own comments, since it says the same
+
+        with replacing(settings) as part:
+            part.write_bytes(text.encode())
+        with replacing(binary) as part, part.open("wb") as file:
+            for frames, adc in recording.batches(max(1, _BATCH_BYTES // config.frame_bytes)):
+                file.write(encode(adc, config).astype("<i2", copy=False).data)
+                progress(frames.stop, len(recording))
+    return binary
+
+
+def export_tum(source: Path, output: Path, *, run: None, progress: Callable[[int, int], None]) -> Path:
+    """Write the trajectory of a run, or the true poses of a recording as far as they are known.
+
+    Raises:
+        InputError: there is none, or the file cannot be written.
+    """
+    if source.is_dir():
+        return write_tum(output, *RunFolder(source).trajectory)
+    with Recording(source) as recording:
+        if (truth := recording.true_poses()) is None:
+            raise InputError(f"{source}: has no true poses (/truth/time and /truth/pose) to write as TUM")
+    return write_tum(output, *truth)
+
+
+def export_map(source: Path, output: Path, *, run: None, progress: Callable[[int, int], None]) -> Path:
+    """Write a run's map as ``NAME.pgm`` and ``NAME.yaml``.
+
+    Raises:
+        InputError: `source` is no run with a map, or a file cannot be written.
+    """
+    if not source.is_dir():
+        raise InputError(f"{source}: has no map, expected the folder of a run (radarize run {source} -o RUN)")
+    found = RunFolder(source).map
+    if found is None:
+        raise InputError(f"{source}: has no map.yaml, expected a folder that radarize run wrote")
+    stem = output.with_suffix("") if output.suffix in (".pgm", ".yaml") else output
+    return found.save(stem.with_name(stem.name + ".yaml"))

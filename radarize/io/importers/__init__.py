@@ -1,0 +1,164 @@
+"""Recordings from foreign files, one module per format.
+
+A `Format` opens its files as a `Capture`: samples in batches of whole frames, with whatever came along. What follows is
+the same for all: settle the order of I and Q, stamp the frames, write the recording. Other packages add formats by
+entry points of the group ``radarize.importers``.
+"""
+
+from collections.abc import Callable
+from itertools import chain
+from pathlib import Path
+
+import numpy as np
+
+from radarize.io.errors import InputError
+from radarize.io.files import regular
+from radarize.io.importers.capture import Batch, Capture
+from radarize.io.importers.format import FORMATS, Format
+from radarize.io.importers.parameters import Given
+from radarize.io.recording import Product, RecordingWriter
+from radarize.io.tum import read_tum
+from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import range_balance
+
+__all__ = ["Given", "import_recording"]
+
+#: From this many dB on, the samples themselves say which of I and Q comes first.
+_CERTAIN_DB = 10.0
+#: Frames that are asked.
+_ASKED = 8
+#: What poses given by hand stand in for.
+_POSES = ("truth/time", "truth/pose", "truth/velocity")
+
+
+def import_recording(
+    source: Path,
+    output: Path,
+    given: Given | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Path:
+    """Write a recording (.h5) from a capture.
+
+    Frames are stamped as the source says, else ``start_time + index * frame_period``. What the user should know (a
+    truncated last frame, lost packets, doubtful settings) is joined in the recording's attribute ``warnings``; settings
+    that nobody gave are named in ``assumed``; what the samples told of them is in ``found``.
+
+    Args:
+        source: a DCA1000 ``.bin``, whole or in parts (its ``.cfg`` of the same name, or mmWave Studio's JSON files, may
+            lie beside it), a ``.pcap`` or ``.pcapng`` of its UDP stream, a folder of mmWave Studio files, a ROS bag, an
+            array of samples (``.npy``, ``.npz``, ``.mat``), a sequence in roverd's layout, or RadarHD's data set of
+            pictures, of which ``given.walk`` is taken.
+        output: recording to write.
+        given: what the user says of it.
+        progress: called with frames done and (estimated) frames in all.
+
+    Raises:
+        InputError: unknown format, nothing usable in the source, or a configuration that does not fit it.
+    """
+    source, output = Path(source), Path(output)
+    given = given or Given()
+    start_time = float(given.start_time or 0.0)
+    if source.resolve() == output.resolve():
+        raise InputError(f"{output}: is the source itself, expected another output file")
+    products = _poses(given.poses) if given.poses else {}
+    format = _format(source, given)
+    if format.write:
+        return format.write(source, output, given, products, progress or (lambda done, total: None))
+    capture = format.open(source, given, output.parent)
+    batches = iter(capture.batches)
+    first = next(batches)
+    if given.start_time is not None and first.times is not None:
+        raise InputError(f"{source}: has stamps of its own, but start_time is {given.start_time}, expected none")
+    if "tx_order" in capture.assumed:
+        capture.warnings.append(
+            "one chirp a loop is assumed, of TX1: of a capture with two transmitters, all speeds would be doubled; "
+            "--tx says how many there are"
+        )
+    radar, swapped = _settle_iq_order(capture, first, "iq_order" in given.overrides)
+    streams = {name: each for name, each in capture.streams.items() if not products or not name.startswith(_POSES)}
+    writer = RecordingWriter(
+        output,
+        radar,
+        cfg_text=capture.cfg_text,
+        attributes={"source": source.name, **capture.attributes},
+        streams=streams,
+        products={**capture.products, **products},
+    )
+    done, last = 0, start_time
+    with writer:
+        for batch in chain([first], batches):
+            stamps = batch.times
+            if stamps is None:
+                stamps = start_time + radar.frame_period * np.arange(done, done + len(batch.valid))
+            frames = batch.frames[..., ::-1] if swapped else batch.frames
+            writer.append(frames, stamps, batch.valid, rows={name: batch.rows[name] for name in streams})
+            start_time = stamps[0] if not done else start_time
+            done, last = done + len(batch.valid), stamps[-1]
+            progress(done, max(done, capture.expected_frames))
+        if products:
+            end = last + radar.frame_period
+            capture.warnings += _apart(products["truth/time"].data, start_time, end, given.poses)
+        capture.warnings += writer.losses.warnings()
+        writer.annotate(warnings="; ".join(capture.warnings), assumed=", ".join(capture.assumed))
+    return output
+
+
+def _poses(path: Path) -> dict[str, Product]:
+    """True poses of a TUM file as data sets of a recording, at their own times."""
+    times, poses = read_tum(path)
+    return {
+        "truth/time": Product(times, "s", f"stamps of the poses of {path.name}"),
+        "truth/pose": Product(poses, "m; x y z qx qy qz qw", "sensor in the world"),
+    }
+
+
+def _apart(times: np.ndarray, start: float, end: float, poses: Path) -> list[str]:
+    """A warning if no pose falls into the recording: two clocks, most likely."""
+    if times[-1] >= start and times[0] <= end:
+        return []
+    return [
+        f"{poses} covers {times[0]:.3f} to {times[-1]:.3f} s, but the frames {start:.3f} to {end:.3f} s: "
+        "give start_time to bring both to one clock"
+    ]
+
+
+def _format(source: Path, given: Given) -> Format:
+    """The format of a source.
+
+    Raises:
+        InputError: none that is known, or what the user says belongs to another format.
+    """
+    formats = sorted(FORMATS.values(), key=lambda each: each.last)
+    expected = ", ".join(each.expected for each in formats)
+    if not source.is_dir():
+        regular(source, expected)
+    found = next((each for each in formats if each.fits(source)), None)
+    if found is None:
+        raise InputError(f"{source}: unknown format, expected {expected}")
+    for other in formats:
+        for name in set(other.options) - set(found.options):
+            if (value := getattr(given, name)) != getattr(Given(), name):
+                raise InputError(f"{source}: is no {other.noun}, but {name} is {value}, expected none")
+    return found
+
+
+def _settle_iq_order(capture: Capture, batch: Batch, given: bool) -> tuple[RadarConfig, bool]:
+    """The configuration with the I/Q order that the samples show if it is assumed, and whether to swap them.
+
+    Where the configuration says and they contradict it, there is a warning.
+    """
+    config = capture.config
+    decibels = range_balance(batch.frames[:_ASKED])
+    other = "iiqq" if config.iq_order == "qqii" else "qqii"
+    if given or abs(decibels) < _CERTAIN_DB:
+        return config, False
+    if "iq_order" in capture.assumed:
+        found = config.iq_order if decibels > 0 else other
+        capture.attributes["found"] = f"iq_order {found} ({abs(decibels):.0f} dB more energy at near range)"
+        return config.model_copy(update={"iq_order": found}), decibels < 0
+    if decibels < 0:
+        capture.warnings.append(
+            f"iq_order is {config.iq_order} in the configuration, but the samples look like {other} "
+            f"({-decibels:.0f} dB more energy at near range)"
+        )
+    return config, False

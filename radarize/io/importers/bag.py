@@ -1,0 +1,226 @@
+"""ROS bags of raw radar frames: the published Radarize data set's (ROS 1), and ROS 2 bags with the same topics.
+
+Other topics are stamped as their headers say, or with their receipt where those are not of the bag's clock.
+"""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from radarize.io.errors import InputError, explained
+from radarize.io.importers.bin import all_zero, configured
+from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.companions import ChipPoints, Companion, Depth, InertialSensor, TrackedPose
+from radarize.io.importers.format import Format
+from radarize.io.importers.frames import Frames, Stamps
+from radarize.io.importers.parameters import Given
+from radarize.io.importers.rosbag import Bag, is_frame
+from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import check_layout, decode
+from radarize.radar.presets import PRESETS
+
+#: What may come along: the data set's topic, message types, and who takes it. Where there is no topic of that name,
+#: the only one of the type serves.
+COMPANIONS: tuple[tuple[str, tuple[str, ...], type[Companion]], ...] = (
+    ("/tracking/odom/sample", ("nav_msgs/msg/Odometry",), TrackedPose),
+    ("/tracking/imu", ("sensor_msgs/msg/Imu",), InertialSensor),
+    ("/ti_mmwave/radar_scan_pcl_0", ("sensor_msgs/msg/PointCloud2",), ChipPoints),
+    (
+        "/camera/depth/image_rect_raw/compressedDepth",
+        ("sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/Image"),
+        Depth,
+    ),
+)
+_RADAR = "/radar0/radar_data"
+_CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+#: s: so much of the other topics is read ahead of the frames; messages are received that late at most.
+_AHEAD = 0.5
+
+
+def open_bag(path: Path, given: Given) -> Capture:
+    """Open a bag.
+
+    The radar's configuration is what was given, else the data set's own (preset ``radarize``) if the frames have its
+    size, else what the frames say and the user adds. Range bias and channel calibration come from the frames.
+
+    Args:
+        path: a ROS 1 ``.bag``, a ROS 2 bag's folder, or its ``.mcap`` or ``.db3``.
+        given: what is known of the radar and of its latency.
+
+    Raises:
+        InputError: no readable bag, one without raw frames, or frames that do not fit the configuration.
+    """
+    with Bag(path) as bag:
+        radar, others, warnings = _topics(bag)
+        _, first = _first(bag, radar)
+        config, assumed = _configure(path, first, given)
+        config = _calibrated(config, first, str(path), warnings)
+        companions = {}
+        for topic, kind in others.items():
+            try:
+                companions[topic] = kind(config, _first(bag, topic)[1])
+            except InputError as error:
+                warnings.append(f"{topic} is left out: {error}")
+        _intrinsics(bag, companions)
+        received = bag.receipts(radar)
+    unknown = _turned(companions, given)
+    taken = list(companions.values())
+    check_layout(config)
+    stamps = Stamps(config, first, received, given.latency)
+    capture = Capture(config, given.cfg_text, (), len(received), (*assumed, *stamps.assumed, *unknown), warnings)
+    capture.attributes["stamps"] = str(stamps)
+    capture.streams = {name: stream for companion in taken for name, stream in companion.streams.items()}
+    capture.products = {name: product for companion in taken for name, product in companion.products.items()}
+    capture.attributes["topics"] = ", ".join([radar, *companions])
+    capture.batches = _batches(path, radar, companions, capture, stamps)
+    return capture
+
+
+def _first(bag: Bag, topic: str) -> tuple[float, object]:
+    """Time of receipt (s) and content of a topic's first message."""
+    for _, nanoseconds, message in bag.messages([topic]):
+        return 1e-9 * nanoseconds, message
+    raise InputError(f"{bag.path}: has no message on {topic}, though its index counts {bag.topics[topic][1]}")
+
+
+def _topics(bag: Bag) -> tuple[str, dict[str, type[Companion]], list[str]]:
+    """The topic of raw frames, those that come along, and what was ambiguous."""
+    there = {topic: kind for topic, (kind, count) in bag.topics.items() if count}
+    frames = [topic for topic, kind in there.items() if is_frame(kind)]
+    if not frames:
+        listed = ", ".join(f"{topic} ({kind})" for topic, kind in there.items())
+        raise InputError(
+            f"{bag.path}: has no raw radar frames (messages of a type RadarFrameFull), which odometry and maps are "
+            f"made of; expected a topic such as {_RADAR} beside {listed or 'nothing'}"
+        )
+    warnings = []
+    if len(frames) > 1:
+        warnings.append(f"{bag.path}: has raw frames on {', '.join(frames)}, of which one is taken")
+    radar = _RADAR if _RADAR in frames else frames[0]
+    others = {}
+    for name, kinds, companion in COMPANIONS:
+        found = [topic for topic, kind in there.items() if kind in kinds]
+        if companion is Depth:
+            found = [topic for topic in found if "depth" in topic.lower()]
+        if name in found or len(found) == 1:
+            others[name if name in found else found[0]] = companion
+        elif found:
+            warnings.append(f"{bag.path}: has {', '.join(found)}, none of them {name}, and all are left out")
+    return radar, others, warnings
+
+
+def _configure(path: Path, frame: object, given: Given) -> tuple[RadarConfig, tuple[str, ...]]:
+    with explained(f"{path}: has frames without usable shape, rx, tx and data"):
+        shape = tuple(int(length) for length in np.atleast_1d(frame.shape))
+        rx, tx = _antennas(frame.rx), _antennas(frame.tx)
+        whole = np.asarray(frame.data).dtype.kind in "iu" and min(shape, default=0) > 0
+    loops, rest = divmod(math.prod(shape), max(1, shape[-1] * len(rx) * len(tx))) if whole else (0, 0)
+    if rest or not loops:
+        raise InputError(
+            f"{path}: has frames of shape {shape} with {len(tx)} transmitters and {len(rx)} receivers, expected loops "
+            "x transmitters x receivers x samples"
+        )
+    said = {"samples": shape[-1], "loops": loops, "rx": rx, "tx": tx}
+    preset = PRESETS["radarize"]
+    if given.config is None and said == {name: getattr(preset, name) for name in said}:
+        return given.or_else(preset, "").configure(str(path))[0], ("configuration: preset radarize", "iq_order")
+    return given.configure(str(path), said)
+
+
+def _antennas(field: object) -> tuple[int, ...]:
+    """Antennas in use, 0-based, from a bit mask or from one truth value an antenna."""
+    values = [int(value) for value in np.atleast_1d(field)]
+    if len(values) == 1 and values[0] > 1:
+        return tuple(k for k in range(4) if values[0] >> k & 1)
+    return tuple(k for k, value in enumerate(values) if value)
+
+
+def _calibrated(config: RadarConfig, frame: object, name: str, warnings: list[str]) -> RadarConfig:
+    """The configuration with the frame's calibration, unless it has one of its own."""
+    with explained(f"{name}: has frames without usable range_bias and rx_phase_bias"):
+        pairs = np.asarray(getattr(frame, "rx_phase_bias", ()), float).reshape(-1)
+        bias = float(getattr(frame, "range_bias", 0.0))
+    untouched = config.range_bias == 0 and config.channel_calibration is None
+    if not untouched or not pairs.any():
+        return config
+    if pairs.size != 24 or not np.isfinite([*pairs, bias]).all():
+        warnings.append(f"rx_phase_bias has {pairs.size} numbers, expected 12 pairs; no calibration is taken from it")
+        return config
+    factors = tuple((float(re), float(im)) for re, im in pairs.reshape(12, 2))
+    return config.changed(name, range_bias=bias, channel_calibration=factors)
+
+
+def _intrinsics(bag: Bag, companions: dict[str, Companion]) -> None:
+    """Take the depth camera's pinhole model from its camera_info, if the bag has one."""
+    for topic, companion in companions.items():
+        folder = topic.removesuffix("/compressedDepth").rsplit("/", 1)[0]
+        if isinstance(companion, Depth) and bag.topics.get(f"{folder}/camera_info", ("", 0))[0] == _CAMERA_INFO:
+            for _, _, info in bag.messages([f"{folder}/camera_info"]):
+                matrix = np.asarray(info.K if hasattr(info, "K") else info.k, float)
+                if matrix[0] > 0:
+                    companion.calibrate((matrix[0], matrix[4], matrix[2], matrix[5]))
+                break
+
+
+def _turned(companions: dict[str, Companion], given: Given) -> tuple[str, ...]:
+    """Turn the IMU as the user says; returns ``imu/mount`` if nobody says how it stands."""
+    sensors = [companion for companion in companions.values() if isinstance(companion, InertialSensor)]
+    for sensor in sensors:
+        if given.imu_turn is not None:
+            sensor.turn(Rotation.from_euler("xyz", given.imu_turn, degrees=True), "given")
+    return ("imu/mount",) if any(not sensor.products for sensor in sensors) else ()
+
+
+def _batches(
+    path: Path, radar: str, companions: dict[str, Companion], capture: Capture, stamps: Stamps
+) -> Iterator[Batch]:
+    config, done = capture.config, 0
+    size = batch_frames(config, capture.streams)
+    frames = Frames(config)
+
+    def batch(count: int) -> Batch:
+        nonlocal done
+        times, raw, end = frames.take(count)
+        rows = [companion.rows(times, done, end) for companion in companions.values()]
+        done += len(times)
+        return Batch(
+            decode(raw, config), ~all_zero(raw, config), times, {k: v for part in rows for k, v in part.items()}
+        )
+
+    with Bag(path) as bag:
+        for topic, nanoseconds, message in bag.messages([radar, *companions]):
+            received = 1e-9 * nanoseconds
+            now = stamps(message, received) if topic == radar else received
+            if frames.times and now > frames.last + 2 * _AHEAD:  # the radar is silent: nothing to wait for
+                yield batch(size)
+            elif len(frames.times) > size and now > frames.times[size] + _AHEAD:
+                yield batch(size)
+            elif not frames.times:
+                for companion in companions.values():
+                    companion.forget(now - 2 * _AHEAD)
+            if topic == radar:
+                frames.add(now, message)
+            else:
+                companions[topic].take(message, received)
+    while frames.times:
+        yield batch(size)
+    if not done:
+        raise InputError(
+            f"{path}: {'; '.join(frames.warnings)}; expected {' x '.join(map(str, config.frame_shape))} words a frame"
+        )
+    capture.warnings += frames.warnings
+    for topic, companion in companions.items():
+        if companion.damaged:
+            capture.warnings.append(f"{topic}: {companion.damaged} messages could not be used")
+
+
+FORMAT = Format(
+    "ROS bag",
+    "a ROS bag (.bag, .mcap, .db3 or a folder)",
+    lambda source: source.suffix.lower() in (".bag", ".mcap", ".db3") or (source / "metadata.yaml").is_file(),
+    lambda source, given, _: open_bag(source, configured(source, given)),
+    options=("latency", "imu_turn"),
+)

@@ -1,0 +1,182 @@
+"""Raw ``.bin`` files of a DCA1000: nothing but words, from the first frame's start on.
+
+Long captures come in parts, ``NAME_Raw_0.bin``, ``NAME_Raw_1.bin``, ..., cut anywhere, even within a word.
+"""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Int16
+
+from radarize.io.errors import InputError, explained
+from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.format import Format
+from radarize.io.importers.layout import arranged, likely, recorded
+from radarize.io.importers.parameters import Given
+from radarize.io.importers.words import oddity, signed
+from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import check_layout
+from radarize.radar.presets import load_config
+
+#: Bytes by which a capture is judged.
+_LOOKED_AT = 1 << 20
+_PART = re.compile(r"(?P<name>.+)_Raw_(?P<number>\d+)\.bin", re.IGNORECASE)
+
+
+def parts(source: Path) -> tuple[Path, ...]:
+    """All files of the capture that a ``.bin`` belongs to, in order: itself, unless its name says that it is a part.
+
+    Raises:
+        InputError: a part is missing.
+    """
+    if not (match := _PART.fullmatch(source.name)):
+        return (source,)
+    numbered = {}
+    for path in source.parent.iterdir():
+        other = _PART.fullmatch(path.name)
+        if other and other["name"] == match["name"]:
+            numbered[int(other["number"])] = path
+    if missing := sorted(set(range(max(numbered) + 1)) - numbered.keys()):
+        raise InputError(
+            f"{source.parent}: has parts {', '.join(map(str, sorted(numbered)))} of {match['name']}_Raw_*.bin, "
+            f"expected part {missing[0]} too"
+        )
+    return tuple(numbered[number] for number in sorted(numbered))
+
+
+def whole_name(source: Path) -> Path:
+    """The name of a capture without the number of its part, where its settings may lie: ``NAME.cfg``."""
+    match = _PART.fullmatch(source.name)
+    return source.with_name(match["name"] + ".bin") if match else source
+
+
+def all_zero(words: Int16[np.ndarray, "word"], config: RadarConfig) -> Bool[np.ndarray, "frame loop tx"]:
+    """Chirps (physical order) of nothing but zeros: capture programs put them where packets were lost."""
+    loops, tx = config.frame_shape[:2]
+    fired = words.reshape(-1, loops, tx, 2 * config.samples * len(config.rx)).any(axis=3)
+    return ~fired[:, :, list(config.slot)]
+
+
+def open_bin(
+    files: Sequence[Path],
+    config: RadarConfig,
+    cfg_text: str = "",
+    assumed: tuple[str, ...] = (),
+    warnings: Sequence[str] = (),
+    encoding: str = "signed",
+    layout: str = "pairs",
+) -> Capture:
+    """Open raw files that follow each other.
+
+    Args:
+        encoding, layout: of their words, see `radarize.io.importers.words` and `radarize.io.importers.layout`.
+
+    An incomplete last frame is left out with a warning, unless the samples show that it is the configuration which
+    does not fit; of words that are plainly something else than `encoding` says there is a warning, too. Chirps of
+    nothing but zeros count as lost: capture programs fill lost packets with zeros.
+
+    Raises:
+        InputError: less than one frame, or the samples repeat with another period than the configuration's loop.
+    """
+    told, config = config, recorded(config, layout)
+    check_layout(config)
+    warnings = list(warnings)
+    size = sum(path.stat().st_size for path in files)
+    whole, rest = divmod(size, config.frame_bytes)
+    loops, tx, rx, samples, _ = config.frame_shape
+    name = ", ".join(str(path) for path in files)
+    each = f"{config.frame_bytes} bytes a frame ({loops} loops x {tx} TX x {rx} RX x {samples} samples x 4 bytes)"
+    if not whole:
+        raise InputError(f"{name}: has {size} bytes, less than one frame; expected a multiple of {each}")
+    with files[0].open("rb") as file:
+        begins = file.read(_LOOKED_AT)
+    words = signed(np.frombuffer(begins, "<i2", len(begins) // 2), encoding)
+    if odd := oddity(begins, encoding):
+        warnings.append(f"{name}: {odd}")
+    elif (other := likely(words, told, layout)) != layout:
+        warnings.append(f"{name}: its words look {other}, not {layout}; --layout {other} reads those")
+    elif layout == "pairs" and (period := _other_period(files[0], config)):
+        expected = tx * rx * samples
+        message = (
+            f"{name}: has {size} bytes, {whole} frames and {rest} bytes of {each}, but its samples repeat every "
+            f"{period} and not every {expected} (TX x RX x samples), expected the configuration of this capture"
+        )
+        if rest:
+            raise InputError(message)
+        warnings.append(message)
+    elif rest:
+        warnings.append(
+            f"{name}: has {size} bytes, {whole} whole frames and {rest} bytes of an incomplete one, which is left out; "
+            f"expected {each}"
+        )
+    read = partial(arranged, config=config, layout=layout)
+    return Capture(config, cfg_text, _batches(files, config, encoding, read), whole, assumed, warnings)
+
+
+def _batches(
+    files: Sequence[Path], config: RadarConfig, encoding: str, read: Callable[[np.ndarray], np.ndarray]
+) -> Iterator[Batch]:
+    for data in _blocks(files, batch_frames(config) * config.frame_bytes):
+        words = np.frombuffer(data, "<i2", len(data) // config.frame_bytes * config.frame_bytes // 2)
+        words = words.astype(np.int16, copy=False)
+        if words.size:
+            yield Batch(read(signed(words, encoding)), ~all_zero(words, config))
+
+
+def _blocks(files: Sequence[Path], size: int) -> Iterator[bytes]:
+    """Content of the files put end to end, in blocks of `size` bytes; the last one may be shorter."""
+    block = b""
+    for path in files:
+        with explained(f"{path}: cannot be read", OSError), path.open("rb") as file:
+            while data := file.read(size - len(block)):
+                block += data
+                if len(block) == size:
+                    yield block
+                    block = b""
+    yield block
+
+
+def _other_period(path: Path, config: RadarConfig) -> int | None:
+    """Complex samples after which the capture repeats, if that is clearly not the configuration's loop.
+
+    Chirps of one transmitter and receiver look alike from loop to loop, so the magnitude of the autocorrelation peaks
+    at the loop's length. None where the peak is there, or nowhere distinct.
+    """
+    loop = config.frame_bytes // 4 // config.loops
+    with path.open("rb") as file:
+        data = file.read(1 << 21)
+    words = np.frombuffer(data, "<i2", len(data) // 8 * 4)
+    pairs = words.reshape(-1, 2, 2).astype(np.float32)  # either order of I and Q: the other is its mirror image
+    signal = (pairs[:, 0] + 1j * pairs[:, 1]).reshape(-1)
+    signal -= signal.mean()
+    longest = min(2 * loop, len(signal) // 2)
+    if loop > longest or not signal.any():
+        return None
+    spectrum = np.fft.fft(signal, 2 * len(signal))
+    correlation = np.abs(np.fft.ifft(np.abs(spectrum) ** 2)[: longest + 1])
+    correlation *= len(signal) / (len(signal) - np.arange(longest + 1)) / correlation[0]
+    candidates = np.arange(loop // 2 & ~1, longest + 1, 2)
+    best = int(candidates[np.argmax(correlation[candidates])])
+    return best if correlation[best] > 0.7 and correlation[loop] < 0.5 * correlation[best] else None
+
+
+def configured(source: Path, given: Given) -> Given:
+    """The same with the ``.cfg`` of the source's name beside it, unless a configuration is given."""
+    beside = whole_name(source).with_suffix(".cfg")
+    return given.or_else(*load_config(beside)) if given.config is None and beside.is_file() else given
+
+
+def _open(source: Path, given: Given, _: Path) -> Capture:
+    given = configured(source, given)
+    config, assumed = given.configure(str(source))
+    return open_bin(parts(source), config, given.cfg_text, assumed, encoding=given.encoding, layout=given.layout)
+
+
+def _fits(source: Path) -> bool:
+    return source.suffix.lower() == ".bin" and not source.is_dir()
+
+
+FORMAT = Format(".bin", "a DCA1000 .bin", _fits, _open, options=("encoding", "layout"), last=True)

@@ -1,0 +1,123 @@
+"""Raw frames of a ROS bag: when they begin, and what was wrong with them.
+
+They are stamped as their headers say. The Radarize data set's publisher leaves that unset: then with the time of
+receipt less a latency, by default the burst's length, since no frame is received before its last chirp. That is the
+least; a recorder that waits for a frame's last packet, which the DCA1000 fills with the next frame's beginning, has a
+frame period.
+
+Receipts are late by what the computer did meanwhile; the radar's timer is periodic. So receipts are moved to a line
+below them.
+"""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import minimum_filter1d
+from scipy.stats import theilslopes
+
+from radarize.io.importers.companions import SAME_CLOCK, header_time
+from radarize.radar.config import RadarConfig
+
+#: s that a computer may hold frames up, parts of a recording whose least late frames make the line, and share by which
+#: receipts may be apart otherwise than configured.
+_HELD_UP, _PARTS, _AGREE = 2.0, 32, 0.01
+
+
+class Stamps:
+    """When frames begin: from their headers, or from their receipt.
+
+    Args:
+        first: the first frame.
+        received: when each frame was, s.
+        latency: given by the user, s.
+
+    Attributes:
+        latency: from a frame's start to its receipt, s; None where headers say.
+        assumed: what nobody said.
+    """
+
+    def __init__(self, config: RadarConfig, first: object, received: Float[np.ndarray, "frame"], latency: float | None):
+        from_headers = latency is None and abs(header_time(first) - received[0]) < SAME_CLOCK
+        self.assumed = ("latency",) if latency is None and not from_headers else ()
+        self.latency = None if from_headers else config.burst_time if latency is None else latency
+        self._received = np.unique(received)
+        self._periodic = self._received if from_headers else periodic(self._received, config.frame_period)
+
+    def __call__(self, message: object, received: float) -> float:
+        """Of a frame, s."""
+        if self.latency is None:
+            return header_time(message)
+        return float(self._periodic[np.searchsorted(self._received, received)]) - self.latency
+
+    def __str__(self) -> str:
+        if self.latency is None:
+            return "headers"
+        moved = 1e3 * np.abs(self._received - self._periodic)
+        return (
+            f"receipt, moved to the period of the radar's timer by {np.median(moved):.2f} ms in the median and "
+            f"{moved.max():.2f} ms at most, less a latency of {1e3 * self.latency:.2f} ms"
+        )
+
+
+def periodic(received: Float[np.ndarray, "frame"], period: float) -> Float[np.ndarray, "frame"]:
+    """Receipts, s and ascending, on the line through those that are least late, a whole number of frame periods apart;
+    as they are where no line is within half a period of half of them.
+
+    A frame that is held up is received with those behind it, which say when it could have been. The line's slope is the
+    period by the bag's clock; the configured `period` says which frames are missing, unless receipts contradict it.
+    """
+    if len(received) < 3:
+        return received
+    since, count = received - received[0], np.arange(len(received))
+    between = float(np.median(np.diff(since)))
+    step = period if abs(between / period - 1) < _AGREE else between
+    window = 1 + min(round(_HELD_UP / step), len(since))
+    punctual = minimum_filter1d(since - count * step, window, mode="nearest", origin=-(window // 2)) + count * step
+    numbers, least_late = count - len(count), 0.0
+    for k, at in enumerate(punctual):
+        numbers[k] = max(numbers[k - 1] + 1, round((at - least_late) / step))
+        least_late = min(least_late + _AGREE * step, at - numbers[k] * step)
+    late = since - numbers * np.polyfit(numbers, punctual, 1)[0]
+    least = [part[late[part].argmin()] for part in np.array_split(count, min(_PARTS, len(count)))]
+    slope, start, *_ = theilslopes(since[least], numbers[least])  # whatever frames were numbered wrongly
+    line = start + slope * numbers
+    return received[0] + line if np.median(np.abs(line - since)) < step / 2 else received
+
+
+class Frames:
+    """Raw frames that wait for what comes along with them, and what was wrong with others."""
+
+    def __init__(self, config: RadarConfig):
+        self.config, self.words = config, config.frame_bytes // 2
+        self.times: list[float] = []
+        self.raw: list[np.ndarray] = []
+        self.last = -np.inf
+        self._odd = self._again = 0
+
+    def add(self, time: float, message: object) -> None:
+        """Keep a frame, unless it has another size or does not come after the last one."""
+        words = np.asarray(message.data)
+        if words.dtype.itemsize == 1:
+            words = words[: words.size // 2 * 2].view("<i2")
+        if words.size != self.words:
+            self._odd += 1
+        elif time <= self.last:
+            self._again += 1
+        else:
+            self.last = time
+            self.times.append(time)
+            self.raw.append(words.astype(np.int16, copy=False))
+
+    def take(self, count: int) -> tuple[np.ndarray, np.ndarray, float]:
+        """Stamps and words of the first frames, and the stamp of the frame after them, s."""
+        times, raw = np.array(self.times[:count]), np.concatenate(self.raw[:count])
+        del self.times[:count], self.raw[:count]
+        return times, raw, self.times[0] if self.times else self.last + self.config.frame_period
+
+    @property
+    def warnings(self) -> list[str]:
+        """What was wrong."""
+        counted = (
+            (self._odd, f"frames have not the {self.words} words of the configuration and are left out"),
+            (self._again, "frames came again or out of order and are left out"),
+        )
+        return [f"{count} {what}" for count, what in counted if count]

@@ -1,0 +1,196 @@
+"""Network captures of a DCA1000's UDP stream: ``.pcap``, and Wireshark's ``.pcapng``.
+
+Formats: https://www.ietf.org/archive/id/draft-ietf-opsawg-pcap-04.html, and -pcapng-03.html beside it, by dpkt; link
+type 1 (Ethernet), IPv4, UDP to port 4098. Of a ``.pcapng``, the first interface says the link type and the clock.
+"""
+
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+import dpkt
+import numpy as np
+
+from radarize.io.errors import InputError, explained
+from radarize.io.importers.bin import configured
+from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.format import Format
+from radarize.io.importers.parameters import Given
+from radarize.radar.assembler import FrameAssembler
+from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import DATA_PORT, decode
+
+#: Magic number -> byte order and ticks per second of the time stamps.
+MAGIC = {
+    b"\xd4\xc3\xb2\xa1": ("<", 10**6),
+    b"\xa1\xb2\xc3\xd4": (">", 10**6),
+    b"\x4d\x3c\xb2\xa1": ("<", 10**9),
+    b"\xa1\xb2\x3c\x4d": (">", 10**9),
+}
+NEXT_GENERATION = b"\x0a\x0d\x0d\x0a"
+_ETHERNET = 1
+_LONGEST_RECORD = 1 << 18
+#: With so many times more bytes lost than the file has, the byte counts are damaged, not the network.
+_MOST_LOST = 20
+
+
+def open_pcap(path: Path, config: RadarConfig, cfg_text: str = "", assumed: tuple[str, ...] = ()) -> Capture:
+    """Open a network capture; an incomplete last frame is left out, lost samples are zero and marked.
+
+    Raises:
+        InputError: no pcap or pcapng file of Ethernet packets, or (on reading) without a whole frame.
+    """
+    expected = path.stat().st_size // config.frame_bytes
+    capture = Capture(config, cfg_text, (), expected, assumed)
+    capture.batches = _batches(path, capture)
+    with path.open("rb") as file:
+        _packets(file, path)
+    return capture
+
+
+def _batches(path: Path, capture: Capture) -> Iterator[Batch]:
+    assembler = FrameAssembler(capture.config)
+    size = batch_frames(capture.config)
+    most_lost = _MOST_LOST * path.stat().st_size
+    frames: list[tuple[np.ndarray, np.ndarray]] = []
+    yielded = 0
+    for frame in _frames(path, capture, assembler):
+        if assembler.counts.lost_bytes > most_lost:
+            raise InputError(
+                f"{path}: lacks more than {most_lost} bytes between its data packets, {_MOST_LOST} times its size; "
+                "expected byte counts that grow as packets come"
+            )
+        frames.append(frame)
+        if len(frames) >= size:
+            yielded += len(frames)
+            yield _stack(frames, capture.config)
+            frames.clear()
+    if not yielded and not frames:
+        raise InputError(
+            f"{path}: holds {assembler.counts.incomplete_bytes} bytes of samples in {assembler.counts.received} data "
+            f"packets to UDP port {DATA_PORT}, expected at least one frame of {capture.config.frame_bytes} bytes"
+        )
+    capture.warnings += assembler.counts.warnings()
+    if frames:
+        yield _stack(frames, capture.config)
+
+
+def _frames(path: Path, capture: Capture, assembler: FrameAssembler) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    for time, payload in _payloads(path, capture):
+        capture.attributes.setdefault("first_packet_time", time)
+        yield from assembler.take(payload)
+    yield from assembler.finish()
+
+
+def _stack(frames: list[tuple[np.ndarray, np.ndarray]], config: RadarConfig) -> Batch:
+    words, valid = zip(*frames, strict=True)
+    return Batch(decode(np.concatenate(words), config), np.stack(valid))
+
+
+def _payloads(path: Path, capture: Capture) -> Iterator[tuple[float, bytes]]:
+    """Arrival time (s since 1970) and UDP payload of each data packet; a warning where the file ends too early."""
+    with path.open("rb") as file:
+        packets = _packets(file, path)
+        while True:
+            try:
+                time, data = next(packets)
+            except StopIteration:
+                return
+            except _Broken as error:
+                capture.warnings.append(f"{path}: {error}; what follows is left out")
+                return
+            if payload := _udp_payload(data):
+                yield time, payload
+
+
+class _Broken(Exception):
+    """Why no packet can be read from here on."""
+
+
+def _packets(file: BinaryIO, path: Path) -> Iterator[tuple[float, bytes]]:
+    """Arrival time and Ethernet frame of each packet.
+
+    Raises:
+        InputError: no network capture, or not of Ethernet; at once, before the first packet is asked for.
+        _Broken: (on reading) what follows cannot be read.
+    """
+    magic = file.read(4)
+    file.seek(0)
+    if magic == NEXT_GENERATION:
+        with explained(f"{path}: starts with a broken pcapng section", ValueError, dpkt.Error, struct.error):
+            reader = dpkt.pcapng.Reader(_Bounded(file))
+        link, packets = reader.datalink(), _next_generation(reader)
+    elif magic in MAGIC and len(header := file.read(24)) == 24:
+        order, ticks = MAGIC[magic]
+        link = struct.unpack(order + "I", header[20:])[0] & 0xFFFF
+        packets = _classic(file, struct.Struct(order + "IIII"), ticks)
+    else:
+        raise InputError(f"{path}: starts with {magic.hex() or 'nothing'}, expected a pcap or pcapng header")
+    if link != _ETHERNET:
+        raise InputError(f"{path}: has link type {link}, expected {_ETHERNET} (Ethernet)")
+    return packets
+
+
+def _classic(file: BinaryIO, record: struct.Struct, ticks: int) -> Iterator[tuple[float, bytes]]:
+    while header := file.read(record.size):
+        if len(header) < record.size:
+            raise _Broken("ends within a packet")
+        seconds, fraction, length, _ = record.unpack(header)
+        if length > _LONGEST_RECORD:
+            raise _Broken(f"has a packet of {length} bytes")
+        data = file.read(length)
+        if len(data) < length:
+            raise _Broken("ends within a packet")
+        yield seconds + fraction / ticks, data
+
+
+def _next_generation(reader: dpkt.pcapng.Reader) -> Iterator[tuple[float, bytes]]:
+    try:
+        yield from reader
+    except ValueError as error:
+        raise _Broken(str(error)) from error
+    except (dpkt.Error, struct.error) as error:
+        raise _Broken("ends within a packet") from error
+
+
+class _Bounded:
+    """A file of which nobody reads more at once than a packet may have: lengths come from the file itself."""
+
+    def __init__(self, file: BinaryIO):
+        self._file = file
+
+    def read(self, size: int) -> bytes:
+        if not 0 <= size <= _LONGEST_RECORD:
+            raise ValueError(f"has a block of {size + 8} bytes")
+        return self._file.read(size)
+
+
+def _udp_payload(data: bytes) -> bytes | None:
+    """Payload of an Ethernet frame that carries IPv4 and UDP to the data port, else None."""
+    start = 18 if data[12:14] == b"\x81\x00" else 14  # with or without a VLAN tag
+    if len(data) < start + 28 or data[start - 2 : start] != b"\x08\x00":
+        return None
+    if data[start] >> 4 != 4 or data[start + 9] != 17:
+        return None
+    udp = start + 4 * (data[start] & 0x0F)
+    if len(data) < udp + 8:
+        return None
+    port, length = struct.unpack_from(">HH", data, udp + 2)
+    return data[udp + 8 : udp + length] if port == DATA_PORT else None
+
+
+def _fits(source: Path) -> bool:
+    if source.is_dir():
+        return False
+    with explained(f"{source}: cannot be read", OSError), source.open("rb") as file:
+        return file.read(4) in (*MAGIC, NEXT_GENERATION) or source.suffix.lower() in (".pcap", ".pcapng")
+
+
+def _open(source: Path, given: Given, _: Path) -> Capture:
+    given = configured(source, given)
+    config, assumed = given.configure(str(source))
+    return open_pcap(source, config, given.cfg_text, assumed)
+
+
+FORMAT = Format("network capture", "a .pcap or .pcapng of its packets", _fits, _open)

@@ -1,0 +1,188 @@
+"""Sequences of the red-rover rig in its `roverd` layout, as the data set I/Q-1M has them (Huang et al., 2025).
+
+SEQUENCE/config.yaml          how it was recorded; radar: args: radar: chirps, in GHz, MHz/us, us, ksps and ms
+         radar/meta.json      type and shape of each channel; iq: [loop, tx, rx, 2 x sample] of int16
+         radar/iq, ts         words of the radar frame by frame; stamps, s
+         radar/valid          0 of frames in which lost packets were filled with zeros
+         _radar/pose.npz      poses by a lidar's SLAM: t (s), pos (m), rot (matrices); x forward, y left, z up
+"""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Int16
+from scipy.spatial.transform import Rotation
+
+from radarize.io.errors import InputError, explained
+from radarize.io.files import read_text, regular
+from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.format import Format
+from radarize.io.importers.parameters import Given
+from radarize.io.jsonfile import parse_json
+from radarize.io.npyfile import read_npz
+from radarize.io.recording import Product
+from radarize.io.yamlfile import read_yaml
+from radarize.radar.config import RadarConfig
+from radarize.radar.dca1000 import check_layout, decode
+
+#: Transmitters that fire, one after the other: with two, the raised one in the middle of the row is left out.
+_TRANSMITTERS = {1: (0,), 2: (0, 2), 3: (0, 1, 2)}
+#: Fields of a configuration: their names in config.yaml, and units.
+_FIELDS = {
+    "start_frequency": ("frequency", 1e9), "slope": ("freq_slope", 1e12), "sample_rate": ("sample_rate", 1e3),
+    "idle_time": ("idle_time", 1e-6), "adc_start_time": ("adc_start_time", 1e-6),
+    "ramp_end_time": ("ramp_end_time", 1e-6), "frame_period": ("frame_period", 1e-3),
+}  # fmt: skip
+#: Words in a row, from a multiple of as many on, that are zero where packets were lost and never else.
+_RUN = 16
+
+
+class _Channel(NamedTuple):
+    """A file of frames that follow each other."""
+
+    path: Path
+    dtype: np.dtype
+    shape: tuple[int, ...]
+
+    @property
+    def frames(self) -> int:
+        """Whole ones: a recording may have ended within one."""
+        return regular(self.path, "a channel of a roverd sensor").stat().st_size // self.frame_bytes
+
+    @property
+    def frame_bytes(self) -> int:
+        return math.prod(self.shape) * self.dtype.itemsize
+
+    def read(self, start: int, stop: int) -> np.ndarray:
+        """Of some frames."""
+        with explained(f"{self.path}: cannot be read", OSError), self.path.open("rb") as file:
+            file.seek(start * self.frame_bytes)
+            data = file.read((stop - start) * self.frame_bytes)
+        return np.frombuffer(data, self.dtype).reshape(-1, *self.shape)
+
+
+def is_sequence(source: Path) -> bool:
+    """Whether a folder is such a sequence."""
+    return (source / "radar" / "meta.json").is_file()
+
+
+def open_sequence(source: Path, given: Given) -> Capture:
+    """Open a sequence; chirps that lost packets have filled with zeros are not valid.
+
+    Raises:
+        InputError: no such layout, a channel of another type, or chirps that do not fit its shape.
+    """
+    sensor = source / "radar"
+    meta = parse_json(read_text(sensor / "meta.json", "JSON"), str(sensor / "meta.json"))
+    words, stamps = (_channel(sensor, meta, name, kind) for name, kind in (("iq", "<i2"), ("ts", "<f8")))
+    if len(words.shape) != 4 or words.shape[1] not in _TRANSMITTERS or words.shape[3] % 2:
+        raise InputError(f"{words.path}: has shape {words.shape}, expected loops, 1 to 3 tx, rx and twice the samples")
+    loops, tx, rx, numbers = words.shape
+    found = {"loops": loops, "tx_order": _TRANSMITTERS[tx], "rx": rx, "samples": numbers // 2}
+    config, assumed = given.configure(str(source), _chirps(source / "config.yaml") | found)
+    check_layout(config)
+    if (config.loops, len(config.tx), len(config.rx), 2 * config.samples) != words.shape:
+        raise InputError(f"{words.path}: has shape {words.shape}, expected that of the configuration's frames")
+    count = min(words.frames, stamps.frames)
+    if not count:
+        raise InputError(f"{words.path}: has {words.path.stat().st_size} bytes, expected {words.frame_bytes} a frame")
+    doubtful = np.zeros(count, bool)
+    if "valid" in meta:
+        told = _channel(sensor, meta, "valid", "u1").read(0, count)
+        doubtful[: len(told)] = told == 0
+    capture = Capture(config, "", (), count, assumed, products=_poses(source / "_radar" / "pose.npz"))
+    capture.batches = _batches(words, stamps, doubtful, config)
+    return capture
+
+
+def _channel(sensor: Path, meta: dict, name: str, kind: str) -> _Channel:
+    """A channel of plain numbers.
+
+    Raises:
+        InputError: there is none, or of another type.
+    """
+    about = meta.get(name)
+    shape = about.get("shape") if isinstance(about, dict) else None
+    if not isinstance(shape, list) or not all(isinstance(size, int) and 0 < size <= 1 << 16 for size in shape):
+        raise InputError(f"{sensor / 'meta.json'}: {name} is {str(about)[:80]}, expected format, type and shape")
+    with explained(f"{sensor / 'meta.json'}: {name}: type", TypeError, ValueError):
+        dtype = np.dtype(str(about.get("type"))).newbyteorder("<")
+    if about.get("format") != "raw" or dtype != np.dtype(kind):
+        told = f"{about.get('format')} {about.get('type')}"
+        raise InputError(f"{sensor / 'meta.json'}: {name} is {told[:40]}, expected raw {np.dtype(kind).name}")
+    return _Channel(sensor / name, dtype, tuple(shape))
+
+
+def _chirps(path: Path) -> dict[str, object]:
+    """What the rig's configuration says of them; nothing where there is none.
+
+    Raises:
+        InputError: it says no numbers.
+    """
+    if not path.exists():
+        return {}
+    settings = read_yaml(path)
+    for key in ("radar", "args", "radar"):
+        settings = settings.get(key) if isinstance(settings, dict) else None
+    if not isinstance(settings, dict):
+        raise InputError(f"{path}: has no radar: args: radar:, expected the chirps of the radar there")
+    found: dict[str, object] = {}
+    for field, (name, unit) in _FIELDS.items():
+        if not isinstance(value := settings.get(name), int | float) or isinstance(value, bool):
+            raise InputError(f"{path}: radar.args.radar.{name} is {str(value)[:40]}, expected a number")
+        found[field] = value * unit
+    return found
+
+
+def _poses(path: Path) -> dict[str, Product]:
+    """True poses, if somebody has put any.
+
+    Raises:
+        InputError: no poses, or other numbers of them.
+    """
+    if not path.exists():
+        return {}
+    found = read_npz(path, str(path), ("t", "pos", "rot"), path.stat().st_size)
+    shapes = {name: values.shape for name, values in found.items()}
+    count = len(found["t"]) if "t" in found and found["t"].ndim == 1 else 0
+    if not count or shapes != {"t": (count,), "pos": (count, 3), "rot": (count, 3, 3)}:
+        raise InputError(f"{path}: has {shapes}, expected t, pos (3 numbers) and rot (3 x 3) of as many poses")
+    if not all(np.isfinite(values).all() for values in found.values()) or (np.diff(found["t"]) <= 0).any():
+        raise InputError(f"{path}: has poses that are not finite, or times that do not ascend")
+    with explained(f"{path}: rot", ValueError):
+        turned = Rotation.from_matrix(found["rot"]).as_quat()
+    return {
+        "truth/time": Product(found["t"].astype(float), "s", "stamps of the poses"),
+        "truth/pose": Product(
+            np.hstack([found["pos"], turned]), "m; x y z qx qy qz qw", "of the rig, by SLAM with its lidar"
+        ),
+    }
+
+
+def _batches(
+    words: _Channel, stamps: _Channel, doubtful: Bool[np.ndarray, "frame"], config: RadarConfig
+) -> Iterator[Batch]:
+    size = batch_frames(config)
+    for start in range(0, len(doubtful), size):
+        stop = min(start + size, len(doubtful))
+        frames = words.read(start, stop)
+        lost = _filled(frames)[:, :, list(config.slot)] & doubtful[start:stop, None, None]
+        yield Batch(decode(frames.reshape(-1).astype(np.int16), config), ~lost, stamps.read(start, stop).reshape(-1))
+
+
+def _filled(words: Int16[np.ndarray, "frame loop tx rx word"]) -> Bool[np.ndarray, "frame loop tx"]:
+    """Chirps with a run of zeros."""
+    chirps = words.reshape(*words.shape[:3], -1)
+    runs = chirps[..., : chirps.shape[3] // _RUN * _RUN].reshape(*words.shape[:3], -1, _RUN)
+    return (~runs.any(axis=4)).any(axis=3)
+
+
+FORMAT = Format(
+    "sequence in roverd's layout",
+    "a sequence in roverd's layout",
+    is_sequence,
+    lambda source, given, _: open_sequence(source, given),
+)

@@ -1,0 +1,110 @@
+"""Jobs on this machine: worker processes that live through many jobs, each with its share of the cores."""
+
+import multiprocessing
+import os
+import signal
+import sys
+import threading
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from multiprocessing.connection import Connection, wait
+
+from radarize.io.jobs.job import Job, News, attempt
+
+#: How often a job is begun that its worker does not survive.
+ATTEMPTS = 2
+_SPAWN = multiprocessing.get_context("spawn")
+
+
+class _Worker:
+    """A process and the name of the job that it has."""
+
+    def __init__(self, threads: int):
+        self.connection, theirs = _SPAWN.Pipe()
+        self.process = _SPAWN.Process(target=_serve, args=(theirs, threads), daemon=True)
+        self.process.start()
+        theirs.close()
+        self.busy: str | None = None
+
+    def give(self, name: str, job: Job) -> None:
+        self.busy = name
+        with suppress(OSError):  # it has died at rest, which is heard of as any death
+            self.connection.send((name, job))
+
+    def hear(self) -> News | None:
+        """News; None if it is dead."""
+        try:
+            news = self.connection.recv()
+        except (EOFError, OSError):
+            return None
+        if news.ended:
+            self.busy = None
+        return news
+
+    def stop(self) -> None:
+        self.process.kill()
+        self.process.join()
+        self.connection.close()
+
+
+def perform(jobs: Mapping[str, Job], workers: int | None) -> Iterator[News]:
+    """Do jobs by so many processes at most, by default one per core."""
+    cores = len(os.sched_getaffinity(0))
+    count = min(workers or cores, len(jobs))
+    threads = max(1, cores // count)
+    todo, attempts = deque(jobs), dict.fromkeys(jobs, 0)
+    crew: list[_Worker] = []
+    try:
+        while todo or any(worker.busy for worker in crew):
+            while todo and len(crew) < count:
+                crew.append(_Worker(threads))
+            for worker in crew:
+                if worker.busy is None and todo:
+                    worker.give(name := todo.popleft(), jobs[name])
+            ready = wait([w.connection for w in crew] + [w.process.sentinel for w in crew])
+            for worker in list(crew):
+                if worker.connection in ready and (news := worker.hear()):
+                    yield news
+                elif worker.process.sentinel in ready or worker.connection in ready:
+                    crew.remove(worker)
+                    worker.stop()
+                    if name := worker.busy:
+                        attempts[name] += 1
+                        if attempts[name] < ATTEMPTS:
+                            todo.appendleft(name)
+                            yield News(name)
+                        else:
+                            yield News(name, ended=True, error=f"{name}: its process {_end(worker.process.exitcode)}")
+    finally:
+        for worker in crew:
+            worker.stop()
+
+
+def _end(code: int | None) -> str:
+    if code == -signal.SIGKILL:
+        return "was killed, twice; most often memory is short, and fewer --workers need less"
+    return f"ended with code {code}, twice"
+
+
+def _serve(connection: Connection, threads: int) -> None:
+    """A worker's life."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches every process; the parent ends its workers
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    from radarize.io.jobs.threads import use_threads  # what it loads, only workers need
+
+    use_threads(threads)
+    while True:
+        try:
+            name, job = connection.recv()
+        except EOFError:
+            return
+        use_threads(threads)  # of what came along with the job
+        connection.send(attempt(name, job, lambda done, name=name: connection.send(News(name, done))))
+
+
+def _end_with_parent() -> None:
+    """A parent that was killed cannot end its workers, which would go on writing."""
+    multiprocessing.parent_process().join()
+    sys.stderr.flush()
+    os._exit(1)

@@ -1,0 +1,66 @@
+"""Parts that packages add by entry points: methods, trainings, formats, benchmarks."""
+
+from collections.abc import Iterator, MutableMapping
+from functools import cached_property
+from importlib.metadata import EntryPoint, entry_points
+from typing import Generic, TypeVar, cast
+
+from radarize.io.errors import InputError
+
+Part = TypeVar("Part")
+
+
+class Plugins(MutableMapping[str, Part], Generic[Part]):
+    """Parts by name: the entry points of a group, each imported at its first use, and what a program adds itself.
+
+    Args:
+        group: of entry points, in the ``pyproject.toml`` of any installed package.
+        what: the parts are called in errors.
+
+    Example:
+        >>> Plugins("radarize.scans", "scans").find("first-eco")
+        Traceback (most recent call last):
+        radarize.io.errors.InputError: scans is 'first-eco', expected one of cfar, elevation-aware, first-echo, ...
+    """
+
+    def __init__(self, group: str, what: str):
+        self.group, self.what = group, what
+        self._added: dict[str, Part] = {}
+
+    @cached_property
+    def _installed(self) -> dict[str, EntryPoint]:
+        return {point.name: point for point in entry_points(group=self.group)}
+
+    def find(self, name: str) -> Part:
+        """Return a part.
+
+        Raises:
+            InputError: no part has this name, or its module cannot be imported.
+        """
+        if name not in self:
+            raise InputError(f"{self.what} is {name!r}, expected one of {', '.join(self)}")
+        return self[name]
+
+    def __getitem__(self, name: str) -> Part:
+        if name not in self._added:
+            point = self._installed[name]
+            try:
+                self._added[name] = cast(Part, point.load())
+            except (ImportError, AttributeError) as error:
+                raise InputError(f"{self.what} {name}: {point.value} cannot be imported: {error}") from error
+        return self._added[name]
+
+    def __setitem__(self, name: str, part: Part) -> None:
+        self._added[name] = part
+
+    def __delitem__(self, name: str) -> None:
+        del self._added[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._added or name in self._installed
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(sorted(self._installed.keys() | self._added.keys()))
+
+    def __len__(self) -> int:
+        return len(self._installed.keys() | self._added.keys())

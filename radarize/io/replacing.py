@@ -1,0 +1,96 @@
+"""Files that are whole or not there."""
+
+import contextlib
+import os
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from radarize.io.errors import FULL, DiskFull, InputError, disk_full, explained
+from radarize.io.locks import hold
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """A temporary name beside `path` to write to; it takes the path's place when the block ends, and goes if it fails.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    path = Path(path)
+    part = path.with_name(path.name + ".part")
+    try:
+        with explained(f"{path}: cannot be written", OSError):
+            path.parent.mkdir(parents=True, exist_ok=True)
+            yield part
+            os.replace(part, path)
+    except BaseException as error:
+        with contextlib.suppress(OSError):
+            part.unlink()
+        if isinstance(error, Exception) and not isinstance(error, InputError) and disk_full(error):
+            raise DiskFull(f"{path}: cannot be written ({FULL})") from error  # libraries have errors of their own
+        raise
+
+
+class Replacement:
+    """Files that take the places of those in a folder together, or not at all.
+
+    Args:
+        folder: where they go; made if need be.
+        names: of all files that there may be. The first goes first and comes last: where it is, so are the others, and
+            of one making.
+
+    Attributes:
+        part: folder to write them to.
+
+    Raises:
+        InputError: nothing can be written there, or another program does.
+    """
+
+    def __init__(self, folder: Path, names: Sequence[str]):
+        self.folder, self.names, self.part = folder, names, folder / ".part"
+        self._new = not folder.exists()
+        with explained(f"{folder}: cannot be written", OSError):
+            self.part.mkdir(parents=True, exist_ok=True)
+            self._held: int | None = hold(self.part)
+            for left in self.part.iterdir():  # of one who died here
+                left.unlink()
+
+    def place(self) -> None:
+        """Let the files take their places; those of the folder that are not among them go.
+
+        Raises:
+            InputError: they cannot.
+        """
+        with explained(f"{self.folder}: cannot be written", OSError):
+            for name in self.names:
+                (self.folder / name).unlink(missing_ok=True)
+            for name in reversed(self.names):
+                if (self.part / name).exists():
+                    os.replace(self.part / name, self.folder / name)
+            self._let_go()
+
+    def discard(self) -> None:
+        """Leave the folder as it was; nothing to do after `place`."""
+        if self._held is not None:
+            self._let_go()
+            if self._new:
+                with contextlib.suppress(OSError):
+                    self.folder.rmdir()
+
+    def _let_go(self) -> None:
+        shutil.rmtree(self.part, ignore_errors=True)
+        os.close(self._held)
+        self._held = None
+
+
+def write_whole(path: Path, text: str) -> Path:
+    """Write a text file under a temporary name and rename it when it is whole.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+    return path

@@ -1,0 +1,28 @@
+"""The label that segmentation learns: which cells of range and bearing are free, and which hold the first surface."""
+
+import numpy as np
+from jaxtyping import UInt8
+
+from radarize.learning.features.grid import Grid
+from radarize.learning.features.table import Reading
+
+#: States of a cell of the occupancy label (`/truth/occupancy` says so).
+FREE, SURFACE, UNKNOWN = 0, 1, 2
+
+
+def on_grid(
+    cells: UInt8[np.ndarray, "frame range bearing"], own: Grid, known: Grid
+) -> UInt8[np.ndarray, "frame known bearing"]:
+    """Labels of a radar's range bins on those of another: the nearest cell's, but no surface gets lost in between; what
+    the radar does not reach is unknown."""
+    nearest = np.rint(known.step * np.arange(known.rows) / own.step).astype(int)
+    found = cells[:, np.minimum(nearest, own.rows - 1)]
+    found[:, nearest >= own.rows] = UNKNOWN
+    frame, row, bearing = np.nonzero(cells == SURFACE)
+    row = np.rint(own.step * row / known.step).astype(int)
+    seen = row < known.rows
+    found[frame[seen], row[seen], bearing[seen]] = SURFACE
+    return found
+
+
+OCCUPANCY = Reading("occupancy", "truth/occupancy", on_grid=on_grid)

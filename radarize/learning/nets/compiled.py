@@ -1,0 +1,77 @@
+"""Networks as graphs that onnxruntime runs, norms folded into convolutions.
+
+The graphs, without weights, come with the package for the networks that run live (`radarize.pipeline.graphs` makes
+them). No graph is ever taken from a file of weights or from beside it. Networks of other shapes run in torch.
+"""
+
+import json
+from functools import cached_property
+from hashlib import sha256
+from pathlib import Path
+
+import onnxruntime
+import torch
+from torch import Tensor, nn
+
+from radarize.learning.nets.folded import folded
+from radarize.learning.nets.weights import Header, Network, load
+from radarize.radar.config import RadarConfig
+
+GRAPHS = Path(__file__).parent / "graphs"
+#: Of a header, what decides the graph.
+_SHAPE = ("kind", "setting", "frames", "maps", "width", "grid")
+#: onnxruntime tells of errors alone.
+_ERRORS = 3
+
+
+class Compiled:
+    """A trained network, ready to be asked.
+
+    Args:
+        net: the network, whose weights no longer change.
+        header: of its file.
+
+    Attributes:
+        net: the same network, folded; header: the same.
+    """
+
+    def __init__(self, net: nn.Module, header: Header):
+        self.net, self.header = folded(net), header
+
+    def estimate(self, *inputs: Tensor) -> Tensor | tuple[Tensor, ...]:
+        """What the network's own `estimate` gives."""
+        if self._session is None:
+            return self.net.estimate(*inputs)
+        fed = {name: values.contiguous().numpy() for name, values in zip(self.net.inputs, inputs, strict=True)}
+        found = tuple(torch.from_numpy(values) for values in self._session.run(None, fed))
+        return found if len(found) > 1 else found[0]
+
+    @cached_property
+    def _session(self) -> onnxruntime.InferenceSession | None:
+        """None: there is no such graph. Made when first asked, with as many threads as torch has then."""
+        if not (file := graph_of(self.header)).is_file():
+            return None
+        options = onnxruntime.SessionOptions()
+        options.log_severity_level = _ERRORS
+        options.intra_op_num_threads = torch.get_num_threads()
+        options.add_session_config_entry("session.intra_op.allow_spinning", "0")  # others need the processor
+        weights = {f"net.{name}": values.numpy() for name, values in self.net.state_dict().items()}
+        values = [onnxruntime.OrtValue.ortvalue_from_numpy(each) for each in weights.values()]
+        options.add_external_initializers(list(weights), values)
+        return onnxruntime.InferenceSession(file.read_bytes(), options, providers=["CPUExecutionProvider"])
+
+
+def compiled(path: Path, network: type[Network], config: RadarConfig | None = None) -> tuple[Compiled, Header]:
+    """`radarize.learning.nets.weights.load`, as fast as this machine runs it.
+
+    Raises:
+        InputError: as there.
+    """
+    net, header = load(path, network, config)
+    return Compiled(net, header), header
+
+
+def graph_of(header: Header) -> Path:
+    """Where the graph of a network lies, if there is one: by what decides it."""
+    shape = json.dumps(header.model_dump(mode="json", include=set(_SHAPE)), sort_keys=True)
+    return GRAPHS / f"{header.kind}-{sha256(shape.encode()).hexdigest()[:8]}.onnx"

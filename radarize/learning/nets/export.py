@@ -1,0 +1,71 @@
+"""Networks as ONNX, for run times other than torch."""
+
+import logging
+import warnings
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from radarize.io.replacing import replacing
+from radarize.learning.nets.folded import folded
+from radarize.learning.nets.weights import Header, example
+
+
+class Estimate(nn.Module):
+    """A network whose `forward` is its `estimate`."""
+
+    def __init__(self, net: nn.Module):
+        super().__init__()
+        self.net = net
+
+    def forward(self, *inputs: torch.Tensor):
+        return self.net.estimate(*inputs)
+
+
+def export_onnx(net: nn.Module, header: Header, path: Path) -> Path:
+    """Write a network's `estimate` as one ONNX file: input ``maps`` (item, frame, map, row, azimuth) in dB, any number
+    of items, and for turns ``travel`` (item, 2), or what else the network names; outputs ``estimate`` and
+    ``covariance``, or ``probability``.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    program = _program(folded(net), header)
+    program.model.metadata_props["radarize"] = header.model_dump_json()
+    with replacing(path) as part:
+        program.save(part, external_data=False)
+    return path
+
+
+def export_graph(net: nn.Module, header: Header, path: Path) -> Path:
+    """Write the same without weights, for `compiled`: whoever runs it lends it those of a file."""
+    import onnx  # not installed with every radarize
+
+    net = folded(net)
+    model = _program(net, header, optimize=False).model_proto  # which would mix weights into constants
+    missing = {f"net.{name}" for name in net.state_dict()}
+    for values in model.graph.initializer:
+        if values.name in missing:
+            values.ClearField("raw_data")
+            values.data_location = onnx.TensorProto.EXTERNAL
+            values.external_data.add(key="location", value="weights")  # no file of that name is read
+    for node in model.graph.node:  # where torch's source lies, and what it calls things
+        node.ClearField("metadata_props")
+        node.ClearField("doc_string")
+    model.graph.ClearField("value_info")
+    with replacing(path) as part:
+        part.write_bytes(model.SerializeToString(deterministic=True))
+    return path
+
+
+def _program(net: nn.Module, header: Header, **how: object) -> torch.onnx.ONNXProgram:
+    # torch's exporter lists what it would do with torchvision.
+    logging.getLogger("torch.onnx._internal.exporter._registration").setLevel(logging.ERROR)
+    inputs, item = example(net, header), torch.export.Dim("item")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return torch.onnx.export(
+            Estimate(net).cpu(), inputs, input_names=list(net.inputs), output_names=list(net.outputs),
+            dynamic_shapes=(tuple({0: item} for _ in inputs),), dynamo=True, verbose=False, **how,
+        )  # fmt: skip

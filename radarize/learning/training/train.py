@@ -1,0 +1,157 @@
+"""`radarize train`: from a folder of recordings to a file of weights."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from radarize.io.errors import InputError
+from radarize.io.replacing import replacing
+from radarize.learning.features.grid import Grid
+from radarize.learning.features.table import Table
+from radarize.learning.nets.export import export_onnx
+from radarize.learning.nets.weights import load, save
+from radarize.learning.task import Settings, Task, find_task
+from radarize.learning.training.dataset import recordings
+from radarize.learning.training.team import team
+from radarize.learning.training.trainer import Trainer
+
+#: Without a split, every so manieth recording validates.
+_TENTH = 10
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a training is run.
+
+    Attributes:
+        split: of the data set; every tenth recording validates if None.
+        device: ``cpu`` or ``cuda``; a GPU where there is one if None.
+        workers: processes that read.
+        resume: go on from the checkpoint, if there is one.
+        start: weights to begin with, of a network of the same task, instead of random ones: width, frames and grid are
+            its own, and recordings may be of any radars.
+        onnx: write the network as ONNX as well.
+    """
+
+    split: str | None = None
+    device: str | None = None
+    workers: int = 1
+    resume: bool = False
+    onnx: bool = False
+    start: Path | None = None
+
+
+def train(
+    kind: str,
+    data: Path,
+    output: Path,
+    settings: Settings | None = None,
+    options: Options | None = None,
+    *,
+    progress: Callable[..., None] = lambda *where: None,
+    say: Callable[[str], None] = lambda line: None,
+) -> Path:
+    """Train a network on recordings, alone or as one of the processes that `torchrun` started.
+
+    Args:
+        kind: a key of `radarize.learning.task.TASKS`.
+        data: folder of recordings, of samples or of maps.
+        output: weights to write (.safetensors). The log is beside it (.csv), and so is the checkpoint of the last
+            epoch (.checkpoint) until training has ended.
+        settings: hyper-parameters; the task's own if None.
+        options: how it is run.
+        progress: called with (stage, done, in all).
+        say: takes a line for every epoch.
+
+    Raises:
+        InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
+            is no number.
+    """
+    task, output, data, options = find_task(kind), Path(output), Path(data), options or Options()
+    settings = settings or task.defaults
+    begun, before = load(options.start, task.network) if options.start else (None, None)
+    if before is not None:
+        settings = replace(settings, width=before.width, frames=before.frames)
+    _check(task, settings, output)
+    checkpoint, log = output.with_suffix(".checkpoint"), output.with_suffix(".csv")
+    if checkpoint.exists() and not options.resume:
+        raise InputError(f"{checkpoint}: is left of a training that did not end; --resume goes on, or remove it")
+    network = task.network
+    about = {"kind": network.kind, "setting": network.setting, "data": data.resolve().name, "split": options.split}
+    if before is not None:
+        about |= {"start": options.start.name, "data": f"{before.data}, then {about['data']}"}
+    with team(options.device) as crew:
+        lead = crew.rank == 0
+        progress, say = (progress, say) if lead else (_nothing, _nothing)
+        parts = _read(task, data, options, settings.seed, progress, before and before.grid)
+        trainer = Trainer(task, settings, *parts, crew)
+        if begun is not None:
+            trainer.net.load_state_dict(begun.state_dict())
+        if options.resume and checkpoint.exists():
+            trainer.restore(checkpoint, about)
+            say(f"resuming after epoch {len(trainer.history)}")
+        crew.wait()  # before the first one replaces what the others read
+        while not trainer.finished:
+            found = trainer.train_epoch(partial(progress, "training"))
+            if lead:
+                trainer.save(checkpoint, about)
+                with replacing(log) as part:
+                    pd.DataFrame(trainer.history).to_csv(part, index=False)
+                say(_words(found))
+        if lead:
+            metrics = trainer.finish()
+            header = task.header(
+                settings, trainer.training.grid, data=about["data"], split=options.split,
+                spacings=tuple(trainer.spacings), metrics=metrics,
+                hours=round(trainer.training.duration / 3600 + (before.hours if before else 0.0), 4),
+                epochs=len(trainer.history) + (before.epochs if before else 0),
+            )  # fmt: skip
+            save(trainer.net, header, output)
+            if options.onnx:
+                export_onnx(trainer.net, header, output.with_suffix(".onnx"))
+            checkpoint.unlink(missing_ok=True)
+            say("calibrated: " + _words(metrics))
+        crew.wait()
+    return output
+
+
+def _words(numbers: dict[str, float]) -> str:
+    return ", ".join(f"{name} {value:.5g}" for name, value in numbers.items())
+
+
+def _nothing(*where) -> None:
+    pass
+
+
+def _read(
+    task: Task, data: Path, options: Options, seed: int, progress: Callable[..., None], grid: Grid | None
+) -> tuple[Table, Table]:
+    """Training and validation data, on a grid if there is one."""
+    if options.split is None:
+        found = recordings(data)
+        if len(found) < 2:
+            raise InputError(f"{data}: holds one recording, expected at least two, one of which validates")
+        apart = set(np.random.default_rng(seed).permutation(len(found))[: max(1, len(found) // _TENTH)])
+        parts = [[p for k, p in enumerate(found) if (k in apart) == held] for held in (False, True)]
+    else:
+        parts = [recordings(data, options.split, part) for part in ("train", "validation")]
+    return task.table(parts[0] + parts[1], options.workers, progress, grid).divide(len(parts[0]))
+
+
+def _check(task: Task, settings: Settings, output: Path) -> None:
+    for name in ("width", "frames", "epochs", "batch", "rate", "plateau", "patience"):
+        if not (value := getattr(settings, name)) > 0:
+            raise InputError(f"{name} is {value}, expected a positive number")
+    if settings.frames < task.least_frames:
+        raise InputError(f"frames is {settings.frames}, expected at least {task.least_frames} to move between")
+    for name, known in (("schedule", ("plateau", "cosine", "steps")), ("precision", ("float32", "bfloat16"))):
+        if (value := getattr(settings, name)) not in known:
+            raise InputError(f"{name} is {value!r}, expected one of: {', '.join(known)}")
+    if settings.seed < 0:
+        raise InputError(f"seed is {settings.seed}, expected no negative number")
+    if output.is_dir() or output.suffix != ".safetensors":
+        raise InputError(f"output is {output}, expected a file NAME.safetensors")

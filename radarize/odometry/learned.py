@@ -1,0 +1,136 @@
+"""Velocity and turns by the networks (paper, sections 4.2 and 4.3), as estimators like any others."""
+
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+
+from radarize.learning.nets.compiled import compiled
+from radarize.learning.nets.motion import RotationNet, TranslationNet
+from radarize.odometry.doppler import Velocities
+from radarize.odometry.rotation import LAG, Rotations
+from radarize.odometry.settings import TurnConfig
+from radarize.odometry.ties import Ties
+from radarize.radar.config import RadarConfig
+from radarize.signal.batch import Batch
+
+#: (m/s)^2, covariance of a velocity of which a network says nothing.
+ANY_VELOCITY = 2.0**2 * np.eye(2)
+
+
+class LearnedVelocity:
+    """Velocity estimator by `TranslationNet`.
+
+    Attributes:
+        limit: m/s; it sees no faster speeds.
+
+    Raises:
+        InputError: no such weights, or they are for another radar.
+    """
+
+    #: m, see `VelocityEstimator`: it was taught the velocity of the origin.
+    lever = 0.0
+
+    def __init__(self, radar: RadarConfig, weights: Path):
+        self._net, header = compiled(weights, TranslationNet, radar)
+        self._windows = header.windows(radar, TranslationNet.maker)
+        self.limit = header.grid.reach / 2
+
+    @torch.inference_mode()
+    def estimate(self, batch: Batch, asked: Bool[np.ndarray, "frame"] | None = None) -> Velocities:
+        """Velocities of the next frames, or of those that are asked for; no echoes are counted."""
+        told = ~batch.aliases.any(axis=1)  # it was taught speeds that do not alias
+        if asked is not None:
+            told &= asked
+        velocity = np.zeros((len(batch), 2))
+        covariance = np.tile(ANY_VELOCITY, (len(batch), 1, 1))
+        self._windows.announce(partial(batch.maps, self._windows.maps), batch.stamps)
+        if told.any():
+            (shown,) = self._windows.wanted()
+            told &= shown.whole
+        if told.any():
+            mean, spread = self._net.estimate(shown.maps[told])
+            velocity[told], covariance[told] = mean.double().numpy(), spread.double().numpy()
+        return Velocities(velocity, covariance, np.zeros(len(batch), int), told)
+
+
+class LearnedRotation:
+    """Rotation estimator by `RotationNet`: turns over several spacings, reconciled by a filter.
+
+    The paper sums turns of one spacing in interleaved chains, which drift apart. Here the yaws of the last frames are
+    one Gaussian state (`Ties`), which goes on at its rate where frames are lost.
+
+    Attributes:
+        lag: see `RotationEstimator`.
+        spacings: the radar's frames over which turns are measured, ascending.
+    """
+
+    lag = LAG
+
+    def __init__(self, radar: RadarConfig, weights: Path, settings: TurnConfig | None = None):
+        settings = settings or TurnConfig()
+        self._net, header = compiled(weights, RotationNet, radar)
+        known = header.spacings
+        self._windows = header.windows(radar, RotationNet.maker, [s for s in settings.spacings if s in known] or known)
+        self.spacings = self._windows.spacings
+        size = self.spacings[-1] + 1
+        self._longest = (size - 0.5) * radar.frame_period
+        self._velocities, self._times = np.zeros((0, 2)), np.zeros(0)  # of as many frames
+        self._yaws = Ties(size, settings.wander, settings.fastest)
+        self._alike = settings.alike
+
+    def estimate(self, batch: Batch, velocities: Velocities) -> Rotations:
+        """Yaw increments of the next frames; their variances add up to that of the yaw since the beginning."""
+        times = batch.centers
+        before = self._times[-1] if len(self._times) else times[0]
+        turns, back = self.turns(batch, velocities)
+        yaw, growth = np.zeros(len(times)), np.zeros(len(times))
+        for i, dt in enumerate(np.diff(times, prepend=before)):
+            last, known = self._yaws.values[-1], self._yaws.covariance[-2, -2]
+            self._yaws.predict(float(dt))
+            if dt > self._longest:
+                # What comes after a gap does say how fast the sensor may have turned within; but that would be told as
+                # a turn of a later frame.
+                self._yaws.part()
+            for ago, (turn, noise) in zip(back[:, i], turns[:, i], strict=True):
+                self._yaws.tie(int(ago), turn, noise)
+            yaw[i] = self._yaws.values[-1] - last
+            growth[i] = max(self._yaws.covariance[-2, -2] - known, 1e-8)
+        told = (back > 0).any(axis=0)
+        growth[told] *= self._alike
+        return Rotations.independent(yaw, growth, told)
+
+    @torch.inference_mode()
+    def turns(
+        self, batch: Batch, velocities: Velocities
+    ) -> tuple[Float[np.ndarray, "spacing frame 2"], Int[np.ndarray, "spacing frame"]]:
+        """What the network says of the next frames.
+
+        Returns:
+            Turns (rad) over each spacing until them, and variances; NaN where frames are missing in between.
+            From how many frames ago; 0 where frames are missing.
+        """
+        windows = self._windows.push(batch.maps(self._windows.maps), batch.stamps)
+        whole = np.stack([shown.whole for shown in windows])
+        back = np.where(whole, np.stack([shown.back for shown in windows]), 0)
+        turns = np.full((*back.shape, 2), np.nan)
+        travel = self._travel(batch.centers, velocities.velocity, back)[whole]
+        if whole.any():
+            shown = torch.cat([shown.maps[shown.whole] for shown in windows])
+            mean, variance = self._net.estimate(shown, torch.from_numpy(travel).float())
+            turns[whole] = torch.stack([mean[:, 0], variance[:, 0, 0]], dim=1).double().numpy()
+        return turns, back
+
+    def _travel(
+        self, times: np.ndarray, velocities: np.ndarray, back: np.ndarray
+    ) -> Float[np.ndarray, "spacing frame 2"]:
+        """What `RotationNet` wants to be told of windows that began so many frames ago."""
+        kept = 1 - len(self._yaws.values)
+        self._times = np.concatenate([self._times[kept:], times])
+        self._velocities = np.concatenate([self._velocities[kept:], velocities])
+        newest = np.arange(len(self._times) - len(times), len(self._times))
+        first = newest - back
+        lasting = self._times[newest] - self._times[first]
+        return lasting[..., None] * (self._velocities[newest] + self._velocities[first]) / 2

@@ -1,0 +1,153 @@
+"""Plain files in and out: scans and odometry of any sensor, and the folder that a session leaves behind."""
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize.io.errors import InputError
+from radarize.io.files import regular
+from radarize.io.npyfile import read_npz
+from radarize.io.tum import planar, planar_poses, read_tum
+from radarize.odometry.claims import Claims
+from radarize.pipeline.runfolder import RunFolder, RunWriter
+from radarize.slam.backend import Slam
+from radarize.slam.config import SlamConfig
+
+#: Of a ``.npz``; times need not be there.
+_FIELDS = ("ranges", "angle_min", "angle_increment", "range_max", "times")
+
+
+@dataclass(frozen=True)
+class Log:
+    """Scans, and odometry if there is any.
+
+    Attributes:
+        times: of scans, s, in any order.
+        azimuths: of the beams, rad, positive to the left.
+        ranges: m; inf: nothing seen; nan: not known.
+        odometry_times, odometry: s; x, y (m) and yaw (rad).
+        covariances: of each motion since the odometry entry before, in the later one's frame; None: not known.
+        claims: how far motions over several entries may be off; None: not known.
+    """
+
+    times: Float[np.ndarray, "scan"]
+    azimuths: Float[np.ndarray, "beam"]
+    ranges: Float[np.ndarray, "scan beam"]
+    odometry_times: Float[np.ndarray, "pose"]
+    odometry: Float[np.ndarray, "pose 3"]
+    covariances: Float[np.ndarray, "pose 3 3"] | None = None
+    claims: Claims | None = None
+
+    @classmethod
+    def read(cls, scans: Path, odometry: Path | None = None) -> "Log":
+        """Read a log.
+
+        Args:
+            scans: a ``.npz`` with ``ranges`` (scan, beam) in m, ``range_max`` in m (that much or more: nothing seen),
+                ``angle_min`` and ``angle_increment`` in rad (positive to the left), and ``times`` (scan,) in s; without
+                times scan i was taken at second i. Or the folder of a run, whose ``scans.h5`` is taken.
+            odometry: TUM file. Of a run's folder its ``odometry.tum`` by default.
+
+        Raises:
+            InputError: a file or field is missing or is not as described.
+        """
+        scans, moved, covariances, claims = Path(scans), odometry and read_tum(odometry), None, None
+        if scans.is_dir():
+            run = RunFolder(scans)
+            moved = moved or run.odometry
+            if not run.scans:
+                raise InputError(f"{scans}: has no scans.h5, expected a run with scans")
+            times, azimuths, ranges = (run.scans[name].astype(float) for name in ("time", "azimuths", "ranges"))
+            covariances, claims = run.scans.get("step_covariance"), run.claims
+        else:
+            times, azimuths, ranges = _npz_scans(scans)
+        if moved is None:
+            return cls(times, azimuths, ranges, np.zeros(0), np.zeros((0, 3)))
+        stamps, poses = moved
+        if covariances is not None and len(covariances) != len(stamps):
+            covariances = claims = None  # the odometry is another one
+        return cls(times, azimuths, ranges, stamps, planar(poses), covariances, claims)
+
+    def feed(self, slam: Slam, progress: Callable[[int, int], None] = lambda done, total: None) -> None:
+        """Give everything to a new session, in order of time, and finish it; `progress` takes scans done and in all."""
+        spreads = self.covariances if self.covariances is not None else [None] * len(self.odometry_times)
+        odometry = deque(zip(self.odometry_times, self.odometry, spreads, strict=True))
+        for done, i in enumerate(np.argsort(self.times, kind="stable"), 1):
+            while odometry and odometry[0][0] <= self.times[i]:
+                slam.add_odometry(*odometry.popleft())
+            slam.add_scan(self.times[i], self.azimuths, self.ranges[i])
+            progress(done, len(self.times))
+        for entry in odometry:
+            slam.add_odometry(*entry)
+        slam.finish()
+
+
+def run(
+    scans: Path,
+    odometry: Path | None,
+    output: Path,
+    *,
+    config: SlamConfig,
+    reference: Path | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> Path:
+    """SLAM on plain files.
+
+    Args:
+        scans, odometry: as in `Log.read`.
+        output: folder to write: trajectory.tum (a pose for every scan), odometry.tum, map.pgm and map.yaml, scans.h5,
+            run.json, and reference.tum if there is one: what `radarize evaluate` and `radarize report` read.
+        config: of the back end.
+        reference: TUM file of true poses; of a run's folder its ``reference.tum`` by default.
+        progress: called with (scans done, scans in all).
+
+    Raises:
+        InputError: unusable input, or the folder cannot be written.
+    """
+    scans, output = Path(scans), Path(output)
+    if scans.is_dir() and output.resolve() == scans.resolve():
+        raise InputError(f"{output}: is the run to be read, expected another folder to write")
+    log, truth = Log.read(scans, odometry), None if reference is None else read_tum(reference)
+    source = RunFolder(scans) if scans.is_dir() else None
+    if truth is None and source is not None:
+        truth = source.reference
+    slam = Slam(config)
+    log.feed(slam, progress)
+    with RunWriter(output) as writer:
+        if source is not None:
+            writer.inherit(source.scans, without=("trajectory_covariance",))
+        else:
+            writer.put("time", log.times, "s")
+            writer.put("azimuths", log.azimuths, "rad")
+            writer.put("ranges", log.ranges, "m")
+        if len(log.odometry):
+            writer.write_poses("odometry", (log.odometry_times, planar_poses(log.odometry)))
+        if truth is not None:
+            writer.write_poses("reference", truth)
+        named = None if odometry is None else Path(odometry).name
+        return writer.finish(slam, {"scans": scans.name, "odometry": named, "slam_settings": config.model_dump()})
+
+
+def _npz_scans(path: Path) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    regular(path, "scans (.npz) or the folder of a run")
+    arrays = read_npz(path, str(path), _FIELDS, path.stat().st_size)
+    found = {name: np.asarray(array, float) for name, array in arrays.items()}
+    for name in _FIELDS[:4]:
+        if name not in found:
+            raise InputError(f"{path}: has no {name}, expected ranges, angle_min, angle_increment and range_max")
+    ranges = found["ranges"]
+    if ranges.ndim != 2:
+        raise InputError(f"{path}: ranges has shape {ranges.shape}, expected (scan, beam)")
+    for name in ("angle_min", "angle_increment", "range_max"):
+        if found[name].size != 1 or not np.isfinite(found[name]).all():
+            raise InputError(f"{path}: {name} is {found[name].tolist()}, expected one finite number")
+    times = found.get("times", np.arange(float(len(ranges))))
+    if times.shape != ranges.shape[:1] or not np.isfinite(times).all():
+        raise InputError(f"{path}: times has shape {times.shape}, expected {ranges.shape[:1]} finite seconds")
+    with np.errstate(over="ignore"):  # refused where they are used
+        azimuths = found["angle_min"].item() + found["angle_increment"].item() * np.arange(ranges.shape[1])
+    return times, azimuths, np.where(ranges >= found["range_max"].item(), np.inf, ranges)

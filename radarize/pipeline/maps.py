@@ -1,0 +1,144 @@
+"""Heat maps of frames, with named axes."""
+
+from collections.abc import Callable
+from typing import Literal
+
+import numpy as np
+import torch
+import xarray
+
+from radarize.io.errors import InputError
+from radarize.io.load import Samples, Source, samples_of
+from radarize.signal.effort import together
+from radarize.signal.heatmaps import Heatmaps
+
+Beamformer = Literal["bartlett", "capon", "elevation-aware"]
+_UNITS = {"range": "m", "doppler": "m/s", "azimuth": "rad"}
+
+
+def range_azimuth(frames: Samples | Source, *, method: Beamformer = "bartlett") -> xarray.DataArray:
+    """Compute range-azimuth maps: power over range and azimuth, summed over Doppler.
+
+    Args:
+        frames: of a recording, such as ``rec[100:110]`` or ``rec[100]``; a recording for all of its frames.
+        method: beamformer: ``"bartlett"`` (Taylor-windowed sum over the longest row of antennas), ``"capon"`` (minimum
+            variance, sharper), or ``"elevation-aware"`` (pairs of antennas that weaken ceiling and floor).
+
+    Returns:
+        (frame, range, azimuth), without the axis of frames for a single frame; squared ADC counts, an echo of amplitude
+        A reads A^2. Coordinates: ``range`` m, ``azimuth`` rad, ascending, positive to the left, ``time`` s.
+
+    Raises:
+        InputError: a recording without samples, or an array without such antennas.
+
+    Example:
+        >>> maps = rz.range_azimuth(rec[4:8])
+        >>> dict(maps.sizes)
+        {'frame': 4, 'range': 96, 'azimuth': 121}
+        >>> ahead = maps.sel(azimuth=0, method="nearest")
+        >>> float(ahead.range[1])  # range resolution, m
+        0.04...
+    """
+    _check("method", method, ("bartlett", "capon", "elevation-aware"))
+
+    def power(maps: Heatmaps, spectrum: torch.Tensor) -> torch.Tensor:
+        if method == "elevation-aware":
+            return maps.elevation_aware_of(spectrum)
+        return maps.range_azimuth_of(spectrum, method)
+
+    return _made(samples_of(frames), power, "range", "azimuth")
+
+
+def doppler_azimuth(frames: Samples | Source, *, method: Beamformer = "bartlett") -> xarray.DataArray:
+    """Compute Doppler-azimuth maps: power over closing speed and azimuth, summed over range.
+
+    A static world that a radar of velocity v in direction theta sees lies at v cos(azimuth - theta).
+
+    Args:
+        frames, method: see `range_azimuth`.
+
+    Returns:
+        (frame, doppler, azimuth), without the axis of frames for a single frame; squared ADC counts. Coordinates:
+        ``doppler`` m/s, ascending, closing positive, ``azimuth`` rad, ``time`` s.
+
+    Raises:
+        InputError: see `range_azimuth`.
+
+    Example:
+        >>> rz.doppler_azimuth(rec[4]).dims
+        ('doppler', 'azimuth')
+    """
+    _check("method", method, ("bartlett", "capon", "elevation-aware"))
+
+    def power(maps: Heatmaps, spectrum: torch.Tensor) -> torch.Tensor:
+        return maps.doppler_azimuth_of(spectrum, method, elevation_aware=method == "elevation-aware")
+
+    return _made(samples_of(frames), power, "doppler", "azimuth")
+
+
+def range_doppler(frames: Samples | Source) -> xarray.DataArray:
+    """Compute range-Doppler maps: power over range and closing speed, averaged over all virtual antennas.
+
+    Args:
+        frames: see `range_azimuth`.
+
+    Returns:
+        (frame, range, doppler), without the axis of frames for a single frame; squared ADC counts. Coordinates:
+        ``range`` m, ``doppler`` m/s, ascending, closing positive, ``time`` s.
+
+    Raises:
+        InputError: a recording without samples.
+
+    Example:
+        >>> power = rz.range_doppler(rec[4])
+        >>> power.dims, power.doppler.units
+        (('range', 'doppler'), 'm/s')
+    """
+    return _made(samples_of(frames), Heatmaps.range_doppler_of, "range", "doppler")
+
+
+def range_profile(frames: Samples | Source) -> xarray.DataArray:
+    """Compute range profiles: power over range, summed over Doppler and averaged over all virtual antennas.
+
+    Args:
+        frames: see `range_azimuth`.
+
+    Returns:
+        (frame, range), without the axis of frames for a single frame; squared ADC counts. Coordinates: ``range`` m,
+        ``time`` s.
+
+    Raises:
+        InputError: a recording without samples.
+
+    Example:
+        >>> profile = rz.range_profile(rec[4])
+        >>> nearest = profile.where(profile.range > 0.3).idxmax("range")
+        >>> bool(0.3 < nearest < 4)
+        True
+    """
+    return _made(samples_of(frames), Heatmaps.range_profile_of, "range")
+
+
+def _made(frames: Samples, power: Callable[[Heatmaps, torch.Tensor], torch.Tensor], *names: str) -> xarray.DataArray:
+    maps, size = Heatmaps(frames.config), together(frames.config)
+    parts = (frames[start : start + size] for start in range(0, len(frames), size))
+    made = [power(maps, maps.spectrum(part.samples, part.valid)).numpy() for part in parts]
+    axes = {"range": maps.ranges, "doppler": maps.velocities, "azimuth": maps.azimuths}
+    empty = np.zeros((0, *(len(axes[name]) for name in names)), np.float32)
+    found = xarray.DataArray(
+        np.concatenate([empty, *made]),
+        dims=("frame", *names),
+        coords={
+            "frame": np.array(frames.numbers),
+            "time": ("frame", frames.times, {"units": "s"}),
+            **{name: (name, axes[name], {"units": _UNITS[name]}) for name in names},
+        },
+        name="power",
+        attrs={"units": "counts^2"},
+    )
+    return found[0] if frames.alone else found
+
+
+def _check(name: str, value: str, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise InputError(f"{name} is {value!r}, expected one of {', '.join(known)}")

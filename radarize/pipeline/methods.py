@@ -1,0 +1,92 @@
+"""Methods of odometry and of scans by name, and the pipelines made of them: what ``--odometry`` and ``--scans`` accept
+and benchmarks compare.
+
+A method is an entry point of the group ``radarize.odometry`` or ``radarize.scans`` in the ``pyproject.toml`` of this or
+any other package; its value is a `Method`. A program may also add one itself: ``SCANS["mine"] = Method(...)``.
+"""
+
+from radarize.io.errors import InputError
+from radarize.io.plugins import Plugins
+from radarize.learning.nets.weights import check, header_of
+from radarize.pipeline.method import Inputs, Method, Weights
+from radarize.pipeline.pipeline import OdometryEstimator, Pipeline, ScanExtractor
+from radarize.radar.config import RadarConfig
+from radarize.signal.polar import pictured
+
+ODOMETRY: Plugins[Method] = Plugins("radarize.odometry", "odometry")
+SCANS: Plugins[Method] = Plugins("radarize.scans", "scans")
+#: Methods of choice.
+BEST = {"odometry": "fused", "scans": "segmentation"}
+#: Methods without networks, for radars that the shipped ones do not fit.
+CLASSICAL = {"odometry": "doppler", "scans": "first-echo"}
+#: Methods for recordings of pictures.
+PICTURED = {"odometry": "pictures", "scans": "pictures"}
+
+
+def make_odometry(inputs: Inputs, name: str) -> OdometryEstimator:
+    """Make odometry by a key of `ODOMETRY`.
+
+    Raises:
+        InputError: unknown name, or see `Method`.
+    """
+    return _readable(ODOMETRY.find(name), f"odometry {name}", PICTURED["odometry"], inputs).make(inputs)
+
+
+def make_scans(inputs: Inputs, name: str) -> ScanExtractor:
+    """Make an extractor of scans by a key of `SCANS`.
+
+    Raises:
+        InputError: unknown name, or see `Method`.
+    """
+    return _readable(SCANS.find(name), f"scans {name}", PICTURED["scans"], inputs).make(inputs)
+
+
+def make_pipeline(inputs: Inputs, odometry: str, scans: str, endless: bool = False) -> Pipeline:
+    """Make a pipeline by the names of its methods.
+
+    Args:
+        inputs: what methods are made from.
+        odometry, scans: keys of `ODOMETRY` and `SCANS`.
+        endless: as of `radarize.slam.backend.Slam`.
+
+    Raises:
+        InputError: unknown name, or see `Method`.
+    """
+    extractor = make_scans(inputs, scans)
+    return Pipeline(make_odometry(inputs, odometry), extractor, inputs.configuration.slam, endless)
+
+
+def _readable(method: Method, name: str, pictured_method: str, inputs: Inputs) -> Method:
+    """The method, if it can read the recording."""
+    recording = inputs.recording
+    if recording is not None and not recording.has_samples and not (method.pictures or method.scans):
+        what = name.partition(" ")[0]
+        wanted = f"{what} {pictured_method}" if pictured(recording) else "a recording with /radar/adc"
+        raise InputError(f"{recording.path}: has no raw samples, which {name} needs, expected {wanted}")
+    return method
+
+
+def best_methods(radar: RadarConfig) -> tuple[dict[str, str], str]:
+    """Odometry and scans of choice for a radar, and where these are classical ones, why."""
+    chosen, why, weights = dict(BEST), [], Weights()
+    for what, known in (("odometry", ODOMETRY), ("scans", SCANS)):
+        try:
+            for kind in known[BEST[what]].needed(radar):
+                check(weights.of(kind), radar)
+        except InputError as error:
+            chosen[what] = CLASSICAL[what]
+            why.append(str(error))
+    return chosen, "; ".join(why)
+
+
+def pace(odometry: str, radar: RadarConfig) -> int:
+    """Every N-th frame is enough for odometry: a network of turns was trained at a frame rate of its own, and odometry
+    with it is no better where frames come more often. Without one, every frame counts.
+
+    Raises:
+        InputError: unknown name.
+    """
+    if "rotation" not in ODOMETRY.find(odometry).networks:
+        return 1
+    taught = header_of(Weights().of("rotation")).grid
+    return max(1, int(taught.frame_period / radar.frame_period * (1 + 1e-3))) if taught else 1

@@ -1,0 +1,121 @@
+"""Odometry of a recording."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from radarize.io.errors import InputError
+from radarize.io.load import Source, frames_of
+from radarize.io.pose import between
+from radarize.io.recording import Clip
+from radarize.io.trajectory import Trajectory
+from radarize.io.tum import planar_poses
+from radarize.odometry.claims import Claims, Unknown
+from radarize.odometry.integration import Track
+from radarize.pipeline.config import Configuration
+from radarize.pipeline.methods import BEST, ODOMETRY, PICTURED, best_methods, make_odometry, make_scans
+from radarize.pipeline.session import batches, inputs_of
+from radarize.signal.batch import Preprocessor
+from radarize.signal.polar import pictured
+
+
+def estimate_odometry(
+    frames: Source,
+    method: str | None = None,
+    *,
+    scans: str | None = None,
+    weights: str | Path | None = None,
+    config: Configuration | str | Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Trajectory:
+    """Estimate how the radar moved, frame by frame, without loop closure. ``rz.odometry`` is the same.
+
+    Args:
+        frames: of a recording: ``rec``, a part of it ``rec[100:400]``, or every second frame ``rec[::2]``.
+        method: a name of ``radarize run --odometry``, such as ``"fused"`` or ``"doppler"``; by default networks where
+            they fit the radar, else ``"doppler"``, which has none.
+        scans: method of the scans, for an odometry that is made from scans.
+        weights: folder of the networks' weights; by default the shipped ones.
+        config: settings of the pipeline, or a YAML file of them (``radarize config`` prints all).
+        progress: called with (frames done, frames in all).
+
+    Returns:
+        Poses at the frames' burst centres from the origin on, with velocities and covariances. Frames that were lost
+        are left out.
+
+    Raises:
+        InputError: a recording without frames, an unknown method, or one that lacks weights, samples or an IMU.
+
+    Example:
+        >>> odometry = rz.odometry(rec, method="doppler")
+        >>> odometry
+        <odometry: 24 poses, ... m in 0.77 s>
+        >>> odometry.velocity.shape, odometry.covariance.shape
+        ((24, 2), (24, 3, 3))
+    """
+    frames = frames_of(frames)
+    chosen, _ = choose(frames, weights, method, scans)
+    inputs = inputs_of(frames, folder(weights), configuration(config))
+    estimator = make_odometry(inputs, chosen["odometry"])
+    extractor = make_scans(inputs, chosen["scans"]) if ODOMETRY[chosen["odometry"]].scans else None
+    tracks = []
+    for batch in batches(frames, Preprocessor(inputs.signal, inputs.every), progress or (lambda done, total: None)):
+        if batch:
+            batch.ranges = extractor.extract(batch) if extractor else None
+            tracks.append(estimator.update(batch))
+    if not tracks:
+        raise InputError(f"{frames.recording.path}: all its {len(frames)} frames are lost or silent, expected samples")
+    return trajectory(tracks)
+
+
+def choose(
+    frames: Clip, weights: str | Path | None, odometry: str | None, scans: str | None
+) -> tuple[dict[str, str], str]:
+    """Methods by what they are for, those of choice where none is named; and why these have no networks, if so."""
+    best, why = (BEST, "") if weights else best_methods(frames.config)
+    if pictured(frames.recording):
+        best, why = PICTURED, ""
+    return {"odometry": odometry or best["odometry"], "scans": scans or best["scans"]}, why
+
+
+def folder(weights: str | Path | None) -> Path | None:
+    """Where weights lie."""
+    return None if weights is None else Path(weights)
+
+
+def configuration(config: Configuration | str | Path | None) -> Configuration:
+    """Settings of the pipeline.
+
+    Raises:
+        InputError: a file of them is missing or wrong.
+    """
+    if config is None or isinstance(config, Configuration):
+        return config or Configuration()
+    return Configuration.load(config)
+
+
+def trajectory(tracks: list[Track]) -> Trajectory:
+    """Tracks of consecutive batches as one."""
+
+    def joined(name: str) -> np.ndarray:
+        return np.concatenate([getattr(track, name) for track in tracks])
+
+    names = ("noise", "kept", "held")
+    claims = Claims(*(np.concatenate([getattr(track.claims, name) for track in tracks]) for name in names))
+    pose = joined("pose")
+    return Trajectory(
+        joined("time"), planar_poses(pose), since_start(pose, claims), joined("velocity"),
+        joined("velocity_covariance"), name="odometry",
+    )  # fmt: skip
+
+
+def since_start(pose: Float[np.ndarray, "frame 3"], claims: Claims) -> Float[np.ndarray, "frame 3 3"]:
+    """Covariance of each pose (x, y in m, yaw in rad) in its own frame, given the first one."""
+    found = np.zeros((len(pose), 3, 3))
+    unknown = Unknown(claims.held[0])
+    for k in range(1, len(pose)):
+        unknown.step(between(pose[k - 1], pose[k]), claims, k)
+        found[k] = unknown.covariance
+    return found

@@ -1,0 +1,175 @@
+"""What the networks see of a frame: four heat maps in dB, small enough to keep instead of the samples.
+
+| map | axes | for |
+|---|---|---|
+| range_azimuth | range x azimuth, row of 8 antennas, Capon | rotation, segmentation |
+| elevation_aware | range x azimuth, pairs that look at the horizon, Bartlett | segmentation |
+| doppler_azimuth | Doppler x azimuth, row of 8 antennas, Capon, limited | translation |
+| doppler_elevation_aware | Doppler x azimuth, pairs that look at the horizon, Bartlett, limited | translation |
+
+Azimuth has 80 columns of 1.5 deg, symmetric about the boresight, so that a flip is a mirror: Capon's ridges are that
+wide. Range and Doppler keep their bins. Maps over Doppler are of the limited spectrum (`Heatmaps.limited`), or a single
+flash would drown the ridge on which the whole static world lies. Decibels are of squared ADC counts, rounded to a
+quarter: far below the speckle's 5.6 dB, exact in float16, and compressible to 0.4 of its size.
+"""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Complex64, Float, Float16, Int, Int16
+from torch import Tensor
+
+from radarize.io.errors import InputError
+from radarize.io.recording import Recording
+from radarize.io.stopwatch import stage
+from radarize.radar.config import RadarConfig
+from radarize.signal.heatmaps import Heatmaps
+
+#: Maps by name, with what they are.
+MAPS = {
+    "range_azimuth": "power over range and azimuth",
+    "elevation_aware": "power over range and azimuth near the horizon, of antenna pairs",
+    "doppler_azimuth": "power over closing speed and azimuth",
+    "doppler_elevation_aware": "power over closing speed and azimuth near the horizon, of antenna pairs",
+}
+#: Maps as networks take them.
+Maps = Float[Tensor, "item frame map row azimuth"]
+#: Columns, rad, positive to the left, ascending.
+AZIMUTHS = np.radians(np.arange(-59.25, 60.0, 1.5))
+#: dB; what is weaker reads this. An ADC's rounding alone gives about as much.
+FLOOR = -30.0
+STEP = 0.25
+
+
+@dataclass(frozen=True)
+class Axes:
+    """Cells of a map.
+
+    Attributes:
+        rows: range bins, or Doppler bins.
+        step: m, or m/s, from row to row.
+        azimuths: of columns, rad, ascending to the left.
+        centred: rows are speeds, m/s, zero in the middle; otherwise ranges, m, from zero on.
+    """
+
+    rows: int
+    step: float
+    azimuths: Float[np.ndarray, "azimuth"]
+    centred: bool = False
+
+
+class Maker(ABC):
+    """Makes the maps that a method's networks see, of one radar configuration.
+
+    Attributes:
+        maps: by name, what they are.
+        history: frames before its own that a map needs.
+        physical: rows are metres or m/s, so that a network can be shown those of any chirp, see `Resampling`.
+    """
+
+    maps: dict[str, str]
+    history = 0
+    physical = False
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all maps."""
+        return tuple(self.maps)
+
+    @staticmethod
+    def stride(config: RadarConfig) -> int:
+        """Frames from one that networks see to the next: they see every frame, unless told otherwise."""
+        return 1
+
+    @staticmethod
+    @abstractmethod
+    def axes(config: RadarConfig, name: str) -> Axes:
+        """Rows and columns of a map."""
+
+    @abstractmethod
+    def __call__(
+        self,
+        adc: Int16[np.ndarray, "frame loop tx rx sample 2"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+        names: tuple[str, ...] | None = None,
+        frames: slice | Int[np.ndarray, "map"] = slice(None),
+    ) -> dict[str, Float16[np.ndarray, "map row azimuth"]]:
+        """Maps of some of consecutive frames.
+
+        Args:
+            adc, valid: see `Heatmaps.spectrum`.
+            names: of `self.names`; all if None.
+            frames: whose maps are wanted.
+
+        Raises:
+            InputError: samples that do not fit the configuration.
+        """
+
+
+class MapMaker(Maker):
+    """Makes the maps of one radar configuration, dB.
+
+    Without antennas of two heights, maps near the horizon are the row's, by Bartlett as well: they differ in what is
+    above and below.
+    """
+
+    maps = MAPS
+    physical = True
+
+    def __init__(self, config: RadarConfig):
+        self.heatmaps = Heatmaps(config, AZIMUTHS)
+
+    @staticmethod
+    def axes(config: RadarConfig, name: str) -> Axes:
+        """Rows and columns of a map."""
+        if name.startswith("doppler"):
+            return Axes(config.loops, config.velocity_resolution, AZIMUTHS, centred=True)
+        return Axes(config.samples, config.range_resolution, AZIMUTHS)
+
+    def shape(self, name: str) -> tuple[int, int]:
+        """Rows and columns of a map."""
+        axes = self.axes(self.heatmaps.config, name)
+        return axes.rows, len(axes.azimuths)
+
+    def __call__(self, adc, valid=None, names=None, frames=slice(None)):
+        return self.of(self.heatmaps.spectrum(adc[frames], None if valid is None else valid[frames]), names)
+
+    def of(
+        self, spectrum: Complex64[torch.Tensor, "frame range doppler antenna"], names: tuple[str, ...] | None = None
+    ) -> dict[str, Float16[np.ndarray, "frame row azimuth"]]:
+        """Maps of a spectrum at hand."""
+        heatmaps, names = self.heatmaps, names or self.names
+        paired = heatmaps.pairs is not None
+        with stage("maps"):
+            limited = heatmaps.limited(spectrum) if any(n.startswith("doppler") for n in names) else None
+            makers = {
+                "range_azimuth": lambda: heatmaps.range_azimuth_of(spectrum, "capon"),
+                "elevation_aware": lambda: (
+                    heatmaps.elevation_aware_of(spectrum) if paired else heatmaps.range_azimuth_of(spectrum)
+                ),
+                "doppler_azimuth": lambda: heatmaps.doppler_azimuth_of(limited, "capon"),
+                "doppler_elevation_aware": lambda: heatmaps.doppler_azimuth_of(limited, elevation_aware=paired),
+            }
+            return {name: _decibels(makers[name]()) for name in names}
+
+
+def _decibels(power: torch.Tensor) -> np.ndarray:
+    level = 10 * torch.log10(power.clamp_min(10 ** (FLOOR / 10)))
+    return (torch.round(level / STEP) * STEP).half().cpu().numpy()
+
+
+def maps_of(recording: Recording, start: int, stop: int, names: tuple[str, ...], maker: Maker, stride: int = 1) -> dict:
+    """Maps of every so manieth of frames start...stop-1: as stored, or made from the samples, which gives the same.
+
+    Raises:
+        InputError: a map that the recording neither holds nor can make.
+    """
+    for name in names:
+        if name not in maker.names:
+            raise InputError(f"{recording.path}: has no map {name}; its array makes {', '.join(maker.names)}")
+    if all(recording.has(f"maps/{name}") for name in names):
+        return {name: recording.rows(f"maps/{name}", start, stop)[::stride] for name in names}
+    first = max(0, start - maker.history)
+    return maker(recording.adc(first, stop), recording.valid(first, stop), names, slice(start - first, None, stride))

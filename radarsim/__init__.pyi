@@ -1,1 +1,0 @@
-from radarsim.api import simulate as simulate

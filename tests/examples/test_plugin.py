@@ -1,0 +1,75 @@
+"""A package of somebody else, installed by pip: its method and its format are there, and no file of ours knows them."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from radarize.io.recording import Recording
+from radarize.pipeline.runfolder import RunFolder
+from radarize.radar.cfg import write_cfg
+from radarize.radar.presets import PRESETS
+from radarize.signal.bearings import BEARINGS
+from tests.echoes import record
+
+PLUGIN = Path(__file__).parents[2] / "examples" / "plugin"
+
+
+@pytest.fixture(scope="module")
+def radarize(tmp_path_factory):
+    """The command where the package is installed; without it the same arguments end in an error."""
+    folder = tmp_path_factory.mktemp("installed")
+    shutil.copytree(PLUGIN, folder / "source")
+    install = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--no-index"]
+    subprocess.run([*install, "--target", folder / "site", folder / "source"], check=True)
+
+    def run(*arguments, plugin: bool = True) -> subprocess.CompletedProcess:
+        path = os.pathsep.join([*([str(folder / "site")] if plugin else []), *sys.path])
+        command = [sys.executable, "-m", "radarize.cli", *map(str, arguments)]
+        return subprocess.run(command, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": path})
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def words(tmp_path_factory) -> Path:
+    """Frames of a point target 3 m ahead, as a file that only the plug-in can read."""
+    config = PRESETS["radarize"].model_copy(update={"loops": 8})
+    stamps, point = np.arange(4) * config.frame_period, np.array([[3.0, 0.0, 0.0]])
+    still = lambda t: (np.zeros((*t.shape, 3)), np.zeros(t.shape))  # noqa: E731
+    file = tmp_path_factory.mktemp("words") / "point.words"
+    record(config, still, point, np.array([900.0]), stamps, np.random.default_rng(0), noise=3.0).tofile(file)
+    file.with_suffix(".cfg").write_text(write_cfg(config))
+    return file
+
+
+def test_its_format_is_read_and_its_method_runs(radarize, words, tmp_path):
+    done = radarize("import", words, "-o", tmp_path / "point.h5")
+    assert done.returncode == 0, done.stderr
+    with Recording(tmp_path / "point.h5") as recording:
+        assert recording.adc(0, 4).tobytes() == words.read_bytes()
+    arguments = "run", tmp_path / "point.h5", "-o", tmp_path / "run", "--odometry", "doppler", "--scans", "nearby"
+    done = radarize(*arguments)
+    assert done.returncode == 0, done.stderr
+    ahead = np.abs(BEARINGS).argmin()
+    assert RunFolder(tmp_path / "run").scans["ranges"][:, ahead] == pytest.approx(3.0, abs=0.1)
+    assert "nearby" in radarize("run", "--help").stdout
+
+
+def test_without_it_both_are_refused(radarize, words, tmp_path):
+    done = radarize("import", words, "-o", tmp_path / "point.h5", plugin=False)
+    assert done.returncode == 2 and "unknown format, expected" in done.stderr
+    done = radarize("run", tmp_path / "point.h5", "-o", tmp_path / "run", "--scans", "nearby", plugin=False)
+    assert done.returncode == 2
+
+
+def test_damaged_files_are_refused_by_the_plug_in(radarize, words, tmp_path):
+    short = tmp_path / "short.words"
+    short.write_bytes(words.read_bytes()[:-2])
+    shutil.copy(words.with_suffix(".cfg"), short.with_suffix(".cfg"))
+    done = radarize("import", short, "-o", tmp_path / "short.h5")
+    assert done.returncode == 2 and "expected frames of" in done.stderr

@@ -18,7 +18,7 @@ from radarize.io.tum import planar
 from radarize.odometry.learned import LearnedRotation, LearnedVelocity
 from radarize.pipeline.method import Inputs
 from radarize.scans import echoes
-from radarize.scans.segmentation import LEAST, NEAR, Segmentation, likeliest
+from radarize.scans.segmentation import LEAST, NEAR, SegmentationScans, likeliest
 from radarize.signal.batch import Preprocessor
 from radarize.signal.bearings import BEARINGS
 from radarize.signal.effort import BATCH
@@ -42,7 +42,7 @@ def judge(case: Case, networks: Networks) -> tuple[dict[str, float], np.ndarray]
             network(inputs.radar, inputs.weights.of(kind))
             for network, kind in ((LearnedVelocity, "translation"), (LearnedRotation, "rotation"))
         )
-        scans = Segmentation(inputs.radar, inputs.weights.of("segmentation"))
+        scans = SegmentationScans(inputs.radar, inputs.weights.of("segmentation"))
         turns, ranges = [], []
         for frames, adc in recording.batches(BATCH):
             batch = preprocessor.process(adc, recording.times[frames], recording.valid(frames.start, frames.stop))

@@ -31,7 +31,7 @@ from radarize.evaluation.benchmark.choices import TRAINING
 from radarize.io.jobs import Report
 from radarize.io.recording import Recording
 from radarize.io.yamlfile import read_yaml
-from radarize.learning.features.table import Table
+from radarize.learning.features.table import FeatureTable
 from radarize.learning.task import Settings
 from radarize.learning.training.dataset import recordings
 from radarsim.world.description import shipped
@@ -119,12 +119,12 @@ def chosen(data: Path, variant: Variant) -> tuple[Path, ...]:
 
 
 @cache
-def table(paths: tuple[Path, ...]) -> Table:
+def table(paths: tuple[Path, ...]) -> FeatureTable:
     """Simulated walks in memory."""
     return Pictures().table(paths)
 
 
-def trained(known: Table, settings: Settings, steps: int, report: Report) -> PictureNet:
+def trained(known: FeatureTable, settings: Settings, steps: int, report: Report) -> PictureNet:
     """A network after so many steps."""
     task, rng = Pictures(), np.random.default_rng(settings.seed)
     torch.manual_seed(settings.seed)

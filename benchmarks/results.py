@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from radarize.evaluation.benchmark.results import Data, Network, Results, Walk, command, machine
+from radarize.evaluation.benchmark.results import Data, Results, UsedNetwork, Walk, command, machine
 from radarize.evaluation.benchmark.table import Beside, Table
 from radarize.io.console import progress
 from radarize.io.errors import InputError
@@ -42,7 +42,7 @@ class Page(NamedTuple):
     rows: Sequence[Mapping[str, object]]
     data: Data
     notes: Sequence[str]
-    networks: tuple[Network, ...] = ()
+    networks: tuple[UsedNetwork, ...] = ()
     beside: Sequence[Beside] = ()
 
 

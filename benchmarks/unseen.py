@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from benchmarks.results import FOLDER, SHARED, script
 from radarize.evaluation.benchmark.dataset import DataSet
-from radarize.evaluation.benchmark.followed import Followed, joined, true_poses
+from radarize.evaluation.benchmark.followed import FrameErrors, joined, true_poses
 from radarize.evaluation.benchmark.results import command
 from radarize.evaluation.benchmark.study import Benchmark, Chosen, Options, Study, carry_out
 from radarize.evaluation.benchmark.table import Table, with_error, with_median
@@ -97,8 +97,8 @@ def row(runs: pd.DataFrame, paths: list[Path]) -> dict[str, object]:
 
 
 @cache
-def _followed(run: Path) -> Followed:
-    return Followed.read(run)
+def _followed(run: Path) -> FrameErrors:
+    return FrameErrors.read(run)
 
 
 @cache

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import tests.interruptible  # noqa: F401
-from radarize.capture.board import Network
+from radarize.capture.board import NetworkAddresses
 from radarize.capture.sensor import Sensor
 from radarize.io.recording import RecordingWriter
 from radarize.radar.cfg import write_cfg
@@ -50,9 +50,9 @@ def record(path: Path, config: RadarConfig, frames: int) -> np.ndarray:
     return adc
 
 
-def network() -> Network:
+def network() -> NetworkAddresses:
     """Addresses on this machine with ports that nobody uses."""
-    return Network(COMPUTER, BOARD, *free_ports())
+    return NetworkAddresses(COMPUTER, BOARD, *free_ports())
 
 
 def free_ports() -> tuple[int, int]:
@@ -74,7 +74,7 @@ def free_ports() -> tuple[int, int]:
 
 
 @contextmanager
-def emulated(source: Path | Source, **options: object) -> Iterator[tuple[Emulator, Network]]:
+def emulated(source: Path | Source, **options: object) -> Iterator[tuple[Emulator, NetworkAddresses]]:
     """A virtual sensor in this process, by default playing a recording, with its first frames ready."""
     where = network()
     with Emulator(
@@ -87,7 +87,7 @@ def emulated(source: Path | Source, **options: object) -> Iterator[tuple[Emulato
         yield emulator, where
 
 
-def sensor(emulator: Emulator, where: Network, config: RadarConfig = SMALL) -> Sensor:
+def sensor(emulator: Emulator, where: NetworkAddresses, config: RadarConfig = SMALL) -> Sensor:
     """Our client of a virtual sensor."""
     return Sensor(config, write_cfg(config), "test.cfg", emulator.port, network=where, slots=256)
 

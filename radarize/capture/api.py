@@ -11,18 +11,20 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int16
 
-from radarize.capture.board import Network
+from radarize.capture.board import NetworkAddresses
 from radarize.capture.live import Live, prepare
-from radarize.capture.page import Page, Unwatched
+from radarize.capture.page import LivePage, Unwatched
 from radarize.capture.record import Keeper, recording
 from radarize.capture.replay import Replay
 from radarize.capture.sensor import Sensor
-from radarize.capture.stream import Stream
+from radarize.capture.stream import FrameStream
 from radarize.capture.uart import BAUD
 from radarize.io.errors import InputError, refuse_unknown
 from radarize.io.recording import spare
-from radarize.pipeline.method import Inputs
-from radarize.pipeline.methods import best_methods, pace
+from radarize.pipeline.config import Configuration
+from radarize.pipeline.method import Inputs, Weights
+from radarize.pipeline.methods import BEST, best_methods, pace
+from radarize.pipeline.odometry import configuration, folder
 from radarize.pipeline.pipeline import Result
 from radarize.pipeline.runfolder import OccupancyMap
 from radarize.radar.config import RadarConfig
@@ -115,7 +117,9 @@ class LiveSession:
     live: Live
     server: "Server | None" = None
 
-    def __init__(self, stream: Stream, inputs: Inputs, methods: dict[str, str], most: int | None, options: LiveOptions):
+    def __init__(
+        self, stream: FrameStream, inputs: Inputs, methods: dict[str, str], most: int | None, options: LiveOptions
+    ):
         self.stream, self.methods, self.most = stream, methods, most
         self._threads = torch.get_num_threads()  # which `prepare` sets to one
         self._inputs, self._options, self._stack = prepare(inputs, methods), options, ExitStack()
@@ -131,7 +135,7 @@ class LiveSession:
 
                 self.server = stack.enter_context(Server(foxglove))
             address = given.get("address")
-            page = Unwatched() if address is None else stack.enter_context(Page(address))
+            page = Unwatched() if address is None else stack.enter_context(LivePage(address))
             self.live = Live(self._inputs, self.methods, page, self.server)
             stack.enter_context(self.stream)
             if output := given.get("output"):
@@ -212,6 +216,8 @@ def live(
     replay: str | Path | None = None,
     odometry: str | None = None,
     scans: str | None = None,
+    weights: str | Path | None = None,
+    pipeline: Configuration | str | Path | None = None,
     every: int | None = None,
     duration: float | None = None,
     frames: int | None = None,
@@ -227,6 +233,8 @@ def live(
         port: the radar's serial command port.
         replay: a recording (``.h5``) to play instead of a radar.
         odometry, scans: methods by name, see `run`.
+        weights: folder of the networks' weights; by default the shipped ones.
+        pipeline: settings of the pipeline, or a YAML file of them, as ``config`` of `run`.
         every: follow every N-th frame; by default as the networks were taught.
         duration: end after so many s.
         frames: end after so many frames.
@@ -254,9 +262,10 @@ def live(
         raise InputError(f"--replay {replay} is given with --config or --port, expected one of the two")
     stream = Replay(Path(replay)) if replay else sensor(config, port, options)
     radar = stream.config
-    best = best_methods(radar)[0]
+    best = BEST if weights else best_methods(radar)[0]
     methods = {"odometry": odometry or best["odometry"], "scans": scans or best["scans"]}
-    inputs = Inputs(radar, every=every or pace(methods["odometry"], radar))
+    every = every or pace(methods["odometry"], radar)
+    inputs = Inputs(radar, configuration(pipeline), Weights(folder(weights)), every=every)
     return LiveSession(stream, inputs, methods, frames_within(duration, frames, radar.frame_period), options)
 
 
@@ -270,9 +279,9 @@ def sensor(config: str | Path | RadarConfig | None, port: str | None, options: L
         name, wanted = ("config", "a .cfg or a preset") if config is None else ("port", "a TTY")
         raise InputError(f"--{name} is missing, expected {wanted}")
     radar, text = load_config(config)
-    known = {each.name for each in fields(Network)}
+    known = {each.name for each in fields(NetworkAddresses)}
     addresses: dict[str, Any] = {name: value for name, value in options.items() if name in known}
-    return Sensor(radar, text, str(config), port, baud=options.get("baud", BAUD), network=Network(**addresses))
+    return Sensor(radar, text, str(config), port, baud=options.get("baud", BAUD), network=NetworkAddresses(**addresses))
 
 
 def frames_within(duration: float | None, frames: int | None, period: float) -> int | None:

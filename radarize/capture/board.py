@@ -13,7 +13,7 @@ from radarize.radar.dca1000_commands import (
     COMMAND_PORT,
     COMPUTER_ADDRESS,
     RAW_TWO_LANES,
-    Command,
+    Opcode,
     Reply,
     Request,
     Status,
@@ -32,7 +32,7 @@ _TROUBLE = {
 
 
 @dataclass(frozen=True)
-class Network:
+class NetworkAddresses:
     """Addresses and ports; the defaults are those of a board as delivered.
 
     Attributes:
@@ -72,21 +72,21 @@ class Network:
         return f"--host {self.host}, UDP port {port}: {getattr(error, 'strerror', None) or error}"
 
 
-class Board:
+class CaptureCard:
     """A DCA1000; use as a context manager.
 
     Raises:
         InputError: the command port cannot be bound.
     """
 
-    def __init__(self, network: Network):
+    def __init__(self, network: NetworkAddresses):
         self.network = network
         self._socket = network.bind(network.command_port)
         self._reported = Status(0)
         self._foreign = ""
         self._port: int | None = None
 
-    def __enter__(self) -> "Board":
+    def __enter__(self) -> "CaptureCard":
         return self
 
     def __exit__(self, *_) -> None:
@@ -104,23 +104,23 @@ class Board:
             raise InputError(f"radar configuration: sends {rate:.0f} Mbit/s, expected at most the DCA1000's {limit:g}")
         # A quarter to spare for its bursts, where there is one.
         delay = next((d for d, limit in _THROUGHPUT.items() if rate < 0.75 * limit), min(_THROUGHPUT))
-        self.request(Command.ALIVE)
-        self.request(Command.RESET_FPGA)
-        version = self.request(Command.VERSION, answer=True)
-        self.request(Command.CONFIGURE, RAW_TWO_LANES)
-        self.request(Command.PACKETS, packet_settings(delay))
+        self.request(Opcode.ALIVE)
+        self.request(Opcode.RESET_FPGA)
+        version = self.request(Opcode.VERSION, answer=True)
+        self.request(Opcode.CONFIGURE, RAW_TWO_LANES)
+        self.request(Opcode.PACKETS, packet_settings(delay))
         return f"{version & 0x7F}.{version >> 7 & 0x7F}"
 
     def start(self) -> None:
         """Pass samples on from now."""
         self._reported = Status(0)
-        self.request(Command.START)
+        self.request(Opcode.START)
 
     def stop(self) -> None:
         """Pass no more samples on."""
-        self.request(Command.STOP)
+        self.request(Opcode.STOP)
 
-    def request(self, command: Command, body: bytes = b"", answer: bool = False) -> int:
+    def request(self, command: Opcode, body: bytes = b"", answer: bool = False) -> int:
         """Send a command; returns the status of its reply.
 
         Args:
@@ -182,6 +182,6 @@ class Board:
             except InputError:
                 continue
             self._port = port
-            if reply.command == Command.STATUS:
+            if reply.command == Opcode.STATUS:
                 self._reported |= Status(reply.status)
             return reply

@@ -10,10 +10,10 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from radarize.capture.page import Page, Unwatched
+from radarize.capture.page import LivePage, Unwatched
 from radarize.capture.record import Keeper
-from radarize.capture.stream import Stream, follow
-from radarize.capture.view import View
+from radarize.capture.stream import FrameStream, follow
+from radarize.capture.view import LiveView
 from radarize.io.recording import Losses
 from radarize.io.stopwatch import stage
 from radarize.pipeline.health import Health
@@ -54,11 +54,11 @@ class Live:
     """
 
     def __init__(
-        self, inputs: Inputs, methods: dict[str, str], page: Page | Unwatched, foxglove: "Server | None" = None
+        self, inputs: Inputs, methods: dict[str, str], page: LivePage | Unwatched, foxglove: "Server | None" = None
     ):
         self.pipeline, self.page, self.foxglove = make_pipeline(inputs, **methods, endless=True), page, foxglove
         self.preprocessor = Preprocessor(inputs.signal, inputs.every)
-        self.view = View(self.pipeline, inputs.signal)
+        self.view = LiveView(self.pipeline, inputs.signal)
         self.losses, self.health = Losses(inputs.delivered.frame_period), Health(inputs.radar)
         self._keeper: Keeper | None = None
         self.busy = 0.0
@@ -68,22 +68,9 @@ class Live:
         self._drawn: Future[None] = Future()
         self._drawn.set_result(None)
 
-    def run(
-        self,
-        stream: Stream,
-        stopping: Event,
-        *,
-        frames: int | None = None,
-        keeper: Keeper | None = None,
-        progress: Callable[[int, int], None] = lambda done, total: None,
-    ) -> None:
-        """`follow` the stream to its end."""
-        for _ in self.follow(stream, stopping, frames=frames, keeper=keeper, progress=progress):
-            pass
-
     def follow(
         self,
-        stream: Stream,
+        stream: FrameStream,
         stopping: Event,
         *,
         frames: int | None = None,
@@ -129,12 +116,12 @@ class Live:
         self._painter.shutdown()
         self.page.send("end", {"troubles": self.troubles(stream)})
 
-    def troubles(self, stream: Stream) -> list[str]:
+    def troubles(self, stream: FrameStream) -> list[str]:
         """What is wrong with the stream and its recording so far, and where odometry had a hard time."""
         left_out = self._keeper.warnings() if self._keeper else []
         return [*stream.troubles(), *left_out, *self.health.warnings()]
 
-    def _show(self, stream: Stream, adc: np.ndarray, valid: np.ndarray, stamp: float) -> None:
+    def _show(self, stream: FrameStream, adc: np.ndarray, valid: np.ndarray, stamp: float) -> None:
         now = time.monotonic()
         if now < self._frame_due or not (self.page.watched or self.foxglove):
             return
@@ -182,7 +169,7 @@ def prepare(inputs: Inputs, methods: dict[str, str]) -> Inputs:
     move, through a room of its own, so that whatever is compiled or loaded at first use is there."""
     torch.set_num_threads(1)  # a frame is too little to share out: threads that wait for each other cost more
     pipeline, preprocessor, radar = make_pipeline(inputs, **methods), Preprocessor(inputs.signal), inputs.radar
-    view, rng = View(pipeline, inputs.signal), np.random.default_rng(0)
+    view, rng = LiveView(pipeline, inputs.signal), np.random.default_rng(0)
     for frames in range(1, TOGETHER + 1):
         adc = rng.integers(-200, 200, (frames, *radar.frame_shape), dtype=np.int16)
         stamps = (preprocessor.taken + np.arange(frames)) * radar.frame_period

@@ -26,7 +26,7 @@ class Unwatched:
         """Nothing."""
 
 
-class Page:
+class LivePage:
     """Serves the page; use as a context manager.
 
     What is sent under a name replaces what was sent before: a browser that cannot keep up, or comes later, gets the
@@ -57,7 +57,7 @@ class Page:
         self._closed = False
         self._thread = threading.Thread(target=self._server.serve_forever, daemon=True)
 
-    def __enter__(self) -> "Page":
+    def __enter__(self) -> "LivePage":
         self._thread.start()
         return self
 
@@ -103,7 +103,7 @@ class Page:
 
 
 class _Server(ThreadingHTTPServer):
-    page: Page
+    page: LivePage
     name: str  # of the address that was given
     daemon_threads = False  # so that closing waits for the last events
 

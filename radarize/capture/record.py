@@ -11,7 +11,7 @@ from threading import Event
 import numpy as np
 from jaxtyping import Bool, Float, Int16
 
-from radarize.capture.stream import Stream, follow
+from radarize.capture.stream import FrameStream, follow
 from radarize.io.errors import DiskFull, InputError, first_line
 from radarize.io.recording import RecordingWriter
 
@@ -62,7 +62,7 @@ class Keeper:
 
 
 @contextmanager
-def recording(stream: Stream, output: Path, overwrite: bool = False) -> Iterator[Keeper]:
+def recording(stream: FrameStream, output: Path, overwrite: bool = False) -> Iterator[Keeper]:
     """A keeper of a stream's frames. Whatever ends it, the recording is whole under its own name; where the disk does
     not permit that, what is left is named, and how to rescue it.
 
@@ -103,7 +103,7 @@ def _sentence(error: BaseException) -> str:
 
 
 def record(
-    stream: Stream,
+    stream: FrameStream,
     output: Path,
     stopping: Event,
     *,

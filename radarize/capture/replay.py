@@ -3,13 +3,13 @@
 import time
 from pathlib import Path
 
-from radarize.capture.stream import GLANCE, Outlet, Stream
+from radarize.capture.stream import GLANCE, FrameStream, Outlet
 from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarize.radar.assembler import PacketCounts
 
 
-class Replay(Stream):
+class Replay(FrameStream):
     """A recording as a stream.
 
     Args:

@@ -4,9 +4,9 @@ import contextlib
 import socket
 import time
 
-from radarize.capture.board import Board, Network
+from radarize.capture.board import CaptureCard, NetworkAddresses
 from radarize.capture.receiver import buffer_warning, enlarge, receive
-from radarize.capture.stream import Stream
+from radarize.capture.stream import FrameStream
 from radarize.capture.uart import BAUD, Uart, text_for
 from radarize.io.errors import InputError
 from radarize.io.recording.captured import FROM_RADAR
@@ -18,7 +18,7 @@ from radarize.radar.limits import check_limits
 _LAST_PACKET = 3.0
 
 
-class Sensor(Stream):
+class Sensor(FrameStream):
     """A radar that streams from entering the context on, and is stopped on leaving it.
 
     Args:
@@ -47,7 +47,7 @@ class Sensor(Stream):
         port: str,
         *,
         baud: int = BAUD,
-        network: Network,
+        network: NetworkAddresses,
         slots: int = 64,
     ):
         check_limits(config, demo=True)
@@ -56,7 +56,7 @@ class Sensor(Stream):
         self.port = port
         with contextlib.ExitStack() as stack:
             self._uart = stack.enter_context(Uart(port, baud))
-            self._board = stack.enter_context(Board(network))
+            self._board = stack.enter_context(CaptureCard(network))
             self._receiver = stack.enter_context(network.bind(network.data_port))
             self._open = stack.pop_all()
         self._notes = buffer_warning(enlarge(self._receiver), config)

@@ -75,7 +75,7 @@ class Outlet:
 Source = Callable[..., None]
 
 
-class Stream:
+class FrameStream:
     """Frames that a source puts out in a process of its own; use as a context manager.
 
     Args:
@@ -103,7 +103,7 @@ class Stream:
         shared = (self.ring, self._stop, self._ready, self._counts)
         self._process = CONTEXT.Process(target=_fill, args=(source, arguments, shared, failure), daemon=True)
 
-    def __enter__(self) -> "Stream":
+    def __enter__(self) -> "FrameStream":
         self._process.start()
         deadline = time.monotonic() + _START_PATIENCE
         while not self._ready.wait(GLANCE):
@@ -183,7 +183,7 @@ def _fill(source: Source, arguments: tuple, shared: tuple, failure) -> None:
         pass
 
 
-def follow(stream: Stream, stopping: Event, *, most: int, frames: int | None = None) -> Iterator[np.ndarray]:
+def follow(stream: FrameStream, stopping: Event, *, most: int, frames: int | None = None) -> Iterator[np.ndarray]:
     """Batches of frames of `FrameRing.dtype`, until the stream ends, the user stops it, or there are enough.
 
     Args:

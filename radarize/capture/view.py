@@ -59,7 +59,7 @@ def png(pixels: UInt8[np.ndarray, "row column ..."]) -> str:
     return "data:image/png;base64," + base64.b64encode(buffer.getvalue()).decode()
 
 
-class View:
+class LiveView:
     """Pictures and figures of a pipeline, as plain data for a page.
 
     Attributes:

@@ -135,8 +135,12 @@ def live(
     frames: FrameCount = None,
     odometry: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
     scans: Annotated[str | None, typer.Option(help="See `radarize run`.")] = None,
+    weights: Annotated[Path | None, typer.Option(help="See `radarize run`.")] = None,
+    pipeline: Annotated[
+        Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")
+    ] = None,
     every: Annotated[
-        int | None, typer.Option(min=1, help="Follow every so many-th frame; by default as the networks were taught.")
+        int | None, typer.Option(min=1, help="Follow every N-th frame; by default as the networks were trained.")
     ] = None,
     address: Annotated[str, typer.Option(help="Where to show the page; port 0 is any.")] = "127.0.0.1:8470",
     foxglove: Annotated[

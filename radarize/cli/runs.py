@@ -34,7 +34,7 @@ def run_(
         Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
     ] = None,
     config: Annotated[Path | None, typer.Option(help="Settings of the pipeline (YAML), see `radarize config`.")] = None,
-    every: Annotated[int, typer.Option(min=1, help="Use every so many-th frame.")] = 1,
+    every: Annotated[int, typer.Option(min=1, help="Use every N-th frame.")] = 1,
 ):
     """Estimate trajectory and map of a recording."""
     from radarize.io.load import load

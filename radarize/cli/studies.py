@@ -43,7 +43,7 @@ def train(
     from dataclasses import replace
 
     from radarize.learning.task import find_task
-    from radarize.learning.training.train import Options, train
+    from radarize.learning.training.train import RealOptions, train
 
     if onnx:
         import onnxscript  # noqa: F401  missed now, not after the training
@@ -57,7 +57,7 @@ def train(
     hyper = replace(find_task(task).defaults, **given)
     with progress("train", "with --resume the same command goes on after the last whole epoch") as report:
         written = train(
-            task, data, output, hyper, Options(split, device, workers, resume, onnx, start),
+            task, data, output, hyper, RealOptions(split, device, workers, resume, onnx, start),
             progress=report, say=lambda line: typer.echo(line, err=True),
         )  # fmt: skip
     print(written)
@@ -101,10 +101,10 @@ def benchmark(
     if name == "real":
         return _benchmark_real(data, out, weights, walks, predictions or [], poses, workers, ray)
     from radarize.evaluation.benchmark.run import benchmark as compare
-    from radarize.evaluation.benchmark.study import Options
+    from radarize.evaluation.benchmark.study import RealOptions
 
     chosen = [method for word in methods or () for method in word.split(",")]
-    options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
+    options = RealOptions(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
     with progress("benchmark", f"what has ended is kept in {out}, and the same command goes on after it") as report:
         published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
     for each in published:
@@ -122,7 +122,7 @@ def _benchmark_real(
     workers: int | None,
     ray: str | None,
 ) -> None:
-    from radarize.baselines.real.real import SHOWN, Options, real
+    from radarize.baselines.real.real import SHOWN, RealOptions, real
 
     numbers = [number.strip() for number in walks.split(",")] if walks else []
     if wrong := [number for number in numbers if not number.isdecimal()]:
@@ -132,7 +132,7 @@ def _benchmark_real(
         if not (name and folder and Path(folder).is_dir()):
             raise InputError(f"--predictions is {name}={folder}, expected NAME=FOLDER of a folder that is there")
     others = {name: Path(each) for name, each in named.items()}
-    options = Options([int(number) for number in numbers], others, weights, poses, workers, ray)
+    options = RealOptions([int(number) for number in numbers], others, weights, poses, workers, ray)
     with progress("real") as report:
         results = real(data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
     print_table(*results.tables[0].in_terminal(SHOWN))

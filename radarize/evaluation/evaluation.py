@@ -42,7 +42,7 @@ class Evaluation(Mapping[str, object]):
         return methods(self._run.folder)
 
     @property
-    def tables(self) -> Iterator[words.Table | str]:
+    def tables(self) -> Iterator[words.PrintedTable | str]:
         """Tables and sentences, for a page or a terminal."""
         return words.everything(self._figures)
 
@@ -98,13 +98,13 @@ def evaluate(run: Run | str | Path, *, reference: str | Path | None = None) -> E
     return Evaluation(run if isinstance(run, Run) else Run(run), None if reference is None else Path(reference))
 
 
-def _frame(table: words.Table) -> "pandas.DataFrame":
+def _frame(table: words.PrintedTable) -> "pandas.DataFrame":
     import pandas
 
     return pandas.DataFrame(table.rows, columns=list(table.head))
 
 
-def _plain(table: words.Table) -> str:
+def _plain(table: words.PrintedTable) -> str:
     """A table as text of even columns."""
     rows = [tuple(table.head), *table.rows]
     widths = [max(len(row[k]) for row in rows) for k in range(len(table.head))]

@@ -11,7 +11,7 @@ from torch import Generator, Tensor, nn
 
 from radarize.io.plugins import Plugins
 from radarize.learning.features.grid import Grid
-from radarize.learning.features.table import Reading, Table
+from radarize.learning.features.table import FeatureTable, Reading
 from radarize.learning.nets.gaussian import Gaussian
 from radarize.learning.nets.weights import Header, Network, build
 from radarize.signal.maps import Maps
@@ -100,9 +100,9 @@ class Task(ABC):
         workers: int = 1,
         progress: Callable[..., None] = lambda *where: None,
         grid: Grid | None = None,
-    ) -> Table:
-        """All that it reads of recordings, see `Table.read`."""
-        return Table.read(paths, self.maps, self.truth, self.sensed, self.network.maker, workers, progress, grid)
+    ) -> FeatureTable:
+        """All that it reads of recordings, see `FeatureTable.read`."""
+        return FeatureTable.read(paths, self.maps, self.truth, self.sensed, self.network.maker, workers, progress, grid)
 
     def optimise(self, parameters: Iterable[nn.Parameter], settings: Settings) -> torch.optim.Optimizer:
         """The algorithm, at work."""
@@ -118,16 +118,16 @@ class Task(ABC):
         """Frames of windows."""
         return starts[:, None] + spacing[:, None] * torch.arange(count)
 
-    def inputs(self, table: Table, frames: Int[Tensor, "item frame"]) -> Inputs:
+    def inputs(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Inputs:
         """What the network reads of windows."""
         return table.window(frames)
 
-    def label(self, table: Table, frames: Int[Tensor, "item frame"]) -> Tensor:
+    def label(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Tensor:
         """What the network should say of windows."""
         return table.truth[self.truth[0].name][frames[:, -1]]
 
     def items(
-        self, table: Table, starts: Int[Tensor, "item"], spacing: Int[Tensor, "item"], count: int
+        self, table: FeatureTable, starts: Int[Tensor, "item"], spacing: Int[Tensor, "item"], count: int
     ) -> tuple[Inputs, Tensor]:
         """What the network reads of windows of so many frames, and what it should say."""
         frames = self.frames(starts, spacing, count)
@@ -189,7 +189,7 @@ class Motion(Task):
         net.spread.fill_(0.5 * normalised.mean().log())
 
 
-def turns(table: Table, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item 1"]:
+def turns(table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item 1"]:
     """Change of yaw from the first frame of windows to the last, rad."""
     yaw = table.truth["yaw"]
     return torch.remainder(yaw[frames[:, -1]] - yaw[frames[:, 0]] + torch.pi, 2 * torch.pi) - torch.pi

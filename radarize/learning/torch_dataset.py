@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from radarize.learning.training.dataset import Frames
+from radarize.learning.training.dataset import FrameDataset
 
 
 def torch_dataset(
@@ -15,7 +15,7 @@ def torch_dataset(
     part: str = "train",
     window: int = 1,
     stride: int = 1,
-) -> Frames:
+) -> FrameDataset:
     """Read a folder of recordings as a torch `Dataset`, lazily, from any number of processes.
 
     Args:
@@ -39,4 +39,4 @@ def torch_dataset(
         >>> {name: tuple(tensor.shape) for name, tensor in dataset[0].items()}
         {'doppler_azimuth': (1, 32, 80), 'velocity': (1, 3)}
     """
-    return Frames(data, split, part, (*features, *labels), window, stride=stride)
+    return FrameDataset(data, split, part, (*features, *labels), window, stride=stride)

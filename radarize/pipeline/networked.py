@@ -12,7 +12,7 @@ from radarize.odometry.rotation import MapRotation
 from radarize.pipeline.method import Inputs, Method
 from radarize.radar.array import is_whole
 from radarize.scans.extraction import HeatmapScans
-from radarize.scans.segmentation import Segmentation
+from radarize.scans.segmentation import SegmentationScans
 
 
 def learned(inputs: Inputs) -> Odometry:
@@ -43,10 +43,10 @@ def _turns(inputs: Inputs) -> LearnedRotation:
     return LearnedRotation(inputs.radar, inputs.weights.of("rotation"), inputs.configuration.turns)
 
 
-def segmentation(inputs: Inputs, first: bool = True) -> Segmentation:
+def segmentation(inputs: Inputs, first: bool = True) -> SegmentationScans:
     """The network's first surfaces, or its likeliest cells; farther than it sees, first echoes."""
     far = HeatmapScans(inputs.signal.heatmaps, "first-echo", inputs.configuration.scans) if first else None
-    return Segmentation(inputs.radar, inputs.weights.of("segmentation"), first, far)
+    return SegmentationScans(inputs.radar, inputs.weights.of("segmentation"), first, far)
 
 
 FUSED = Method("networks and Doppler", fused, ("translation", "rotation"), whole=("rotation",))

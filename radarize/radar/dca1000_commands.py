@@ -27,7 +27,7 @@ RAW_TWO_LANES = bytes([1, 2, 1, 2, 3, 30])
 VERSION_2_8 = 2 | 8 << 7
 
 
-class Command(IntEnum):
+class Opcode(IntEnum):
     """Codes of requests, which replies repeat."""
 
     RESET_FPGA = 1

@@ -25,7 +25,7 @@ OUTERMOST = 3 / 8
 _STEP = 0.3
 
 
-class Segmentation:
+class SegmentationScans:
     """Scans of a stream's frames.
 
     Args:

@@ -16,7 +16,7 @@ from radarize.radar.dca1000_commands import (
     COMMAND_PORT,
     RAW_TWO_LANES,
     VERSION_2_8,
-    Command,
+    Opcode,
     Reply,
     Request,
     Status,
@@ -51,30 +51,30 @@ class Board:
 
     def _execute(self, command: int, body: bytes) -> int:
         match command:
-            case Command.ALIVE | Command.STATUS | Command.RADAR_MODE:
+            case Opcode.ALIVE | Opcode.STATUS | Opcode.RADAR_MODE:
                 pass
-            case Command.VERSION:
+            case Opcode.VERSION:
                 return VERSION_2_8
-            case Command.RESET_FPGA:
+            case Opcode.RESET_FPGA:
                 self._link.stop()
                 self._packets = _DEFAULT
-            case Command.RESET_RADAR:
+            case Opcode.RESET_RADAR:
                 self._say("board: radar reset")
                 self._reset_radar()
-            case Command.CONFIGURE:
+            case Opcode.CONFIGURE:
                 if body[:5] != RAW_TWO_LANES[:5] or len(body) != len(RAW_TWO_LANES):  # the last is a timer
                     wanted = f"{RAW_TWO_LANES.hex(' ')} (raw, 2 lanes, 16 bit)"
                     raise InputError(f"settings {body.hex(' ')} fail, expected {wanted}")
-            case Command.PACKETS:
+            case Opcode.PACKETS:
                 self._packets = read_packet_settings(body)
-            case Command.EEPROM:
+            case Opcode.EEPROM:
                 self._say("board: EEPROM written; the emulator keeps its addresses")
-            case Command.START:
+            case Opcode.START:
                 if self._link.recording:
                     raise InputError("start fails, it is recording")
                 self._link.start(*self._packets)
                 self._say(f"board: recording, {self._packets[0] * 1e6:g} us between packets")
-            case Command.STOP:
+            case Opcode.STOP:
                 self._link.stop()
             case _:
                 raise InputError(f"request {command} fails, the emulator cannot do it")
@@ -128,7 +128,7 @@ class BoardSockets:
 
     def report(self, status: Status) -> None:
         """Send a status that nobody asked for."""
-        self._send(Reply(Command.STATUS, status).encode(), self._replies_to)
+        self._send(Reply(Opcode.STATUS, status).encode(), self._replies_to)
 
     def close(self) -> None:
         self._closed.set()

@@ -11,7 +11,7 @@ import radarize as rz
 import radarsim
 from radarize import cli as radarize_cli
 from radarize.capture.api import LiveOptions
-from radarize.capture.board import Network
+from radarize.capture.board import NetworkAddresses
 from radarize.capture.uart import BAUD
 from radarize.io.importers import Given
 from radarize.io.load import CaptureOptions
@@ -43,7 +43,14 @@ PAIRS = {
     "radarize import": (rz.load, dict.fromkeys(CaptureOptions.__annotations__) | of_fields(Given), {}),
     "radarize live": (
         rz.live,
-        {**of_fields(Network), "baud": BAUD, "output": None, "overwrite": False, "address": None, "foxglove": None},
+        {
+            **of_fields(NetworkAddresses),
+            "baud": BAUD,
+            "output": None,
+            "overwrite": False,
+            "address": None,
+            "foxglove": None,
+        },
         {},
     ),
     "radarsim simulate": (radarsim.simulate, defaults(planned) | of_fields(Walk), {}),

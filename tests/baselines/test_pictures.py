@@ -13,7 +13,7 @@ from radarize.baselines.pictures.memory import LASTS, Memory
 from radarize.baselines.pictures.network import COLUMNS
 from radarize.baselines.pictures.points import first_surfaces, points
 from radarize.baselines.pictures.training import BIAS, UNKNOWN, biased, entropy, rolled, unpacked, zoomed
-from radarize.learning.features.table import Table
+from radarize.learning.features.table import FeatureTable
 from radarize.learning.task import find_task
 from radarize.radar.presets import PRESETS
 from radarize.signal import polar
@@ -225,7 +225,7 @@ def test_recordings_of_the_simulator_are_read(tmp_path):
         writer.append(samples([(3.0, 0.2, 300)], frames=6), 0.05 * np.arange(6), rows=rows)
     task = find_task("pictures")
     table = task.table([tmp_path / "a.h5"])
-    assert isinstance(table, Table) and table.maps["antennas"].shape == (6, BINS, 8)
+    assert isinstance(table, FeatureTable) and table.maps["antennas"].shape == (6, BINS, 8)
     header = task.header(task.defaults, table.grid)
     assert header.maps == ("picture",) and (header.grid.rows, header.grid.azimuths) == (polar.ROWS, polar.COLUMNS)
     assert header.grid.frame_period == 0.05

@@ -18,7 +18,7 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Product, Recording, RecordingWriter, Stream
 from radarize.io.tum import read_tum
 from radarize.learning.features.grid import Grid
-from radarize.learning.features.table import Table
+from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets.weights import Header, build, example, header_of, load, save
 from radarize.learning.task import find_task
 from radarize.pipeline.method import Inputs, Weights
@@ -69,7 +69,7 @@ def data(tmp_path_factory):
 def test_velocity_is_a_finite_difference_at_the_end_of_its_interval(data):
     """On a circle: the chord, seen from the heading before, is turned by half of the turn to the left."""
     (velocity,) = TASKS["translation"].truth
-    table = Table.read([data / "0.h5"], ("published_range_azimuth_1",), (velocity,), maker=PublishedMaps)
+    table = FeatureTable.read([data / "0.h5"], ("published_range_azimuth_1",), (velocity,), maker=PublishedMaps)
     assert table.lengths == [12] and table.grid.frame_period == pytest.approx(2 * CONFIG.frame_period)
     step = 2 * TURN
     speed = 2 * np.sin(step / 2) / (2 * CONFIG.frame_period)

@@ -14,7 +14,7 @@ from radarize.baselines.pictures.training import UNKNOWN, chamfer, unpacked
 from radarize.baselines.radarhd.network import DRAWN, SEEN, RadarHdNet, RadarHdPictureNet, columns
 from radarize.baselines.radarhd.pictures import LEAST, known
 from radarize.learning.features.grid import Grid
-from radarize.learning.features.table import Table
+from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets.unet import through
 from radarize.learning.nets.weights import load, save
 from radarize.learning.task import find_task
@@ -107,7 +107,7 @@ def test_loss_against_loops():
     assert torch.equal(known(logits + 3 * (label == UNKNOWN), label), found)
 
 
-def table(rows: list[float], frames: int = 5) -> Table:
+def table(rows: list[float], frames: int = 5) -> FeatureTable:
     """Recordings of a wall each, as antennas hear it and a lidar sees it."""
     antennas = heard(rows, items=len(rows), frames=frames).flatten(0, 2).half()
     lidar = np.zeros((len(rows), frames, polar.ROWS, polar.BEAMS), bool)
@@ -115,7 +115,7 @@ def table(rows: list[float], frames: int = 5) -> Table:
         each[:, int(row), 200:312] = True
     packed = torch.from_numpy(np.packbits(lidar, axis=3)).flatten(0, 1)
     grid = Grid.of(RADAR, "antennas", PictureMaker)
-    return Table({"antennas": antennas}, {"lidar": packed}, [frames] * len(rows), grid, 0.2)
+    return FeatureTable({"antennas": antennas}, {"lidar": packed}, [frames] * len(rows), grid, 0.2)
 
 
 def test_it_is_trained_on_what_ours_is_trained_on(monkeypatch):

@@ -13,7 +13,7 @@ from radarize.learning.nets.weights import Header, build, example, save
 from radarize.pipeline.method import Inputs
 from radarize.pipeline.networked import segmentation
 from radarize.radar.presets import PRESETS
-from radarize.scans.segmentation import NEAR, OUTERMOST, Segmentation, at_middles, first_surface
+from radarize.scans.segmentation import NEAR, OUTERMOST, SegmentationScans, at_middles, first_surface
 from radarize.signal.batch import Preprocessor, Signal
 from radarize.signal.bearings import BEARINGS
 from radarsim.sensors.scan import RAYS, Cell, Occupancy
@@ -99,7 +99,7 @@ def untrained(tmp_path):
 def test_ghosts_behind_a_surface_and_guesses_are_not_returned(untrained):
     signal = Signal(CONFIG)
     ranges = signal.heatmaps.ranges
-    scans = Segmentation(CONFIG, untrained)
+    scans = SegmentationScans(CONFIG, untrained)
     zeros = torch.zeros(2, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64)
     batch = of_spectrum(signal, zeros, np.arange(2) * CONFIG.frame_period)
     assert scans.extract(batch).shape == (2, len(BEARINGS))
@@ -114,7 +114,7 @@ def test_ghosts_behind_a_surface_and_guesses_are_not_returned(untrained):
     assert np.allclose(found[:, 10], ranges[30], atol=step / 2)
     assert np.isinf(found[:, 20]).all() and np.isfinite(found).sum() == 2
     assert first_surface(likely, 0.4)[0, 20] == pytest.approx(40, abs=0.5)
-    alone = Segmentation(CONFIG, untrained, first=False)
+    alone = SegmentationScans(CONFIG, untrained, first=False)
     alone._net = Says(likely)
     found = alone.extract(batch)
     assert np.allclose(found[:, 10], ranges[60], atol=step / 2) and np.isfinite(found).sum() == 2
@@ -141,12 +141,12 @@ def test_a_radar_that_sees_farther_has_echoes_beyond_the_network(untrained):
     batch = of_spectrum(
         signal, torch.zeros(2, radar.samples, radar.loops, 12, dtype=torch.complex64), np.arange(2) / 30
     )
-    scans = Segmentation(radar, untrained, beyond=Echoes(told))
+    scans = SegmentationScans(radar, untrained, beyond=Echoes(told))
     scans._net = Says(likely)
     found = scans.extract(batch)
     assert np.allclose(found[:, 10], 45 * CONFIG.range_resolution, atol=0.5 * CONFIG.range_resolution)
     assert (found[:, 20] == 9.0).all() and np.isinf(found[:, 30]).all() and np.isfinite(found).sum() == 4
-    near = Segmentation(CONFIG, untrained, beyond=Echoes(told))  # which sees no farther than the network
+    near = SegmentationScans(CONFIG, untrained, beyond=Echoes(told))  # which sees no farther than the network
     near._net = Says(likely)
     batch = of_spectrum(Signal(CONFIG), torch.zeros(1, CONFIG.samples, CONFIG.loops, 12, dtype=torch.complex64), [0.0])
     assert np.isfinite(near.extract(batch)).sum() == 1

@@ -15,7 +15,7 @@ from radarize.baselines.rnin.training import displaced, rotation
 from radarize.io.errors import InputError
 from radarize.io.recording import Recording, RecordingWriter, Stream
 from radarize.learning.features.grid import Grid
-from radarize.learning.features.table import Table
+from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets.export import export_onnx
 from radarize.learning.nets.weights import Header, build, example, load, save
 from radarize.learning.task import find_task
@@ -39,7 +39,7 @@ QUICK = {
 ALONE = Team(0, 1, torch.device("cpu"))
 
 
-def table(kind: str, seed: int, frames: int) -> Table:
+def table(kind: str, seed: int, frames: int) -> FeatureTable:
     """Frames by a law that the kind's network can learn in seconds."""
     rng = np.random.default_rng(seed)
     tensor = torch.from_numpy
@@ -52,12 +52,12 @@ def table(kind: str, seed: int, frames: int) -> Table:
         middle = (depth + slope * AZIMUTHS)[:, None]
         maps = 25 * np.exp(-0.5 * ((np.arange(ROWS)[:, None] - middle) / 0.7) ** 2) + rng.normal(0, 1, (1, ROWS, 80))
         scan = (depth + slope * BEARINGS).astype(np.float32)
-        return Table({"range_azimuth": tensor(maps).half()}, {"scan": tensor(scan)}, [20] * walls, GRID, PERIOD)
+        return FeatureTable({"range_azimuth": tensor(maps).half()}, {"scan": tensor(scan)}, [20] * walls, GRID, PERIOD)
     if kind == "rnin":  # who feels a push moves by it
         push = rng.normal(0, 1, (frames, 1, 3))
         sensed = np.concatenate([push + rng.normal(0, 0.1, (frames, 100, 3)), rng.normal(0, 0.1, (frames, 100, 3))], 2)
         truth = {"displacement": tensor(push[:, 0].astype(np.float32))}
-        return Table({}, truth, [frames], None, PERIOD, {"levelled": tensor(sensed).half()})
+        return FeatureTable({}, truth, [frames], None, PERIOD, {"levelled": tensor(sensed).half()})
     # Level motion in the xy plane: a step since three frames ago by the force, a turn by the angular velocity.
     force, turn = rng.normal(0, 2, (frames, 2)), rng.normal(0, 1, frames)
     poses, start = np.zeros((frames, 7)), np.zeros((3, 3))
@@ -70,7 +70,7 @@ def table(kind: str, seed: int, frames: int) -> Table:
     sensed[..., :2], sensed[..., 2], sensed[..., 5] = force[:, None], 9.8, turn[:, None]
     panorama = (rng.random((frames, 64, 256)) < 0.001).astype(np.float16)
     assert not start.any()
-    return Table({}, {"pose": tensor(poses)}, [frames], None, PERIOD,
+    return FeatureTable({}, {"pose": tensor(poses)}, [frames], None, PERIOD,
                  {"panorama": tensor(panorama), "imu": tensor(sensed).half()})  # fmt: skip
 
 
@@ -97,7 +97,7 @@ def test_labels_of_milliego_are_motions_seen_from_the_older_frame():
     task, rng = TASKS["milliego"], np.random.default_rng(0)
     place, turned = rng.normal(0, 1, (5, 3)), Rotation.random(5, random_state=0)
     poses = np.column_stack([place, turned.as_quat()])
-    some = Table({}, {"pose": torch.from_numpy(poses)}, [5], None, PERIOD)
+    some = FeatureTable({}, {"pose": torch.from_numpy(poses)}, [5], None, PERIOD)
     label = task.label(some, torch.tensor([[0, 2, 4], [1, 2, 3]])).numpy()
     for item, pair, a, b in ((0, 0, 0, 2), (0, 1, 2, 4), (1, 0, 1, 2)):
         assert label[item, pair, :3] == pytest.approx(turned[a].inv().apply(place[b] - place[a]), abs=1e-5)
@@ -161,7 +161,7 @@ def test_ranges_of_another_radar_are_bins_of_the_networks_grid(tmp_path):
         samples = np.random.default_rng(0).normal(0, 100, (1, *CONFIG.frame_shape)).astype(np.int16)
         writer.append(samples, np.zeros(1), rows={"truth/scan": scan})
     grid = Grid.of(CONFIG, "range_azimuth").model_copy(update={"step": step, "rows": int(2.5 / step)})
-    table = Table.read([tmp_path / "a.h5"], ["range_azimuth"], task.truth, grid=grid)
+    table = FeatureTable.read([tmp_path / "a.h5"], ["range_azimuth"], task.truth, grid=grid)
     assert table.maps["range_azimuth"].shape[1] == grid.rows
     assert table.truth["scan"].numpy() == pytest.approx(np.array([[0.5 / step, 1.5 / step, -1, -1]]))
 

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks import transfer
 from radarize.evaluation.benchmark.dataset import DataSet
-from radarize.evaluation.benchmark.followed import Followed
+from radarize.evaluation.benchmark.followed import FrameErrors
 from radarize.evaluation.benchmark.runs import figures
 from radarize.evaluation.motion import velocity_errors
 from radarize.pipeline.run import run
@@ -39,7 +39,7 @@ def test_a_recording_says_what_it_is_of(recording, judged):
 
 def test_frames_of_a_run_tell_what_its_metrics_tell(judged):
     folder, found = judged
-    followed = Followed.read(folder)
+    followed = FrameErrors.read(folder)
     velocity = velocity_errors(followed.velocity, followed.true_velocity, followed.covariance)
     assert velocity["rmse"] == pytest.approx(found["velocity"]["rmse"], rel=1e-5)
     # Errors of single steps and of windows of eight are those of the same path.

@@ -5,9 +5,9 @@ import threading
 
 import pytest
 
-from radarize.capture.board import Board, Network
+from radarize.capture.board import CaptureCard, NetworkAddresses
 from radarize.io.errors import InputError
-from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings
+from radarize.radar.dca1000_commands import Opcode, Reply, Request, Status, packet_settings
 from radarize.radar.presets import PRESETS
 from tests.virtual import SMALL, network
 
@@ -44,24 +44,24 @@ class Scripted:
                 continue
             self.asked.append(request)
             if len(self.asked) > self._deaf:
-                self.say(Reply(Command.STATUS, 0).encode())  # not what was asked for
+                self.say(Reply(Opcode.STATUS, 0).encode())  # not what was asked for
                 self.say(b"\x5a\xa5")
                 self.say(Reply(request.command, self._statuses.get(request.command, 0)).encode())
 
 
 def test_configuration_in_the_order_of_the_manual():
-    with Scripted({Command.VERSION: 0x0402}) as board, Board(board.network) as client:
+    with Scripted({Opcode.VERSION: 0x0402}) as board, CaptureCard(board.network) as client:
         assert client.configure(SMALL) == "2.8"
         client.start()
         client.stop()
     names = ["ALIVE", "RESET_FPGA", "VERSION", "CONFIGURE", "PACKETS", "START", "STOP"]
-    assert [Command(request.command).name for request in board.asked] == names
+    assert [Opcode(request.command).name for request in board.asked] == names
     assert board.asked[3].body.hex() == "01020102031e" and board.asked[4].body.hex() == "be05350c0000"
 
 
 def test_more_data_gets_shorter_pauses():
     rates = {36: 25e-6, 240: 25e-6, 300: 10e-6, 500: 5e-6, 700: 5e-6}
-    with Scripted() as board, Board(board.network) as client:
+    with Scripted() as board, CaptureCard(board.network) as client:
         for rate, delay in rates.items():
             client.configure(SMALL.model_copy(update={"frame_period": 8e-6 * SMALL.frame_bytes / rate}))
             assert board.asked[-1].body == packet_settings(delay)
@@ -71,17 +71,17 @@ def test_more_data_gets_shorter_pauses():
 
 def test_a_request_that_is_lost_is_repeated(monkeypatch):
     monkeypatch.setattr("radarize.capture.board._PATIENCE", 0.1)
-    with Scripted(deaf=2) as board, Board(board.network) as client:
-        client.request(Command.ALIVE)
+    with Scripted(deaf=2) as board, CaptureCard(board.network) as client:
+        client.request(Opcode.ALIVE)
     assert len(board.asked) == 3
 
 
 def test_no_board_and_a_board_that_refuses(monkeypatch):
     monkeypatch.setattr("radarize.capture.board._PATIENCE", 0.1)
-    with Board(network()) as client:
+    with CaptureCard(network()) as client:
         with pytest.raises(InputError, match="no DCA1000 answers ALIVE at UDP port .* powered"):
             client.configure(PRESETS["radarize"])
-    with Scripted({Command.START: 1}) as board, Board(board.network) as client:
+    with Scripted({Opcode.START: 1}) as board, CaptureCard(board.network) as client:
         with pytest.raises(InputError, match="answers START with status 1, expected 0"):
             client.start()
 
@@ -89,51 +89,58 @@ def test_no_board_and_a_board_that_refuses(monkeypatch):
 def test_replies_of_others_are_not_heard(monkeypatch):
     monkeypatch.setattr("radarize.capture.board._PATIENCE", 0.2)
     where = network()
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger, Board(where) as client:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger, CaptureCard(where) as client:
         forger.bind(("127.0.0.3", where.command_port))  # the board's own port, but not its address
-        for reply in (Reply(Command.ALIVE), Reply(Command.VERSION, 0x0402), Reply(Command.STATUS, Status.NO_LVDS)):
+        for reply in (
+            Reply(Opcode.ALIVE),
+            Reply(Opcode.VERSION, 0x0402),
+            Reply(Opcode.STATUS, Status.NO_LVDS),
+        ):
             forger.sendto(reply.encode(), (where.host, where.command_port))
         assert client.status(0.1) == Status(0)
-        forger.sendto(Reply(Command.ALIVE).encode(), (where.host, where.command_port))
+        forger.sendto(Reply(Opcode.ALIVE).encode(), (where.host, where.command_port))
         with pytest.raises(InputError, match="no DCA1000 answers ALIVE.*127.0.0.3:.* sent something instead"):
-            client.request(Command.ALIVE)
+            client.request(Opcode.ALIVE)
 
 
 def test_nor_are_those_from_another_port_of_the_board(monkeypatch):
-    with Scripted() as board, Board(board.network) as client:
-        client.request(Command.ALIVE)
+    with Scripted() as board, CaptureCard(board.network) as client:
+        client.request(Opcode.ALIVE)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger:
             forger.bind((board.network.dca, 0))
-            for reply in (Reply(Command.START, 1), Reply(Command.STATUS, Status.MEMORY_FULL)):
+            for reply in (Reply(Opcode.START, 1), Reply(Opcode.STATUS, Status.MEMORY_FULL)):
                 forger.sendto(reply.encode(), (board.network.host, board.network.command_port))
         client.start()
         assert client.status(0.1) == Status(0)
 
 
 def test_a_forged_failure_and_noise_stop_nothing():
-    with Scripted() as board, Board(board.network) as client:
+    with Scripted() as board, CaptureCard(board.network) as client:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as forger:
             forger.bind(("127.0.0.3", 0))
-            for data in (Reply(Command.START, 1).encode(), b"noise"):
+            for data in (Reply(Opcode.START, 1).encode(), b"noise"):
                 forger.sendto(data, (board.network.host, board.network.command_port))
         client.start()
         board.say(b"noise")
-        board.say(Reply(Command.STATUS, Status.NO_LVDS).encode())
+        board.say(Reply(Opcode.STATUS, Status.NO_LVDS).encode())
         assert client.status(0.2) == Status.NO_LVDS  # what comes after a datagram that cannot be read is heard
 
 
 def test_what_the_board_reports_on_its_own():
-    with Scripted() as board, Board(board.network) as client:
+    with Scripted() as board, CaptureCard(board.network) as client:
         assert client.troubles() == []
-        board.say(Reply(Command.STATUS, Status.NO_LVDS).encode())
-        board.say(Reply(Command.STATUS, Status.RECORD_COMPLETED).encode())
+        board.say(Reply(Opcode.STATUS, Status.NO_LVDS).encode())
+        board.say(Reply(Opcode.STATUS, Status.RECORD_COMPLETED).encode())
         assert client.status(0.2) == Status.NO_LVDS | Status.RECORD_COMPLETED
         assert len(client.troubles()) == 1 and "ribbon cable" in client.troubles()[0]
 
 
 def test_addresses_that_cannot_be_used():
     with pytest.raises(InputError, match="--host 192.0.2.7: no network interface .*sudo ip address add 192.0.2.7/24"):
-        Board(Network(host="192.0.2.7"))
+        CaptureCard(NetworkAddresses(host="192.0.2.7"))
     where = network()
-    with Board(where), pytest.raises(InputError, match=f"UDP port {where.command_port} is taken.*another capture"):
-        Board(where)
+    with (
+        CaptureCard(where),
+        pytest.raises(InputError, match=f"UDP port {where.command_port} is taken.*another capture"),
+    ):
+        CaptureCard(where)

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from radarize.capture import live
 from radarize.capture import record as record_module
-from radarize.capture.page import Page
+from radarize.capture.page import LivePage
 from radarize.capture.record import record
 from radarize.capture.stream import StreamCounts
 from radarize.capture.uart import Uart
@@ -252,6 +252,6 @@ def test_a_live_pipeline_takes_no_more_frames_at_a_time_than_it_was_prepared_for
     )
     live.prepare(Inputs(SMALL), CLASSICAL)
     monkeypatch.setattr(live, "follow", lambda *_, most, **__: asked.append(most) or [])
-    with Page("127.0.0.1:0") as page:
+    with LivePage("127.0.0.1:0") as page:
         live.Live(Inputs(SMALL), CLASSICAL, page).run(Played(), threading.Event())
     assert sorted(set(sizes)) == list(range(1, asked[0] + 1))

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from radarize.capture.live import Live, prepare
-from radarize.capture.page import Page
+from radarize.capture.page import LivePage
 from radarize.capture.record import Keeper
 from radarize.capture.replay import Replay
 from radarize.cli import app
@@ -76,7 +76,7 @@ def poses(results: list[Result]) -> np.ndarray:
 def test_a_replay_gives_what_the_file_gives(walk, tmp_path, every):
     """Of every frame, or of every second; all are recorded."""
     inputs = Inputs(PRESETS["radarize"], every=every)
-    with Page("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
+    with LivePage("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
         live = Kept(inputs, CLASSICAL, page)
         with RecordingWriter(tmp_path / "again.h5", stream.config) as writer:
             live.run(stream, threading.Event(), keeper=Keeper(writer))
@@ -104,7 +104,7 @@ def test_foxglove_gets_what_the_page_gets(walk):
         def __getattr__(self, name):
             return lambda *given: sent.append((name, *given))
 
-    with Page("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
+    with LivePage("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
         live = Kept(Inputs(PRESETS["radarize"]), CLASSICAL, page, Server())
         places, place = [], live.view.pose
         live.view.pose = lambda: places.append(place()) or places[-1]
@@ -118,7 +118,7 @@ def test_foxglove_gets_what_the_page_gets(walk):
 
 def test_too_slow_means_dropped_frames_not_delay(walk):
     """Ten times real time, and room for four frames: what is processed is whole, and the rest is counted."""
-    with Page("127.0.0.1:0") as page, Replay(walk, speed=1e4, slots=4) as stream:
+    with LivePage("127.0.0.1:0") as page, Replay(walk, speed=1e4, slots=4) as stream:
         live = Live(Inputs(PRESETS["radarize"]), CLASSICAL, page)
         while stream.counts.frames < FRAMES:
             pass
@@ -131,7 +131,7 @@ def test_too_slow_means_dropped_frames_not_delay(walk):
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed (apt-get install chromium)")
 def test_a_browser_shows_it_while_it_runs(walk, tmp_path):
     inputs = prepare(Inputs(PRESETS["radarize"]), CLASSICAL)
-    with Page("127.0.0.1:0") as page, Browser(page.url, tmp_path / "profile") as browser:
+    with LivePage("127.0.0.1:0") as page, Browser(page.url, tmp_path / "profile") as browser:
         browser.wait("document.getElementById('state').textContent == 'waiting for frames'")
         browser.wait("events.readyState == 1")
         shown = threading.Event()
@@ -188,7 +188,7 @@ def test_options_that_do_not_go_together(arguments, words):
 
 
 def test_the_page_gives_latecomers_the_newest_and_ends():
-    with Page("127.0.0.1:0") as page:
+    with LivePage("127.0.0.1:0") as page:
         for number in range(3):
             page.send("frame", {"number": number})
         page.send("end", {})
@@ -203,11 +203,11 @@ def test_the_page_gives_latecomers_the_newest_and_ends():
 
 
 def test_addresses_that_are_taken_or_none():
-    with Page("127.0.0.1:0") as page:
+    with LivePage("127.0.0.1:0") as page:
         taken = page.url.removeprefix("http://").strip("/")
         for address, words in ((taken, "in use"), ("127.0.0.1", "no port number"), ("192.0.2.1:80", "assign")):
             with pytest.raises(InputError, match=f"--address {address}: .*{words}.*, expected HOST:PORT"):
-                Page(address)
+                LivePage(address)
 
 
 def test_a_recording_that_cannot_be_played(tmp_path):
@@ -224,7 +224,7 @@ def test_the_map_of_an_hour_is_drawn_beside_the_frames(monkeypatch):
     ranges = np.full(len(BEARINGS), 2.0)
     nodes = [Node.gather([Scan(float(k), np.zeros(3), BEARINGS, ranges)], config) for k in range(len(angles))]
     poses = np.stack([9 * np.cos(angles), 9 * np.sin(angles), angles], axis=1)
-    with Page("127.0.0.1:0") as page:
+    with LivePage("127.0.0.1:0") as page:
         live = Live(Inputs(SMALL), CLASSICAL, page)
         slam, took = live.pipeline.slam, []
         for count in (6990, 7000):

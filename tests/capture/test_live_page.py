@@ -5,21 +5,21 @@ import socket
 import pytest
 
 from radarize.capture import page as module
-from radarize.capture.page import Page
+from radarize.capture.page import LivePage
 
 
-def asked(page: Page, *headers: str, path: str = "/") -> str:
+def asked(page: LivePage, *headers: str, path: str = "/") -> str:
     """The first line of the answer to a request with such headers."""
     with connected(page) as client:
         client.sendall("\r\n".join([f"GET {path} HTTP/1.1", *headers, "", ""]).encode())
         return client.makefile().readline().strip()
 
 
-def connected(page: Page) -> socket.socket:
+def connected(page: LivePage) -> socket.socket:
     return socket.create_connection(("127.0.0.1", port(page)), timeout=10)
 
 
-def port(page: Page) -> int:
+def port(page: LivePage) -> int:
     return int(page.url.rstrip("/").rsplit(":", 1)[1])
 
 
@@ -40,7 +40,7 @@ def port(page: Page) -> int:
     ],
 )
 def test_only_the_page_itself_asks(host, origin, answer):
-    with Page("127.0.0.1:0") as page:
+    with LivePage("127.0.0.1:0") as page:
         headers = [("Host", host), ("Origin", origin)]
         given = [f"{name}: {value.format(port(page))}" for name, value in headers if value]
         for path in ("/", "/other") if answer == 403 else ("/",):
@@ -49,7 +49,7 @@ def test_only_the_page_itself_asks(host, origin, answer):
 
 def test_one_connection_too_many_is_told_so(monkeypatch):
     monkeypatch.setattr(module, "_CLIENTS", 2)
-    with Page("127.0.0.1:0") as page:
+    with LivePage("127.0.0.1:0") as page:
         held = [connected(page) for _ in range(2)]
         page.send("frame", {})
         with connected(page) as third:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from radarize.capture.ring import FrameRing
-from radarize.capture.stream import Stream, follow
+from radarize.capture.stream import FrameStream, follow
 from radarize.io.errors import InputError
 from tests.capture import sources
 from tests.virtual import SMALL
@@ -37,7 +37,7 @@ def test_a_full_ring_takes_no_more_and_loses_nothing():
 
 
 def test_a_stream_from_another_process():
-    with Stream(SMALL, sources.count, SMALL, 50, slots=64) as stream:
+    with FrameStream(SMALL, sources.count, SMALL, 50, slots=64) as stream:
         batches = list(follow(stream, threading.Event(), most=16))
         assert max(map(len, batches)) <= 16
         assert [number for batch in batches for number in batch["number"]] == list(range(50))
@@ -46,7 +46,7 @@ def test_a_stream_from_another_process():
 
 
 def test_a_slow_reader_gets_whole_frames_and_a_count():
-    with Stream(SMALL, sources.count, SMALL, 50, slots=8) as stream:
+    with FrameStream(SMALL, sources.count, SMALL, 50, slots=8) as stream:
         while stream.packets.received < 50:  # the source waits for nobody
             time.sleep(0.01)
         numbers = [number for batch in follow(stream, threading.Event(), most=4) for number in batch["number"]]
@@ -56,10 +56,10 @@ def test_a_slow_reader_gets_whole_frames_and_a_count():
 
 def test_the_user_and_the_number_of_frames_end_it():
     stopping = threading.Event()
-    with Stream(SMALL, sources.wait) as stream:
+    with FrameStream(SMALL, sources.wait) as stream:
         stopping.set()
         assert list(follow(stream, stopping, most=4)) == []
-    with Stream(SMALL, sources.count, SMALL, 20, slots=64) as stream:
+    with FrameStream(SMALL, sources.count, SMALL, 20, slots=64) as stream:
         found = list(follow(stream, threading.Event(), most=3, frames=7))
         assert np.concatenate(found)["number"].tolist() == list(range(7))
 
@@ -67,7 +67,7 @@ def test_the_user_and_the_number_of_frames_end_it():
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_what_a_terminal_sends_to_all_its_processes_loses_no_frame(number):
     """A closed terminal and `timeout` do so; the main process stops as the user does."""
-    with Stream(SMALL, sources.count, SMALL, 50, 0.01) as stream:
+    with FrameStream(SMALL, sources.count, SMALL, 50, 0.01) as stream:
         (receiver,) = multiprocessing.active_children()
         os.kill(receiver.pid, number)
         found = [number for batch in follow(stream, threading.Event(), most=16) for number in batch["number"]]
@@ -75,7 +75,7 @@ def test_what_a_terminal_sends_to_all_its_processes_loses_no_frame(number):
 
 
 def test_failures_are_sentences():
-    with Stream(SMALL, sources.fail) as stream, pytest.raises(InputError, match="the file is damaged"):
+    with FrameStream(SMALL, sources.fail) as stream, pytest.raises(InputError, match="the file is damaged"):
         list(follow(stream, threading.Event(), most=4))
-    with Stream(SMALL, sources.die) as stream, pytest.raises(InputError, match="has died .exit code 9"):
+    with FrameStream(SMALL, sources.die) as stream, pytest.raises(InputError, match="has died .exit code 9"):
         list(follow(stream, threading.Event(), most=4))

@@ -7,10 +7,10 @@ from contextlib import contextmanager
 
 import serial
 
-from radarize.capture.board import Network
+from radarize.capture.board import NetworkAddresses
 from radarize.radar.cfg import write_cfg
 from radarize.radar.config import RadarConfig
-from radarize.radar.dca1000_commands import RAW_TWO_LANES, Command, Reply, Request, packet_settings
+from radarize.radar.dca1000_commands import RAW_TWO_LANES, Opcode, Reply, Request, packet_settings
 from radarsim.emulator.commandline import PROMPT
 from radarsim.emulator.emulator import Emulator
 from tests.virtual import CONFIG, emulated
@@ -21,7 +21,7 @@ SMALL = CONFIG.model_copy(update={"loops": 4, "samples": 32, "frame_period": 20e
 class Client:
     """Any capture software: a serial port, and two sockets as a DCA1000 wants them."""
 
-    def __init__(self, port: str, where: Network):
+    def __init__(self, port: str, where: NetworkAddresses):
         self.serial = serial.Serial(port, 115200, timeout=150)
         self.commands, self.data = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
         self.commands.bind((where.host, where.command_port))
@@ -46,17 +46,17 @@ class Client:
     def configure(self, config: RadarConfig) -> list[str]:
         return [self.say(line) for line in write_cfg(config).splitlines()]
 
-    def ask(self, command: Command, body: bytes = b"") -> Reply:
+    def ask(self, command: Opcode, body: bytes = b"") -> Reply:
         self.commands.sendto(Request(command, body).encode(), self.board)
         return Reply.decode(self.commands.recvfrom(2048)[0])
 
     def record(self, delay: float = 25e-6) -> None:
         for command, body in (
-            (Command.ALIVE, b""),
-            (Command.RESET_FPGA, b""),
-            (Command.CONFIGURE, RAW_TWO_LANES),
-            (Command.PACKETS, packet_settings(delay)),
-            (Command.START, b""),
+            (Opcode.ALIVE, b""),
+            (Opcode.RESET_FPGA, b""),
+            (Opcode.CONFIGURE, RAW_TWO_LANES),
+            (Opcode.PACKETS, packet_settings(delay)),
+            (Opcode.START, b""),
         ):
             assert self.ask(command, body) == Reply(command, 0)
 

@@ -11,7 +11,7 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarize.radar.cfg import write_cfg
 from radarize.radar.dca1000 import Packet, decode, encode
-from radarize.radar.dca1000_commands import Command, Reply, Request, Status
+from radarize.radar.dca1000_commands import Opcode, Reply, Request, Status
 from radarsim.emulator.commandline import PROMPT
 from radarsim.emulator.disturbance import Disturbance
 from radarsim.emulator.simulation import Simulation
@@ -33,7 +33,7 @@ def test_a_capture_by_hand(playing):
     before = time.monotonic()
     received.append(client.data.recv(2048))
     assert time.monotonic() - before == pytest.approx(2, abs=0.3)
-    assert Reply.decode(client.commands.recvfrom(2048)[0]) == Reply(Command.STATUS, Status.RECORD_COMPLETED)
+    assert Reply.decode(client.commands.recvfrom(2048)[0]) == Reply(Opcode.STATUS, Status.RECORD_COMPLETED)
     assert received == [packet.encode() for packet in packets(encode(adc, SMALL).tobytes())]
     assert any("end of the source; 12 frames sent" in line for line in said)
     # Once more: the recording starts again, and so do the counts; this time the client stops.
@@ -42,7 +42,7 @@ def test_a_capture_by_hand(playing):
     client.say("sensorStart 0")
     again = [client.data.recv(2048) for _ in range(10)]
     assert again == received[:10]
-    assert client.ask(Command.STOP) == Reply(Command.STOP, 0)
+    assert client.ask(Opcode.STOP) == Reply(Opcode.STOP, 0)
 
 
 def test_q_first_or_i_first_as_the_configuration_says(playing):
@@ -95,7 +95,7 @@ def test_sensor_stop_ends_with_a_whole_frame(tmp_path):
             client.data.recv(2048)
         assert client.say("sensorStop").endswith("sensorStop\nDone\n\r" + PROMPT)
         frames = emulator.frames
-        client.ask(Command.STOP)
+        client.ask(Opcode.STOP)
         time.sleep(0.1)
         assert emulator.frames == frames >= 7
         assert emulator.link.packets == -(-frames * CONFIG.frame_bytes // 1456)
@@ -131,7 +131,7 @@ def test_2500_packets_through_a_bad_network(tmp_path):
         while emulator.link.packets < 2_600:
             received += client.packets(silence=0.005)
         client.say("sensorStop")
-        client.ask(Command.STOP)
+        client.ask(Opcode.STOP)
         received += client.packets()
         count = emulator.frames
     whole = encode(adc, CONFIG).tobytes()
@@ -197,11 +197,11 @@ def test_an_unplugged_cable_loses_packets_and_stops_nothing(tmp_path, monkeypatc
             while emulator.frames < 3:
                 assert time.monotonic() < waited and emulator._thread.is_alive()
                 time.sleep(0.01)
-            client.commands.sendto(Request(Command.ALIVE).encode(), client.board)  # whose reply is lost
+            client.commands.sendto(Request(Opcode.ALIVE).encode(), client.board)  # whose reply is lost
             time.sleep(0.1)
         assert select.select([client.data], [], [], 5)[0]  # plugged in again
         assert "Done" in client.say("sensorStop")
-        assert client.ask(Command.ALIVE) == Reply(Command.ALIVE, 0)
+        assert client.ask(Opcode.ALIVE) == Reply(Opcode.ALIVE, 0)
         assert sum("are lost (Network is unreachable)" in line for line in said) == 1
 
 

@@ -6,7 +6,7 @@ import time
 import pytest
 
 from radarize.io.errors import InputError
-from radarize.radar.dca1000_commands import Command, Reply
+from radarize.radar.dca1000_commands import Opcode, Reply
 from radarsim.emulator.commandline import PROMPT
 from tests.emulator.client import SMALL, attached
 from tests.virtual import record
@@ -43,7 +43,7 @@ def test_the_wrong_baud_rate_gives_garbage(playing):
 def test_the_board_resets_the_radar(playing):
     client, _, said = playing
     client.configure(SMALL)
-    assert client.ask(Command.RESET_RADAR) == Reply(Command.RESET_RADAR, 0)
+    assert client.ask(Opcode.RESET_RADAR) == Reply(Opcode.RESET_RADAR, 0)
     client.serial.write(b"sensorStop\n")  # into the void: the radar is booting
     banner = client.serial.read_until(PROMPT.encode()).decode()
     assert "xWR18xx MMW Demo" in banner and "sensorStop" not in banner

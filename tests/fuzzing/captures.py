@@ -17,7 +17,7 @@ from radarize.io.tum import read_tum
 from radarize.radar.assembler import FrameAssembler
 from radarize.radar.cfg import write_cfg
 from radarize.radar.dca1000 import decode, encode
-from radarize.radar.dca1000_commands import Command, Reply, Request, Status, packet_settings, read_packet_settings
+from radarize.radar.dca1000_commands import Opcode, Reply, Request, Status, packet_settings, read_packet_settings
 from radarize.radar.limits import check_limits
 from radarize.radar.presets import PRESETS, load_config
 from tests.fuzzing.damage import damaged, misspelled
@@ -98,8 +98,12 @@ def tum() -> Reader:
 def udp_packets() -> Reader:
     """Data packets of a DCA1000, its commands, replies and settings."""
     sound = [packet.encode() for packet in packets(encode(FRAMES, CONFIG).tobytes())]
-    others = [Request(Command.ALIVE).encode(), Request(Command.PACKETS, packet_settings()).encode(), packet_settings()]
-    others += [Reply(Command.STATUS, Status.MEMORY_FULL).encode()]
+    others = [
+        Request(Opcode.ALIVE).encode(),
+        Request(Opcode.PACKETS, packet_settings()).encode(),
+        packet_settings(),
+    ]
+    others += [Reply(Opcode.STATUS, Status.MEMORY_FULL).encode()]
 
     def read(stream: list[bytes]) -> None:
         assembler = FrameAssembler(CONFIG)

@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from radarize.io.errors import InputError
 from radarize.radar.cfg import write_cfg
-from radarize.radar.dca1000_commands import RAW_TWO_LANES, Command, Request, packet_settings
+from radarize.radar.dca1000_commands import RAW_TWO_LANES, Opcode, Request, packet_settings
 from radarsim.emulator.board import Board
 from radarsim.emulator.commandline import CommandLine
 from tests.fuzzing.damage import damaged, misspelled
@@ -30,11 +30,11 @@ def command_line() -> Reader:
 
 def board() -> Reader:
     """Requests, damaged, one after another."""
-    sound = [Request(command).encode() for command in Command]
+    sound = [Request(command).encode() for command in Opcode]
     sound += [
-        Request(Command.CONFIGURE, RAW_TWO_LANES).encode(),
-        Request(Command.PACKETS, packet_settings()).encode(),
-        Request(Command.EEPROM, bytes(18)).encode(),
+        Request(Opcode.CONFIGURE, RAW_TWO_LANES).encode(),
+        Request(Opcode.PACKETS, packet_settings()).encode(),
+        Request(Opcode.EEPROM, bytes(18)).encode(),
     ]
 
     def read(stream: list[bytes]) -> None:

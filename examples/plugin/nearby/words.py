@@ -6,7 +6,7 @@ import numpy as np
 
 from radarize.io.errors import InputError
 from radarize.io.importers.bin import configured
-from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
 from radarize.io.importers.format import Format
 from radarize.io.importers.parameters import Given
 
@@ -23,7 +23,7 @@ def open_words(source: Path, given: Given, _: Path) -> Capture:
     def batches():
         for first in range(0, count, size := batch_frames(config)):
             frames = np.array(words[first : first + size])
-            yield Batch(frames, np.ones(frames.shape[:3], bool))
+            yield CapturedFrames(frames, np.ones(frames.shape[:3], bool))
 
     return Capture(config, given.cfg_text, batches(), count, assumed)
 

@@ -11,7 +11,7 @@ from torch import Generator, Tensor, nn
 from radarize.baselines.milliego.network import DEGREES, PAIR, SAMPLES, MilliEgoNet
 from radarize.baselines.milliego.panorama import seen
 from radarize.io.recording import Recording
-from radarize.learning.features.table import POSE, Reading, Table
+from radarize.learning.features.table import POSE, FeatureTable, Reading
 from radarize.learning.task import Inputs, Settings, Task
 from radarize.odometry.inertial import Imu, instants
 
@@ -35,10 +35,10 @@ class MilliEgo(Task):
     def spacings(self, frame_period: float) -> Sequence[int]:
         return (max(1, round(PAIR / frame_period)),)
 
-    def inputs(self, table: Table, frames: Int[Tensor, "item frame"]) -> Inputs:
+    def inputs(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Inputs:
         return tuple(table.sensed[name][frames].float() for name in self.reads)
 
-    def label(self, table: Table, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item pair 6"]:
+    def label(self, table: FeatureTable, frames: Int[Tensor, "item frame"]) -> Float[Tensor, "item pair 6"]:
         poses = table.truth["pose"][frames].numpy()
         turned = Rotation.from_quat(poses[..., 3:].reshape(-1, 4)).as_matrix().reshape(*poses.shape[:2], 3, 3)
         back = np.swapaxes(turned[:, :-1], -1, -2)

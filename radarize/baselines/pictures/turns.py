@@ -10,7 +10,7 @@ from radarize.baselines.pictures import roughening
 from radarize.baselines.pictures.maps import PictureMaker
 from radarize.baselines.pictures.task import PictureTask
 from radarize.learning.features import augment
-from radarize.learning.features.table import YAW, Table
+from radarize.learning.features.table import YAW, FeatureTable
 from radarize.learning.nets import losses
 from radarize.learning.nets.correlation import Correlation
 from radarize.learning.nets.gaussian import Gaussian
@@ -69,7 +69,7 @@ class PictureTurns(PictureTask, Motion):
     least_frames = 2
     defaults = Settings(width=8, frames=5, epochs=24, batch=64, rate=1e-3, schedule="cosine")
 
-    def label(self, table: Table, frames: Tensor) -> Float[Tensor, "item 1"]:
+    def label(self, table: FeatureTable, frames: Tensor) -> Float[Tensor, "item 1"]:
         return turns(table, frames[:, -2:])
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:

@@ -16,7 +16,7 @@ from radarize.baselines.published.networks import (
     PublishedTranslationNet,
 )
 from radarize.learning.features import augment
-from radarize.learning.features.table import YAW, Reading, Table
+from radarize.learning.features.table import YAW, FeatureTable, Reading
 from radarize.learning.task import Motion, Settings, turns
 from radarize.learning.training.tasks import Rotation, Segmentation, Translation
 from radarize.signal.maps import Maps
@@ -68,7 +68,7 @@ class PublishedRotation(Plain):
     least_frames = 2
     defaults = Settings(width=64, patience=30)
 
-    def label(self, table: Table, frames: Tensor) -> Tensor:
+    def label(self, table: FeatureTable, frames: Tensor) -> Tensor:
         return turns(table, frames)
 
     def augment(self, maps: Maps, label: Tensor, generator: Generator) -> tuple[Maps, Tensor]:

@@ -41,7 +41,7 @@ def _larger(*scale: float) -> nn.Upsample:
     return nn.Upsample(scale_factor=scale, mode="bilinear", align_corners=True)
 
 
-class Drawing(Network):
+class DrawingNet(Network):
     """Range-azimuth maps to a picture of eight times as many columns.
 
     Args:
@@ -84,7 +84,7 @@ class Drawing(Network):
         return torch.sigmoid(self(maps))
 
 
-class RadarHdNet(Drawing):
+class RadarHdNet(DrawingNet):
     """Capon's maps to a picture of the first surfaces on `columns(DRAWN)`.
 
     The original sees 256 ranges, 64 directions of half a circle and a Bartlett beamformer's magnitudes; this one sees
@@ -105,7 +105,7 @@ class RadarHdNet(Drawing):
         return pad(image, (0, 0, _LEAKAGE, 0))
 
 
-class RadarHdPictureNet(Drawing):
+class RadarHdPictureNet(DrawingNet):
     """RadarHD's own pictures (`radarize.signal.polar`) to those of its lidar, both of half a circle: columns are
     `AZIMUTHS` and, as doubling them leaves the outer ones where they are, `BEAM_AZIMUTHS`."""
 

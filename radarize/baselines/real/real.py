@@ -32,7 +32,7 @@ from radarize.baselines.real.points import Distances, Judged, judge
 from radarize.baselines.walks.clock import Clock
 from radarize.baselines.walks.poses import by_instant, poses_of
 from radarize.baselines.walks.walks import PERIOD, Predictions, Walk
-from radarize.evaluation.benchmark.results import Data, Network, Results, command, machine
+from radarize.evaluation.benchmark.results import Data, Results, UsedNetwork, command, machine
 from radarize.evaluation.benchmark.results import Walk as Facts
 from radarize.evaluation.benchmark.table import Table
 from radarize.io.errors import InputError
@@ -79,7 +79,7 @@ _SAID = ("chamfer_m", "yaw_rmse_deg", "ate_m")
 
 
 @dataclass(frozen=True)
-class Options:
+class RealOptions:
     """What is compared.
 
     Attributes:
@@ -104,7 +104,7 @@ class Options:
 def real(
     data: Path,
     output: Path,
-    options: Options = Options(),  # noqa: B008
+    options: RealOptions = RealOptions(),  # noqa: B008
     *,
     progress: Callable[[int, int], None] = lambda done, total: None,
     say: Callable[[str], None] = lambda line: None,
@@ -147,7 +147,7 @@ def real(
     ]
     kinds = [*(reader.network.kind for reader in READERS.values()), TURNS]
     paths = [Weights(options.weights).of(kind) for kind in kinds]
-    networks = tuple(Network.of(path) for path in paths if path.is_file())
+    networks = tuple(UsedNetwork.of(path) for path in paths if path.is_file())
     results = Results("In the real world", tables, data_of, networks, options.command)
     results.write(Path(output), "real")
     return results
@@ -162,7 +162,7 @@ class _Compared(NamedTuple):
     apart: dict[tuple[int, str], list[Distances]]
 
 
-def _compare(walk: Walk, options: Options, report: Report) -> _Compared:
+def _compare(walk: Walk, options: RealOptions, report: Report) -> _Compared:
     """All methods on a walk; `report` takes frames done."""
     weights = Weights(options.weights)
     poses = poses_of(walk, options.poses)

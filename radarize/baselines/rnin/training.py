@@ -14,7 +14,7 @@ from torch import Generator, Tensor, nn
 from radarize.baselines.rnin.network import LASTS, SAMPLES, RninNet
 from radarize.io.recording import Recording
 from radarize.io.tum import planar
-from radarize.learning.features.table import Reading, Table
+from radarize.learning.features.table import FeatureTable, Reading
 from radarize.learning.task import Inputs, Motion, Settings
 from radarize.odometry.inertial import GRAVITY, Imu, instants
 
@@ -49,10 +49,10 @@ class Rnin(Motion):
     def spacings(self, frame_period: float) -> Sequence[int]:
         return (max(1, round(LASTS / frame_period)),)
 
-    def inputs(self, table: Table, frames: Int[Tensor, "item window"]) -> Inputs:
+    def inputs(self, table: FeatureTable, frames: Int[Tensor, "item window"]) -> Inputs:
         return table.sensed["levelled"][frames].float()
 
-    def label(self, table: Table, frames: Int[Tensor, "item window"]) -> Float[Tensor, "item window 3"]:
+    def label(self, table: FeatureTable, frames: Int[Tensor, "item window"]) -> Float[Tensor, "item window 3"]:
         return table.truth["displacement"][frames]
 
     def augment(self, windows: Tensor, label: Tensor, generator: Generator) -> tuple[Inputs, Tensor]:

@@ -15,7 +15,7 @@ from radarize.io.tum import planar
 
 
 @dataclass(frozen=True)
-class Walk:
+class NamedWalk:
     """A recording, or a part of one, that figures are of.
 
     Attributes:
@@ -31,7 +31,7 @@ class Walk:
     simulated: bool
 
     @classmethod
-    def of(cls, recording: Recording) -> "Walk":
+    def of(cls, recording: Recording) -> "NamedWalk":
         """As a recording says."""
         about, metres = recording.attributes, None
         if recording.has("truth/pose"):
@@ -41,7 +41,7 @@ class Walk:
         return cls(str(about.get("scene", "-")), int(about["seed"]) if "seed" in about else None, metres, simulated)
 
     @classmethod
-    def radarhd(cls, number: int) -> "Walk":
+    def radarhd(cls, number: int) -> "NamedWalk":
         """One of RadarHD's repository."""
         return cls(f"radarhd {number}", None, None, False)
 
@@ -60,7 +60,7 @@ class Choice:
     recordings: dict[str, tuple[int | None, ...]]
     looked_at: int = 0
 
-    def among(self, walks: Sequence[Walk]) -> int:
+    def among(self, walks: Sequence[NamedWalk]) -> int:
         """How many of some recordings may have been looked at."""
         hits = sum(bool({walk.seed, None} & {*self.recordings.get(walk.scene, ())}) for walk in walks)
         return min(hits, self.looked_at or hits)
@@ -197,7 +197,7 @@ BEARINGS = {
 }
 
 #: Six of RadarHD's training walks.
-REAL = {Walk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
+REAL = {NamedWalk.radarhd(number).scene: (None,) for number in (113, 119, 121, 126, 128, 135)}
 
 #: 60 s by robot in those buildings.
 ROBOTS = {
@@ -262,7 +262,7 @@ REVERSED = {
 #: RadarHD's training walks, one by one and all together.
 #: RadarHD's training walks.
 TRAINING = (*range(112, 117), *range(118, 124), *range(125, 132), *range(133, 139), 140)
-PICTURES = {Walk.radarhd(number).scene: (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
+PICTURES = {NamedWalk.radarhd(number).scene: (None,) for number in TRAINING} | {"RadarHD, train": (None,)}
 
 CHOICES = (
     Choice("the beam of pictures, levels of clutter, and the training of networks for pictures", PICTURES),
@@ -294,7 +294,7 @@ CHOICES = (
 )
 
 
-def helped(walks: Sequence[Walk]) -> list[str]:
+def helped(walks: Sequence[NamedWalk]) -> list[str]:
     """Sentences on which of some recordings helped to choose settings."""
     found = []
     for choice in CHOICES:

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from radarize.evaluation.benchmark.choices import Walk
+from radarize.evaluation.benchmark.choices import NamedWalk
 from radarize.evaluation.benchmark.results import Data
 from radarize.io.errors import InputError
 from radarize.io.jsonfile import read_json
@@ -36,7 +36,7 @@ class Case:
     frames: int = field(compare=False)
     config: RadarConfig = field(compare=False, repr=False)
     attributes: dict = field(compare=False, repr=False)
-    walk: Walk = field(compare=False, repr=False)
+    walk: NamedWalk = field(compare=False, repr=False)
 
     @classmethod
     def of(cls, path: Path, name: str | None = None) -> "Case":
@@ -47,7 +47,7 @@ class Case:
         """
         with Recording(path) as recording:
             about, frames, config = recording.attributes, len(recording), recording.config
-            walk = Walk.of(recording)
+            walk = NamedWalk.of(recording)
         building = str(about.get("scene", "-")).split("_")[0]
         return cls(name or path.stem, path, building, str(about.get("platform", "-")), frames, config, about, walk)
 

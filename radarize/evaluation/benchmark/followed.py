@@ -16,7 +16,7 @@ from radarize.pipeline.runfolder import RunFolder
 
 
 @dataclass(frozen=True)
-class Followed:
+class FrameErrors:
     """One recording by one method.
 
     Attributes:
@@ -35,7 +35,7 @@ class Followed:
     period: float
 
     @classmethod
-    def read(cls, run: Path) -> "Followed":
+    def read(cls, run: Path) -> "FrameErrors":
         """From a run's folder.
 
         Raises:
@@ -66,19 +66,19 @@ def true_poses(run: RunFolder) -> Pose:
     return true if len(times) == len(true) else true[np.abs(true_times[:, None] - times).argmin(axis=0)]
 
 
-def joined(found: Sequence[Followed]) -> dict[str, np.ndarray]:
+def joined(found: Sequence[FrameErrors]) -> dict[str, np.ndarray]:
     """Frames of several recordings, one after the other, by attribute."""
-    names = [each.name for each in fields(Followed) if each.name not in ("claims", "period")]
+    names = [each.name for each in fields(FrameErrors) if each.name not in ("claims", "period")]
     return {name: np.concatenate([getattr(one, name) for one in found]) for name in names}
 
 
-def turned(found: Sequence[Followed], seconds: float) -> tuple[np.ndarray, np.ndarray]:
-    """`Followed.turned` of several recordings, one after the other."""
+def turned(found: Sequence[FrameErrors], seconds: float) -> tuple[np.ndarray, np.ndarray]:
+    """`FrameErrors.turned` of several recordings, one after the other."""
     errors, claims = zip(*(one.turned(seconds) for one in found), strict=True)
     return np.concatenate(errors), np.concatenate(claims)
 
 
-def turn_nees(found: Sequence[Followed], seconds: float) -> float:
+def turn_nees(found: Sequence[FrameErrors], seconds: float) -> float:
     """Mean squared error of `turned` over its claims; NaN without any, infinite where nothing is claimed."""
     errors, claims = map(pd.Series, turned(found, seconds))
     return float((errors**2 / claims).mean())

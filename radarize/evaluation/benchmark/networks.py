@@ -7,14 +7,14 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 from radarize.evaluation.benchmark.identity import of_code, of_file
-from radarize.evaluation.benchmark.results import Network
+from radarize.evaluation.benchmark.results import UsedNetwork
 from radarize.evaluation.benchmark.steps import Report
 from radarize.io.errors import InputError
 from radarize.io.jsonfile import read_json
 from radarize.io.replacing import write_whole
 from radarize.learning.task import Settings, find_task
 from radarize.learning.training.dataset import recordings
-from radarize.learning.training.train import Options, train
+from radarize.learning.training.train import TrainOptions, train
 from radarize.pipeline.method import Weights
 
 #: File with what a training began with, so that no other goes on from its checkpoint.
@@ -42,12 +42,12 @@ class Networks:
         """What tells the files of some kinds from others."""
         return {kind: of_file(self.weights.of(kind)) for kind in kinds}
 
-    def used(self, kinds: Iterable[str]) -> tuple[Network, ...]:
+    def used(self, kinds: Iterable[str]) -> tuple[UsedNetwork, ...]:
         """What the files of some kinds say of themselves, those that can be read."""
         found = []
         for kind in kinds:
             with suppress(InputError):  # a method that needs it says why it could not run
-                found.append(Network.of(self.weights.of(kind)))
+                found.append(UsedNetwork.of(self.weights.of(kind)))
         return tuple(found)
 
 
@@ -116,7 +116,7 @@ class Training:
             output.with_suffix(".checkpoint").unlink(missing_ok=True)
             write_whole(begun, json.dumps(self.identity(), indent=1))
         try:
-            train(self.kind, self.data, output, self.settings, Options(self.split, resume=True), say=say)
+            train(self.kind, self.data, output, self.settings, TrainOptions(self.split, resume=True), say=say)
         except InputError as error:
             raise InputError(f"{self.kind} could not be trained: {error}") from error
         return {"log": lines}

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pandas as pd
 
-from radarize.evaluation.benchmark.followed import Followed, joined, turn_nees, turned
+from radarize.evaluation.benchmark.followed import FrameErrors, joined, turn_nees, turned
 from radarize.evaluation.benchmark.protocol import figures_of
 from radarize.evaluation.benchmark.study import Study
 from radarize.evaluation.benchmark.table import Table, with_median
@@ -72,7 +72,7 @@ def platform_tables(study: Study) -> list[Table]:
 
 def steps_table(study: Study) -> Table:
     """Figures of all frames, by platform, by building and of all."""
-    read = cache(lambda run: Followed.read(study.output / run.place))
+    read = cache(lambda run: FrameErrors.read(study.output / run.place))
     rows = [
         {"odometry": pair.odometry, **group, **row(runs, list(map(read, runs["run"])))}
         for pair, group, runs in study.by_group()
@@ -80,7 +80,7 @@ def steps_table(study: Study) -> Table:
     return Table("Steps and trajectories, by platform and building", rows, list(NOTES))
 
 
-def row(runs: pd.DataFrame, found: Sequence[Followed]) -> dict[str, object]:
+def row(runs: pd.DataFrame, found: Sequence[FrameErrors]) -> dict[str, object]:
     """Figures of several recordings: of all their frames, and means over trajectories."""
     frames, turns = joined(found), Statistics.of(turned(found, WINDOW)[0])
     velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
@@ -102,7 +102,7 @@ def row(runs: pd.DataFrame, found: Sequence[Followed]) -> dict[str, object]:
 
 def claims_tables(study: Study) -> list[Table]:
     """A row for every odometry on each platform, in each building and on all."""
-    read = cache(lambda run: Followed.read(study.output / run.place))
+    read = cache(lambda run: FrameErrors.read(study.output / run.place))
     rows = [
         {"odometry": pair.odometry, **group, **_claims(list(map(read, runs["run"])))}
         for pair, group, runs in study.by_group()
@@ -110,7 +110,7 @@ def claims_tables(study: Study) -> list[Table]:
     return [Table("Claimed uncertainty against errors", rows, list(CLAIMS))]
 
 
-def _claims(found: list[Followed]) -> dict[str, float]:
+def _claims(found: list[FrameErrors]) -> dict[str, float]:
     frames = joined(found)
     velocity = velocity_errors(frames["velocity"], frames["true_velocity"], frames["covariance"])
     row = {"velocity": velocity["nees"], "velocity, median": velocity["nees_median"]}

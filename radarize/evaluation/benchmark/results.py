@@ -18,7 +18,7 @@ from pathlib import Path
 from pydantic import TypeAdapter
 
 from radarize import __version__
-from radarize.evaluation.benchmark.choices import Walk, helped
+from radarize.evaluation.benchmark.choices import NamedWalk, helped
 from radarize.evaluation.benchmark.table import Table
 from radarize.io.errors import explained
 from radarize.io.recording import Recording
@@ -37,7 +37,7 @@ class Data:
     """
 
     name: str
-    walks: tuple[Walk, ...]
+    walks: tuple[NamedWalk, ...]
     seed: int | None = None
 
     @classmethod
@@ -50,7 +50,7 @@ class Data:
         walks = []
         for path in paths:
             with Recording(path) as recording:
-                walks.append(Walk.of(recording))
+                walks.append(NamedWalk.of(recording))
         return cls(name, tuple(walks), seed)
 
     @property
@@ -69,7 +69,7 @@ class Data:
 
 
 @dataclass(frozen=True)
-class Network:
+class UsedNetwork:
     """A trained network that figures were taken with.
 
     Attributes:
@@ -88,7 +88,7 @@ class Network:
     hours: float = 0.0
 
     @classmethod
-    def of(cls, path: Path) -> "Network":
+    def of(cls, path: Path) -> "UsedNetwork":
         """As a file of weights says.
 
         Raises:
@@ -171,7 +171,7 @@ class Results:
     title: str
     tables: list[Table]
     data: Data
-    networks: tuple[Network, ...]
+    networks: tuple[UsedNetwork, ...]
     command: str
     notes: list[str] = field(default_factory=list)
     machine: dict[str, str] = field(default_factory=machine)

@@ -68,7 +68,7 @@ class _Step:
 
 
 @dataclass(frozen=True)
-class Run(_Step):
+class RunStep(_Step):
     """The pipeline on a recording: a folder as `radarize run` writes it, and one without loop closure in it."""
 
     alone = False

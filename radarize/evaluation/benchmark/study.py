@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from radarize.evaluation.benchmark.dataset import Case, DataSet, groups
 from radarize.evaluation.benchmark.networks import Networks, Training
 from radarize.evaluation.benchmark.protocol import PROTOCOLS, Protocol
-from radarize.evaluation.benchmark.results import Network, Results, command
-from radarize.evaluation.benchmark.runs import Pair, Run, Timing
+from radarize.evaluation.benchmark.results import Results, UsedNetwork, command
+from radarize.evaluation.benchmark.runs import Pair, RunStep, Timing
 from radarize.evaluation.benchmark.steps import Step, perform
 from radarize.evaluation.benchmark.table import Table
 from radarize.evaluation.report.page import Page
@@ -195,11 +195,11 @@ class Study:
         return [case for case in self.data.cases if case in tested]
 
     @property
-    def runs(self) -> list[tuple[str, Run]]:
+    def runs(self) -> list[tuple[str, RunStep]]:
         """All runs with their splits, recording by recording, so that each is read from memory after the first time."""
         return [
             # Methods without networks are the same in every split.
-            (split, Run(case, pair, self.networks[split] if pair.networks else Networks()))
+            (split, RunStep(case, pair, self.networks[split] if pair.networks else Networks()))
             for split, cases in self.splits.items()
             for case in cases
             for pair in self.pairs
@@ -224,7 +224,7 @@ class Study:
             once: each run once, in the order of recordings; else as often as it tests in a split.
 
         Returns:
-            Columns ``run`` (`Run`), ``split``, ``recording`` (name), and every figure of
+            Columns ``run`` (`RunStep`), ``split``, ``recording`` (name), and every figure of
             `radarize.evaluation.benchmark.runs.figures` by its path: ``odometry.ate.position.mean``.
         """
         order = {case: k for k, case in enumerate(self.data.cases)}
@@ -259,7 +259,7 @@ class Study:
         )
 
     @property
-    def used(self) -> tuple[Network, ...]:
+    def used(self) -> tuple[UsedNetwork, ...]:
         """Networks that it was done with."""
         found = [one for networks in self.networks.values() for one in networks.used(self.kinds)]
         return tuple(dict.fromkeys(found))
@@ -294,7 +294,7 @@ def carry_out(studies: Sequence[Study], progress: Callable[[int, int], None]) ->
     """
     steps = [step for study in studies for step in study.steps]
     # Networks before runs, and runs before timings, which want quiet cores.
-    steps.sort(key=lambda step: (Training, Run, Timing).index(type(step)))
+    steps.sort(key=lambda step: (Training, RunStep, Timing).index(type(step)))
     options = studies[0].options
     results = perform(steps, studies[0].output, options.workers, progress, options.ray)
     for study in studies:

@@ -61,7 +61,7 @@ _BESIDE = (
 )
 
 
-class Table(NamedTuple):
+class PrintedTable(NamedTuple):
     """Words in columns; `numbers` are the columns that hold figures."""
 
     head: Sequence[str]
@@ -69,24 +69,24 @@ class Table(NamedTuple):
     numbers: Sequence[int] = (1,)
 
 
-def trajectories(metrics: Mapping[str, object]) -> Table:
+def trajectories(metrics: Mapping[str, object]) -> PrintedTable:
     """Errors of a run's trajectories; the last column says what they mean."""
     names = [name for name in ("odometry", "slam") if name in metrics]
     rows = [(f.words, *(f.text(metrics[name]) for name in names), f.meaning) for f in _TRAJECTORY]
-    return Table(("trajectory", *names, "what it means"), rows, range(1, 1 + len(names)))
+    return PrintedTable(("trajectory", *names, "what it means"), rows, range(1, 1 + len(names)))
 
 
-def parts(metrics: Mapping[str, object]) -> Iterator[Table]:
+def parts(metrics: Mapping[str, object]) -> Iterator[PrintedTable]:
     """Errors of a run's map, scans and velocities, as far as they are known."""
     for name, figures in _PARTS.items():
         if name in metrics:
-            yield Table((name, "value"), [(figure.words, figure.text(metrics[name])) for figure in figures])
+            yield PrintedTable((name, "value"), [(figure.words, figure.text(metrics[name])) for figure in figures])
 
 
-def everything(metrics: Mapping[str, object]) -> Iterator[Table | str]:
+def everything(metrics: Mapping[str, object]) -> Iterator[PrintedTable | str]:
     """Tables and sentences of all that `radarize.evaluation.evaluate` returned, without what figures mean."""
     head, rows, numbers = trajectories(metrics)
-    yield Table(head[:-1], [row[:-1] for row in rows], numbers)
+    yield PrintedTable(head[:-1], [row[:-1] for row in rows], numbers)
     yield from parts(metrics)
     if "blind" in metrics:
         sentence, spans = blindness(BlindSpans.model_validate(metrics["blind"]))
@@ -95,22 +95,22 @@ def everything(metrics: Mapping[str, object]) -> Iterator[Table | str]:
             yield spans
 
 
-def beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> Table:
+def beside(runs: Sequence[tuple[str, Mapping[str, object]]]) -> PrintedTable:
     """Runs of one recording beside each other, by what they were made with."""
     head = ("method", *(figure.title for figure in _BESIDE))
     rows = [(name, *(figure.text(metrics, unit=False) for figure in _BESIDE)) for name, metrics in runs]
-    return Table(head, rows, range(1, len(head)))
+    return PrintedTable(head, rows, range(1, len(head)))
 
 
-def health(found: Sequence[Condition]) -> Table:
+def health(found: Sequence[Condition]) -> PrintedTable:
     """Where odometry had a hard time, and what would help."""
     rows = [(f"{each.start_s:.1f}", f"{each.stop_s:.1f}", each.kind, each.advice) for each in found]
-    return Table(("from, s", "to, s", "what", "advice"), rows, (0, 1))
+    return PrintedTable(("from, s", "to, s", "what", "advice"), rows, (0, 1))
 
 
-def blindness(found: BlindSpans) -> tuple[str, Table]:
+def blindness(found: BlindSpans) -> tuple[str, PrintedTable]:
     """A sentence on how much of the way odometry was blind, and where it was."""
     rows = [(f"{s.start_s:.1f}", f"{s.stop_s:.1f}", f"{s.way_m:.2f}", s.why) for s in found.spans]
     over = f"(no match believed, no velocity) over {found.way_m:.1f} m, {100 * found.share_of_way:.0f} % of the way"
-    table = Table(("blind from, s", "to, s", "way, m", "why"), rows, (0, 1, 2))
+    table = PrintedTable(("blind from, s", "to, s", "way, m", "why"), rows, (0, 1, 2))
     return f"Odometry was blind {over if rows else 'nowhere'}.", table

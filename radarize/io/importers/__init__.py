@@ -13,7 +13,7 @@ import numpy as np
 
 from radarize.io.errors import InputError
 from radarize.io.files import regular
-from radarize.io.importers.capture import Batch, Capture
+from radarize.io.importers.capture import Capture, CapturedFrames
 from radarize.io.importers.format import FORMATS, Format
 from radarize.io.importers.parameters import Given
 from radarize.io.recording import Product, RecordingWriter
@@ -142,7 +142,7 @@ def _format(source: Path, given: Given) -> Format:
     return found
 
 
-def _settle_iq_order(capture: Capture, batch: Batch, given: bool) -> tuple[RadarConfig, bool]:
+def _settle_iq_order(capture: Capture, batch: CapturedFrames, given: bool) -> tuple[RadarConfig, bool]:
     """The configuration with the I/Q order that the samples show if it is assumed, and whether to swap them.
 
     Where the configuration says and they contradict it, there is a warning.

@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from radarize.io.errors import InputError, explained
 from radarize.io.importers.bin import all_zero, configured
-from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
 from radarize.io.importers.companions import ChipPoints, Companion, Depth, InertialSensor, TrackedPose
 from radarize.io.importers.format import Format
-from radarize.io.importers.frames import Frames, Stamps
+from radarize.io.importers.frames import BagFrames, Stamps
 from radarize.io.importers.parameters import Given
 from radarize.io.importers.rosbag import Bag, is_frame
 from radarize.radar.config import RadarConfig
@@ -176,17 +176,17 @@ def _turned(companions: dict[str, Companion], given: Given) -> tuple[str, ...]:
 
 def _batches(
     path: Path, radar: str, companions: dict[str, Companion], capture: Capture, stamps: Stamps
-) -> Iterator[Batch]:
+) -> Iterator[CapturedFrames]:
     config, done = capture.config, 0
     size = batch_frames(config, capture.streams)
-    frames = Frames(config)
+    frames = BagFrames(config)
 
-    def batch(count: int) -> Batch:
+    def batch(count: int) -> CapturedFrames:
         nonlocal done
         times, raw, end = frames.take(count)
         rows = [companion.rows(times, done, end) for companion in companions.values()]
         done += len(times)
-        return Batch(
+        return CapturedFrames(
             decode(raw, config), ~all_zero(raw, config), times, {k: v for part in rows for k, v in part.items()}
         )
 

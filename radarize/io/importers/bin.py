@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Int16
 
 from radarize.io.errors import InputError, explained
-from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
 from radarize.io.importers.format import Format
 from radarize.io.importers.layout import arranged, likely, recorded
 from radarize.io.importers.parameters import Given
@@ -118,12 +118,12 @@ def open_bin(
 
 def _batches(
     files: Sequence[Path], config: RadarConfig, encoding: str, read: Callable[[np.ndarray], np.ndarray]
-) -> Iterator[Batch]:
+) -> Iterator[CapturedFrames]:
     for data in _blocks(files, batch_frames(config) * config.frame_bytes):
         words = np.frombuffer(data, "<i2", len(data) // config.frame_bytes * config.frame_bytes // 2)
         words = words.astype(np.int16, copy=False)
         if words.size:
-            yield Batch(read(signed(words, encoding)), ~all_zero(words, config))
+            yield CapturedFrames(read(signed(words, encoding)), ~all_zero(words, config))
 
 
 def _blocks(files: Sequence[Path], size: int) -> Iterator[bytes]:

@@ -21,7 +21,7 @@ def batch_frames(config: RadarConfig, streams: Mapping[str, Stream] | None = Non
 
 
 @dataclass
-class Batch:
+class CapturedFrames:
     """Frames that follow each other.
 
     Attributes:
@@ -53,7 +53,7 @@ class Capture:
 
     config: RadarConfig
     cfg_text: str
-    batches: Iterable[Batch]
+    batches: Iterable[CapturedFrames]
     expected_frames: int
     assumed: tuple[str, ...] = ()
     warnings: list[str] = field(default_factory=list)

@@ -12,7 +12,7 @@ from jaxtyping import Complex, Int16
 from radarize.io.errors import InputError
 from radarize.io.importers.arrays import ArrayFile, open_array
 from radarize.io.importers.bin import configured
-from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
 from radarize.io.importers.format import Format
 from radarize.io.importers.parameters import Given
 from radarize.radar.config import RadarConfig
@@ -31,7 +31,7 @@ _PEAK = 8192
 
 
 @dataclass(frozen=True)
-class Axes:
+class ArrayAxes:
     """Where in an array what is found.
 
     Attributes:
@@ -41,7 +41,7 @@ class Axes:
     names: tuple[str, ...]
 
     @classmethod
-    def parse(cls, text: str, array: ArrayFile) -> "Axes":
+    def parse(cls, text: str, array: ArrayFile) -> "ArrayAxes":
         """Axes from their names (``frame,loop,virtual,sample``), or lengths for `STANDARD` in order (``9,32,3,4,96``).
 
         Raises:
@@ -63,7 +63,7 @@ class Axes:
         return cls(tuple(words))
 
     @classmethod
-    def guess(cls, array: ArrayFile) -> "Axes":
+    def guess(cls, array: ArrayFile) -> "ArrayAxes":
         """The axes of a recording, if there are as many.
 
         Raises:
@@ -132,7 +132,7 @@ def open_cube(path: Path, given: Given, folder: Path) -> Capture:
         InputError: not such a file, or its shape does not fit the configuration.
     """
     array = open_array(path, given.variable, folder)
-    axes = Axes.parse(given.shape, array) if given.shape else Axes.guess(array)
+    axes = ArrayAxes.parse(given.shape, array) if given.shape else ArrayAxes.guess(array)
     said = given.config.model_dump() | {"tx": given.config.tx} if given.config else {}
     said |= {name: value for name, value in given.overrides.items() if value}
     counts = {name: len(value) if isinstance(value, tuple) else value for name, value in said.items()}
@@ -152,7 +152,7 @@ def open_cube(path: Path, given: Given, folder: Path) -> Capture:
     return capture
 
 
-def _batches(array: ArrayFile, axes: Axes, capture: Capture) -> Iterator[Batch]:
+def _batches(array: ArrayFile, axes: ArrayAxes, capture: Capture) -> Iterator[CapturedFrames]:
     config, scale, clipped = capture.config, None, 0
     size = batch_frames(config)
     for start in range(0, capture.expected_frames, size):
@@ -171,7 +171,7 @@ def _batches(array: ArrayFile, axes: Axes, capture: Capture) -> Iterator[Batch]:
                 capture.attributes["counts_per_unit"] = scale
         frames, lost = _counts(values, scale)
         clipped += lost
-        yield Batch(frames, frames.any(axis=(3, 4, 5)) & known.all(axis=(3, 4)))
+        yield CapturedFrames(frames, frames.any(axis=(3, 4, 5)) & known.all(axis=(3, 4)))
     if clipped:
         capture.warnings.append(f"{clipped} values lie outside of 16 bits and are cut")
 

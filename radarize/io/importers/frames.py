@@ -83,7 +83,7 @@ def periodic(received: Float[np.ndarray, "frame"], period: float) -> Float[np.nd
     return received[0] + line if np.median(np.abs(line - since)) < step / 2 else received
 
 
-class Frames:
+class BagFrames:
     """Raw frames that wait for what comes along with them, and what was wrong with others."""
 
     def __init__(self, config: RadarConfig):

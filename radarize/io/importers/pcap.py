@@ -14,7 +14,7 @@ import numpy as np
 
 from radarize.io.errors import InputError, explained
 from radarize.io.importers.bin import configured
-from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
 from radarize.io.importers.format import Format
 from radarize.io.importers.parameters import Given
 from radarize.radar.assembler import FrameAssembler
@@ -49,7 +49,7 @@ def open_pcap(path: Path, config: RadarConfig, cfg_text: str = "", assumed: tupl
     return capture
 
 
-def _batches(path: Path, capture: Capture) -> Iterator[Batch]:
+def _batches(path: Path, capture: Capture) -> Iterator[CapturedFrames]:
     assembler = FrameAssembler(capture.config)
     size = batch_frames(capture.config)
     most_lost = _MOST_LOST * path.stat().st_size
@@ -83,9 +83,9 @@ def _frames(path: Path, capture: Capture, assembler: FrameAssembler) -> Iterator
     yield from assembler.finish()
 
 
-def _stack(frames: list[tuple[np.ndarray, np.ndarray]], config: RadarConfig) -> Batch:
+def _stack(frames: list[tuple[np.ndarray, np.ndarray]], config: RadarConfig) -> CapturedFrames:
     words, valid = zip(*frames, strict=True)
-    return Batch(decode(np.concatenate(words), config), np.stack(valid))
+    return CapturedFrames(decode(np.concatenate(words), config), np.stack(valid))
 
 
 def _payloads(path: Path, capture: Capture) -> Iterator[tuple[float, bytes]]:

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from radarize.io.errors import InputError, explained
 from radarize.io.files import read_text, regular
-from radarize.io.importers.capture import Batch, Capture, batch_frames
+from radarize.io.importers.capture import Capture, CapturedFrames, batch_frames
 from radarize.io.importers.format import Format
 from radarize.io.importers.parameters import Given
 from radarize.io.jsonfile import parse_json
@@ -164,13 +164,15 @@ def _poses(path: Path) -> dict[str, Product]:
 
 def _batches(
     words: _Channel, stamps: _Channel, doubtful: Bool[np.ndarray, "frame"], config: RadarConfig
-) -> Iterator[Batch]:
+) -> Iterator[CapturedFrames]:
     size = batch_frames(config)
     for start in range(0, len(doubtful), size):
         stop = min(start + size, len(doubtful))
         frames = words.read(start, stop)
         lost = _filled(frames)[:, :, list(config.slot)] & doubtful[start:stop, None, None]
-        yield Batch(decode(frames.reshape(-1).astype(np.int16), config), ~lost, stamps.read(start, stop).reshape(-1))
+        yield CapturedFrames(
+            decode(frames.reshape(-1).astype(np.int16), config), ~lost, stamps.read(start, stop).reshape(-1)
+        )
 
 
 def _filled(words: Int16[np.ndarray, "frame loop tx rx word"]) -> Bool[np.ndarray, "frame loop tx"]:

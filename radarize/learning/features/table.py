@@ -56,7 +56,7 @@ _BATCH = 32
 
 
 @dataclass(frozen=True, eq=False)
-class Table:
+class FeatureTable:
     """Frames of recordings, one after the other.
 
     Attributes:
@@ -86,7 +86,7 @@ class Table:
         workers: int = 1,
         progress: Callable[..., None] = lambda *where: None,
         grid: Grid | None = None,
-    ) -> "Table":
+    ) -> "FeatureTable":
         """Read recordings of maps, or make the maps of recordings of samples.
 
         Args:
@@ -161,18 +161,18 @@ class Table:
         blind = blind.cumsum(0)
         return found[blind[found + reach] == blind[found]]
 
-    def divide(self, count: int) -> tuple["Table", "Table"]:
+    def divide(self, count: int) -> tuple["FeatureTable", "FeatureTable"]:
         """The first `count` recordings, and the others."""
         frame = sum(self.lengths[:count])
 
-        def part(frames: slice, lengths: Sequence[int]) -> Table:
+        def part(frames: slice, lengths: Sequence[int]) -> FeatureTable:
             columns = ("maps", "truth", "sensed")
             some = {what: {name: rows[frames] for name, rows in getattr(self, what).items()} for what in columns}
             return replace(self, lengths=lengths, **some)
 
         return part(slice(frame), self.lengths[:count]), part(slice(frame, None), self.lengths[count:])
 
-    def on(self, device: torch.device) -> "Table":
+    def on(self, device: torch.device) -> "FeatureTable":
         """With its maps in a device's memory, where windows are cut out many times faster than they are sent."""
         return replace(self, maps={name: values.to(device) for name, values in self.maps.items()})
 

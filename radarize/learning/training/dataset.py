@@ -26,7 +26,7 @@ TRUTH = {
 DEFAULT = ("range_azimuth", "elevation_aware", "doppler_azimuth", "doppler_elevation_aware", "velocity", "turn", "scan")
 
 
-class Frames(Dataset):
+class FrameDataset(Dataset):
     """Windows of frames of the recordings in a folder, as dictionaries of tensors.
 
     Args:

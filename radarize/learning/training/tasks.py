@@ -9,7 +9,7 @@ from torch.nn.functional import binary_cross_entropy_with_logits
 
 from radarize.learning.features import augment
 from radarize.learning.features.occupancy import OCCUPANCY, SURFACE, UNKNOWN
-from radarize.learning.features.table import VELOCITY, YAW, Table
+from radarize.learning.features.table import VELOCITY, YAW, FeatureTable
 from radarize.learning.nets import losses
 from radarize.learning.nets.motion import RotationNet, TranslationNet
 from radarize.learning.nets.segmentation import SegmentationNet
@@ -53,7 +53,7 @@ class Rotation(Motion):
     #: m, standard deviation of the travel that is told.
     doubt = 0.01
 
-    def label(self, table: Table, frames: Tensor) -> Float[Tensor, "item 3"]:
+    def label(self, table: FeatureTable, frames: Tensor) -> Float[Tensor, "item 3"]:
         """Turn (rad) and travel (m): the mean of the velocities at the window's ends times its duration."""
         velocity, first, last = table.truth["velocity"], frames[:, 0], frames[:, -1]
         duration = (last - first)[:, None] * table.frame_period

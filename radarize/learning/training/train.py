@@ -11,7 +11,7 @@ import pandas as pd
 from radarize.io.errors import InputError
 from radarize.io.replacing import replacing
 from radarize.learning.features.grid import Grid
-from radarize.learning.features.table import Table
+from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets.export import export_onnx
 from radarize.learning.nets.weights import load, save
 from radarize.learning.task import Settings, Task, find_task
@@ -24,7 +24,7 @@ _TENTH = 10
 
 
 @dataclass(frozen=True)
-class Options:
+class TrainOptions:
     """How a training is run.
 
     Attributes:
@@ -50,7 +50,7 @@ def train(
     data: Path,
     output: Path,
     settings: Settings | None = None,
-    options: Options | None = None,
+    options: TrainOptions | None = None,
     *,
     progress: Callable[..., None] = lambda *where: None,
     say: Callable[[str], None] = lambda line: None,
@@ -71,7 +71,7 @@ def train(
         InputError: unusable data or settings, a checkpoint that was not to be resumed or does not fit, or a loss that
             is no number.
     """
-    task, output, data, options = find_task(kind), Path(output), Path(data), options or Options()
+    task, output, data, options = find_task(kind), Path(output), Path(data), options or TrainOptions()
     settings = settings or task.defaults
     begun, before = load(options.start, task.network) if options.start else (None, None)
     if before is not None:
@@ -128,8 +128,8 @@ def _nothing(*where) -> None:
 
 
 def _read(
-    task: Task, data: Path, options: Options, seed: int, progress: Callable[..., None], grid: Grid | None
-) -> tuple[Table, Table]:
+    task: Task, data: Path, options: TrainOptions, seed: int, progress: Callable[..., None], grid: Grid | None
+) -> tuple[FeatureTable, FeatureTable]:
     """Training and validation data, on a grid if there is one."""
     if options.split is None:
         found = recordings(data)

@@ -18,7 +18,7 @@ from torch import Generator, Tensor
 from torch.optim.lr_scheduler import ReduceLROnPlateau
 
 from radarize.io.errors import InputError
-from radarize.learning.features.table import Table
+from radarize.learning.features.table import FeatureTable
 from radarize.learning.nets import weights
 from radarize.learning.task import Inputs, Settings, Task
 from radarize.learning.training.team import Team
@@ -41,7 +41,7 @@ class Trainer:
         InputError: too few frames.
     """
 
-    def __init__(self, task: Task, settings: Settings, training: Table, validation: Table, team: Team):
+    def __init__(self, task: Task, settings: Settings, training: FeatureTable, validation: FeatureTable, team: Team):
         self.task, self.settings, self.team = task, settings, team
         self.training, self.validation = training.on(team.device), validation.on(team.device)
         self.spacings = task.spacings(training.frame_period)
@@ -218,7 +218,7 @@ class Trainer:
         seed = np.random.SeedSequence((self.settings.seed, epoch, step, self.team.rank)).generate_state(1, np.uint64)
         return Generator(self.team.device).manual_seed(int(seed[0] >> 1))
 
-    def _items(self, table: Table, starts: Tensor, spacings: Tensor) -> tuple[Inputs, Tensor]:
+    def _items(self, table: FeatureTable, starts: Tensor, spacings: Tensor) -> tuple[Inputs, Tensor]:
         inputs, label = self.task.items(table, starts, spacings, self.settings.frames)
         device = self.team.device
         inputs = tuple(each.to(device) for each in inputs) if isinstance(inputs, tuple) else inputs.to(device)

@@ -11,8 +11,8 @@ import pytest
 from radarize.evaluation.benchmark import odometry, runtime
 from radarize.evaluation.benchmark.choices import CHOICES, EVALUATION, helped
 from radarize.evaluation.benchmark.dataset import DataSet, groups
-from radarize.evaluation.benchmark.followed import Followed
-from radarize.evaluation.benchmark.results import Data, Network, Results, Walk, command, commit
+from radarize.evaluation.benchmark.followed import FrameErrors
+from radarize.evaluation.benchmark.results import Data, Results, UsedNetwork, Walk, command, commit
 from radarize.evaluation.benchmark.table import PAPER, Table
 from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.io.alignment import trajectory
@@ -64,14 +64,14 @@ def test_folders_of_data_sets_make_one(rooms, tmp_path):
     assert [case.name for case in DataSet.load(tmp_path).cases] == ["loops/A_cart", "tilt/A_cart"]
 
 
-def followed(length: float, speed: float, turn: float, frames: int = 40) -> tuple[Followed, dict]:
+def followed(length: float, speed: float, turn: float, frames: int = 40) -> tuple[FrameErrors, dict]:
     """A straight walk that odometry takes for faster by `speed` m/s and turning by `turn` rad a frame; its errors."""
     times, zero = np.arange(frames) / 30, np.zeros(frames)
     true = np.column_stack([np.linspace(0, length, frames), zero, zero])
     seen = true * [1.1, 1, 1]
     errors = evaluate_trajectory(*(trajectory(times, planar_poses(poses)) for poses in (seen, true)))
     velocity = np.tile([1.0, 0.0], (frames, 1))
-    found = Followed(
+    found = FrameErrors(
         velocity + [speed, 0],
         np.tile(np.eye(2) * 0.01, (frames, 1, 1)),
         velocity,
@@ -108,7 +108,7 @@ def test_stages_add_up_as_in_the_paper():
 
 
 MACHINE = {"processor": "abacus", "cores": "2", "version": "0", "commit": "abc (clean)"}
-NETWORK = Network("rotation", 1234567, "training", "random-0", 5)
+NETWORK = UsedNetwork("rotation", 1234567, "training", "random-0", 5)
 TABLE = Table("One", [{"who": "a", "x": 0.12345, "n": 3}, {"who": "b", "x": np.nan, "n": None}], ["A note."])
 RESULTS = Results("Two", [TABLE], Data("d", (Walk("office", 7, 12.3, True),), 5), (NETWORK,), "c", ["Of all."], MACHINE)
 
@@ -172,7 +172,7 @@ def test_which_recordings_helped_to_choose_is_looked_up():
 
 
 def test_networks_tell_their_size_and_training():
-    network = Network.of(Weights(None).of("rotation"))
+    network = UsedNetwork.of(Weights(None).of("rotation"))
     assert (
         network.sentence.startswith("rotation, width 16, 70")
         and "trained on 2.1 h of training, then any-radar (random-0), 11 epochs" in network.sentence

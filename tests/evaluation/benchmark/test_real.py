@@ -10,7 +10,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from radarize.baselines.real.motion import SMOOTH, disturbed, shifted_turns, smoothed, turn_errors
-from radarize.baselines.real.real import Options, clocked_turn_errors, median_error, real
+from radarize.baselines.real.real import RealOptions, clocked_turn_errors, median_error, real
 from radarize.baselines.walks.clock import Clock
 from radarize.baselines.walks.poses import BEARINGS, scan, true_poses
 from radarize.baselines.walks.walks import Walk
@@ -78,7 +78,7 @@ def test_every_walk_and_method_has_a_row(clone, tmp_path, monkeypatch):
 def test_networks_have_rows_where_their_weights_are(clone, tmp_path):
     """One of RadarHD's kind that draws what the radar sees is as near as the picture itself."""
     weights(repeating(), tmp_path / "radarhd-pictures.safetensors")
-    found = real(clone, tmp_path / "out", Options(weights=tmp_path))
+    found = real(clone, tmp_path / "out", RealOptions(weights=tmp_path))
     rows, maps = ({row["method"]: row for row in found.tables[k].rows} for k in (0, 3))
     assert "network" not in rows and rows["radarhd-simulated"]["frames"] == FRAMES - 40
     for name in ("chamfer_m", "mod_hausdorff_m", "instant_chamfer_m"):
@@ -92,7 +92,7 @@ def test_what_is_of_one_instant_is_nearer(tmp_path):
     """A radar that lost frames: by number, pictures are of places up to 0.75 m apart; by instant they agree."""
     walk = MadeUp(tmp_path / "clone", 7, 320, first=-30.0, rate=1.08)
     write_tum(tmp_path / "7.tum", 0.05 * np.arange(320), planar_poses(np.array([walk.pose(k) for k in range(320)])))
-    found = real(walk.write(walk.folder), tmp_path / "out", Options(weights=tmp_path, poses=tmp_path))
+    found = real(walk.write(walk.folder), tmp_path / "out", RealOptions(weights=tmp_path, poses=tmp_path))
     rows = {row["method"]: row for row in found.tables[0].rows}
     assert rows["picture"]["instant_chamfer_m"] < 0.32 < 0.45 < rows["picture"]["chamfer_m"]
     shifted = rows["shifted pictures, smoothed"]

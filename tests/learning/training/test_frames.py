@@ -12,7 +12,7 @@ from torch.utils.data import DataLoader
 from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarize.learning.features.keeping import keep_maps
-from radarize.learning.training.dataset import DEFAULT, Frames
+from radarize.learning.training.dataset import DEFAULT, FrameDataset
 from radarize.signal.maps import MAPS, STEP
 from tests.learning.training.walks import CONFIG, TURN, VELOCITY, walk
 
@@ -40,33 +40,35 @@ def maps_folder(folder, tmp_path_factory):
 
 
 def test_windows(folder):
-    whole = Frames(folder, window=3, spacing=2, stride=4)  # first frames 0, 4 of 12: the window reaches over 5
+    whole = FrameDataset(folder, window=3, spacing=2, stride=4)  # first frames 0, 4 of 12: the window reaches over 5
     assert len(whole) == 3 * 2
     item = whole[3]  # the second window of b
     assert list(item) == list(DEFAULT)
     with Recording(folder / "b.h5") as recording:
         times = recording.times
-    assert np.allclose(Frames(folder, fields=("time",), window=3, spacing=2, stride=4)[3]["time"], times[[4, 6, 8]])
+    assert np.allclose(
+        FrameDataset(folder, fields=("time",), window=3, spacing=2, stride=4)[3]["time"], times[[4, 6, 8]]
+    )
     assert item["range_azimuth"].shape == (3, 96, 80) and item["doppler_azimuth"].shape == (3, CONFIG.loops, 80)
     assert all(item[name].dtype == torch.float32 for name in DEFAULT)
     assert torch.allclose(item["velocity"], torch.tensor(VELOCITY).expand(3, 3))
     assert torch.allclose(item["turn"], torch.full((2,), 2 * TURN), atol=1e-5)  # also where yaw passes pi
     assert item["scan"].shape == (3, 88)
-    assert len(Frames(folder, window=12)) == 3
+    assert len(FrameDataset(folder, window=12)) == 3
     with pytest.raises(InputError, match="no recording has 13 frames"):
-        Frames(folder, window=13)
+        FrameDataset(folder, window=13)
     with pytest.raises(IndexError):
         whole[6]
 
 
 def test_samples(folder):
-    item = Frames(folder, fields=("adc",), window=2, spacing=3)[9]  # the first window of b
+    item = FrameDataset(folder, fields=("adc",), window=2, spacing=3)[9]  # the first window of b
     with Recording(folder / "b.h5") as recording:
         assert np.array_equal(item["adc"].numpy(), recording.adc(0, 4)[::3])
 
 
 def test_samples_and_stored_maps_read_the_same(folder, maps_folder):
-    fresh, stored = Frames(folder), Frames(maps_folder)
+    fresh, stored = FrameDataset(folder), FrameDataset(maps_folder)
     assert len(fresh) == len(stored)
     for index in (0, 17, len(fresh) - 1):
         for name, values in fresh[index].items():
@@ -74,14 +76,14 @@ def test_samples_and_stored_maps_read_the_same(folder, maps_folder):
 
 
 def test_splits(folder):
-    assert [path.stem for path in Frames(folder, "random-0").paths] == ["a", "b"]
-    assert [path.stem for path in Frames(folder, "random-0", "test").paths] == ["c"]
+    assert [path.stem for path in FrameDataset(folder, "random-0").paths] == ["a", "b"]
+    assert [path.stem for path in FrameDataset(folder, "random-0", "test").paths] == ["c"]
 
 
 @pytest.mark.parametrize("method", ["fork", "spawn"])
 def test_worker_processes(maps_folder, method):
     """After the parent has read, too: what it has open is not for its children."""
-    frames = Frames(maps_folder, fields=("range_azimuth", "turn"), stride=2)
+    frames = FrameDataset(maps_folder, fields=("range_azimuth", "turn"), stride=2)
     alone = [frames[k] for k in range(len(frames))]
     loader = DataLoader(frames, batch_size=4, num_workers=2, multiprocessing_context=method)
     batches = list(loader)
@@ -103,24 +105,24 @@ def test_worker_processes(maps_folder, method):
 )
 def test_what_is_missing_is_named(folder, arguments, expected):
     with pytest.raises(InputError, match=expected):
-        Frames(folder, **arguments)
+        FrameDataset(folder, **arguments)
 
 
 def test_folders_that_are_no_data_set(folder, maps_folder, tmp_path):
     with pytest.raises(InputError, match="holds no recordings"):
-        Frames(tmp_path)
+        FrameDataset(tmp_path)
     walk(tmp_path / "real.h5", truth=False)
     with pytest.raises(InputError, match="real.h5: has no /truth/velocity"):
-        Frames(tmp_path)
-    assert Frames(tmp_path, fields=("range_azimuth",))[0]["range_azimuth"].shape == (2, 96, 80)
+        FrameDataset(tmp_path)
+    assert FrameDataset(tmp_path, fields=("range_azimuth",))[0]["range_azimuth"].shape == (2, 96, 80)
     with pytest.raises(InputError, match="dataset.json: no such file, expected a data set with splits"):
-        Frames(tmp_path, "random-0")
+        FrameDataset(tmp_path, "random-0")
     splits = {"random-0": {"train": ["real", "x", "y"]}}
     (tmp_path / "dataset.json").write_text(json.dumps({"splits": splits}))
     with pytest.raises(InputError, match="lacks x.h5 and 1 more of random-0/train"):
-        Frames(tmp_path, "random-0")
+        FrameDataset(tmp_path, "random-0")
     with pytest.raises(InputError, match="has no /radar/adc"):
-        Frames(maps_folder, fields=("adc",))
+        FrameDataset(maps_folder, fields=("adc",))
 
 
 def test_the_example_of_the_readme_trains(folder, monkeypatch, capsys):

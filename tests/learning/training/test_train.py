@@ -17,12 +17,12 @@ from radarize.io.errors import InputError
 from radarize.io.recording import Recording
 from radarize.learning.features.grid import Grid, Resampling
 from radarize.learning.features.occupancy import OCCUPANCY, SURFACE, UNKNOWN
-from radarize.learning.features.table import VELOCITY, YAW, Table
+from radarize.learning.features.table import VELOCITY, YAW, FeatureTable
 from radarize.learning.nets import losses
 from radarize.learning.nets.weights import header_of, load, read
 from radarize.learning.task import find_task
 from radarize.learning.training.team import Team
-from radarize.learning.training.train import Options, train
+from radarize.learning.training.train import TrainOptions, train
 from tests.learning.training.ridges import CONFIG, data_set, write
 
 pytestmark = pytest.mark.usefixtures("one_thread")
@@ -60,7 +60,7 @@ def judged(kind: str, weights: Path, recording: Path) -> dict[str, float]:
 def hazards(weights: Path, recording: Path) -> tuple[float, float]:
     """Cells that hold the first surface, and how many of them the network expects."""
     net, header = load(weights, TASKS["segmentation"].network, CONFIG)
-    table = Table.read([recording], header.maps, (OCCUPANCY,))
+    table = FeatureTable.read([recording], header.maps, (OCCUPANCY,))
     label = table.truth["occupancy"]
     with torch.no_grad():
         likely = net.estimate(table.window(table.starts(1)[:, None]))
@@ -97,7 +97,7 @@ def test_uncertainty_follows_what_is_seen(tmp_path):
     claimed = []
     for blank in (0, 1):
         path = write(tmp_path / f"{blank}.h5", "velocity", 100, 9, blank)
-        table = Table.read([path], header.maps, (VELOCITY,))
+        table = FeatureTable.read([path], header.maps, (VELOCITY,))
         with torch.no_grad():
             covariance = net.estimate(table.window(table.starts(1)[:, None]))[1]
         claimed.append(covariance.diagonal(dim1=1, dim2=2).median(dim=0).values.sqrt().numpy())
@@ -135,7 +135,7 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
             small,
             tmp_path / "part.safetensors",
             settings=replace(TINY, seed=1),
-            options=Options(resume=True),
+            options=TrainOptions(resume=True),
         )
     said = []
     resumed = train(
@@ -143,7 +143,7 @@ train("translation", {str(small)!r}, {str(tmp_path / "part.safetensors")!r}, set
         small,
         tmp_path / "part.safetensors",
         settings=TINY,
-        options=Options(resume=True),
+        options=TrainOptions(resume=True),
         say=said.append,
     )
     assert said[0] == "resuming after epoch 2"
@@ -200,7 +200,9 @@ def test_a_loss_that_is_no_number_is_said(small, tmp_path, monkeypatch):
 
 def test_workers_read_the_same(small):
     paths = sorted(small.glob("*.h5"))
-    alone, together = (Table.read(paths, ("doppler_azimuth",), (VELOCITY, YAW), workers=workers) for workers in (1, 2))
+    alone, together = (
+        FeatureTable.read(paths, ("doppler_azimuth",), (VELOCITY, YAW), workers=workers) for workers in (1, 2)
+    )
     assert alone.lengths == together.lengths == [60, 60, 60]
     assert torch.equal(alone.maps["doppler_azimuth"], together.maps["doppler_azimuth"])
     assert all(torch.equal(alone.truth[name], together.truth[name]) for name in ("velocity", "yaw"))
@@ -211,7 +213,7 @@ def test_workers_read_the_same(small):
 
 
 def test_maps_lie_where_the_network_is_and_truth_here(small):
-    table = Table.read(sorted(small.glob("*.h5")), ("doppler_azimuth",), (VELOCITY, YAW))
+    table = FeatureTable.read(sorted(small.glob("*.h5")), ("doppler_azimuth",), (VELOCITY, YAW))
     there = table.on(torch.device("meta"))
     frames = torch.tensor([[0, 1], [3, 4]])
     assert there.window(frames).device.type == "meta"
@@ -241,9 +243,9 @@ def test_the_command(tmp_path):
         ({"kind": "rotation", "settings": replace(TINY, frames=1)}, "frames is 1, expected at least 2"),
         ({"kind": "published-rotation", "settings": replace(TINY, frames=1)}, "frames is 1, expected at least 2"),
         ({"kind": "picture-turns", "settings": replace(TINY, frames=1)}, "frames is 1, expected at least 2"),
-        ({"options": Options(device="abacus")}, "device is 'abacus', expected cpu or cuda"),
+        ({"options": TrainOptions(device="abacus")}, "device is 'abacus', expected cpu or cuda"),
         ({"output": Path("net.pt")}, "output is net.pt, expected a file NAME.safetensors"),
-        ({"options": Options("random-0")}, "dataset.json: no such file, expected a data set"),
+        ({"options": TrainOptions("random-0")}, "dataset.json: no such file, expected a data set"),
         ({"data": Path("nowhere")}, "nowhere: holds no recordings"),
     ],
 )
@@ -263,13 +265,13 @@ def test_recordings_of_two_radars_or_broken_truth_are_refused(tmp_path):
     from tests.learning.training.walks import walk
 
     with pytest.raises(InputError, match="b.h5: has maps of rows 8 instead of 16 as in a.h5, expected one radar's"):
-        Table.read([good, walk(tmp_path / "b.h5")], ("doppler_azimuth",), (VELOCITY,))
+        FeatureTable.read([good, walk(tmp_path / "b.h5")], ("doppler_azimuth",), (VELOCITY,))
     import h5py
 
     with h5py.File(good, "r+") as file:
         file["truth/velocity"][:] = np.nan
     with pytest.raises(InputError, match="a.h5: /truth/velocity lacks values or holds no numbers"):
-        Table.read([good], ("doppler_azimuth",), (VELOCITY,))
+        FeatureTable.read([good], ("doppler_azimuth",), (VELOCITY,))
 
 
 def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
@@ -280,7 +282,7 @@ def test_windows_with_unknown_truth_or_readings_are_left_out(tmp_path):
     with h5py.File(paths[0], "r+") as file:
         file["truth/velocity"][3, 1] = np.nan
         file["truth/pose"][7] = np.nan
-    table = Table.read(paths, ("doppler_azimuth",), (VELOCITY, YAW))
+    table = FeatureTable.read(paths, ("doppler_azimuth",), (VELOCITY, YAW))
     assert table.starts(1).tolist() == [0, 1, 2, 4, 5, 6, *range(8, 16)]
     assert table.starts(3).tolist() == [0, 4, *range(8, 14)]
     table = replace(table, sensed={"imu": torch.zeros(16, 15, 6)})
@@ -301,7 +303,7 @@ def test_maps_of_any_radar_are_brought_to_a_grid(tmp_path):
     """As networks are shown them; frames of the radar that has the grid stay as they are."""
     paths = [write(tmp_path / "a.h5", "velocity", 5), write(tmp_path / "b.h5", "velocity", 6, config=OTHER)]
     grid = Grid.of(CONFIG, "doppler_azimuth")
-    table = Table.read(paths, ("doppler_azimuth",), (VELOCITY,), grid=grid)
+    table = FeatureTable.read(paths, ("doppler_azimuth",), (VELOCITY,), grid=grid)
     assert table.grid == grid and list(table.lengths) == [5, 6]
     with Recording(paths[0]) as own, Recording(paths[1]) as other:
         assert np.array_equal(table.maps["doppler_azimuth"][:5], own.read("maps/doppler_azimuth"))
@@ -318,7 +320,7 @@ def test_a_training_begins_with_weights_and_sees_any_radar(small, tmp_path):
     for k, config in enumerate((CONFIG, OTHER, OTHER)):
         write(mixed / f"{k}.h5", "velocity", 60, seed=20 + k, config=config)
     short = replace(QUICK["translation"], width=3, frames=5, epochs=1, rate=1e-6)
-    again = train("translation", mixed, tmp_path / "again.safetensors", short, Options(start=first))
+    again = train("translation", mixed, tmp_path / "again.safetensors", short, TrainOptions(start=first))
     before, header = header_of(first), header_of(again)
     assert (header.width, header.frames, header.grid) == (before.width, before.frames, before.grid)
     assert header.data == "small0, then mixed" and header.epochs == before.epochs + 1
@@ -329,4 +331,4 @@ def test_a_training_begins_with_weights_and_sees_any_radar(small, tmp_path):
     errors = [judged("translation", path, held)["rmse_m_s"] for path in (first, again)]
     assert errors[0] < 0.3 and abs(errors[1] - errors[0]) < 0.05  # of 0.8 m/s RMS
     with pytest.raises(InputError, match="is a network for 'translation' .*expected one for 'rotation'"):
-        train("rotation", mixed, tmp_path / "turns.safetensors", options=Options(start=first))
+        train("rotation", mixed, tmp_path / "turns.safetensors", options=TrainOptions(start=first))

@@ -60,7 +60,7 @@ def measure(path: Path, methods: dict[str, str]) -> dict[str, object]:
         note(0, 0)
         reading = last[0]
         with watch.running():
-            live.run(stream, threading.Event(), progress=note)
+            list(live.follow(stream, threading.Event(), progress=note))
         used = time.process_time() - start
     (began, first), (ended, final) = instants[1], instants[-1]
     frames, counts = max(live.losses.frames, 1), stream.counts

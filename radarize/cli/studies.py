@@ -89,12 +89,10 @@ def benchmark(
     """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
     import os
 
-    from radarize.evaluation.benchmark.registry import BENCHMARKS
+    from radarize.evaluation.benchmark.study import BENCHMARKS
 
     if name == "list":
-        listed = [(each, about.about) for each, about in BENCHMARKS.items()]
-        real = ("real", "Points, turns and maps of real walks against a lidar (RadarHD's repository).")
-        return print_table(("benchmark", "what it compares"), [*listed, real])
+        return print_table(("benchmark", "what it compares"), [(each, of.about) for each, of in BENCHMARKS.items()])
     for option, value in (("--data", data), ("--out", out)):
         if value is None:
             raise InputError(f"{option} is missing, expected a folder")
@@ -110,30 +108,3 @@ def benchmark(
     for each in published:
         print(out / f"{each}.html")
     print(out / "index.html")
-
-
-def _benchmark_real(
-    data: Path,
-    out: Path,
-    weights: Path | None,
-    walks: str | None,
-    predictions: list[str],
-    poses: Path | None,
-    workers: int | None,
-    ray: str | None,
-) -> None:
-    from radarize.baselines.real.real import SHOWN, RealOptions, real
-
-    numbers = [number.strip() for number in walks.split(",")] if walks else []
-    if wrong := [number for number in numbers if not number.isdecimal()]:
-        raise InputError(f"--walks names {wrong[0]!r}, expected numbers as in 227,230")
-    named = dict(each.partition("=")[::2] for each in predictions)
-    for name, folder in named.items():
-        if not (name and folder and Path(folder).is_dir()):
-            raise InputError(f"--predictions is {name}={folder}, expected NAME=FOLDER of a folder that is there")
-    others = {name: Path(each) for name, each in named.items()}
-    options = RealOptions([int(number) for number in numbers], others, weights, poses, workers, ray)
-    with progress("real") as report:
-        results = real(data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
-    print_table(*results.tables[0].in_terminal(SHOWN))
-    print(out / "real.md")

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, MutableMapping
 from functools import cached_property
 from importlib.metadata import EntryPoint, entry_points
+from importlib.util import find_spec
 from typing import Generic, TypeVar, cast
 
 from radarize.io.errors import InputError
@@ -60,7 +61,16 @@ class Plugins(MutableMapping[str, Part], Generic[Part]):
         return name in self._added or name in self._installed
 
     def __iter__(self) -> Iterator[str]:
-        return iter(sorted(self._installed.keys() | self._added.keys()))
+        """Names of what can be imported: folders of this package may be deleted."""
+        there = {name for name, point in self._installed.items() if name in self._added or _exists(point.module)}
+        return iter(sorted(there | self._added.keys()))
 
     def __len__(self) -> int:
-        return len(self._installed.keys() | self._added.keys())
+        return len(list(iter(self)))
+
+
+def _exists(module: str) -> bool:
+    try:
+        return find_spec(module) is not None
+    except ModuleNotFoundError:  # a folder above it
+        return False

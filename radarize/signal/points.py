@@ -233,14 +233,6 @@ class PointClouds:
         return which, self.u_y[cell], u_z
 
 
-def _formed(
-    x: Complex[np.ndarray, "detection antenna"], steering: Complex[np.ndarray, "antenna direction"]
-) -> Complex[np.ndarray, "detection direction"]:
-    """Beams of each detection, in the same order of sums whatever stands beside it: BLAS takes another one, and differs
-    in the last digits, for other numbers of rows."""
-    return (np.ascontiguousarray(x)[:, None] @ steering)[:, 0]
-
-
 def level_around(level: np.ndarray, cfar: Cfar, axis: int, cyclic: bool) -> np.ndarray:
     """Mean level (dB) of the cells around each along an axis; at the ends of one that is no circle, of one side."""
     reach = cfar.window + cfar.guard

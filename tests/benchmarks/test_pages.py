@@ -8,8 +8,8 @@ import pytest
 import typer
 
 from radarize import cli as radarize
-from radarize.evaluation.benchmark.registry import BENCHMARKS
 from radarize.evaluation.benchmark.results import Results
+from radarize.evaluation.benchmark.study import BENCHMARKS
 from radarsim import cli as radarsim
 
 ROOT = Path(__file__).parents[2]

@@ -253,5 +253,5 @@ def test_a_live_pipeline_takes_no_more_frames_at_a_time_than_it_was_prepared_for
     live.prepare(Inputs(SMALL), CLASSICAL)
     monkeypatch.setattr(live, "follow", lambda *_, most, **__: asked.append(most) or [])
     with LivePage("127.0.0.1:0") as page:
-        live.Live(Inputs(SMALL), CLASSICAL, page).run(Played(), threading.Event())
+        list(live.Live(Inputs(SMALL), CLASSICAL, page).follow(Played(), threading.Event()))
     assert sorted(set(sizes)) == list(range(1, asked[0] + 1))

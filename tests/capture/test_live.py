@@ -79,7 +79,7 @@ def test_a_replay_gives_what_the_file_gives(walk, tmp_path, every):
     with LivePage("127.0.0.1:0") as page, Replay(walk, speed=2.0, slots=FRAMES) as stream:
         live = Kept(inputs, CLASSICAL, page)
         with RecordingWriter(tmp_path / "again.h5", stream.config) as writer:
-            live.run(stream, threading.Event(), keeper=Keeper(writer))
+            list(live.follow(stream, threading.Event(), keeper=Keeper(writer)))
     assert live.pipeline.seconds["page"] > 0
     offline, preprocessor = make_pipeline(inputs, **CLASSICAL), Preprocessor(inputs.signal, every)
     with Recording(walk) as one, Recording(tmp_path / "again.h5") as other:
@@ -108,7 +108,7 @@ def test_foxglove_gets_what_the_page_gets(walk):
         live = Kept(Inputs(PRESETS["radarize"]), CLASSICAL, page, Server())
         places, place = [], live.view.pose
         live.view.pose = lambda: places.append(place()) or places[-1]
-        live.run(stream, threading.Event())
+        list(live.follow(stream, threading.Event()))
     assert {name for name, *_ in sent} == {"pose", "scan", "picture", "map", "path"}
     _, slam, odometry = next(given for name, *given in reversed(sent) if name == "pose")
     assert abs(poses(live.results) - odometry).max(axis=1).min() < 1e-9
@@ -122,7 +122,7 @@ def test_too_slow_means_dropped_frames_not_delay(walk):
         live = Live(Inputs(PRESETS["radarize"]), CLASSICAL, page)
         while stream.counts.frames < FRAMES:
             pass
-        live.run(stream, threading.Event())
+        list(live.follow(stream, threading.Event()))
         assert live.losses.frames + stream.counts.dropped == FRAMES
         assert stream.counts.dropped >= FRAMES - 8
         assert f"{stream.counts.dropped} of {FRAMES} frames were dropped" in stream.troubles()[0]
@@ -138,7 +138,7 @@ def test_a_browser_shows_it_while_it_runs(walk, tmp_path):
 
         def run() -> None:
             with Replay(walk, speed=0.5, slots=FRAMES) as stream:
-                Live(inputs, CLASSICAL, page).run(stream, shown)
+                list(Live(inputs, CLASSICAL, page).follow(stream, shown))
 
         thread = threading.Thread(target=run)
         thread.start()

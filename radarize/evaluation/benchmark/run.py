@@ -6,9 +6,8 @@ from pathlib import Path
 from matplotlib import pyplot
 
 from radarize.evaluation.benchmark.dataset import DataSet
-from radarize.evaluation.benchmark.registry import BENCHMARKS
 from radarize.evaluation.benchmark.results import Results, machine
-from radarize.evaluation.benchmark.study import Options, Study, carry_out
+from radarize.evaluation.benchmark.study import BENCHMARKS, Benchmark, Options, Study, carry_out
 from radarize.evaluation.benchmark.table import cell
 from radarize.evaluation.report.page import Link, Page
 from radarize.io.errors import InputError
@@ -45,15 +44,16 @@ def benchmark(
     Raises:
         InputError: an unknown name, or data that is not fit for it.
     """
-    if name != ALL and name not in BENCHMARKS:
-        raise InputError(f"benchmark is {name!r}, expected one of: {', '.join((*BENCHMARKS, ALL))}")
+    known = {each: of for each, of in BENCHMARKS.items() if isinstance(of, Benchmark)}
+    if name != ALL and name not in known:
+        raise InputError(f"benchmark is {name!r}, expected one of: {', '.join((*known, ALL))}")
     options.check()
     machine()  # as things are now: sources may change while it runs
     found, output = DataSet.load(data), Path(output)
     studies: dict[str, Study] = {}
-    for each in BENCHMARKS if name == ALL else (name,):
+    for each in known if name == ALL else (name,):
         try:
-            studies[each] = Study.plan(BENCHMARKS[each], found, output, options)
+            studies[each] = Study.plan(known[each], found, output, options)
         except InputError as error:
             if name != ALL:
                 raise

@@ -16,6 +16,7 @@ from radarize.evaluation.benchmark.steps import Step, perform
 from radarize.evaluation.benchmark.table import Table
 from radarize.evaluation.report.page import Page
 from radarize.io.errors import InputError
+from radarize.io.plugins import Plugins
 from radarize.pipeline.methods import BEST, ODOMETRY, SCANS, best_methods
 
 
@@ -122,6 +123,22 @@ class Benchmark:
     lacks: Callable[[DataSet], str] = lambda data: ""
     draw: Callable[["Study", Page], None] = lambda study, page: None
     picture: Callable[[list[Table]], Figure | None] = lambda tables: None
+
+
+@dataclass(frozen=True)
+class OwnBenchmark:
+    """A benchmark on other data than folders of recordings, which does everything itself.
+
+    Attributes:
+        about: in a sentence.
+        compare: called with the folder of data, the folder to write, and the options of ``radarize benchmark`` by name.
+    """
+
+    about: str
+    compare: Callable[..., None]
+
+
+BENCHMARKS: Plugins["Benchmark | OwnBenchmark"] = Plugins("radarize.benchmarks", "benchmark")
 
 
 @dataclass

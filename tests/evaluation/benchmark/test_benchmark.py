@@ -17,10 +17,9 @@ from radarize.evaluation.benchmark import identity, networks
 from radarize.evaluation.benchmark.dataset import DataSet
 from radarize.evaluation.benchmark.odometry import SEEN
 from radarize.evaluation.benchmark.protocol import PROTOCOLS
-from radarize.evaluation.benchmark.registry import BENCHMARKS
 from radarize.evaluation.benchmark.run import benchmark
 from radarize.evaluation.benchmark.steps import kept, perform
-from radarize.evaluation.benchmark.study import Chosen, Options, Study
+from radarize.evaluation.benchmark.study import BENCHMARKS, Chosen, Options, Study
 from radarize.io.console import run as command_line
 from radarize.io.errors import InputError
 from radarize.io.recording import Recording

@@ -26,7 +26,7 @@ find_python() {
 # Whether .venv is whole: it runs, belongs to this folder, and holds every locked version.
 is_complete() {
     .venv/bin/python - 2>/dev/null <<PYTHON
-import importlib.metadata, importlib.util, pathlib, sys
+import importlib.metadata, importlib.util, pathlib, sys, tomllib
 
 assert pathlib.Path(sys.prefix) == pathlib.Path(".venv").resolve()
 assert pathlib.Path(".venv/.ready").read_text() == pathlib.Path("requirements.lock").read_text()
@@ -36,8 +36,11 @@ for line in pathlib.Path("requirements.lock").read_text().splitlines():
         name, version = line.split("==")
         assert importlib.metadata.version(name).split("+")[0] == version
 assert all(importlib.util.find_spec(name) for name in "$NEEDED".split())
-found = {point.name for point in importlib.metadata.distribution("radarize").entry_points}
-assert {"radarize", "radarsim"} <= found
+about = tomllib.loads(pathlib.Path("pyproject.toml").read_text())["project"]
+groups = {"console_scripts": about["scripts"], **about["entry-points"]}
+declared = {(group, name, value) for group, points in groups.items() for name, value in points.items()}
+found = importlib.metadata.distribution("radarize").entry_points
+assert declared == {(point.group, point.name, point.value) for point in found}
 PYTHON
 }
 

@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.likeness import discriminator, statistics
 from benchmarks.likeness.pictures import Bursts, Simulated, buildings, real
 from benchmarks.likeness.sheet import draw
-from benchmarks.results import SHARED, Data, Page, Walk, performed, script
+from benchmarks.results import SHARED, Data, NamedWalk, Page, performed, script
 
 #: What is compared with the real walks: fields of the scene files.
 SETS = {"bare": {"clutter": 0.0, "unevenness": 0.0}, "furnished": {"clutter": 1.0, "unevenness": 1.0}}
@@ -73,9 +73,9 @@ def main(options: argparse.Namespace) -> Page:
         if options.sheets:
             draw(Path(options.sheets), name, found["real, train"], found[name], judged[name]["one picture"])
     found["real, test"] = list(real(options.recordings, "test").values())
-    made = [Walk(about["name"], options.seed + k, None, True) for k, about in
+    made = [NamedWalk(about["name"], options.seed + k, None, True) for k, about in
             enumerate(buildings(options.walks, options.seed))]  # fmt: skip
-    recorded = [Walk(f"RadarHD, {part}", None, None, simulated=False) for part in ("train", "test")
+    recorded = [NamedWalk(f"RadarHD, {part}", None, None, simulated=False) for part in ("train", "test")
                 for _ in found[f"real, {part}"]]  # fmt: skip
     return Page(
         rows(found, judged),

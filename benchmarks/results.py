@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from radarize.evaluation.benchmark.results import Data, Results, UsedNetwork, Walk, command, machine
+from radarize.evaluation.benchmark.results import Data, NamedWalk, Results, UsedNetwork, command, machine
 from radarize.evaluation.benchmark.table import Beside, Table
 from radarize.io.console import progress
 from radarize.io.errors import InputError
@@ -114,12 +114,12 @@ def performed(jobs: Mapping[str, Job], workers: int | None, title: str) -> list:
 
 def radarhd(title: str, walks: Sequence) -> Data:
     """Data of RadarHD's walks (`radarize.baselines.walks.walks.Walk`)."""
-    return Data(title, tuple(Walk.radarhd(walk.number) for walk in walks))
+    return Data(title, tuple(NamedWalk.radarhd(walk.number) for walk in walks))
 
 
-def walked(scene: str, seed: int, motion: Motion) -> Walk:
+def walked(scene: str, seed: int, motion: Motion) -> NamedWalk:
     """A simulated walk of which no recording was made."""
-    return Walk(scene, seed, Statistics.of(motion).distance, simulated=True)
+    return NamedWalk(scene, seed, Statistics.of(motion).distance, simulated=True)
 
 
 def timed(work: Callable[..., T], *arguments: object) -> tuple[T, float]:

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from rich.progress import track
 
-from benchmarks.results import SHARED, Data, Page, Walk, memory_mb, script, timed
+from benchmarks.results import SHARED, Data, NamedWalk, Page, memory_mb, script, timed
 from radarize.evaluation.benchmark.networks import Networks
 from radarize.evaluation.benchmark.runs import Pair
 from radarize.evaluation.benchmark.table import Beside
@@ -137,7 +137,7 @@ def graph_rows(seed: int) -> list[dict[str, object]]:
     return rows
 
 
-def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
+def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[NamedWalk]]:
     """Means over the runs of a benchmark's folder, each with its own odometry and scans, and the worst one, by
     settings; and what they are of."""
     paths = sorted(path.parent for path in folder.glob(f"*/{Pair(**BEST)}/reference.tum"))
@@ -157,7 +157,9 @@ def radar_rows(folder: Path) -> tuple[list[dict[str, object]], list[Walk]]:
         for case, config in cases.items():
             found[case].append(row(path.parent.name, log, truth, config))
         about = read_json(path / "run.json")["recording_attributes"]
-        walks.append(Walk(about.get("scene", "-"), about.get("seed"), found["radar"][-1]["path m"], "engine" in about))
+        walks.append(
+            NamedWalk(about.get("scene", "-"), about.get("seed"), found["radar"][-1]["path m"], "engine" in about)
+        )
     summary = []
     for case, rows in found.items():
         worst = max(rows, key=itemgetter("ATE m"))
@@ -180,7 +182,7 @@ def main(options: argparse.Namespace) -> Page:
         log, truth = lidar(name)
         target = f"{metres} m, {radians} rad, {seconds} s"
         rows.append(row(f"lidar, {name}", log, truth, lidar_preset, target))
-        walks.append(Walk(name, None, rows[-1]["path m"], simulated=False))
+        walks.append(NamedWalk(name, None, rows[-1]["path m"], simulated=False))
         rows.append(row(f"lidar, {name}, {CLASSIC}", log, truth, SlamConfig.preset("cartographer")))
         disturbed: dict[str, list[str]] = {"odometry noise x 2": [], "a third of the scans lost": []}
         for seed in range(options.seeds):

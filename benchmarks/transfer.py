@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.results import FOLDER, SHARED, Data, Page, Walk, script
+from benchmarks.results import FOLDER, SHARED, Data, NamedWalk, Page, script
 from radarize.io.console import progress
 from radarize.io.recording import Recording
 from radarize.learning.training.dataset import recordings
@@ -142,7 +142,7 @@ def main(options: argparse.Namespace) -> Page:
             notes.append(f"{capture}: {refusal(path)}")
         report(2 * len(found), 2 * len(found))
         real = Data.of("public captures and simulated frames", list(found.values()), options.seed)
-        stands = [Walk(name, options.seed, 0.0, simulated=True) for name in SCENES]
+        stands = [NamedWalk(name, options.seed, 0.0, simulated=True) for name in SCENES]
     draw(shown, FOLDER / "transfer.png")
     return Page(
         rows,

@@ -24,9 +24,9 @@ def of_spectrum(signal: Signal, spectrum: torch.Tensor, times: np.ndarray) -> Ba
 
 
 def of_scans(signal: Signal, scans: np.ndarray, times: np.ndarray) -> Batch:
-    """Of scans in the place of samples, for who makes scans of them."""
+    """Of scans that have been extracted."""
     found = Batch(signal, None, times)
-    found.samples = scans
+    found.ranges = scans
     return found
 
 

@@ -88,7 +88,9 @@ def installed(wheel, tmp_path_factory):
 def test_the_wheel_holds_what_the_repository_does(wheel):
     found = set(zipfile.ZipFile(wheel).namelist())
     scenes = {f"radarsim/scenes/{path.relative_to(ROOT / 'scenes')}" for path in (ROOT / "scenes").rglob("*.*")}
-    weights = {f"radarize/learning/weights/{path.name}" for path in (ROOT / "radarize" / "weights").iterdir()}
+    weights = {
+        f"radarize/learning/weights/{path.name}" for path in (ROOT / "radarize" / "learning" / "weights").iterdir()
+    }
     boards = {f"radarize/radar/boards/{name}.yaml" for name in BOARDS}
     pages = {"radarize/capture/live.html", "radarize/evaluation/report/templates/page.html"}
     types = {f"{package}/{name}" for package in ("radarize", "radarsim") for name in ("__init__.pyi", "py.typed")}

@@ -36,8 +36,10 @@ if TYPE_CHECKING:
 
 
 class LiveOptions(TypedDict, total=False):
-    """How the radar is reached, and what else is done with its frames; the options of ``radarize live``."""
+    """How the radar is reached, what methods are made of, what else is done with frames; options of ``radarize live``."""
 
+    weights: str | Path | None
+    pipeline: Configuration | str | Path | None
     baud: int
     host: str
     dca: str
@@ -216,8 +218,6 @@ def live(
     replay: str | Path | None = None,
     odometry: str | None = None,
     scans: str | None = None,
-    weights: str | Path | None = None,
-    pipeline: Configuration | str | Path | None = None,
     every: int | None = None,
     duration: float | None = None,
     frames: int | None = None,
@@ -233,14 +233,14 @@ def live(
         port: the radar's serial command port.
         replay: a recording (``.h5``) to play instead of a radar.
         odometry, scans: methods by name, see `run`.
-        weights: folder of the networks' weights; by default the shipped ones.
-        pipeline: settings of the pipeline, or a YAML file of them, as ``config`` of `run`.
         every: follow every N-th frame; by default as the networks were taught.
         duration: end after so many s.
         frames: end after so many frames.
-        options: ``baud`` of the port; ``host`` (this computer), ``dca``, ``command_port`` and ``data_port`` of the
-            DCA1000; ``output``: record as well (``.h5``), ``overwrite`` one that is there; ``address`` (``HOST:PORT``)
-            of a local page that shows it, ``foxglove`` of a server for Foxglove.
+        options: ``weights``: folder of the networks' weights, by default the shipped ones; ``pipeline``: its settings,
+            or a YAML file of them, as ``config`` of `run`; ``baud`` of the port; ``host`` (this computer), ``dca``,
+            ``command_port`` and ``data_port`` of the DCA1000; ``output``: record as well (``.h5``), ``overwrite`` one
+            that is there; ``address`` (``HOST:PORT``) of a local page that shows it, ``foxglove`` of a server for
+            Foxglove.
 
     Returns:
         A session to iterate over: a `LiveFrame` for each frame that odometry uses, with pose, velocity and scan.
@@ -262,10 +262,11 @@ def live(
         raise InputError(f"--replay {replay} is given with --config or --port, expected one of the two")
     stream = Replay(Path(replay)) if replay else sensor(config, port, options)
     radar = stream.config
+    weights = options.get("weights")
     best = BEST if weights else best_methods(radar)[0]
     methods = {"odometry": odometry or best["odometry"], "scans": scans or best["scans"]}
     every = every or pace(methods["odometry"], radar)
-    inputs = Inputs(radar, configuration(pipeline), Weights(folder(weights)), every=every)
+    inputs = Inputs(radar, configuration(options.get("pipeline")), Weights(folder(weights)), every=every)
     return LiveSession(stream, inputs, methods, frames_within(duration, frames, radar.frame_period), options)
 
 

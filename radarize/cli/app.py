@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 import typer
 
 from radarize.io.console import new_app
+from radarize.io.plugins import Plugins
 
 app = new_app("Radar-only indoor SLAM on raw I/Q of single-chip mmWave radars.")
 
@@ -26,6 +27,11 @@ Overwrite = Annotated[
     bool, typer.Option("--overwrite", help="Replace a recording that came from a radar, or what was left of one.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
+
+
+def names(group: str) -> str:
+    """Names of a group of entry points, for help."""
+    return ", ".join(Plugins(group, group))
 
 
 def warn(warnings: list[str]) -> None:

@@ -12,6 +12,7 @@ from radarize.cli.app import (
     RecordingFile,
     RunPath,
     app,
+    names,
     warn,
 )
 from radarize.io.console import print_table, progress, working
@@ -21,12 +22,8 @@ from radarize.io.console import print_table, progress, working
 def run_(
     recording: RecordingFile,
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder to write.")],
-    odometry: Annotated[
-        str | None, typer.Option(help="Where motion comes from: fused, learned, doppler or scan-matching.")
-    ] = None,
-    scans: Annotated[
-        str | None, typer.Option(help="How scans are made: segmentation, first-echo, elevation-aware...")
-    ] = None,
+    odometry: Annotated[str | None, typer.Option(help=f"Method of odometry: {names('radarize.odometry')}.")] = None,
+    scans: Annotated[str | None, typer.Option(help=f"Method of scans: {names('radarize.scans')}.")] = None,
     settings: Annotated[
         Reading, typer.Option(help="Reading of the paper: published is --odometry published --scans published.")
     ] = "corrected",

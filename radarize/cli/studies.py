@@ -5,28 +5,28 @@ from typing import Annotated
 
 import typer
 
-from radarize.cli.app import Reading, app
+from radarize.cli.app import Reading, app, names
 from radarize.io.console import print_table, progress
 from radarize.io.errors import InputError
 
 
 @app.command()
 def train(
-    task: Annotated[
-        str, typer.Argument(metavar="TASK", help="translation, rotation, segmentation, radarhd, milliego or rnin.")
-    ],
+    task: Annotated[str, typer.Argument(metavar="TASK", help=f"{names('radarize.tasks')}.")],
     data: Annotated[Path, typer.Option(help="Folder of recordings, see `radarsim dataset`.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="Weights to write (.safetensors).")],
     split: Annotated[str | None, typer.Option(help="Of the data set; else every tenth recording validates.")] = None,
-    width: Annotated[int | None, typer.Option(help="Of the network (16); the paper's is 64.")] = None,
-    frames: Annotated[int | None, typer.Option(help="That the network sees (2, 2, 1).")] = None,
-    epochs: Annotated[int | None, typer.Option(help="At most (30, 30, 5).")] = None,
-    batch: Annotated[int | None, typer.Option(help="Items of a step (128, 128, 48).")] = None,
-    rate: Annotated[float | None, typer.Option(help="Learning rate (1e-3, 1e-3, 1e-4).")] = None,
+    width: Annotated[int | None, typer.Option(help="Width of the network; the paper's is 64.")] = None,
+    frames: Annotated[int | None, typer.Option(help="Frames per input window.")] = None,
+    epochs: Annotated[int | None, typer.Option(help="Maximum number of epochs.")] = None,
+    batch: Annotated[int | None, typer.Option(help="Windows per step.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Learning rate.")] = None,
     schedule: Annotated[str | None, typer.Option(help="Of the rate: plateau, steps, or cosine for few epochs.")] = None,
-    patience: Annotated[int | None, typer.Option(help="Epochs without progress before it ends (15).")] = None,
-    precision: Annotated[str | None, typer.Option(help="Of convolutions: float32, or bfloat16.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Of everything random (0).")] = None,
+    patience: Annotated[
+        int | None, typer.Option(help="Epochs without a better validation loss before it ends.")
+    ] = None,
+    precision: Annotated[str | None, typer.Option(help="Precision of convolutions: float32 or bfloat16.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of weights, order and augmentation.")] = None,
     device: Annotated[str | None, typer.Option(help="cpu or cuda; a GPU where there is one.")] = None,
     workers: Annotated[int, typer.Option(help="Processes that read recordings.")] = 1,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where a training was stopped.")] = False,
@@ -36,14 +36,14 @@ def train(
     ] = None,
     settings: Annotated[Reading, typer.Option(help="Reading of the paper: corrected, or published.")] = "corrected",
 ):
-    """Train a network on recordings; figures in brackets are the three tasks' defaults.
+    """Train a network on recordings. What is not given has the default of the task.
 
     On several GPUs: torchrun --nproc-per-node 4 -m radarize.cli train ...
     """
     from dataclasses import replace
 
     from radarize.learning.task import find_task
-    from radarize.learning.training.train import RealOptions, train
+    from radarize.learning.training.train import TrainOptions, train
 
     if onnx:
         import onnxscript  # noqa: F401  missed now, not after the training
@@ -57,7 +57,7 @@ def train(
     hyper = replace(find_task(task).defaults, **given)
     with progress("train", "with --resume the same command goes on after the last whole epoch") as report:
         written = train(
-            task, data, output, hyper, RealOptions(split, device, workers, resume, onnx, start),
+            task, data, output, hyper, TrainOptions(split, device, workers, resume, onnx, start),
             progress=report, say=lambda line: typer.echo(line, err=True),
         )  # fmt: skip
     print(written)
@@ -70,7 +70,7 @@ def benchmark(
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder to write; goes on where it was left.")] = None,
     methods: Annotated[
         list[str] | None,
-        typer.Option(help="Odometry and scans to compare; by default all that read samples: fused,doppler,threshold."),
+        typer.Option(help="Odometry and scans to compare: fused,doppler,threshold; by default all that read samples."),
     ] = None,
     weights: Annotated[
         Path | None, typer.Option(help="Folder of networks' weights; by default the shipped ones.")
@@ -99,10 +99,9 @@ def benchmark(
     if name == "real":
         return _benchmark_real(data, out, weights, walks, predictions or [], poses, workers, ray)
     from radarize.evaluation.benchmark.run import benchmark as compare
-    from radarize.evaluation.benchmark.study import RealOptions
 
     chosen = [method for word in methods or () for method in word.split(",")]
-    options = RealOptions(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
+    options = Options(chosen, weights, train, epochs, protocol, workers or len(os.sched_getaffinity(0)), ray)
     with progress("benchmark", f"what has ended is kept in {out}, and the same command goes on after it") as report:
         published = compare(name, data, out, options, progress=report, say=lambda line: typer.echo(line, err=True))
     for each in published:

@@ -65,7 +65,7 @@ class PointCloudConfig(Frozen):
     min_range: float = Field(0.2, ge=0)
 
 
-#: For methods that need many points, such as RANSAC over them (`radarize.baselines.ransac`): thresholds 10 dB lower.
+#: For methods that need many points, such as RANSAC over them (`doppler-ransac`): thresholds 10 dB lower.
 DENSE = PointCloudConfig(
     range_cfar=Cfar(window=8, guard=4, smallest=True, threshold=5.0),
     doppler_cfar=Cfar(window=4, guard=2, threshold=5.0),

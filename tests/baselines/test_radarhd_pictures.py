@@ -75,7 +75,7 @@ def test_pictures_become_pictures_of_the_same_half_circle(tmp_path):
 
 def test_shipped_weights_for_maps_say_what_they_said():
     """To the bit: against what is seen of maps written out, and the same layers."""
-    net, header = load(Path(radarize.__file__).parent / "weights" / "radarhd.safetensors", RadarHdNet)
+    net, header = load(Path(radarize.__file__).parent / "learning" / "weights" / "radarhd.safetensors", RadarHdNet)
     rows, azimuths = header.grid.rows, header.grid.azimuths
     noise = torch.Generator().manual_seed(0)
     maps = 10 * torch.randn((2, header.frames, 1, rows, azimuths), generator=noise)

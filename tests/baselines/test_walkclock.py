@@ -1,13 +1,15 @@
 """Clocks of a radar and a lidar beside it."""
 
-from pathlib import Path
+from pathlib import lzma
 
 import numpy as np
+import Path
 import pytest
 
 from radarize.baselines.walks.clock import Clock
+from radarize.io.errors import InputError
 from radarize.signal import polar
-from tests.twoclocks import MadeUp
+from tests.baselines.twoclocks import MadeUp
 
 FRAMES = 400
 
@@ -38,3 +40,12 @@ def test_worlds_that_differ_tell_no_clock():
 
     clock = Clock.of(Strangers(Path(), 7, FRAMES))
     assert (clock.first, clock.rate) == (0.0, 1.0) and clock.alike < 0.1
+
+
+def test_predictions_that_unpack_without_end(tmp_path, monkeypatch):
+    from radarize.baselines.walks import walks
+
+    monkeypatch.setattr(walks, "_LARGEST", 1 << 23)
+    (tmp_path / "1.npz.xz").write_bytes(lzma.compress(bytes(1 << 24), preset=0))
+    with pytest.raises(InputError, match="more than"):
+        walks._packed(tmp_path / "1.npz.xz")

@@ -2,7 +2,6 @@
 
 import io
 import json
-import lzma
 import os
 import time
 import zipfile
@@ -103,15 +102,6 @@ def test_logs_that_unpack_without_end(tmp_path, monkeypatch):
     (tmp_path / "a.log.gz").write_bytes(gzip.compress(b"\n" * (1 << 20)))
     with pytest.raises(InputError, match="more than 65536 bytes"):
         carmen.scans_of(tmp_path / "a.log.gz")
-
-
-def test_predictions_that_unpack_without_end(tmp_path, monkeypatch):
-    from radarize.baselines.walks import walks
-
-    monkeypatch.setattr(walks, "_LARGEST", 1 << 23)
-    (tmp_path / "1.npz.xz").write_bytes(lzma.compress(bytes(1 << 24), preset=0))
-    with pytest.raises(InputError, match="more than"):
-        walks._packed(tmp_path / "1.npz.xz")
 
 
 def a_map(folder, pixels, resolution=0.05):

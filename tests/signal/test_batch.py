@@ -6,7 +6,7 @@ import torch
 
 from radarize.io.errors import InputError
 from radarize.radar.presets import PRESETS
-from radarize.signal.batch import LEAST_SHARE, Batch, Preprocessor, Signal
+from radarize.signal.batch import LEAST_SHARE, Preprocessor, Signal
 from radarize.signal.heatmaps import Heatmaps
 from radarize.signal.points import PointClouds
 from tests.batches import batch, stream
@@ -28,23 +28,9 @@ def adc():
 def test_what_is_made_is_made_once(signal, adc, monkeypatch):
     """However many ask, and anew for the next batch; methods of two objects are two."""
     asked = []
-
-    class Asks:
-        def of(self, one: Batch) -> list[int]:
-            asked.append((self, one))
-            return [len(one)]
-
-    first, second = (batch(signal, adc[:3], np.arange(3)) for _ in range(2))
-    mine, other = Asks(), Asks()
-    assert first.made(mine.of) is first.made(mine.of) and first.made(mine.of) == [3]
-    assert asked == [(mine, first)]
-    assert first.made(other.of) is not first.made(mine.of) and second.made(mine.of) is not first.made(mine.of)
-    assert asked == [(mine, first), (other, first), (mine, second)]
-
     for where, name in ((Heatmaps, "spectrum"), (PointClouds, "of")):
         whole = getattr(where, name)
         monkeypatch.setattr(where, name, lambda *of, whole=whole, name=name: asked.append(name) or whole(*of))
-    asked.clear()
     third = batch(signal, adc[:3], np.arange(3))
     assert not asked and third.spectrum is third.spectrum and third.points is third.points
     assert asked == ["spectrum", "of"]
@@ -119,7 +105,7 @@ def test_maps_alone(signal):
     assert np.array_equal(first.maps(("picture",))["picture"], shown) and len(first) == 2
     assert np.array_equal(second.numbers, [2, 3]) and len(second) == 2 and preprocessor.lost == 0
     stamps = CONFIG.frame_period * np.array([5, 6])
-    third = Preprocessor(Signal(CONFIG.every(2)), every=2).take_maps({"picture": shown}, stamps)
+    third = Preprocessor(Signal(CONFIG.every(2)), every=2).process_maps({"picture": shown}, stamps)
     assert np.array_equal(third.maps(("picture",))["picture"], shown[:1]) and third.stamps.tolist() == [stamps[0]]
     with pytest.raises(InputError, match=r"frames from 0.233 s on have no samples, only picture"):
         _ = second.spectrum

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from radarize.baselines.walks.clouds import Apart
 from radarize.radar.presets import PRESETS
 from radarize.signal import polar
 
@@ -89,17 +88,3 @@ def test_a_wall_in_the_lidars_picture():
     picture[tuple(polar.lidar_pixels(np.concatenate([wall, wall + [0, 0, 0.4], -wall])).T)] = True
     points = polar.cartesian(picture)
     assert np.abs(points[:, 0] - 2.0).max() < 0.11 and np.ptp(points[:, 1]) == pytest.approx(6.0, abs=0.15)
-
-
-def test_measures_of_points():
-    """Against brute force; and a cloud that is 0.3 m off is 0.3 m off."""
-    rng = np.random.default_rng(0)
-    a, b = rng.uniform(0, 5, (40, 2)), rng.uniform(0, 5, (70, 2))
-    apart = np.linalg.norm(a[:, None] - b[None], axis=2)
-    found = Apart.of(a, b)
-    assert found.chamfer == pytest.approx((apart.min(axis=1).mean() + apart.min(axis=0).mean()) / 2)
-    assert found.hausdorff == pytest.approx(max(np.median(apart.min(axis=1)), np.median(apart.min(axis=0))))
-    line = np.stack([np.zeros(50), np.linspace(0, 5, 50)], axis=1)
-    moved = Apart.of(line, line + [0.3, 0])
-    assert moved.chamfer == pytest.approx(0.3) and moved.hausdorff == pytest.approx(0.3)
-    assert np.isnan(Apart.of(line[:0], line).chamfer)

@@ -32,8 +32,8 @@ from radarize.baselines.real.points import Distances, Judged, judge
 from radarize.baselines.walks.clock import Clock
 from radarize.baselines.walks.poses import by_instant, poses_of
 from radarize.baselines.walks.walks import PERIOD, Predictions, Walk
+from radarize.evaluation.benchmark.choices import NamedWalk as Facts
 from radarize.evaluation.benchmark.results import Data, Results, UsedNetwork, command, machine
-from radarize.evaluation.benchmark.results import Walk as Facts
 from radarize.evaluation.benchmark.table import Table
 from radarize.io.errors import InputError
 from radarize.io.jobs import Report, perform

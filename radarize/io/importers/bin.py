@@ -175,8 +175,14 @@ def _open(source: Path, given: Given, _: Path) -> Capture:
     return open_bin(parts(source), config, given.cfg_text, assumed, encoding=given.encoding, layout=given.layout)
 
 
+def of_studio(source: Path) -> bool:
+    """Whether the settings of mmWave Studio lie beside a ``.bin``, and no ``.cfg`` of its name."""
+    configured = whole_name(source).with_suffix(".cfg").is_file()
+    return not configured and len(list(source.parent.glob("*.mmwave.json"))) == 1
+
+
 def _fits(source: Path) -> bool:
-    return source.suffix.lower() == ".bin" and not source.is_dir()
+    return source.suffix.lower() == ".bin" and not source.is_dir() and not of_studio(source)
 
 
-FORMAT = Format(".bin", "a DCA1000 .bin", _fits, _open, options=("encoding", "layout"), last=True)
+FORMAT = Format(".bin", "a DCA1000 .bin", _fits, _open, options=("encoding", "layout"))

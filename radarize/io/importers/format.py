@@ -25,7 +25,7 @@ class Format:
         write: writes the recording of a format without samples (such as one of pictures): source, output, what the user
             says, further data sets, progress. None of a format with samples.
         options: fields of `Given` that belong to this format and some others only.
-        last: asked after all other formats.
+        last: asked after all other formats, such as one of any folder.
     """
 
     noun: str

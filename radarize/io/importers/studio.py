@@ -3,16 +3,11 @@
 from pathlib import Path, PureWindowsPath
 
 from radarize.io.errors import InputError
-from radarize.io.importers.bin import open_bin, parts, whole_name
+from radarize.io.importers.bin import of_studio, open_bin, parts
 from radarize.io.importers.capture import Capture
 from radarize.io.importers.format import Format
 from radarize.io.importers.parameters import Given
 from radarize.radar.studio import load_json, load_studio
-
-
-def beside(source: Path) -> bool:
-    """Whether exactly one settings file lies beside a ``.bin``."""
-    return len(list(source.parent.glob("*.mmwave.json"))) == 1
 
 
 def open_studio(source: Path, given: Given) -> Capture:
@@ -69,8 +64,7 @@ def _one(folder: Path, pattern: str) -> Path:
 def _fits(source: Path) -> bool:
     if source.is_dir():
         return not (source / "metadata.yaml").is_file()
-    configured = whole_name(source).with_suffix(".cfg").is_file()
-    return source.suffix.lower() == ".bin" and not configured and beside(source)
+    return source.suffix.lower() == ".bin" and of_studio(source)
 
 
 FORMAT = Format(

@@ -104,7 +104,7 @@ def test_what_cannot_run_is_a_dash_with_a_reason(rooms, toys, tmp_path):
 
 def test_runs_are_done_once(rooms, toys, tmp_path, monkeypatch):
     benchmark("odometry", rooms, tmp_path, Options(toys))
-    monkeypatch.setattr("radarize.evaluation.benchmark.runs.run_each", None)  # would break whatever runs now
+    monkeypatch.setattr("radarize.evaluation.benchmark.runs.run_recording", None)  # would break whatever runs now
     benchmark("odometry", rooms, tmp_path, Options(toys))
     found = benchmark("buildings", rooms, tmp_path, Options(toys))["buildings"]  # B_robot is new
     assert any("scaled+metre: - on 1 of 3 recordings" in note for note in found.notes)
@@ -244,8 +244,8 @@ def test_a_protocol_means_the_same_in_every_table(rooms, toys, tmp_path, monkeyp
 @pytest.mark.parametrize(
     ("name", "choices", "expected"),
     [
-        ("odometri", {}, "benchmark is 'odometri', expected one of: odometry, odometry-platforms, slam"),
-        ("odometry", {"methods": ["dopler"]}, "methods names 'dopler', expected some of: fused, learned"),
+        ("odometri", {}, "benchmark is 'odometri', expected one of: ablation, buildings, mapping"),
+        ("odometry", {"methods": ["dopler"]}, "methods names 'dopler', expected some of: doppler, doppler-ransac"),
         ("odometry", {"protocol": "mine"}, "protocol is 'mine', expected one of: paper, mended"),
         ("odometry", {"weights": Path("none")}, "weights is none, expected a folder"),
         ("odometry", {"weights": Path(), "trained": True}, "weights . are given with --train, expected one"),

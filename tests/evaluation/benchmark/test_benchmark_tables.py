@@ -12,7 +12,7 @@ from radarize.evaluation.benchmark import odometry, runtime
 from radarize.evaluation.benchmark.choices import CHOICES, EVALUATION, helped
 from radarize.evaluation.benchmark.dataset import DataSet, groups
 from radarize.evaluation.benchmark.followed import FrameErrors
-from radarize.evaluation.benchmark.results import Data, Results, UsedNetwork, Walk, command, commit
+from radarize.evaluation.benchmark.results import Data, NamedWalk, Results, UsedNetwork, command, commit
 from radarize.evaluation.benchmark.table import PAPER, Table
 from radarize.evaluation.metrics import evaluate_trajectory
 from radarize.io.alignment import trajectory
@@ -110,7 +110,9 @@ def test_stages_add_up_as_in_the_paper():
 MACHINE = {"processor": "abacus", "cores": "2", "version": "0", "commit": "abc (clean)"}
 NETWORK = UsedNetwork("rotation", 1234567, "training", "random-0", 5)
 TABLE = Table("One", [{"who": "a", "x": 0.12345, "n": 3}, {"who": "b", "x": np.nan, "n": None}], ["A note."])
-RESULTS = Results("Two", [TABLE], Data("d", (Walk("office", 7, 12.3, True),), 5), (NETWORK,), "c", ["Of all."], MACHINE)
+RESULTS = Results(
+    "Two", [TABLE], Data("d", (NamedWalk("office", 7, 12.3, True),), 5), (NETWORK,), "c", ["Of all."], MACHINE
+)
 
 
 def test_a_page_says_what_it_is_worth_and_can_be_read_again(tmp_path):
@@ -161,13 +163,13 @@ def test_a_recording_tells_its_way_and_whether_it_is_real(rooms):
 def test_which_recordings_helped_to_choose_is_looked_up():
     tasks = Specification.load("evaluation").tasks
     assert [task.seed for task in tasks] == [seed for seeds in EVALUATION.values() for seed in seeds]
-    walks = [Walk(scene, seed, 1.0, True) for scene, seeds in EVALUATION.items() for seed in seeds]
+    walks = [NamedWalk(scene, seed, 1.0, True) for scene, seeds in EVALUATION.items() for seed in seeds]
     said = helped(walks)
     assert len(said) == 2 and said[0].startswith("at most 4 of 15 helped to choose the probability")
     assert helped(walks[:2])[1].startswith("at most 2 of 2")
     others = [replace(walk, seed=1) for walk in walks]
     assert helped(others) == ["none helped to choose settings", "other walks through A_0, B_0, C_0, D_0, office did"]
-    assert helped([Walk("elsewhere", 1, 1.0, True)]) == ["none helped to choose settings"]
+    assert helped([NamedWalk("elsewhere", 1, 1.0, True)]) == ["none helped to choose settings"]
     assert all(choice.recordings for choice in CHOICES)
 
 

@@ -31,7 +31,7 @@ def test_jobs_end_as_they_do_here(cluster, tmp_path, monkeypatch):
 
 def test_steps_are_done_on_nodes(cluster, tmp_path):
     (tmp_path / "notes").mkdir()
-    steps = [Note("t", alone=True), Note("a"), Note("b1", together="b"), Note("b2", together="b")]
+    steps = [Note("t", alone=True), Note("a"), Note("b1"), Note("b2")]
     steps.append(Note("c", trouble="no"))
     moved = []
     found = do_steps(steps, tmp_path, 1, lambda *where: moved.append(where), ray=cluster)

@@ -113,10 +113,9 @@ def test_loading_imports_no_compiler():
     script = """
 import sys
 from radarize.pipeline.method import Weights
-from radarize.baselines.milliego.network import MilliEgoNet
-from radarize.learning.nets.motion import RotationNet
+from radarize.learning.nets.motion import RotationNet, TranslationNet
 from radarize.learning.nets.weights import load
-for network in (MilliEgoNet, RotationNet):
+for network in (TranslationNet, RotationNet):
     load(Weights().of(network.kind), network)
 print("torch" in sys.modules, "torch._dynamo" in sys.modules)
 """

@@ -169,7 +169,7 @@ class Watched(module.Trainer):
         return found
 module.Trainer = Watched
 from radarize.learning.task import Settings
-options = module.Options(device="cpu")
+options = module.TrainOptions(device="cpu")
 module.train("translation", {str(small)!r}, {str(tmp_path / "net.safetensors")!r}, settings={TINY!r}, options=options)
 """
     (tmp_path / "both.py").write_text(code)
@@ -237,7 +237,7 @@ def test_the_command(tmp_path):
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        ({"kind": "flight"}, "task is 'flight', expected one of milliego, rotation, segmentation"),
+        ({"kind": "flight"}, "task is 'flight', expected one of milliego, picture-turns, pictures"),
         ({"settings": replace(TINY, batch=0)}, "batch is 0, expected a positive number"),
         ({"settings": replace(TINY, frames=70)}, "training has 0 windows of 70 frames"),
         ({"kind": "rotation", "settings": replace(TINY, frames=1)}, "frames is 1, expected at least 2"),

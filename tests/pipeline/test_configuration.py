@@ -55,7 +55,7 @@ def test_methods_get_their_settings():
     )
     inputs = Inputs(PRESETS["radarize"], mine)
     pipeline = make_pipeline(inputs, "doppler", "first-echo")
-    assert inputs.signal.heatmaps.settings.loading == 0.3 and pipeline.scanner.config.min_range == 1.5
+    assert inputs.signal.heatmaps.settings.loading == 0.3 and pipeline.extractor.config.min_range == 1.5
     assert pipeline.odometry.rotation._heatmaps.settings.loading == 0.3
     assert pipeline.slam.config == mine.slam
 

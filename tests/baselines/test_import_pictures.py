@@ -18,7 +18,7 @@ from radarize.io.pose import between
 from radarize.io.recording import Recording
 from radarize.io.tum import planar, read_tum, write_tum
 from radarize.signal import polar
-from tests.twoclocks import MadeUp
+from tests.baselines.twoclocks import MadeUp
 
 
 @pytest.fixture
@@ -129,7 +129,7 @@ def test_which_walk(clone, tmp_path):
     for source, walk, words in (
         (clone, None, "--walk is missing"),
         (clone, 8, "has no walk 8"),
-        (tmp_path, 7, "dataset_5"),
+        (tmp_path, 7, "is no data set of RadarHD's walks, but walk is 7, expected none"),
     ):
         with pytest.raises(InputError, match=words):
             import_recording(source, tmp_path / "x.h5", Given(walk=walk))

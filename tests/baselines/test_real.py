@@ -20,7 +20,7 @@ from radarize.io.pose import between
 from radarize.io.tum import planar_poses, write_tum
 from radarize.signal import polar
 from tests.baselines.test_radarhd_pictures import repeating, weights
-from tests.twoclocks import MadeUp
+from tests.baselines.twoclocks import MadeUp
 
 FRAMES = 46
 

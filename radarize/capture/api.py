@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class LiveOptions(TypedDict, total=False):
-    """How the radar is reached, what methods are made of, what else is done with frames; options of ``radarize live``."""
+    """How the radar is reached, what methods are made of, what else is done with frames: of ``radarize live``."""
 
     weights: str | Path | None
     pipeline: Configuration | str | Path | None

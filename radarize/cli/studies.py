@@ -89,15 +89,16 @@ def benchmark(
     """Compare methods on recordings: tables, plots and a page, with the paper's figures beside ours."""
     import os
 
-    from radarize.evaluation.benchmark.study import BENCHMARKS
+    from radarize.evaluation.benchmark.study import BENCHMARKS, Options, OwnBenchmark
 
     if name == "list":
         return print_table(("benchmark", "what it compares"), [(each, of.about) for each, of in BENCHMARKS.items()])
     for option, value in (("--data", data), ("--out", out)):
         if value is None:
             raise InputError(f"{option} is missing, expected a folder")
-    if name == "real":
-        return _benchmark_real(data, out, weights, walks, predictions or [], poses, workers, ray)
+    if name in BENCHMARKS and isinstance(own := BENCHMARKS[name], OwnBenchmark):
+        given = {"weights": weights, "walks": walks, "poses": poses, "workers": workers, "ray": ray}
+        return own.compare(data, out, predictions=predictions or [], **given)
     from radarize.evaluation.benchmark.run import benchmark as compare
 
     chosen = [method for word in methods or () for method in word.split(",")]

@@ -89,7 +89,7 @@ class CaptureCard:
     def __enter__(self) -> "CaptureCard":
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self._socket.close()
 
     def configure(self, config: RadarConfig) -> str:

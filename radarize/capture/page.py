@@ -4,8 +4,10 @@ import contextlib
 import ipaddress
 import json
 import threading
+from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from socket import socket
 from urllib.parse import urlsplit
 
 from radarize.evaluation.report.page import STYLE
@@ -15,6 +17,8 @@ from radarize.io.errors import InputError
 _KEEP_ALIVE = 5.0
 #: Connections at a time: each browser holds one, and a second while it loads the page.
 _CLIENTS = 32
+#: What socketserver hands its methods.
+_Request = socket | tuple[bytes, socket]
 
 
 class Unwatched:
@@ -61,7 +65,7 @@ class LivePage:
         self._thread.start()
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         with self._changed:
             self._closed = True
             self._changed.notify_all()
@@ -81,7 +85,7 @@ class LivePage:
             self._newest[name] = self._count, data
             self._changed.notify_all()
 
-    def follow(self, write) -> None:
+    def follow(self, write: Callable[[bytes], object]) -> None:
         """Write events as they come until the page closes; runs in a browser's thread."""
         seen = 0
         with self._changed:
@@ -107,28 +111,29 @@ class _Server(ThreadingHTTPServer):
     name: str  # of the address that was given
     daemon_threads = False  # so that closing waits for the last events
 
-    def __init__(self, *arguments):
+    def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]):
         self._room = threading.BoundedSemaphore(_CLIENTS)
-        super().__init__(*arguments)
+        super().__init__(address, handler)
 
-    def process_request(self, request, client_address) -> None:
+    def process_request(self, request: _Request, client_address: object) -> None:
         """Answer in a thread of its own, while there is room."""
         if self._room.acquire(blocking=False):
             super().process_request(request, client_address)
             return
         words = f"{_CLIENTS} connections are open already, which is as many as this page serves; close one\n"
+        assert isinstance(request, socket)  # over TCP; over UDP it would be a pair
         with contextlib.suppress(OSError):
             request.sendall(f"HTTP/1.0 503 Service Unavailable\r\nContent-Type: text/plain\r\n\r\n{words}".encode())
         self.shutdown_request(request)
 
-    def process_request_thread(self, request, client_address) -> None:
+    def process_request_thread(self, request: _Request, client_address: object) -> None:
         """Make room again when a connection ends."""
         try:
             super().process_request_thread(request, client_address)
         finally:
             self._room.release()
 
-    def handle_error(self, request, client_address) -> None:
+    def handle_error(self, request: _Request, client_address: object) -> None:
         """A browser that went away is no error."""
 
 
@@ -166,5 +171,5 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Cache-Control", "no-store")
         self.end_headers()
 
-    def log_message(self, *_) -> None:
+    def log_message(self, *_: object) -> None:
         """The terminal is for the user's own."""

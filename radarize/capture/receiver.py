@@ -63,7 +63,7 @@ class Origin:
         self._since = 0.0
         self.foreign = 0
 
-    def take(self, sender: tuple[str, int], data: bytes) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def take(self, sender: tuple[str, int], data: bytes | memoryview) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """As `FrameAssembler.take`, of what came from a sender."""
         address, port = sender
         if address != self._address or self._port not in (None, port):
@@ -89,7 +89,8 @@ class Origin:
             return PacketCounts()
         assembler = self._known[self._port]
         passed = (1 + _DRIFT) * (time.monotonic() - self._since) + _AHEAD
-        assembler.furthest = assembler.begun + self._rate * passed
+        if assembler.begun is not None:  # else nothing but damaged packets came
+            assembler.furthest = assembler.begun + self._rate * passed
         return assembler.counts
 
     def finish(self) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -108,7 +109,7 @@ def receive(outlet: Outlet, receiver: socket.socket, sender: str, config: RadarC
     buffer = bytearray(HEADER.size + MAX_PAYLOAD + 1)
     view = memoryview(buffer)
 
-    def put(words, valid) -> None:
+    def put(words: np.ndarray, valid: np.ndarray) -> None:
         time_ = outlet.counts.frames * config.frame_period
         outlet.put(time_, decode(words, config)[0], valid)
 

@@ -4,9 +4,13 @@ import contextlib
 import signal
 import time
 from collections.abc import Callable, Iterator
+from ctypes import Array, c_double
 from dataclasses import astuple, dataclass, fields
 from multiprocessing import parent_process
+from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Event as Flag
 from threading import Event
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -40,10 +44,13 @@ class StreamCounts:
     first: float = 0.0
 
 
+_Counts = TypeVar("_Counts", StreamCounts, PacketCounts)
+
+
 class Outlet:
     """The filling process's end of a stream: what a source (`Source`) writes to."""
 
-    def __init__(self, ring: FrameRing, stop, ready, shared):
+    def __init__(self, ring: FrameRing, stop: Flag, ready: Flag, shared: Array[c_double]):
         self.ring, self._stop, self._ready, self._shared = ring, stop, ready, shared
         self.counts = StreamCounts()
 
@@ -68,7 +75,9 @@ class Outlet:
     @property
     def orphaned(self) -> bool:
         """Whether the reader is gone."""
-        return not parent_process().is_alive()
+        reader = parent_process()
+        assert reader is not None  # this is the filling process
+        return not reader.is_alive()
 
 
 #: Fills an outlet until it is stopped or has no more; runs in the stream's process, so it must be a module's function.
@@ -112,7 +121,7 @@ class FrameStream:
                 raise InputError("the receiving process does not start; is there memory left?")
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         if self._process.pid is None:
             return
         self._stop.set()
@@ -165,12 +174,13 @@ class FrameStream:
         return _read(PacketCounts, self._counts[len(fields(StreamCounts)) :])
 
 
-def _read(kind: type, values: list[float]):
+def _read(kind: type[_Counts], values: list[float]) -> _Counts:
     named = zip(fields(kind), values, strict=True)
-    return kind(**{field.name: value if field.type is float else int(value) for field, value in named})
+    counts: dict[str, Any] = {field.name: value if field.type is float else int(value) for field, value in named}
+    return kind(**counts)
 
 
-def _fill(source: Source, arguments: tuple, shared: tuple, failure) -> None:
+def _fill(source: Source, arguments: tuple, shared: tuple, failure: Connection) -> None:
     # A terminal's signals come here, too; but the main process ends this one, when everything has been received.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)

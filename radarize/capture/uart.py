@@ -50,7 +50,7 @@ class Uart:
     def __enter__(self) -> "Uart":
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self._serial.close()
 
     def configure(self, text: str) -> None:

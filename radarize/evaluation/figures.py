@@ -1,8 +1,7 @@
 """What a figure is called, and where it stands in what `radarize.evaluation` found."""
 
 from collections.abc import Mapping
-from functools import reduce
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 #: What stands where there is no figure.
 NONE = "-"
@@ -25,5 +24,7 @@ class Figure(NamedTuple):
 
     def text(self, metrics: Mapping[str, object], unit: bool = True) -> str:
         """Value and unit; metrics are nested."""
-        value = reduce(lambda found, key: (found or {}).get(key), self.path.split("."), metrics)
+        value: Any = metrics
+        for key in self.path.split("."):
+            value = (value or {}).get(key)
         return NONE if value is None else f"{self.factor * value:{self.form}} {self.unit * unit}".strip()

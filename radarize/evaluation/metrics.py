@@ -6,6 +6,7 @@ published tables, relative rotation is a true relative error. Transformations an
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from typing import overload
 
 import numpy as np
 from evo.core.metrics import APE, RPE, PoseRelation
@@ -164,8 +165,16 @@ def _relative_errors(
 ) -> dict[str, Statistics]:
     q, p = reference.poses_se3, estimate.poses_se3
     errors = np.array([RPE.rpe_base(q[i], q[j], p[i], p[j]) for i, j in pairs]).reshape(-1, 4, 4)
-    angles = Rotation.from_matrix(errors[:, :3, :3]).magnitude() if len(errors) else []
+    angles = Rotation.from_matrix(errors[:, :3, :3]).magnitude() if len(errors) else np.empty(0)
     return {"position": Statistics.of(np.linalg.norm(errors[:, :3, 3], axis=1)), "rotation": Statistics.of(angles)}
+
+
+@overload
+def without_nan(content: dict[str, object]) -> dict[str, object]: ...
+
+
+@overload
+def without_nan(content: object) -> object: ...
 
 
 def without_nan(content: object) -> object:

@@ -133,7 +133,8 @@ def fitted(
     Raises:
         InputError: fewer than three poses match.
     """
-    return alignment(*map(planar, matched(estimate, reference)), in_plane=True)
+    estimate, reference = matched(estimate, reference)
+    return alignment(planar(estimate), planar(reference), in_plane=True)
 
 
 def moved(path: PoseTrajectory3D, turn: Float[np.ndarray, "3 3"], shift: Float[np.ndarray, "3"]) -> PoseTrajectory3D:

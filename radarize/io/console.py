@@ -7,7 +7,8 @@ import threading
 import time
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Annotated
+from types import FrameType
+from typing import Annotated, Any
 
 import typer
 
@@ -35,7 +36,7 @@ def new_app(about: str) -> typer.Typer:
         allow_outside: Annotated[
             bool, typer.Option("--allow-outside", help="Let scenes, maps and data sets name files in other folders.")
         ] = False,
-    ):
+    ) -> None:
         del debug, allow_outside  # taken from the arguments by `run`, so that they work in any place
 
     return app
@@ -103,16 +104,16 @@ def progress(label: str, stopped: str = "") -> Iterator[Callable[..., None]]:
 def _bars(label: str) -> Iterator[Callable[..., None]]:
     """Until the first call, while things are being prepared, a spinner turns; so an error then comes without a bar."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
     from rich.progress import TimeRemainingColumn as TimeLeftColumn
 
     console = Console(stderr=True)
     spinner = console.status(f"{label}: preparing")
     text = TextColumn("{task.description:<20}")
     bars = Progress(text, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeLeftColumn(), console=console)
-    tasks: dict[str, int] = {}
+    tasks: dict[str, TaskID] = {}
 
-    def move(*where) -> None:
+    def move(*where: Any) -> None:
         *stage, done, total = where
         name = stage[0] if stage else label
         if not tasks:
@@ -136,7 +137,7 @@ def _lines(label: str) -> Iterator[Callable[..., None]]:
     start, ended, moved = time.monotonic(), threading.Event(), [""]
     begun: dict[str, tuple[float, float]] = {}  # by stage: when, and how much was done then
 
-    def move(*where) -> None:
+    def move(*where: Any) -> None:
         *stage, done, total = where
         name, now = (f"{label}, {stage[0]}" if stage else label), time.monotonic()
         since, before = begun.setdefault(name, (now, done))
@@ -224,7 +225,7 @@ def until_interrupted() -> Iterator[threading.Event]:
     asked = threading.Event()
     signals = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
-    def note(number, frame) -> None:
+    def note(number: int, frame: FrameType | None) -> None:
         if asked.is_set():
             raise KeyboardInterrupt
         asked.set()

@@ -1,6 +1,5 @@
 """Pictures from elsewhere, whose headers are asked before anything is unpacked."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,7 +15,7 @@ MOST_PIXELS = 16 << 20
 
 
 def read_picture(
-    source: Path | BinaryIO, name: str, formats: Sequence[str] = ("PNG",), most: int = MOST_PIXELS, gray: bool = True
+    source: Path | BinaryIO, name: str, formats: tuple[str, ...] = ("PNG",), most: int = MOST_PIXELS, gray: bool = True
 ) -> UInt[np.ndarray, "row column ..."]:
     """A picture's pixels.
 

@@ -15,7 +15,7 @@ class Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-def setting(default: object, about: str, **limits: object) -> Any:
+def setting(default: object, about: str, **limits: Any) -> Any:
     """A field that somebody may set: its default, what it means, with its unit, and limits as of pydantic's `Field`.
 
     Numbers without an upper limit of their own have `MOST`: what is computed from them stays finite.

@@ -1,5 +1,7 @@
 """Planar poses as arrays (..., 3): x m, y m, yaw rad. Leading axes broadcast."""
 
+from typing import overload
+
 import numpy as np
 from jaxtyping import Float
 
@@ -8,6 +10,14 @@ Pose = Float[np.ndarray, "*#batch 3"]
 
 #: Quaternion x y z w of an optical frame (x right, y down, z forward: REP 103) in one with x forward, y left, z up.
 OPTICAL_TURN = (-0.5, 0.5, -0.5, 0.5)
+
+
+@overload
+def wrap(angle: float) -> float: ...
+
+
+@overload
+def wrap(angle: np.ndarray) -> np.ndarray: ...
 
 
 def wrap(angle: np.ndarray | float) -> np.ndarray | float:

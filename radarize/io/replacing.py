@@ -80,6 +80,7 @@ class Replacement:
                     self.folder.rmdir()
 
     def _let_go(self) -> None:
+        assert self._held is not None  # only once, after `place` there is nothing to discard
         shutil.rmtree(self.part, ignore_errors=True)
         os.close(self._held)
         self._held = None

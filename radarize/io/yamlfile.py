@@ -98,8 +98,8 @@ def read_settings(path: str | Path, defaults: Settings, expected: str) -> Settin
 def changed(settings: BaseModel, changes: dict[str, object]) -> dict[str, object]:
     """The fields of settings, with some of them changed: those of settings within settings, too, however deep."""
     within = {
-        name: changed(part, changes[name])
-        for name in changes
-        if isinstance(part := getattr(settings, str(name), None), BaseModel) and isinstance(changes[name], dict)
+        name: changed(part, change)
+        for name, change in changes.items()
+        if isinstance(part := getattr(settings, str(name), None), BaseModel) and isinstance(change, dict)
     }
     return settings.model_dump() | changes | within

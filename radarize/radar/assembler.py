@@ -141,7 +141,7 @@ class FrameAssembler:
         self._partial: dict[int, _PartialFrame] = {}
         self._doubtful = _Doubtful(window)
 
-    def take(self, data: bytes) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    def take(self, data: bytes | memoryview) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """As `add`, with a UDP payload; one that is no data packet is counted as damaged."""
         try:
             packet = Packet.decode(data)

@@ -107,7 +107,7 @@ class Packet:
         return HEADER.pack(self.sequence, self.offset & 0xFFFFFFFF, self.offset >> 32) + self.payload
 
     @classmethod
-    def decode(cls, data: bytes) -> "Packet":
+    def decode(cls, data: bytes | memoryview) -> "Packet":
         """Read a UDP payload.
 
         Raises:

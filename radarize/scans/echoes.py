@@ -6,6 +6,7 @@ first occupied cell is the echo suppression (paper, section 4.3).
 
 import numpy as np
 from jaxtyping import Bool, Float
+from numpy.typing import ArrayLike
 
 
 def first(
@@ -38,7 +39,7 @@ def at(
     return np.where(np.isfinite(bins), ranges[0] + bins * (ranges[1] - ranges[0]), np.inf)
 
 
-def _peak(candidates: np.ndarray, power: np.ndarray, seen: np.ndarray) -> np.ndarray:
+def _peak(candidates: np.ndarray, power: np.ndarray, seen: ArrayLike) -> np.ndarray:
     # Vertex of the parabola through log power at the strongest cell and its two neighbours.
     bins = power.shape[1]
     peak = np.where(candidates, power, -1.0).argmax(axis=1)

@@ -167,7 +167,10 @@ class Heatmaps:
         return x.transpose(-1, -2) @ x.conj() / self._loop_energy
 
     def range_azimuth(
-        self, adc, valid=None, method: Literal["bartlett", "capon"] = "bartlett"
+        self,
+        adc: Real[np.ndarray, "frame loop tx rx sample 2"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+        method: Literal["bartlett", "capon"] = "bartlett",
     ) -> Float32[torch.Tensor, "frame range azimuth"]:
         """Power over range and azimuth of the longest horizontal row of antennas.
 
@@ -183,7 +186,11 @@ class Heatmaps:
         covariance = self.covariance(spectrum, self.row)
         return self._capon(covariance) if method == "capon" else self._bartlett(covariance, self._steering)
 
-    def elevation_aware(self, adc, valid=None) -> Float32[torch.Tensor, "frame range azimuth"]:
+    def elevation_aware(
+        self,
+        adc: Real[np.ndarray, "frame loop tx rx sample 2"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+    ) -> Float32[torch.Tensor, "frame range azimuth"]:
         """Power over range and azimuth of antenna pairs half a wavelength apart in height, averaged.
 
         The mean of a pair passes the horizon and nulls the zenith (paper, section 4), so echoes of ceiling and floor
@@ -196,17 +203,17 @@ class Heatmaps:
 
     def elevation_aware_of(self, spectrum: torch.Tensor) -> torch.Tensor:
         """`elevation_aware` of a spectrum at hand."""
-        covariance = self.covariance(self._paired(spectrum).mean(dim=-1), np.arange(len(self.pairs)))
-        return self._bartlett(covariance, self._pair_steering)
+        x, steering = self._paired(spectrum)
+        return self._bartlett(self.covariance(x, np.arange(len(steering))), steering)
 
-    def _paired(self, spectrum: torch.Tensor) -> torch.Tensor:
-        """Spectra of the elevation pairs, lower and upper along a last axis."""
-        if self.pairs is None:
+    def _paired(self, spectrum: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Spectra of the elevation pairs, each the mean of lower and upper, and their steering phasors."""
+        if self.pairs is None or self._pair_steering is None:
             raise InputError(
                 f"tx {self.config.tx} and rx {self.config.rx} of {self.config.board} hold no antenna pairs of "
                 "different height, expected all three transmitters for elevation"
             )
-        return spectrum[..., torch.as_tensor(self.pairs)]
+        return spectrum[..., torch.as_tensor(self.pairs)].mean(dim=-1), self._pair_steering
 
     def _bartlett(self, covariance: torch.Tensor, steering: torch.Tensor) -> torch.Tensor:
         beams = steering * self._taper(len(steering))
@@ -233,7 +240,11 @@ class Heatmaps:
         y = x @ beams
         return y.real.square() + y.imag.square()
 
-    def doppler_azimuth(self, adc, valid=None) -> Float32[torch.Tensor, "frame doppler azimuth"]:
+    def doppler_azimuth(
+        self,
+        adc: Real[np.ndarray, "frame loop tx rx sample 2"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+    ) -> Float32[torch.Tensor, "frame doppler azimuth"]:
         """Power over speed and azimuth, summed over range: a static world draws v cos(phi - theta)."""
         return self.doppler_azimuth_of(self.spectrum(adc, valid))
 
@@ -252,7 +263,7 @@ class Heatmaps:
             InputError: `elevation_aware` without elevation pairs.
         """
         if elevation_aware:
-            x, steering = self._paired(spectrum).mean(dim=-1), self._pair_steering
+            x, steering = self._paired(spectrum)
         else:
             x, steering = spectrum[..., torch.as_tensor(self.row)], self._steering
         x = x.transpose(1, 2)  # (frame, doppler, range, antenna)
@@ -264,7 +275,11 @@ class Heatmaps:
         """Power over range and speed of a spectrum at hand, averaged over all antennas."""
         return spectrum.abs().square().mean(dim=-1)
 
-    def range_profile(self, adc, valid=None) -> Float32[torch.Tensor, "frame range"]:
+    def range_profile(
+        self,
+        adc: Real[np.ndarray, "frame loop tx rx sample 2"],
+        valid: Bool[np.ndarray, "frame loop tx"] | None = None,
+    ) -> Float32[torch.Tensor, "frame range"]:
         """Power over range, summed over Doppler and averaged over all antennas."""
         return self.range_profile_of(self.spectrum(adc, valid))
 

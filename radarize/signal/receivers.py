@@ -34,7 +34,9 @@ class Receivers:
             self._fill(cells, np.flatnonzero(broken[frame]), np.flatnonzero(~broken[frame]))
         return spectrum
 
-    def _fill(self, cells: Complex64[torch.Tensor, "range doppler tx rx"], broken: np.ndarray, whole: np.ndarray):
+    def _fill(
+        self, cells: Complex64[torch.Tensor, "range doppler tx rx"], broken: np.ndarray, whole: np.ndarray
+    ) -> None:
         """In place."""
         step = sum(
             (cells[..., b] * cells[..., a].conj()).sum(dim=-1, keepdim=True)

@@ -1,13 +1,19 @@
 """Drawings of heat maps and scans with matplotlib, transparent and in neutral ink."""
 
+from typing import TYPE_CHECKING
+
 import matplotlib
 import numpy as np
 from jaxtyping import Float
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from radarize.evaluation.report.page import COLORS, INK
 
-_STYLE = {
+if TYPE_CHECKING:  # matplotlib 3.10 has no such name yet
+    from matplotlib.typing import RcKeyType
+
+_STYLE: "dict[RcKeyType, object]" = {
     "text.color": INK,
     "axes.labelcolor": INK,
     "axes.edgecolor": INK,
@@ -24,7 +30,7 @@ DEPTH, LEAKAGE = 45.0, 0.25
 _MAP = "magma"
 
 
-def canvas(columns: int, rows: int = 1, width: float = 11.0, height: float = 2.6):
+def canvas(columns: int, rows: int = 1, width: float = 11.0, height: float = 2.6) -> tuple[Figure, np.ndarray]:
     """A figure in the page's style and its axes as an array (rows, columns). It is none of pyplot's: a notebook that
     draws a report keeps its own figures and backend."""
     with matplotlib.rc_context(_STYLE):
@@ -46,7 +52,7 @@ def _relative_to_echoes(power: Float[np.ndarray, "range other"], ranges: Float[n
 
 
 def draw_fan(
-    axis,
+    axis: Axes,
     power: Float[np.ndarray, "range azimuth"],
     ranges: Float[np.ndarray, "range"],
     azimuths: Float[np.ndarray, "azimuth"],
@@ -65,7 +71,7 @@ def draw_fan(
 
 
 def draw_doppler(
-    axis,
+    axis: Axes,
     power: Float[np.ndarray, "doppler azimuth"],
     velocities: Float[np.ndarray, "doppler"],
     azimuths: Float[np.ndarray, "azimuth"],
@@ -90,7 +96,7 @@ def draw_doppler(
 
 
 def draw_range_doppler(
-    axis,
+    axis: Axes,
     power: Float[np.ndarray, "range doppler"],
     ranges: Float[np.ndarray, "range"],
     velocities: Float[np.ndarray, "doppler"],
@@ -101,7 +107,7 @@ def draw_range_doppler(
     axis.set(title=title, xlabel="closing speed, m/s", ylabel="range, m")
 
 
-def draw_scan(axis, azimuths: np.ndarray, ranges: np.ndarray, kind: str, label: str) -> None:
+def draw_scan(axis: Axes, azimuths: np.ndarray, ranges: np.ndarray, kind: str, label: str) -> None:
     """Ends of beams from above, in the axes of `draw_fan`: ``"truth"`` as small dots, else as rings."""
     hit = np.isfinite(ranges) & (ranges > 0)
     x, y = -ranges[hit] * np.sin(azimuths[hit]), ranges[hit] * np.cos(azimuths[hit])
@@ -111,7 +117,7 @@ def draw_scan(axis, azimuths: np.ndarray, ranges: np.ndarray, kind: str, label: 
         axis.plot(x, y, "o", mfc="none", mec=COLORS["good"], mew=1.0, ms=4, label=label)
 
 
-def draw_profiles(axis, times: np.ndarray, ranges: np.ndarray, power: Float[np.ndarray, "time range"]) -> None:
+def draw_profiles(axis: Axes, times: np.ndarray, ranges: np.ndarray, power: Float[np.ndarray, "time range"]) -> None:
     """Range profiles side by side over time."""
     far = ranges >= LEAKAGE
     level = decibels(power, power[:, far].max() if far.any() and power.size else None)
@@ -128,7 +134,7 @@ def _edges(values: np.ndarray) -> np.ndarray:
     return np.concatenate([[2 * values[0] - inner[0]], inner, [2 * values[-1] - inner[-1]]])
 
 
-def _draw_cells(axis, x: np.ndarray, y: np.ndarray, level: np.ndarray) -> None:
+def _draw_cells(axis: Axes, x: np.ndarray, y: np.ndarray, level: np.ndarray) -> None:
     """Cells of some dB between borders, and what their colours mean."""
     drawn = axis.pcolormesh(x, y, level, cmap=_MAP, vmin=-DEPTH, vmax=0, rasterized=True)
     bar = axis.figure.colorbar(drawn, ax=axis, pad=0.02, aspect=28)

@@ -7,12 +7,16 @@ import base64
 import io
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from radarize.io.replacing import write_whole
+
+if TYPE_CHECKING:  # pages without plots need neither library
+    from matplotlib.figure import Figure
+    from plotly.graph_objects import Figure as PlotlyFigure
 
 #: Readable on light and dark ground alike: axes and text of plots, and one colour per meaning.
 INK, GRID = "#7d8590", "rgba(125,133,144,0.22)"
@@ -74,13 +78,13 @@ class Page:
         tables = [(title, list(_flat(content))) for title, content in parts.items() if content]
         self._add("columns", parts=tables, numbers=numbers)
 
-    def picture(self, figure, caption: str = "") -> None:
+    def picture(self, figure: "Figure", caption: str = "") -> None:
         """A matplotlib figure as a transparent PNG."""
         buffer = io.BytesIO()
         figure.savefig(buffer, format="png", dpi=130, transparent=True, bbox_inches="tight")
         self._add("picture", data=base64.b64encode(buffer.getvalue()).decode(), caption=caption)
 
-    def plot(self, figure, height: int = 380) -> None:
+    def plot(self, figure: "PlotlyFigure", height: int = 380) -> None:
         """An interactive plotly figure in the page's neutral style."""
         figure.update_layout(
             height=height,

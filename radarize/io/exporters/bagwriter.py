@@ -6,9 +6,10 @@ Version 8 of the format with sqlite3 storage is what every ROS 2 distribution si
 import os
 import tempfile
 from pathlib import Path
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
-from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.interfaces import Connection, Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag2 import Writer
 from rosbags.typesys import Stores, get_typestore
 
@@ -23,19 +24,25 @@ _LATCHED = Qos(
 _TYPES = get_typestore(Stores.ROS2_HUMBLE)
 
 
-def message(kind: str, **fields: object) -> object:
+class Message(Protocol):
+    """A message of the `rosbags` library."""
+
+    __msgtype__: ClassVar[str]
+
+
+def message(kind: str, **fields: Any) -> Message:
     """A message of a type such as ``sensor_msgs/msg/Imu``."""
     return _TYPES.types[kind](**fields)
 
 
-def header(time: float, frame: str) -> object:
+def header(time: float, frame: str) -> Message:
     """A header with a stamp, s, and the frame that its message is given in."""
     nanoseconds = round(1e9 * time)
     stamp = message("builtin_interfaces/msg/Time", sec=nanoseconds // 10**9, nanosec=nanoseconds % 10**9)
     return message("std_msgs/msg/Header", stamp=stamp, frame_id=frame)
 
 
-def vector(values: np.ndarray, kind: str = "Vector3") -> object:
+def vector(values: np.ndarray, kind: str = "Vector3") -> Message:
     """Three or four numbers as ``geometry_msgs`` Vector3, Point or Quaternion."""
     return message(f"geometry_msgs/msg/{kind}", **dict(zip("xyzw", map(float, values), strict=False)))
 
@@ -59,7 +66,7 @@ class BagWriter:
             self._folder = tempfile.TemporaryDirectory(dir=path.parent, prefix=f"{path.name}.part")
             self._writer = Writer(Path(self._folder.name) / path.name, version=8)
             self._writer.open()
-        self._connections: dict[str, object] = {}
+        self._connections: dict[str, Connection] = {}
 
     def __enter__(self) -> "BagWriter":
         return self
@@ -70,7 +77,7 @@ class BagWriter:
             if kind is None:
                 os.replace(Path(self._folder.name) / self.path.name, self.path)
 
-    def write(self, topic: str, time: float, content: object) -> None:
+    def write(self, topic: str, time: float, content: Message) -> None:
         """Append a message, received at `time`, s."""
         kind = content.__msgtype__
         if topic not in self._connections:

@@ -6,6 +6,7 @@ import zipfile
 from abc import ABC, abstractmethod
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Literal
 
 import h5py
 import numpy as np
@@ -63,7 +64,7 @@ class ArrayFile(ABC):
 class MappedArray(ArrayFile):
     """An array at some place of a file; mapped anew for every slice, so that what was read can be forgotten."""
 
-    def __init__(self, name: str, path: Path, header: tuple, offset: int):
+    def __init__(self, name: str, path: Path, header: tuple[tuple[int, ...], bool, np.dtype], offset: int):
         self.name, self._path, self._offset = name, path, offset
         self.shape, self._fortran, stored = header
         self._stored, self.dtype = stored, _checked(stored, name)
@@ -72,7 +73,7 @@ class MappedArray(ArrayFile):
             raise InputError(f"{name}: holds {size} bytes, expected {expected} for shape {self.shape} of {stored}")
 
     def _take(self, where: tuple[slice, ...]) -> np.ndarray:
-        order = "F" if self._fortran else "C"
+        order: Literal["F", "C"] = "F" if self._fortran else "C"
         mapped = np.memmap(self._path, self._stored, "r", self._offset, self.shape, order)
         return _joined(np.array(mapped[where]), self.dtype)
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 from radarize.io.errors import InputError
 from radarize.radar.config import RadarConfig
@@ -76,7 +77,7 @@ class Given:
         Raises:
             InputError: a value is impossible, or too few are known.
         """
-        given = {key: value for key, value in self.overrides.items() if value is not None}
+        given: dict[str, Any] = {key: value for key, value in self.overrides.items() if value is not None}
         if self.config is None:
             given = {**(found or {}), **given}
         for key, most in (("rx", 4), ("tx", 3)):
@@ -94,7 +95,7 @@ class Given:
                 f"{name}: has no radar configuration, expected a .cfg or .mmwave.json file, or at least values for "
                 f"{', '.join(REQUIRED)} (missing: {', '.join(missing)})"
             )
-        fields = {**ASSUMED, **given}
+        fields: dict[str, Any] = {**ASSUMED, **given}
         try:
             adc_end = fields["adc_start_time"] + fields["samples"] / fields["sample_rate"]
             fields.setdefault("ramp_end_time", adc_end + _AFTER_ADC)

@@ -6,7 +6,7 @@ ROS 2 bags before Iron. All other messages are ROS's own.
 
 import heapq
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Generator, Iterator
 from contextlib import ExitStack
 from io import BytesIO
 from pathlib import Path
@@ -19,6 +19,7 @@ from rosbags.rosbag1 import Reader as Reader1
 from rosbags.rosbag1.reader import Header, RecordType, read_bytes, read_uint32
 from rosbags.rosbag2 import Reader as Reader2
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from radarize.io.errors import explained
 
@@ -42,8 +43,11 @@ class StreamingReader(Reader1):
     def read_index_data(self, pos: int, indexes: dict) -> None:
         """Leave the index of messages alone."""
 
-    def messages(self, connections: Collection[Connection] = (), **_) -> Iterator[tuple[Connection, int, bytes]]:
+    def messages(
+        self, connections: Collection[Connection] = (), start: int | None = None, stop: int | None = None
+    ) -> Generator[tuple[Connection, int, bytes], None, None]:
         """Connection, time of receipt (ns) and content of messages, by ascending time."""
+        del start, stop  # bags are read whole
         wanted = {connection.id: connection for connection in connections or self.connections}
         infos = [info for info in self.chunk_infos if wanted.keys() & info.connection_counts.keys()]
         infos.sort(key=lambda info: info.start_time)
@@ -58,6 +62,7 @@ class StreamingReader(Reader1):
                 yield wanted[connection], time, data
 
     def _chunk_messages(self, position: int, wanted: Collection[int]) -> Iterator[tuple[int, int, bytes]]:
+        assert self.bio is not None  # as long as the bag is open
         chunk = self.chunks[position]
         self.bio.seek(chunk.datapos)
         content = chunk.decompressor(read_bytes(self.bio, chunk.datasize))
@@ -101,10 +106,10 @@ class Bag:
     def __enter__(self) -> "Bag":
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self._open.close()
 
-    def _definitions(self):
+    def _definitions(self) -> Typestore:
         """Standard messages, and the radar's frames as the bag defines them."""
         types = get_typestore(Stores.ROS1_NOETIC if self._ros1 else Stores.ROS2_HUMBLE)
         found = get_types_from_msg(FRAME_DEFINITION, FRAME_TYPE)
@@ -123,7 +128,7 @@ class Bag:
         return {
             connection.topic: (
                 connection.msgtype,
-                self._reader.count(connection) if self._ros1 else connection.msgcount,
+                self._reader.count(connection) if isinstance(self._reader, StreamingReader) else connection.msgcount,
             )
             for connection in self._reader.connections
         }

@@ -1,5 +1,6 @@
 """Jobs on a Ray cluster: one Ray task a job, begun again by Ray where a worker or a node is lost."""
 
+import logging
 import os
 import socket
 from collections.abc import Iterator, Mapping
@@ -91,7 +92,7 @@ def _connect(address: str):
     _knock(address)
     if not ray.is_initialized():
         with explained(f"--ray {address}: no cluster answers", ConnectionError, ValueError, RuntimeError):
-            ray.init(address=address, log_to_driver=False, logging_level="ERROR")
+            ray.init(address=address, log_to_driver=False, logging_level=logging.ERROR)
     return ray
 
 

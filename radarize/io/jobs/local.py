@@ -8,6 +8,7 @@ import threading
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection, wait
 
 from radarize.io.jobs.job import Job, News, attempt
@@ -69,13 +70,13 @@ def perform(jobs: Mapping[str, Job], workers: int | None) -> Iterator[News]:
                 elif worker.process.sentinel in ready or worker.connection in ready:
                     crew.remove(worker)
                     worker.stop()
-                    if name := worker.busy:
-                        attempts[name] += 1
-                        if attempts[name] < ATTEMPTS:
-                            todo.appendleft(name)
-                            yield News(name)
+                    if lost := worker.busy:
+                        attempts[lost] += 1
+                        if attempts[lost] < ATTEMPTS:
+                            todo.appendleft(lost)
+                            yield News(lost)
                         else:
-                            yield News(name, ended=True, error=f"{name}: its process {_end(worker.process.exitcode)}")
+                            yield News(lost, ended=True, error=f"{lost}: its process {_end(worker.process.exitcode)}")
     finally:
         for worker in crew:
             worker.stop()
@@ -100,11 +101,17 @@ def _serve(connection: Connection, threads: int) -> None:
         except EOFError:
             return
         use_threads(threads)  # of what came along with the job
-        connection.send(attempt(name, job, lambda done, name=name: connection.send(News(name, done))))
+        connection.send(attempt(name, job, partial(_report, connection, name)))
+
+
+def _report(connection: Connection, name: str, done: float) -> None:
+    connection.send(News(name, done))
 
 
 def _end_with_parent() -> None:
     """A parent that was killed cannot end its workers, which would go on writing."""
-    multiprocessing.parent_process().join()
+    parent = multiprocessing.parent_process()
+    assert parent is not None  # only workers run this
+    parent.join()
     sys.stderr.flush()
     os._exit(1)

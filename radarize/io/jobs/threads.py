@@ -15,7 +15,8 @@ def use_threads(count: int) -> None:
 
     Each is told by its own call: once a library is there, environment variables come too late.
     """
-    numba.set_num_threads(min(count, numba.config.NUMBA_NUM_THREADS))
+    most: int = numba.config.NUMBA_NUM_THREADS  # type: ignore[attr-defined]  # numba sets it while it is imported
+    numba.set_num_threads(min(count, most))
     threadpool_limits(count)
     if "torch" in sys.modules:
         sys.modules["torch"].set_num_threads(count)

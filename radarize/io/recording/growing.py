@@ -49,7 +49,7 @@ class GrowingFile(io.FileIO):
         """Where the next bytes come from."""
         return self._at
 
-    def readinto(self, buffer: memoryview) -> int:
+    def readinto(self, buffer: memoryview) -> int:  # type: ignore[override]  # h5py hands in nothing else
         """Bytes from where the file stands; zeros past its end.
 
         Raises:
@@ -74,7 +74,7 @@ def is_growing(path: Path) -> bool:
     return len(head) == _SIZE and head[:8] == _SIGNATURE and head[8] == 3 and bool(head[_FLAGS] & _OPEN)
 
 
-def lookup3(data: bytes) -> int:
+def lookup3(data: bytes | bytearray) -> int:
     """HDF5's checksum of metadata: Bob Jenkins's lookup3 (burtleburtle.net/bob/c/lookup3.c), 32 bits."""
 
     def turned(value: int, bits: int) -> int:

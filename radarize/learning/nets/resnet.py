@@ -1,5 +1,7 @@
 """ResNet18 (He et al., "Deep residual learning for image recognition", 2016) of any width."""
 
+from types import EllipsisType
+
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -19,8 +21,8 @@ class Block(nn.Module):
         # A 1 x 1 convolution with a stride, of less than 16 channels that lie last, makes oneDNN write past its memory
         # while it trains (github.com/uxlfoundation/oneDNN/issues/6035): there, every second cell is taken before it.
         before = stride if inputs < 16 else 1
-        self.every = (..., *[slice(None, None, before)] * axes)
-        self.shortcut = nn.Identity()
+        self.every: tuple[EllipsisType | slice, ...] = (..., *[slice(None, None, before)] * axes)
+        self.shortcut: nn.Module = nn.Identity()
         if stride != 1 or inputs != outputs:
             self.shortcut = nn.Sequential(convolution(inputs, outputs, 1, stride // before, bias=False), norm(outputs))
 

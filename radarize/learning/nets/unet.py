@@ -35,7 +35,7 @@ class Up(nn.Module):
         return self.mix(torch.cat([beside, pad(x, (0, columns, 0, rows))], dim=1))
 
 
-def through(x: Tensor, down: Iterable[nn.Module], up: Iterable[Up]) -> Tensor:
+def through(x: Tensor, down: Iterable[nn.Module], up: Iterable[nn.Module]) -> Tensor:
     """An image down the levels, each of half the size, and up again."""
     levels: list[Tensor] = []
     for convolution in down:
